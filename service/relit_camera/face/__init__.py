@@ -1,0 +1,1 @@
+"""Frame → face state: detector, landmarks, head pose, smoothing. Trackers stand behind one interface."""

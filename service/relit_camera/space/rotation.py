@@ -1,0 +1,36 @@
+"""Head and environment rotations as scipy `Rotation`.
+
+Angles are intrinsic Y-X-Z in degrees, right-handed: yaw > 0 turns the nose to the picture's right, pitch > 0 turns it
+down, roll > 0 lifts the picture's right side. A head rotation takes head-frame vectors to room-frame vectors. Worked
+point: yaw 90° takes the nose (0, 0, 1) to (1, 0, 0).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+class Angles(NamedTuple):
+    """Yaw, pitch and roll in degrees."""
+
+    yaw: float
+    pitch: float
+    roll: float
+
+
+def rotation_from_angles(yaw_deg: float, pitch_deg: float = 0.0, roll_deg: float = 0.0) -> Rotation:
+    """The rotation of these intrinsic Y-X-Z angles in degrees."""
+    return Rotation.from_euler("YXZ", [yaw_deg, pitch_deg, roll_deg], degrees=True)
+
+
+def angles_from_rotation(rotation: Rotation) -> Angles:
+    """Yaw, pitch and roll in degrees; yaw and roll in ±180, pitch in ±90."""
+    matrix = rotation.as_matrix()
+    # Closed form instead of `as_euler`, which warns at the gimbal lock that a garbage pose may well reach.
+    pitch = np.degrees(np.arcsin(np.clip(-matrix[1, 2], -1.0, 1.0)))
+    yaw = np.degrees(np.arctan2(matrix[0, 2], matrix[2, 2]))
+    roll = np.degrees(np.arctan2(matrix[1, 0], matrix[1, 1]))
+    return Angles(float(yaw), float(pitch), float(roll))

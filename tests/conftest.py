@@ -1,0 +1,17 @@
+"""Fixtures every test may use."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of real data that developers may have beside the checkout (or where RELIT_SHARED says)."""
+    folder = Path(os.environ.get("RELIT_SHARED", Path(__file__).resolve().parents[2] / "shared"))
+    if not (folder / "design.md").exists():
+        pytest.skip(f"no shared data at {folder} (set RELIT_SHARED)")
+    return folder
