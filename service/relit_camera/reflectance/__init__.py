@@ -1,1 +1,1 @@
-"""."""
+"""Samples → reflectance field: triangulation and interpolation over directions; one file a method."""

@@ -1,0 +1,73 @@
+"""The seam between samples and field, and how a method is found by name."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.errors import NotFoundError
+from relit_camera.reflectance.samples import Samples
+from relit_camera.space.directions import texel_directions
+from relit_camera.subject.field import FactoredField, ReflectanceField
+
+DEFAULT_METHOD = "barycentric"
+GROUP = "relit_camera.methods"
+
+
+class Method(Protocol):
+    """Builds a reflectance field from samples."""
+
+    def build(self, samples: Samples) -> ReflectanceField:
+        """The field.
+
+        Raises:
+            LightsError: the directions cannot carry it (too few, or all in one plane).
+        """
+        ...
+
+
+@runtime_checkable
+class LinearMethod(Protocol):
+    """A method whose weights depend on directions alone: it answers any exact direction, not only texels."""
+
+    def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Weight of each captured light at each query direction.
+
+        Args:
+            directions: (lights, 3) unit vectors that were captured.
+            queries: (count, 3) unit vectors.
+
+        Returns:
+            (lights, count) float32; a column sums to 1, or to 0 where nothing was captured.
+
+        Raises:
+            LightsError: the directions cannot carry it.
+        """
+        ...
+
+
+def factored_field(method: LinearMethod, samples: Samples) -> FactoredField:
+    """The field of a linear method, its weights evaluated at the texel centres (thesis 5.1, 5.2)."""
+    weights = method.weights(samples.directions, texel_directions().reshape(-1, 3))
+    return FactoredField(samples.pictures, samples.directions, weights)
+
+
+def method_names() -> list[str]:
+    """Names of all installed methods."""
+    return sorted(point.name for point in entry_points(group=GROUP))
+
+
+def open_method(name: str) -> Method:
+    """The method of that name; `default` is the best there is.
+
+    Raises:
+        NotFoundError: none of that name is installed.
+    """
+    wanted = DEFAULT_METHOD if name == "default" else name
+    for point in entry_points(group=GROUP, name=wanted):
+        method: Method = point.load()()
+        return method
+    raise NotFoundError(f"no reflectance method '{name}'", f"there are: {', '.join(['default', *method_names()])}")

@@ -1,0 +1,31 @@
+"""What a capture yields: aligned pictures of one person, each under one known light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.space.images import Mask
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One-light-at-a-time pictures.
+
+    Attributes:
+        pictures: (lights, height, width, 3) float32 linear RGB, each under a distant light of unit irradiance.
+        directions: (lights, 3) float64 unit vectors toward the lights.
+        matte: (height, width) float32 straight alpha of the person.
+    """
+
+    pictures: NDArray[np.float32]
+    directions: NDArray[np.float64]
+    matte: Mask
+
+    def __post_init__(self) -> None:
+        lights, height, width = self.pictures.shape[:3]
+        if self.directions.shape != (lights, 3) or self.matte.shape != (height, width):
+            shapes = self.pictures.shape, self.directions.shape, self.matte.shape
+            raise ValueError(f"pictures, directions and matte do not fit together: {shapes}")

@@ -1,0 +1,35 @@
+"""Relighting with the whole reflectance matrix (thesis 6.2): the reference of tests and bench."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.light.maps import LightMap
+from relit_camera.relight.relighter import weighted_light
+from relit_camera.space.images import LinearImage
+from relit_camera.subject.field import TEXELS
+from relit_camera.subject.subject import Subject
+
+
+def dense_matrix(subject: Subject) -> NDArray[np.float32]:
+    """R as (3, pixels, 2048) float32: 737 MB for 150 x 200 pixels."""
+    basis = subject.basis.astype(np.float32).reshape(3, subject.metadata.components, -1)
+    matrix = np.empty((3, basis.shape[2], TEXELS), dtype=np.float32)
+    for channel in range(3):
+        np.matmul(basis[channel].T, subject.coefficients, out=matrix[channel])
+    return matrix
+
+
+class DenseRelighter:
+    """O = R · (E ω) with the matrix held in memory."""
+
+    def __init__(self, subject: Subject) -> None:
+        self._matrix = dense_matrix(subject)
+        self._shape = (subject.metadata.height, subject.metadata.width)
+
+    def relight(self, light_map: LightMap) -> LinearImage:
+        """See `Relighter.relight`."""
+        light = weighted_light(light_map)
+        planes = [self._matrix[channel] @ light[:, channel] for channel in range(3)]
+        return np.stack(planes, axis=-1).reshape(*self._shape, 3)

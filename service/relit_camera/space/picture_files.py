@@ -1,0 +1,169 @@
+"""Reading and writing picture files: the border where files' channel orders and curves end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.errors import ImageError
+from relit_camera.files import atomic_path, write_atomic
+from relit_camera.space.colour import Gamma, decode, uint8_from_linear
+from relit_camera.space.images import DisplayImage, LinearImage, Mask
+
+LDR_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff"})
+MAX_PIXELS = 64_000_000
+"""A picture larger than this is refused: no camera or panorama in use is, and it would fill the memory."""
+
+
+def read_linear(path: Path, gamma: Gamma = "srgb") -> LinearImage:
+    """Read a picture as linear RGB float32 (height, width, 3); grey is repeated, alpha ignored.
+
+    8- and 16-bit files are code values in 0..1 under `gamma`; .exr and .hdr are linear already.
+
+    Raises:
+        ImageError: missing, unreadable, too large, or not finite.
+    """
+    suffix = path.suffix.lower()
+    if not path.is_file():
+        raise ImageError(f"no picture at {path}", "check the path")
+    if suffix == ".exr":
+        image = _read_exr(path)
+    elif suffix == ".hdr":
+        image = _read_coded(path)
+    elif suffix in LDR_SUFFIXES:
+        image = decode(_read_coded(path), gamma)
+    else:
+        raise ImageError(f"{path}: '{suffix}' is not a picture format known here", "use .png, .jpg, .exr or .hdr")
+    if not np.isfinite(image).all():
+        raise ImageError(f"{path} holds NaN or infinity", "render or export it again")
+    return image
+
+
+def read_display(path: Path) -> DisplayImage:
+    """Read a picture as uint8 sRGB (height, width, 3); .exr and .hdr are clipped at 1.
+
+    Raises:
+        ImageError: as `read_linear`.
+    """
+    return uint8_from_linear(read_linear(path))
+
+
+def read_mask(path: Path) -> Mask:
+    """Read a matte as float32 (height, width) in 0..1: the alpha channel where there is one, else the grey value.
+
+    Raises:
+        ImageError: missing or unreadable.
+    """
+    if not path.is_file():
+        raise ImageError(f"no matte at {path}", "check the path")
+    coded = _imread(path)
+    if coded is None:
+        raise ImageError(f"{path} cannot be read as a picture", "save it again as PNG")
+    scaled = _unit_range(coded)
+    if scaled.ndim == 3:
+        scaled = scaled[..., 3] if scaled.shape[2] == 4 else scaled[..., :3].mean(axis=2)
+    return np.ascontiguousarray(scaled, dtype=np.float32)
+
+
+def write_linear(path: Path, image: LinearImage) -> None:
+    """Write linear RGB to .npy or .exr as it is, or to .png or .jpg through the sRGB curve, clipped to 0..1.
+
+    Raises:
+        ImageError: the suffix is none of these.
+        StorageError: the file cannot be written.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".npy":
+        with atomic_path(path) as temporary:
+            np.save(temporary, image)
+    elif suffix == ".exr":
+        with atomic_path(path) as temporary:
+            _write_exr(temporary, image)
+    else:
+        write_display(path, uint8_from_linear(image))
+
+
+def write_display(path: Path, image: DisplayImage) -> None:
+    """Write uint8 sRGB RGB to .png or .jpg.
+
+    Raises:
+        ImageError: the suffix is neither.
+        StorageError: the file cannot be written.
+    """
+    write_atomic(path, encode_display(image, path.suffix))
+
+
+def encode_display(image: DisplayImage, suffix: str = ".jpg", quality: int = 90) -> bytes:
+    """The bytes of a .png or .jpg file of uint8 sRGB RGB (height, width, 3).
+
+    Raises:
+        ImageError: the suffix is neither.
+    """
+    if suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        raise ImageError(f"cannot write pictures as '{suffix}'", "use .npy, .exr, .png or .jpg")
+    options = [] if suffix.lower() == ".png" else [cv2.IMWRITE_JPEG_QUALITY, quality]
+    done, data = cv2.imencode(suffix, cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)
+    if not done:
+        raise ImageError(f"a picture of shape {image.shape} cannot be encoded as {suffix}")
+    return bytes(data)
+
+
+def _imread(path: Path) -> NDArray | None:
+    # From memory: cv2.imread writes warnings on stderr for paths and files that it cannot read.
+    data = np.frombuffer(path.read_bytes(), np.uint8)
+    try:
+        return cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    except cv2.error:
+        return None
+
+
+def _read_coded(path: Path) -> NDArray[np.float32]:
+    coded = _imread(path)
+    if coded is None:
+        raise ImageError(f"{path} cannot be read as a picture", "it may be truncated; save or download it again")
+    if coded.shape[0] * coded.shape[1] > MAX_PIXELS:
+        raise ImageError(f"{path} has {coded.shape[0] * coded.shape[1] / 1e6:.0f} million pixels", "scale it down")
+    scaled = _unit_range(coded)
+    if scaled.ndim == 2:
+        return np.repeat(scaled[..., None], 3, axis=2)
+    if scaled.shape[2] == 2:
+        return np.repeat(scaled[..., :1], 3, axis=2)
+    return np.ascontiguousarray(scaled[..., 2::-1])
+
+
+def _unit_range(coded: NDArray) -> NDArray[np.float32]:
+    if coded.dtype == np.uint8:
+        return coded.astype(np.float32) / 255
+    if coded.dtype == np.uint16:
+        return coded.astype(np.float32) / 65535
+    return coded.astype(np.float32)
+
+
+def _read_exr(path: Path) -> NDArray[np.float32]:
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path)) as file:
+            channels = {name: np.asarray(c.pixels, np.float32) for name, c in file.channels().items()}
+    except Exception as error:  # OpenEXR raises RuntimeError, ValueError or its own types for damaged files
+        raise ImageError(f"{path} cannot be read as OpenEXR: {error}", "export it again") from error
+    # Layers are named "layer.R"; the first complete set wins, the unnamed layer first.
+    for names in (("RGBA",), ("RGB",), ("R", "G", "B"), ("Y",), ("V",)):
+        for prefix in ("", *sorted({n.rpartition(".")[0] + "." for n in channels if "." in n})):
+            found = [channels.get(prefix + name) for name in names]
+            if all(part is not None for part in found):
+                planes = [p if p.ndim == 3 else p[..., None] for p in found if p is not None]
+                stacked = np.concatenate(planes, axis=2)[..., :3]
+                return np.ascontiguousarray(np.repeat(stacked, 3, 2) if stacked.shape[2] == 1 else stacked)
+    raise ImageError(f"{path} has channels {sorted(channels)}", "export it with R, G, B or Y")
+
+
+def _write_exr(path: Path, image: LinearImage) -> None:
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(header, {"RGB": np.ascontiguousarray(image, dtype=np.float32)}) as file:
+        file.write(str(path))

@@ -1,0 +1,114 @@
+"""The subject file: one .relit file is a safetensors file, opened memory-mapped. Layout: docs/formats.md."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
+
+from relit_camera.errors import SubjectError
+from relit_camera.files import atomic_path
+from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
+
+SUFFIX = ".relit"
+HEADER_KEY = "relit_subject"
+LANDMARKS = "landmarks."
+MAX_TENSORS = 64
+MAX_BYTES = 8 << 30
+REQUIRED = ("basis", "coefficients", "light_directions", "light_coefficients", "matte", "neutral")
+OPTIONAL = ("normals", "albedo", "depth")
+DTYPES = {"basis": np.float16, "neutral": np.uint8}
+"""Every other tensor is float32."""
+
+
+def write_subject(path: Path, subject: Subject) -> None:
+    """Write a subject whole or not at all.
+
+    Raises:
+        StorageError: the file cannot be written.
+    """
+    tensors: dict[str, NDArray] = {name: getattr(subject, name) for name in REQUIRED}
+    tensors |= {name: getattr(subject, name) for name in OPTIONAL if getattr(subject, name) is not None}
+    tensors |= {LANDMARKS + scheme: points for scheme, points in subject.landmarks.items()}
+    contiguous = {name: np.ascontiguousarray(value) for name, value in tensors.items()}
+    with atomic_path(path) as temporary:
+        try:
+            save_file(contiguous, temporary, metadata={HEADER_KEY: subject.metadata.model_dump_json()})
+        except SafetensorError as error:
+            # The library hides the system's error number in its message.
+            if "os error" in str(error).lower() or "I/O" in str(error):
+                raise OSError(_errno_in(str(error)), str(error)) from error
+            raise
+
+
+def read_subject(path: Path) -> Subject:
+    """Open a subject; its basis stays memory-mapped until it is used.
+
+    Raises:
+        SubjectError: missing, damaged, of another version, or with values that are not finite.
+    """
+    if not path.is_file():
+        raise SubjectError(f"no subject file at {path}", "build one with 'relit capture import' or check the path")
+    if path.stat().st_size > MAX_BYTES:
+        raise SubjectError(f"{path} is larger than {MAX_BYTES >> 30} GiB", "build it again at a smaller size")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            metadata = _metadata(path, file.metadata() or {})
+            names = list(file.keys())
+            if len(names) > MAX_TENSORS:
+                raise _damaged(path, f"it holds {len(names)} tensors")
+            tensors = {name: file.get_tensor(name) for name in names}
+    except (SafetensorError, OSError) as error:
+        raise _damaged(path, str(error)) from error
+    _check(path, tensors)
+    landmarks = {n.removeprefix(LANDMARKS): t for n, t in tensors.items() if n.startswith(LANDMARKS)}
+    arrays = {name: tensors[name] for name in (*REQUIRED, *OPTIONAL) if name in tensors}
+    try:
+        return Subject(metadata=metadata, landmarks=landmarks, **arrays)
+    except ValueError as error:
+        raise _damaged(path, str(error)) from error
+
+
+def _metadata(path: Path, header: Mapping[str, str]) -> SubjectMetadata:
+    try:
+        raw = json.loads(header[HEADER_KEY])
+        version = raw.get("format_version")
+    except (KeyError, ValueError, AttributeError) as error:
+        raise _damaged(path, "it has no Relit Camera header") from error
+    if version != FORMAT_VERSION:
+        raise SubjectError(
+            f"{path} has format version {version}; this program reads version {FORMAT_VERSION}",
+            "build the subject again, or use the program that wrote it",
+        )
+    try:
+        return SubjectMetadata.model_validate(raw)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise _damaged(path, f"header field {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def _check(path: Path, tensors: Mapping[str, NDArray]) -> None:
+    for name in REQUIRED:
+        if name not in tensors:
+            raise _damaged(path, f"it has no tensor '{name}'")
+    for name, tensor in tensors.items():
+        expected = DTYPES.get(name, np.float32)
+        if tensor.dtype != expected:
+            raise _damaged(path, f"'{name}' is {tensor.dtype}, not {np.dtype(expected)}")
+        if tensor.dtype.kind == "f" and not np.isfinite(tensor).all():
+            raise _damaged(path, f"'{name}' holds NaN or infinity")
+
+
+def _damaged(path: Path, reason: str) -> SubjectError:
+    return SubjectError(f"{path} is not a usable subject file: {reason}", "restore it from a copy or build it again")
+
+
+def _errno_in(message: str) -> int:
+    return next((code for code in (28, 13, 30, 2) if os.strerror(code).lower() in message.lower()), 5)

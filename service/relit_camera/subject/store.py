@@ -1,0 +1,81 @@
+"""Named subjects in the user's data folder."""
+
+from __future__ import annotations
+
+import shutil
+from difflib import get_close_matches
+from pathlib import Path
+
+from relit_camera.errors import InputError, NotFoundError
+from relit_camera.files import atomic_path
+from relit_camera.subject.file import SUFFIX, read_subject
+from relit_camera.subject.subject import Subject
+
+
+class SubjectStore:
+    """A folder of .relit files; a subject's name is its file's stem."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def names(self) -> list[str]:
+        """Stored names in alphabetical order."""
+        return sorted(path.stem for path in self.folder.glob(f"*{SUFFIX}"))
+
+    def path(self, name: str) -> Path:
+        """The file of a stored subject.
+
+        Raises:
+            NotFoundError: none of that name.
+        """
+        if name not in self.names():
+            close = get_close_matches(name, self.names(), 1)
+            cure = f"did you mean '{close[0]}'?" if close else f"stored are: {', '.join(self.names()) or 'none'}"
+            raise NotFoundError(f"no subject '{name}'", cure)
+        return self.folder / f"{name}{SUFFIX}"
+
+    def load(self, name: str) -> Subject:
+        """Open a stored subject.
+
+        Raises:
+            NotFoundError: none of that name.
+            SubjectError: its file is damaged.
+        """
+        return read_subject(self.path(name))
+
+    def resolve(self, name_or_path: str) -> tuple[str, Subject]:
+        """A stored name first, else a path. Returns the name to show and the subject.
+
+        Raises:
+            NotFoundError: neither a stored name nor a file.
+            SubjectError: its file is damaged.
+        """
+        if name_or_path in self.names():
+            return name_or_path, self.load(name_or_path)
+        path = Path(name_or_path)
+        if not path.exists():
+            self.path(name_or_path)
+        return path.stem, read_subject(path)
+
+    def add(self, name: str, source: Path) -> None:
+        """Copy a subject file into the store under `name`, whole or not at all.
+
+        Raises:
+            SubjectError: `source` is not a usable subject file.
+            InputError: the name would leave the folder.
+            StorageError: the copy cannot be written.
+        """
+        if Path(name).name != name or name.startswith("."):
+            raise InputError(f"'{name}' cannot name a subject", "use letters, digits, dash and underscore")
+        read_subject(source)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with atomic_path(self.folder / f"{name}{SUFFIX}") as temporary:
+            shutil.copyfile(source, temporary)
+
+    def remove(self, name: str) -> None:
+        """Delete a stored subject.
+
+        Raises:
+            NotFoundError: none of that name.
+        """
+        self.path(name).unlink()
