@@ -1,0 +1,207 @@
+"""The one place that opens ONNX Runtime sessions.
+
+Threads are explicit and never spin: several networks, OpenCV and BLAS share few cores. A provider counts only when it
+is proven: most of the graph's nodes were placed on it and a warm-up ran there. Otherwise the session says why not.
+"""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from numpy.typing import NDArray
+
+from relit_camera.errors import ConfigError, DeviceError, ModelError
+from relit_camera.models import providers
+from relit_camera.models.runtime import (
+    LOG_FATAL,
+    TensorSpec,
+    node_placement,
+    reason,
+    runtime_errors,
+    runtime_options,
+    tensor_specs,
+    warm_up,
+)
+
+if TYPE_CHECKING:
+    import onnxruntime
+
+
+@dataclass(frozen=True)
+class SessionOptions:
+    """How to run a model.
+
+    Attributes:
+        provider: `auto`, `cpu`, `cuda` … (see `models.providers`).
+        threads: threads that work on one operator, at least 1; with 1 it runs in the caller's thread.
+        strict: fail rather than fall back to the CPU.
+    """
+
+    provider: str = providers.AUTO
+    threads: int = 1
+    strict: bool = False
+
+
+@dataclass(frozen=True)
+class SessionReport:
+    """What a person wants to know of an open session.
+
+    Attributes:
+        name: of the model.
+        requested: the provider asked for.
+        provider: the provider proven to run it.
+        why: why it is not the requested one, or "".
+        cure: what to do about that, or "".
+        threads: threads that work on one operator.
+        placement: number of the graph's nodes on each provider.
+        warm_up_ms: time of a run on zeros; None where the model's input shapes are open.
+    """
+
+    name: str
+    requested: str
+    provider: str
+    why: str
+    cure: str
+    threads: int
+    placement: Mapping[str, int]
+    warm_up_ms: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """An open model, with its inputs and outputs by name. `run` may be called from several threads."""
+
+    report: SessionReport
+    inputs: Mapping[str, TensorSpec]
+    outputs: Mapping[str, TensorSpec]
+    _runtime: onnxruntime.InferenceSession
+
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+        return self.report.name
+
+    @property
+    def requested(self) -> str:
+        """The provider asked for."""
+        return self.report.requested
+
+    @property
+    def provider(self) -> str:
+        """The provider proven to run it."""
+        return self.report.provider
+
+    @property
+    def why(self) -> str:
+        """Why `provider` is not the requested one, or ""."""
+        return self.report.why
+
+    def run(self, feeds: Mapping[str, NDArray]) -> dict[str, NDArray]:
+        """Run on one array for each input; returns all outputs by name.
+
+        Raises:
+            ModelError: an input is missing, has another shape or dtype, or the model fails on it.
+        """
+        try:
+            values = self._runtime.run(list(self.outputs), feeds)
+        except runtime_errors() as error:
+            takes = ", ".join(f"{name} {spec}" for name, spec in self.inputs.items())
+            raise ModelError(f"model {self.name} failed: {reason(error)}", f"it takes {takes}") from error
+        return dict(zip(self.outputs, values, strict=True))
+
+
+_open_sessions: weakref.WeakSet[Session] = weakref.WeakSet()
+_open_sessions_lock = threading.Lock()
+
+
+def session_report() -> list[SessionReport]:
+    """Report every session that is still open, by name."""
+    with _open_sessions_lock:
+        reports = [session.report for session in _open_sessions]
+    return sorted(reports, key=lambda report: report.name)
+
+
+def open_session(model: Path | bytes, name: str, options: SessionOptions | None = None) -> Session:
+    """Open an ONNX model (a file, or its bytes), prove its provider and warm it up.
+
+    A provider that is missing, does not load, or takes fewer than half of the nodes is replaced by the CPU, and the
+    session's `why` says so; with `options.strict` that is an error.
+
+    Raises:
+        ModelError: the model is missing, damaged, or cannot run.
+        DeviceError: strict, and the provider cannot run the model.
+        ConfigError: there is no such provider, or no thread.
+    """
+    options = options or SessionOptions()
+    if options.threads < 1:
+        raise ConfigError(f"a model cannot run on {options.threads} threads", "give it at least 1")
+    wanted = providers.choose_provider(options.provider)
+    try:
+        session = _open_proven(model, name, wanted, options)
+    except _NotProvenError as error:
+        cure = providers.cure_for(wanted)
+        if options.strict:
+            raise DeviceError(f"model {name} cannot run on {wanted}: {error}", cure) from error
+        session = _open(model, name, providers.CPU, options, why=f"{wanted}: {error}", cure=cure)
+    with _open_sessions_lock:
+        _open_sessions.add(session)
+    return session
+
+
+class _NotProvenError(Exception):
+    """The provider does not run this model; the message is the reason."""
+
+
+def _open_proven(model: Path | bytes, name: str, provider: str, options: SessionOptions) -> Session:
+    if provider not in providers.available_providers():
+        raise _NotProvenError("the installed ONNX Runtime was built without it")
+    missing = providers.preload(provider)
+    try:
+        session = _open(model, name, provider, options)
+    except _NotProvenError as error:
+        raise _NotProvenError(missing or str(error)) from error
+    placement = session.report.placement
+    nodes, total = placement.get(provider, 0), sum(placement.values())
+    if nodes == 0 < total:
+        raise _NotProvenError(missing or "no node was placed there; its libraries did not load, or it has no device")
+    if 2 * nodes < total:
+        raise _NotProvenError(f"only {nodes} of {total} nodes were placed there")
+    return session
+
+
+def _open(
+    model: Path | bytes, name: str, provider: str, options: SessionOptions, why: str = "", cure: str = ""
+) -> Session:
+    import onnxruntime
+    from onnxruntime.capi.onnxruntime_pybind11_state import InvalidProtobuf, NoModel, NoSuchFile
+
+    source = f"model {name} ({model})" if isinstance(model, Path) else f"model {name}"
+    onnxruntime.set_default_logger_severity(LOG_FATAL)
+    try:
+        runtime = onnxruntime.InferenceSession(
+            model,
+            runtime_options(options.threads),
+            providers=list(dict.fromkeys([providers.full_name(provider), providers.full_name(providers.CPU)])),
+            enable_fallback=0,  # falling back is our decision, and never a silent one
+        )
+        runtime._model_bytes = (
+            None  # it would keep the bytes beside its own copy: hundreds of MB for a relighting graph
+        )
+        inputs, outputs = tensor_specs(runtime.get_inputs()), tensor_specs(runtime.get_outputs())
+        warm_up_ms = warm_up(runtime, inputs)
+    except NoSuchFile as error:
+        raise ModelError(f"{source} does not exist", "check the path, or get it with `relit models pull`") from error
+    except (InvalidProtobuf, NoModel) as error:
+        raise ModelError(f"{source} is no ONNX model, or a damaged one", "export or pull it again") from error
+    except runtime_errors() as error:
+        if provider != providers.CPU:
+            raise _NotProvenError(reason(error)) from error
+        raise ModelError(f"{source} cannot be run: {reason(error)}", "export or pull it again") from error
+    placement = node_placement(runtime)
+    report = SessionReport(name, options.provider, provider, why, cure, options.threads, placement, warm_up_ms)
+    return Session(report, inputs, outputs, runtime)
