@@ -1,0 +1,144 @@
+"""Reading the configuration: defaults < YAML file < RELIT_* environment < command line."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from platformdirs import user_config_path
+from pydantic import ValidationError
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource
+
+from relit_camera.config.settings import RelitSettings
+from relit_camera.errors import ConfigError
+
+CONFIG_VARIABLE = "RELIT_CONFIG"
+LOADER_VARIABLES = frozenset({CONFIG_VARIABLE, "RELIT_MODELS_DIR", "RELIT_SHARED"})
+"""Variables of our prefix that are no settings."""
+
+Nested = Mapping[str, Any]
+
+
+def config_path(given: Path | None = None) -> Path | None:
+    """The configuration file: `given`, else RELIT_CONFIG, else ./config.yaml, else the user's; None where none is.
+
+    Raises:
+        ConfigError: a file was named and is not there.
+    """
+    named = given or (Path(os.environ[CONFIG_VARIABLE]) if os.environ.get(CONFIG_VARIABLE) else None)
+    if named is not None:
+        if not named.is_file():
+            raise ConfigError(f"no configuration file at {named}", "check the path")
+        return named
+    usual = (Path("config.yaml"), user_config_path("relit-camera", appauthor=False) / "config.yaml")
+    return next((path for path in usual if path.is_file()), None)
+
+
+def load_settings(path: Path | None = None, overrides: Nested | None = None) -> RelitSettings:
+    """The configuration of this run.
+
+    Args:
+        path: a YAML file; see `config_path` for the usual places.
+        overrides: nested values from the command line; None values are no override.
+
+    Raises:
+        ConfigError: unreadable YAML, an unknown key, a value out of range; names file, line, key and value.
+    """
+    found = config_path(path)
+    text = _read(found) if found else ""
+    try:
+        document = yaml.safe_load(text) or {}
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f" line {mark.line + 1}" if mark else ""
+        raise ConfigError(f"{found}{line}: {getattr(error, 'problem', None) or error}", "correct the YAML") from error
+    if not isinstance(document, dict):
+        raise ConfigError(f"{found}: expected keys and values, found {type(document).__name__}", "see config.yaml")
+    _check_environment()
+    try:
+        return _settings_class(document)(**_without_none(overrides or {}))
+    except ValidationError as error:
+        raise _config_error(error, found, text) from error
+
+
+def _settings_class(document: Nested) -> type[RelitSettings]:
+    class Loaded(RelitSettings):
+        @classmethod
+        def settings_customise_sources(
+            cls,
+            settings_cls: type[BaseSettings],
+            init_settings: PydanticBaseSettingsSource,
+            env_settings: PydanticBaseSettingsSource,
+            dotenv_settings: PydanticBaseSettingsSource,
+            file_secret_settings: PydanticBaseSettingsSource,
+        ) -> tuple[PydanticBaseSettingsSource, ...]:
+            return init_settings, env_settings, _Document(settings_cls, document)
+
+    return Loaded
+
+
+class _Document(PydanticBaseSettingsSource):
+    """A parsed YAML document as the lowest source."""
+
+    def __init__(self, settings_cls: type[BaseSettings], document: Nested) -> None:
+        super().__init__(settings_cls)
+        self._document = document
+
+    def get_field_value(self, field: object, field_name: str) -> tuple[Any, str, bool]:
+        return self._document.get(field_name), field_name, False
+
+    def __call__(self) -> dict[str, Any]:
+        return dict(self._document)
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"cannot read {path}: {error}", "check the file") from error
+
+
+def _check_environment() -> None:
+    """Refuse misspelt RELIT_* variables: pydantic-settings would ignore them in silence."""
+    known = set(RelitSettings.model_fields)
+    for variable in os.environ:
+        if not variable.startswith("RELIT_") or variable in LOADER_VARIABLES:
+            continue
+        top = variable.removeprefix("RELIT_").split("__")[0].lower()
+        if top not in known:
+            raise ConfigError(f"environment variable {variable} is no setting", f"known are: {', '.join(sorted(known))}")
+
+
+def _without_none(values: Nested) -> dict[str, Any]:
+    cleaned = {k: _without_none(v) if isinstance(v, Mapping) else v for k, v in values.items()}
+    return {k: v for k, v in cleaned.items() if v is not None and v != {}}
+
+
+def _config_error(error: ValidationError, path: Path | None, text: str) -> ConfigError:
+    first = error.errors(include_url=False)[0]
+    location = [part for part in first["loc"] if not str(part).startswith("function-")]
+    key = ".".join(map(str, location))
+    line = _line_of(text, location)
+    place = f"{path} line {line}: " if path and line else ""
+    message = first["msg"].removeprefix("Value error, ")
+    shown = f" (is {first['input']!r:.60})" if not isinstance(first["input"], dict) else ""
+    return ConfigError(f"{place}{key}: {message}{shown}", "see 'relit config schema'")
+
+
+def _line_of(text: str, location: list[Any]) -> int | None:
+    """Line of a key in the YAML text, or None where the value came from elsewhere."""
+    node = yaml.compose(text)
+    line = None
+    for part in location:
+        if isinstance(node, yaml.MappingNode):
+            found = next(((k, v) for k, v in node.value if k.value == str(part)), None)
+            if found is None:
+                return line if part is location[-1] else None
+            line, node = found[0].start_mark.line + 1, found[1]
+        elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+            node = node.value[part]
+            line = node.start_mark.line + 1
+    return line

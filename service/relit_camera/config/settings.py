@@ -1,0 +1,133 @@
+"""What is fixed for one run of the camera: where pictures come from and go to, models, server, folders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from platformdirs import user_data_path
+from pydantic import Field, field_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from relit_camera.config.look import Look, Settings
+
+Even = Annotated[int, Field(ge=64, le=8192, multiple_of=2)]
+
+
+class SourceSettings(Settings):
+    """Where live pictures come from."""
+
+    source: str = "webcam"
+    """`webcam`, a camera's id from `relit devices`, a video or picture file, or `pattern`."""
+    width: Even = 1280
+    """Asked of a webcam; it may answer with another size."""
+    height: Even = 720
+    fps: Annotated[float, Field(ge=1, le=240)] = 30.0
+
+
+class OutputSettings(Settings):
+    """Where relit pictures go."""
+
+    sink: str = "camera"
+    """`camera` (the virtual camera), a video file to write, or `null`."""
+    label: Annotated[str, Field(min_length=1, max_length=31)] = "Relit Camera"
+    """Name of the virtual camera device, as call apps show it."""
+    width: Even = 1280
+    """Even, and fixed for the whole run: readers of the virtual camera break otherwise."""
+    height: Even = 720
+    fps: Annotated[float, Field(ge=1, le=120)] = 30.0
+    placeholder: Path | None = None
+    """Picture shown while there is nothing else to show; ours if not given."""
+
+
+class TrackerSettings(Settings):
+    """How the face is followed."""
+
+    name: str = "mesh"
+    """`mesh`, `openseeface`, or `recorded:FILE.json`."""
+    dead_band_deg: Annotated[float, Field(ge=0, le=5)] = 0.3
+    """Head turns smaller than this do not move the light."""
+    reach_yaw_deg: Annotated[float, Field(ge=5, le=80)] = 40.0
+    """Beyond this turn the picture eases to neutral."""
+    reach_pitch_deg: Annotated[float, Field(ge=5, le=80)] = 30.0
+
+
+class ReenactSettings(Settings):
+    """How the still is moved."""
+
+    model: Path | None = None
+    """An ONNX reenactor of your own (docs/reenactors.md); the built-in first-order motion if not given."""
+
+
+class InferenceSettings(Settings):
+    """How ONNX Runtime runs."""
+
+    provider: Literal["auto", "cpu", "cuda", "tensorrt", "directml", "coreml", "openvino"] = "auto"
+    strict: bool = False
+    """Refuse to start when the provider is not really used, instead of falling back with a word."""
+    threads: Annotated[int, Field(ge=1, le=64)] = 1
+    """Threads of each model; the picture arithmetic has the other cores."""
+
+
+class ServerSettings(Settings):
+    """The REST API and the panel."""
+
+    host: str = "127.0.0.1"
+    port: Annotated[int, Field(ge=0, le=65535)] = 8470
+    """0 picks a free port and prints it."""
+
+    @field_validator("host")
+    @classmethod
+    def _loopback(cls, host: str) -> str:
+        if host not in ("127.0.0.1", "::1", "localhost"):
+            raise ValueError("only loopback addresses (127.0.0.1, ::1, localhost) for now: the preview shows your home")
+        return host
+
+
+class StorageSettings(Settings):
+    """Where environments, subjects, backgrounds and presets are kept."""
+
+    data_dir: Path = Field(default_factory=lambda: user_data_path("relit-camera", appauthor=False))
+
+    @property
+    def environments(self) -> Path:
+        """Folder of stored environments."""
+        return self.data_dir / "environments"
+
+    @property
+    def subjects(self) -> Path:
+        """Folder of stored subjects."""
+        return self.data_dir / "subjects"
+
+    @property
+    def backgrounds(self) -> Path:
+        """Folder of stored background pictures."""
+        return self.data_dir / "backgrounds"
+
+    @property
+    def presets(self) -> Path:
+        """Folder of stored presets."""
+        return self.data_dir / "presets"
+
+
+class RelitSettings(BaseSettings):
+    """The whole configuration. Precedence: defaults < config.yaml < RELIT_* environment < command line.
+
+    In the environment a nested field is written with two underscores: RELIT_SERVER__PORT=9000.
+    """
+
+    model_config = SettingsConfigDict(
+        env_prefix="RELIT_", env_nested_delimiter="__", extra="forbid", frozen=True, use_attribute_docstrings=True
+    )
+
+    source: SourceSettings = SourceSettings()
+    output: OutputSettings = OutputSettings()
+    subject: str | None = None
+    """A stored subject's name, or the path of a .relit file."""
+    look: Look = Look()
+    tracker: TrackerSettings = TrackerSettings()
+    reenact: ReenactSettings = ReenactSettings()
+    inference: InferenceSettings = InferenceSettings()
+    server: ServerSettings = ServerSettings()
+    storage: StorageSettings = StorageSettings()
+    log_level: Literal["debug", "info", "warning", "error"] = "info"

@@ -1,0 +1,115 @@
+"""Turns what users ask for into the next scene: resolves names, checks that parts fit, replaces the scene whole."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from relit_camera.config.look import Background, ColorBackground, EnvironmentBackground, ImageBackground, Look
+from relit_camera.config.settings import StorageSettings
+from relit_camera.errors import InputError, NotFoundError
+from relit_camera.light.backdrop import environment_from_picture
+from relit_camera.light.environment import Environment
+from relit_camera.light.maps import resample
+from relit_camera.light.store import EnvironmentStore
+from relit_camera.space.colour import linear_from_uint8, uint8_from_linear
+from relit_camera.space.images import DisplayImage
+from relit_camera.space.picture_files import LDR_SUFFIXES, read_display
+from relit_camera.stream.scene import Scene
+from relit_camera.subject.store import SubjectStore
+
+LIT_BY_BACKGROUND = "background"
+"""The environment's reserved name for: lit by the virtual background."""
+
+
+class Director:
+    """Holds the scene. Reading is one attribute access; changes are made one at a time, from any thread.
+
+    A change that cannot be resolved raises and leaves the scene as it was.
+    """
+
+    def __init__(self, storage: StorageSettings) -> None:
+        self.environments = EnvironmentStore(storage.environments)
+        self.subjects = SubjectStore(storage.subjects)
+        self._backgrounds = storage.backgrounds
+        self._change = threading.Lock()
+        self.scene = Scene(Look())
+
+    def set_look(self, look: Look) -> Scene:
+        """Show another lighting, background or mode.
+
+        Raises:
+            NotFoundError: an environment or background of that name is not stored.
+            InputError: `background` as environment while the background cannot light.
+        """
+        with self._change:
+            backdrop = self._backdrop(look.background)
+            environment = self._environment(look, backdrop)
+            return self._replace(look=look, environment=environment, backdrop=backdrop)
+
+    def set_subject(self, name_or_path: str | None) -> Scene:
+        """Show another subject, or none.
+
+        Raises:
+            NotFoundError: no such subject or file.
+            SubjectError: its file is damaged.
+        """
+        with self._change:
+            if name_or_path is None:
+                return self._replace(subject=None, subject_name=None)
+            name, subject = self.subjects.resolve(name_or_path)
+            return self._replace(subject=subject, subject_name=name)
+
+    def set_frozen(self, frozen: bool) -> Scene:
+        """Hold the published picture, or let it go on."""
+        with self._change:
+            return self._replace(frozen=frozen)
+
+    def background_names(self) -> list[str]:
+        """Names that an `image` background may have: stored pictures and environments."""
+        return sorted({path.stem for path in self._background_files()} | set(self.environments.names()))
+
+    def _replace(self, **changes: object) -> Scene:
+        self.scene = replace(self.scene, **changes, revision=self.scene.revision + 1)  # type: ignore[arg-type]
+        return self.scene
+
+    def _environment(self, look: Look, backdrop: DisplayImage | None) -> Environment | None:
+        name = look.lighting.environment
+        if name is None:
+            return None
+        if name != LIT_BY_BACKGROUND:
+            return self.environments.resolve(name)
+        background = look.background
+        if isinstance(background, ImageBackground) and background.image in self.environments.names():
+            return self.environments.load(background.image)
+        if isinstance(background, ColorBackground):
+            code = int(background.color[1:], 16)
+            backdrop = np.full((90, 160, 3), [code >> 16, code >> 8 & 255, code & 255], dtype=np.uint8)
+        if backdrop is None:
+            kind = "an environment needs a name" if isinstance(background, EnvironmentBackground) else "has no picture"
+            raise InputError(
+                f"the face cannot be lit by a background of kind '{background.kind}': it {kind}",
+                "choose an image or color background first",
+            )
+        panorama = environment_from_picture(linear_from_uint8(backdrop))
+        return Environment(LIT_BY_BACKGROUND, panorama, resample(panorama.radiance), panorama.notes)
+
+    def _backdrop(self, background: Background) -> DisplayImage | None:
+        if not isinstance(background, ImageBackground):
+            return None
+        for path in self._background_files():
+            if path.stem == background.image:
+                return read_display(path)
+        if background.image in self.environments.names():
+            panorama = self.environments.load(background.image).panorama
+            return uint8_from_linear(panorama.radiance[:, ::-1])
+        known = ", ".join(self.background_names()) or "none"
+        raise NotFoundError(f"no background picture '{background.image}'", f"stored are: {known}")
+
+    def _background_files(self) -> list[Path]:
+        if not self._backgrounds.is_dir():
+            return []
+        return sorted(path for path in self._backgrounds.iterdir() if path.suffix.lower() in LDR_SUFFIXES)
