@@ -14,12 +14,11 @@ CPU = "cpu"
 _PREFERRED = ("cuda",)
 """What `auto` takes where this ONNX Runtime was built with it; for networks this small others seldom beat the CPU."""
 
-_SUFFIX = "ExecutionProvider"
-
 
 def short_name(provider: str) -> str:
     """Shorten `CUDAExecutionProvider` to `cuda`."""
-    return provider.removesuffix(_SUFFIX).lower()
+    name = provider.removesuffix("ExecutionProvider").lower()
+    return "directml" if name == "dml" else name
 
 
 def full_name(provider: str) -> str:
