@@ -86,7 +86,7 @@ class Tracker(Protocol):
     scheme: str
 
     def track(self, frame: Frame) -> FaceState:
-        """The face state of `frame`."""
+        """Measure the face in `frame`."""
         ...
 
     def reset(self) -> None:
