@@ -1,0 +1,143 @@
+"""Clocks of the live path: how long each stage takes, how many frames pass, and when the next one is due."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from relit_camera.stream.status import Percentiles
+
+WINDOW = 300
+"""Durations kept for a median: ten seconds at 30 frames a second."""
+
+
+class DurationWindow:
+    """The last durations of one kind. Thread-safe."""
+
+    def __init__(self, length: int = WINDOW) -> None:
+        self._seconds: deque[float] = deque(maxlen=length)
+        self._lock = threading.Lock()
+
+    def add(self, seconds: float) -> None:
+        """Remember one duration, forgetting the oldest."""
+        with self._lock:
+            self._seconds.append(seconds)
+
+    @property
+    def latest_ms(self) -> float:
+        """The last duration in milliseconds, 0 before the first."""
+        with self._lock:
+            return self._seconds[-1] * 1e3 if self._seconds else 0.0
+
+    def percentiles(self) -> Percentiles:
+        """Median and 95th percentile in milliseconds, 0 before the first duration."""
+        with self._lock:
+            seconds = np.array(self._seconds)
+        if seconds.size == 0:
+            return Percentiles(0.0, 0.0)
+        p50, p95 = np.percentile(seconds, [50, 95]) * 1e3
+        return Percentiles(float(p50), float(p95))
+
+
+class StageTimer:
+    """Durations of named stages. One thread usually times, others read.
+
+    with timer.stage("track"):
+        state = tracker.track(frame)
+    """
+
+    def __init__(self, length: int = WINDOW) -> None:
+        self._length = length
+        self._windows: dict[str, DurationWindow] = {}
+        self._lock = threading.Lock()
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time the body of a with-statement; a body that raises is not counted."""
+        start = time.perf_counter()
+        yield
+        self.add(name, time.perf_counter() - start)
+
+    def add(self, name: str, seconds: float) -> None:
+        """Count a duration that was measured elsewhere."""
+        with self._lock:
+            window = self._windows.setdefault(name, DurationWindow(self._length))
+        window.add(seconds)
+
+    def percentiles(self) -> dict[str, Percentiles]:
+        """Median and 95th percentile of every stage in milliseconds, in the order the stages were first timed."""
+        return {name: window.percentiles() for name, window in self._copy().items()}
+
+    def latest_ms(self) -> dict[str, float]:
+        """Give the last duration of every stage in milliseconds."""
+        return {name: window.latest_ms for name, window in self._copy().items()}
+
+    def _copy(self) -> dict[str, DurationWindow]:
+        with self._lock:
+            return dict(self._windows)
+
+
+class RateMeter:
+    """Events a second over the last few seconds; falls to 0 when nothing comes. Thread-safe."""
+
+    def __init__(self, window_s: float = 3.0) -> None:
+        self._window_s = window_s
+        self._times: deque[float] = deque(maxlen=4096)
+        self._lock = threading.Lock()
+
+    def tick(self, now: float | None = None) -> None:
+        """Count one event at monotonic time `now`."""
+        with self._lock:
+            self._times.append(time.monotonic() if now is None else now)
+
+    def rate(self, now: float | None = None) -> float:
+        """Events a second at monotonic time `now`, 0 for fewer than two events in the window."""
+        now = time.monotonic() if now is None else now
+        with self._lock:
+            while self._times and self._times[0] < now - self._window_s:
+                self._times.popleft()
+            if len(self._times) < 2:
+                return 0.0
+            # Up to `now` once the next event is overdue, so that the rate falls at once when events stop.
+            span = self._times[-1] - self._times[0]
+            overdue = max(0.0, now - self._times[-1] - span / (len(self._times) - 1))
+            return (len(self._times) - 1) / max(span + overdue, 1e-6)
+
+
+class Pacer:
+    """Deadlines at a frame rate, by arithmetic on one monotonic clock, so that they do not drift.
+
+    A picture that is ready waits for the next deadline, up to a whole period. When pictures come at about the frame
+    rate, the deadlines are moved by at most 1 % of a period a frame, until pictures are ready a fifth of a period ahead
+    of them: latency falls, and the time between frames stays even. Pictures of any other rate come at all phases and
+    move the deadlines to and fro, by nothing on average.
+    """
+
+    MARGIN = 0.2
+    NUDGE = 0.01
+    LATE = 3.0
+
+    def __init__(self, fps: float, now: float) -> None:
+        self.period = 1.0 / fps
+        self.deadline = now
+
+    def advance(self, now: float, waited_s: float | None = None) -> None:
+        """Set the next deadline; after a hiccup of several periods begin anew at `now` instead of catching up.
+
+        Args:
+            now: monotonic time in seconds.
+            waited_s: how long the picture just shown had been ready; None if nothing new was shown.
+        """
+        self.deadline += self.period
+        if waited_s is not None:
+            half = self.period / 2
+            ahead = (waited_s - self.MARGIN * self.period + half) % self.period - half
+            limit = self.NUDGE * self.period
+            self.deadline -= min(max(ahead, -limit), limit)
+        if now - self.deadline > self.LATE * self.period:
+            self.deadline = now + self.period
