@@ -57,7 +57,7 @@ def verify(names: Names = None, mirror: Mirror = None) -> None:
     registry = Registry()
     if mirror:
         registry.verify_mirror(names or (), mirror)
-        typer.echo(f"{mirror} has what it needs")
+        typer.echo(f"{mirror} has the upstream files")
         return
     states = {name: registry.state(name) for name in registry.names(names or ())}
     for name, state in states.items():

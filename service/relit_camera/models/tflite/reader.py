@@ -100,8 +100,7 @@ def _operator(model: Any, operator: Any) -> Operator:
     import tflite
 
     code = model.OperatorCodes(operator.OpcodeIndex())
-    # Files older than schema 3a keep the code in the deprecated field, one byte wide.
-    kind = _constant_names(tflite.BuiltinOperator)[max(code.BuiltinCode(), code.DeprecatedBuiltinCode())]
+    kind = _constant_names(tflite.BuiltinOperator)[code.BuiltinCode()]
     if kind == "CUSTOM":
         kind = code.CustomCode().decode()
     inputs, outputs = operator.InputsAsNumpy().tolist(), operator.OutputsAsNumpy().tolist()
