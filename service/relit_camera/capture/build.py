@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import UTC, datetime
 
 import numpy as np
 
 from relit_camera import __version__
 from relit_camera.errors import InputError
-from relit_camera.reflectance.method import open_method
+from relit_camera.reflectance.method import DEFAULT_METHOD, open_method
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.colour import Gamma, uint8_from_linear
 from relit_camera.space.directions import texel_directions, texel_solid_angles
-from relit_camera.space.images import DisplayImage
+from relit_camera.space.images import DisplayImage, Points
 from relit_camera.subject.compress import compress
 from relit_camera.subject.field import FactoredField
 from relit_camera.subject.subject import Subject, SubjectMetadata
 
 
-def build_subject(samples: Samples, method: str, source: str, gamma: Gamma = "srgb") -> Subject:
+def build_subject(
+    samples: Samples,
+    method: str,
+    source: str,
+    gamma: Gamma = "srgb",
+    landmarks: Mapping[str, Points] | None = None,
+) -> Subject:
     """Build and compress the field of `samples`.
 
     Args:
@@ -26,11 +33,13 @@ def build_subject(samples: Samples, method: str, source: str, gamma: Gamma = "sr
         method: a name that `reflectance.method.open_method` knows.
         source: file name that the header should tell.
         gamma: the curve that the pictures were decoded with, for the header.
+        landmarks: known points of the face by scheme; where none are given, a tracker finds them when it needs them.
 
     Raises:
         NotFoundError: no such method.
         LightsError: the directions cannot carry a field.
     """
+    method = DEFAULT_METHOD if method == "default" else method
     field = open_method(method).build(samples)
     if not isinstance(field, FactoredField):
         raise InputError(f"the field of method '{method}' cannot be compressed yet", "use barycentric, planar or nearest")
@@ -55,6 +64,7 @@ def build_subject(samples: Samples, method: str, source: str, gamma: Gamma = "sr
         light_coefficients=compressed.light_coefficients,
         matte=samples.matte,
         neutral=neutral_picture(field, samples),
+        landmarks=landmarks or {},
     )
 
 

@@ -1,1 +1,1 @@
-"""."""
+"""Face motion → moved picture: reenactors behind one interface."""

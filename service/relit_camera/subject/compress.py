@@ -37,14 +37,16 @@ class CompressedField:
 def compress(field: FactoredField, matte: NDArray[np.float32], target_db: float = TARGET_DB) -> CompressedField:
     """The fewest principal pictures that return every captured light at `target_db` or better inside the matte.
 
-    A light counts in the principal directions by the square root of the sphere that its weight covers, so that a
-    densely sampled patch does not take the basis for itself. Lights too dark to have a peak of their own are judged
-    by the field's. With all components kept the field is exact but for float16.
+    Every light is scaled to the same energy before the principal directions are taken, so that a dim light from
+    behind comes back as well, for its own brightness, as a bright one from the front. Lights too dark to have a peak
+    of their own are judged by a tenth of the field's. With all components kept the field is exact but for float16.
     """
     lights, height, width, _ = field.pictures.shape
     samples = field.pictures.reshape(lights, -1)
-    importance = np.sqrt(np.maximum(field.weights.sum(axis=1), 1e-3 * field.weights.sum() / lights + 1e-12))
-    weighted_gram = (samples @ samples.T).astype(np.float64) * np.outer(importance, importance)
+    gram = (samples @ samples.T).astype(np.float64)
+    energy = np.diag(gram)
+    importance = 1 / np.sqrt(np.maximum(energy, 1e-4 * energy.max()))
+    weighted_gram = gram * np.outer(importance, importance)
     eigenvalues, vectors = np.linalg.eigh(weighted_gram)
     order = np.argsort(eigenvalues)[::-1]
     vectors = vectors[:, order]

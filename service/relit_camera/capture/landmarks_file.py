@@ -1,0 +1,31 @@
+"""Known landmarks beside a set of one-light pictures: JSON {scheme: [[x, y], …]}, pixels, centres at integers + ½."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from relit_camera.errors import LightsError
+from relit_camera.space.images import Points
+
+_Layout = TypeAdapter(dict[str, list[tuple[float, float]]])
+
+
+def read_landmarks(path: Path, required: bool) -> Mapping[str, Points]:
+    """Landmarks (count, 2) float32 by scheme; empty if the file is not there and not `required`.
+
+    Raises:
+        LightsError: required and missing, or not in the layout.
+    """
+    if not path.is_file() and not required:
+        return {}
+    try:
+        listed = _Layout.validate_python(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, ValidationError) as error:
+        cure = "it must be JSON {scheme: [[x, y], …]}"
+        raise LightsError(f"{path} holds no landmarks: {str(error).splitlines()[0]}", cure) from error
+    return {scheme: np.array(points, dtype=np.float32).reshape(-1, 2) for scheme, points in listed.items()}

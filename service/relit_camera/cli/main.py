@@ -1,0 +1,88 @@
+"""The `relit` command: mounts the command groups and prints errors."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from relit_camera.errors import RelitError
+
+GROUPS = {
+    "run": ("relit_camera.cli.run", "Run the camera: webcam in, relit virtual camera out, REST API and panel."),
+    "replay": ("relit_camera.cli.replay", "Relight a recorded video into another video."),
+    "track": ("relit_camera.cli.track", "Follow the face in a video and write what was seen as JSON."),
+    "relight": ("relit_camera.cli.relight", "Relight a subject's still."),
+    "capture": ("relit_camera.cli.capture", "Build a subject from pictures or video."),
+    "subject": ("relit_camera.cli.subject", "Look into subject files."),
+    "models": ("relit_camera.cli.models", "List, pull and verify the public models."),
+    "devices": ("relit_camera.cli.devices", "List cameras and virtual cameras."),
+    "config": ("relit_camera.cli.config", "Check and show the configuration."),
+    "bench": ("relit_camera.cli.bench", "Measure relighting and the live chain on this machine."),
+    "doctor": ("relit_camera.cli.doctor", "Find out what keeps the camera from working, and the cure."),
+}
+"""Command → module with a typer `app`, and its help. A module is imported when its command is called."""
+
+
+class _LazyGroup(TyperGroup):
+    """Imports a command's module only when it is needed, so that `relit --help` answers at once."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(GROUPS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name not in GROUPS:
+            return None
+        wanted_help = ctx.info_name is not None and not ctx.resilient_parsing and cmd_name not in sys.argv[1:2]
+        if wanted_help:
+            return typer.core.TyperCommand(cmd_name, callback=lambda: None, help=GROUPS[cmd_name][1])
+        command = typer.main.get_command(import_module(GROUPS[cmd_name][0]).app)
+        command.name = cmd_name
+        command.help = command.help or GROUPS[cmd_name][1]
+        return command
+
+
+app = typer.Typer(
+    cls=_LazyGroup,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Relit Camera: your face, lit by any place you choose.",
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from relit_camera import __version__
+
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    context: typer.Context,
+    config: Annotated[Path | None, typer.Option(help="Configuration file (YAML).", metavar="FILE")] = None,
+    log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error.")] = None,
+    version: Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True)] = False,
+) -> None:
+    """Keep the global options for the commands; they load the settings when they need them."""
+    context.obj = {"config": config, "log_level": log_level}
+    level = (log_level or "warning").upper()
+    logging.basicConfig(level=getattr(logging, level, logging.WARNING), format="%(levelname)s %(name)s: %(message)s")
+
+
+def run() -> None:
+    """Entry point: exit 0 done, 1 the input is at fault (one line on stderr), 2 usage; our own faults show a traceback."""
+    try:
+        app()
+    except RelitError as error:
+        print(f"relit: {error}", file=sys.stderr)
+        sys.exit(1)
+    except BrokenPipeError:
+        sys.exit(1)

@@ -1,0 +1,124 @@
+"""Ratio relighting: the live frame times relit(target) / relit(room) of the still warped onto it.
+
+The person's own mouth, eyes and texture live on; only the light is exchanged.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.errors import SubjectError
+from relit_camera.face.follow import FaceMotion
+from relit_camera.light.maps import rotate
+from relit_camera.reenact.control_points import control_points, skull_ring, still_anchors
+from relit_camera.reenact.dense_motion import DenseMotion
+from relit_camera.reenact.first_order import feathered, moved_flow
+from relit_camera.reenact.reenactor import Moved, Stage
+from relit_camera.reenact.room_probe import RoomProbe
+from relit_camera.reenact.warp import Warp
+from relit_camera.space.colour import linear_from_uint8
+from relit_camera.space.images import Frame, LinearImage, Mask
+
+RATIO_RANGE = (0.02, 12.0)
+FLOOR = 0.03
+"""Share of the room-lit face's mean that is added to both sides of the ratio: shadows stay bounded."""
+EDGE = 0.02
+"""Share of the still's width at the matte's edge that is not trusted."""
+EXTEND = 16
+"""The extension beyond the still is computed at this fraction of the frame's size."""
+STRANGER = 0.17
+"""Residual of the room fit from which the live face is not the subject's."""
+TRIAL_S = 1.5
+"""The fit is judged after this long."""
+
+
+class RatioReenactor:
+    """See `Reenactor`; the live picture is used as it is, so there is no matte: alpha is 1."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._face = stage.face
+        self._relighter = stage.relighter
+        self._points = control_points(stage.face)
+        self._motion = DenseMotion(stage.options)
+        self._probe = RoomProbe(stage.subject, stage.face)
+        self._weight = trusted(feathered(stage.subject.matte))
+        self._since: float | None = None
+
+    def move(self, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved:
+        """See `Reenactor.move`.
+
+        Raises:
+            SubjectError: the live face is not the subject's: no light explains it.
+        """
+        live = linear_from_uint8(frame.image)
+        width, height = frame.size
+        everything = (0, 0, width, height)
+        if motion.pose is None:
+            return Moved(live, np.ones((height, width), np.float32), everything)
+        room = self._probe.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
+        self._since = frame.time_s if self._since is None else self._since
+        if room.residual > STRANGER and frame.time_s - self._since > TRIAL_S:
+            raise SubjectError(
+                f"the live face does not look like the subject under any light (deviation {room.residual:.2f})",
+                "choose your own subject, or mode reenact",
+            )
+        under_room = self._relighter.relight(rotate(room.light_map, motion.rotation)) * room.gain
+        inside = self._weight > 0.5
+        floor = FLOOR * under_room[inside].mean(axis=0)
+        ratio = np.clip((relit + floor) / (np.maximum(under_room, 0) + floor), *RATIO_RANGE)
+
+        # Where nobody is tracked with confidence the picture eases back to the live one.
+        ratio = 1 + (ratio - 1) * np.float32(motion.presence)
+        warped = self._warp(motion, frame.size).apply(
+            np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32), everything
+        )
+        return Moved(live * extended(warped), np.ones((height, width), np.float32), everything)
+
+    def _warp(self, motion: FaceMotion, size: tuple[int, int]) -> Warp:
+        """The still as it lies on the live face: one similarity for the head, a dense flow for the rest."""
+        assert motion.pose is not None
+        face, chosen = self._face, self._points.chosen
+        landmarks = motion.landmarks.astype(np.float64)
+        live = np.vstack([landmarks[chosen], skull_ring(motion.pose, size), still_anchors(motion.pose, size)])
+        still_from_live = similarity(landmarks[list(face.scheme.rigid)], face.landmarks[list(face.scheme.rigid)])
+        target = live @ still_from_live[:, :2].T + still_from_live[:, 2]
+        moved = landmarks @ still_from_live[:, :2].T + still_from_live[:, 2]
+        return Warp(still_from_live, moved_flow(self._motion, face, self._points, target, moved))
+
+
+def trusted(matte: Mask) -> Mask:
+    """How far the still's ratio counts: inside the matte, less toward its edge, where the still's rim is not the live one's."""
+    reach = max(round(EDGE * matte.shape[1]), 1)
+    inner = cv2.erode(matte, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
+    return np.asarray(cv2.GaussianBlur(inner, (0, 0), reach / 2), dtype=np.float32)
+
+
+def similarity(points: NDArray[np.float64], onto: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The rotation, scale and shift (2, 3) that bring `points` (count, 2) nearest to `onto` in least squares."""
+    centre, goal = points.mean(axis=0), onto.mean(axis=0)
+    # As complex numbers a similarity is one factor, and least squares a quotient.
+    p, q = (points - centre) @ [1, 1j], (onto - goal) @ [1, 1j]
+    factor = np.vdot(p, q) / max(np.vdot(p, p).real, 1e-12)
+    turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
+    return np.column_stack([turn, goal - turn @ centre])
+
+
+def extended(warped: NDArray[np.float32]) -> LinearImage:
+    """A ratio (height, width, 3) for the whole frame, from one that is known only on the person.
+
+    Args:
+        warped: (height, width, 4): ratio times weight, and the weight.
+
+    Beyond the person the ratio goes on smoothly: wide blurs of what is known, divided by the blurred weight.
+    """
+    height, width = warped.shape[:2]
+    small = cv2.resize(warped, (max(width // EXTEND, 1), max(height // EXTEND, 1)), interpolation=cv2.INTER_AREA)
+    spread = np.zeros_like(small)
+    for sigma in (1.0, 3.0, 8.0, 20.0):
+        # Narrow blurs win where they have weight: detail near the person, the mean far away.
+        spread += cv2.GaussianBlur(small, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE) / np.float32(sigma**3)
+    beyond = (spread[..., :3] + 1e-9) / (spread[..., 3:] + 1e-9)
+    beyond = cv2.resize(beyond, (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(warped[..., :3] + (1 - warped[..., 3:]) * beyond, dtype=np.float32)

@@ -1,0 +1,76 @@
+"""The seam between a relit still and a living picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Protocol
+
+from relit_camera.errors import NotFoundError
+from relit_camera.face.follow import FaceMotion
+from relit_camera.models.session import SessionOptions
+from relit_camera.relight.relighter import Relighter
+from relit_camera.reenact.source_face import SourceFace
+from relit_camera.space.images import Frame, LinearImage, Mask
+from relit_camera.subject.subject import Subject
+
+GROUP = "relit_camera.reenactors"
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a reenactor works with for as long as the subject stays.
+
+    Attributes:
+        subject: the person.
+        relighter: of the same subject; a reenactor may relight under other lights than the scene's.
+        face: the face in the subject's still, in the tracker's landmark scheme.
+        size: (width, height) of the pictures to make.
+        options: how ONNX Runtime runs.
+    """
+
+    subject: Subject
+    relighter: Relighter
+    face: SourceFace
+    size: tuple[int, int]
+    options: SessionOptions
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A moved picture.
+
+    Attributes:
+        picture: (height, width, 3) float32 linear, premultiplied with `alpha`, in display exposure.
+        alpha: (height, width) float32, the person.
+        box: (left, top, right, bottom) in output pixels outside which alpha is 0.
+    """
+
+    picture: LinearImage
+    alpha: Mask
+    box: tuple[int, int, int, int]
+
+
+class Reenactor(Protocol):
+    """Moves a relit still as the live face moves. Keeps state between frames; not thread-safe."""
+
+    def move(self, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved:
+        """The still's relit picture (subject's size, linear, display exposure), moved as `motion` says.
+
+        `frame` is the live picture, for reenactors that build on it.
+        """
+        ...
+
+
+def open_reenactor(name: str, stage: Stage) -> Reenactor:
+    """A reenactor of that name.
+
+    Raises:
+        NotFoundError: none of that name is installed.
+    """
+    for point in entry_points(group=GROUP, name=name):
+        reenactor: Reenactor = point.load()(stage)
+        return reenactor
+    known = ", ".join(sorted(point.name for point in entry_points(group=GROUP)))
+    raise NotFoundError(f"no reenactor '{name}'", f"there are: {known}")
+

@@ -1,0 +1,73 @@
+"""The face in the subject's still: where its landmarks are and how the head stands."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.errors import SubjectError
+from relit_camera.face.pose import fit_pose, unproject
+from relit_camera.face.landmarks import Scheme
+from relit_camera.face.schemes import landmark_scheme
+from relit_camera.face.state import HeadPose, Tracker
+from relit_camera.space.images import Frame, Points
+from relit_camera.subject.subject import Subject
+
+SEARCH_FRAMES = 4
+"""A tracker sees the still this many times: it settles as it would on a video of a person sitting still."""
+
+
+@dataclass(frozen=True)
+class SourceFace:
+    """The still's face.
+
+    Attributes:
+        scheme: the landmark scheme.
+        landmarks: (count, 2) float32 pixels of the still.
+        pose: of the head in the still, relative to the camera.
+        head_points: (count, 3) float64 centimetres: the landmarks in head axes.
+        size: (width, height) of the still.
+    """
+
+    scheme: Scheme
+    landmarks: Points
+    pose: HeadPose
+    head_points: NDArray[np.float64]
+    size: tuple[int, int]
+
+
+def source_face(subject: Subject, tracker: Tracker) -> SourceFace:
+    """Find the face in the subject's still: as stored with the subject, else as `tracker` sees it.
+
+    Raises:
+        SubjectError: the subject keeps no landmarks of the tracker's scheme and the tracker finds no face in it.
+    """
+    scheme = landmark_scheme(tracker.scheme)
+    landmarks = subject.landmarks.get(scheme.name)
+    if landmarks is None:
+        landmarks = _find(subject, tracker)
+    if len(landmarks) != scheme.count:
+        raise SubjectError(
+            f"the subject keeps {len(landmarks)} landmarks of scheme '{scheme.name}', which has {scheme.count}",
+            "build the subject again",
+        )
+    pose = fit_pose(landmarks, scheme, subject.size)
+    if pose is None:
+        raise SubjectError("no head pose fits the landmarks of the subject's face", "build the subject again")
+    return SourceFace(scheme, landmarks, pose, unproject(landmarks, pose, scheme, subject.size), subject.size)
+
+
+def _find(subject: Subject, tracker: Tracker) -> Points:
+    tracker.reset()
+    for index in range(SEARCH_FRAMES):
+        state = tracker.track(Frame(subject.neutral, index, time.monotonic(), index / 30))
+    tracker.reset()
+    if not state.visible:
+        raise SubjectError(
+            f"tracker '{tracker.name}' finds no face in the subject's still",
+            "choose a subject whose face looks into the camera, or another tracker",
+        )
+    return state.landmarks

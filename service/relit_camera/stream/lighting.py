@@ -1,0 +1,53 @@
+"""The light as it is shown: what the scene asks for, in display exposure, eased from what was."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relit_camera.config.look import Lighting
+from relit_camera.light.environment import Environment
+from relit_camera.light.exposure import display_scale
+from relit_camera.light.maps import LightMap
+from relit_camera.light.room import room_light
+from relit_camera.stream.scene import Scene
+
+
+def display_light(environment: Environment | None, lighting: Lighting) -> LightMap:
+    """The room's light (32, 64, 3) in display exposure, face gain included.
+
+    The environment, turned as asked, is scaled so that a white ball facing the camera reads 0.8. Lamps are not: their
+    intensity already is what such a ball reads, so that a lamp is as bright in a night street as in a studio.
+    """
+    surround = room_light(environment, lighting.model_copy(update={"lamps": ()}))
+    lamps = room_light(None, lighting)
+    gain = 2.0 ** (lighting.exposure_ev + lighting.face_gain_ev)
+    return np.asarray((surround * display_scale(surround) + lamps) * gain, dtype=np.float32)
+
+
+class EasedLight:
+    """Follows the scenes' light over each lighting's `transition_s`."""
+
+    def __init__(self) -> None:
+        self._key: tuple[Environment | None, Lighting] | None = None
+        self._from: LightMap | None = None
+        self._target: LightMap | None = None
+        self._since = 0.0
+
+    def update(self, scene: Scene, now: float) -> LightMap:
+        """The room's light at `now` seconds; the first scene's is there at once."""
+        key = (scene.environment, scene.look.lighting)
+        if self._key is None or key[0] is not self._key[0] or key[1] != self._key[1]:
+            self._from = self._shown(now)
+            self._target = display_light(*key)
+            self._key, self._since = key, now
+        return self._shown(now)  # type: ignore[return-value]
+
+    def _shown(self, now: float) -> LightMap | None:
+        if self._from is None or self._key is None or self._target is None:
+            return self._target
+        duration = self._key[1].transition_s
+        share = min((now - self._since) / duration, 1.0) if duration > 0 else 1.0
+        if share >= 1:
+            return self._target
+        smooth = np.float32(share * share * (3 - 2 * share))
+        return np.asarray(self._from + (self._target - self._from) * smooth, dtype=np.float32)
