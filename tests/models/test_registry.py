@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import io
+import logging
 import os
 import threading
 import zipfile
@@ -148,6 +150,16 @@ def test_pull_takes_the_chosen_only_and_says_so(registry: Registry) -> None:
     assert stored(registry) == {"plain.onnx", "relu.onnx"}
     registry.pull(["plain"], say=said.append)
     assert said == ["plain: getting relu.onnx", "plain: already there"]
+
+
+def test_pull_logs_nothing_beside(registry: Registry) -> None:
+    logger, stream = pooch.get_logger(), io.StringIO()
+    logger.setLevel(logging.INFO)
+    handler = logging.StreamHandler(stream)
+    logger.addHandler(handler)
+    registry.pull(["plain"])
+    logger.removeHandler(handler)
+    assert stream.getvalue() == ""
 
 
 def test_pull_from_a_folder_asks_nobody(registry: Registry, upstream: Upstream) -> None:

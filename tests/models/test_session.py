@@ -213,6 +213,13 @@ def test_wrong_feeds_are_one_clear_line(feeds: dict[str, np.ndarray], capfd: pyt
     assert capfd.readouterr() == ("", "")
 
 
+def test_a_failure_inside_the_graph_is_not_printed_either(capfd: pytest.CaptureFixture[str]) -> None:
+    opened = open_session(graph_bytes(["batch", "size"]), "open")
+    with pytest.raises(ModelError, match=r"model open failed: .*it takes image float32 \[\?, \?\]$"):
+        opened.run({"image": np.ones((1, 4), np.float32)})
+    assert capfd.readouterr() == ("", "")
+
+
 def test_the_report_knows_the_open_sessions_only() -> None:
     second, first = open_session(graph_bytes(), "report b"), open_session(graph_bytes(), "report a")
     mine = [report for report in session_report() if report.name.startswith("report ")]

@@ -257,6 +257,21 @@ def test_layouts_do_not_mix(case: str) -> None:
     np.testing.assert_allclose(result, expected(picture), rtol=1e-4, atol=1e-4)
 
 
+def test_a_picture_with_channels_first_meets_a_computed_vector() -> None:
+    writer, feed, weights = NetworkWriter(), noise(1, 4, 6, 3), noise(5, 1, 1, 3, seed=1)
+    convolution = [writer.computed(*feed.shape), writer.constant(weights), writer.constant(noise(5))]
+    picture, mean, result = writer.computed(1, 4, 6, 5), writer.computed(5), writer.computed(1, 4, 6, 5)
+    values = {"StrideH": 1, "StrideW": 1, "Padding": VALID}
+    axes = writer.constant(np.array([0, 1, 2], np.int32))
+    writer.operators = [
+        Operator("CONV_2D", convolution, [picture], ("Conv2DOptions", values)),
+        Operator("MEAN", [picture, axes], [mean], ("ReducerOptions", {"KeepDims": 0})),
+        Operator("SUB", [picture, mean], [result], ("SubOptions", {})),
+    ]
+    truth = np.einsum("byxc,oc->byxo", feed, weights[:, 0, 0]) + noise(5)
+    np.testing.assert_allclose(run(writer, result, feed), truth - truth.mean((0, 1, 2)), atol=1e-5)
+
+
 def test_the_same_bytes_give_the_same_bytes() -> None:
     writer = NetworkWriter()
     writer.computed(2, 3)

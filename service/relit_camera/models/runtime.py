@@ -16,9 +16,6 @@ from relit_camera.models import providers
 if TYPE_CHECKING:
     import onnxruntime
 
-LOG_FATAL = 4
-"""The severity to log from. What ONNX Runtime would print below it reaches us as an exception or in the placement."""
-
 _ELEMENTS = {"float": "float32", "double": "float64"}
 """Where ONNX's element names differ from NumPy's."""
 
@@ -41,7 +38,6 @@ def runtime_options(threads: int) -> onnxruntime.SessionOptions:
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.execution_mode = onnxruntime.ExecutionMode.ORT_SEQUENTIAL
-    options.log_severity_level = LOG_FATAL
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.add_session_config_entry("session.inter_op.allow_spinning", "0")
     options.add_session_config_entry("session.record_ep_graph_assignment_info", "1")

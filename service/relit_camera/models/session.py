@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from relit_camera.errors import ConfigError, DeviceError, ModelError
 from relit_camera.models import providers
 from relit_camera.models.runtime import (
-    LOG_FATAL,
     TensorSpec,
     node_placement,
     reason,
@@ -30,6 +29,9 @@ from relit_camera.models.runtime import (
 
 if TYPE_CHECKING:
     import onnxruntime
+
+_LOG_FATAL = 4
+"""The severity to log from. What ONNX Runtime would print below it reaches us as an exception or in the placement."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +183,7 @@ def _open(
     from onnxruntime.capi.onnxruntime_pybind11_state import InvalidProtobuf, NoModel, NoSuchFile
 
     source = f"model {name} ({model})" if isinstance(model, Path) else f"model {name}"
-    onnxruntime.set_default_logger_severity(LOG_FATAL)
+    onnxruntime.set_default_logger_severity(_LOG_FATAL)
     try:
         runtime = onnxruntime.InferenceSession(
             model,

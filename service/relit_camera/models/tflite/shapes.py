@@ -72,7 +72,7 @@ def strided_slice(graph: Graph, operator: Operator) -> None:
         raise graph.unsupported("a slice that runs backward, or with an ellipsis, a new axis or an offset")
     axes = range(len(begin))
     dropped = [bool(options.ShrinkAxisMask() >> axis & 1) for axis in axes]
-    starts = [0 if options.BeginMask() >> axis & 1 and not dropped[axis] else begin[axis] for axis in axes]
+    starts = [0 if options.BeginMask() >> axis & 1 else begin[axis] for axis in axes]
     ends = [_TO_THE_END if options.EndMask() >> axis & 1 else end[axis] for axis in axes]
     ends = [starts[axis] + 1 or _TO_THE_END if dropped[axis] else ends[axis] for axis in axes]
     bounds_of_slice = [graph.integers(values) for values in (starts, ends, list(axes), strides)]
