@@ -60,7 +60,7 @@ def fit_pose(
 
 def project(points: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]) -> Points:
     """Pixels (count, 2) float32 of head-space points (count, 3) in centimetres under `pose`."""
-    camera_points = pose.rotation.apply(points) + pose.translation
+    camera_points = points @ pose.rotation.as_matrix().T + pose.translation
     scale = pose.focal_px / -camera_points[:, 2]
     x = size[0] / 2 + camera_points[:, 0] * scale
     y = size[1] / 2 - camera_points[:, 1] * scale
@@ -73,9 +73,9 @@ def unproject(landmarks: Points, pose: HeadPose, scheme: Scheme, size: tuple[int
     So depth is the mean face's, and what a landmark says beyond that lies in the picture plane. The inverse of
     `project` for points at those depths.
     """
-    depth = -(pose.rotation.apply(scheme.canonical) + pose.translation)[:, 2]
+    camera_from_head = pose.rotation.as_matrix()
+    depth = -(scheme.canonical @ camera_from_head[2] + pose.translation[2])
     x = (landmarks[:, 0] - size[0] / 2) * depth / pose.focal_px
     y = (size[1] / 2 - landmarks[:, 1]) * depth / pose.focal_px
     camera_points = np.stack([x, y, -depth], axis=1)
-    points: NDArray[np.float64] = pose.rotation.inv().apply(camera_points - pose.translation)
-    return points
+    return np.asarray((camera_points - pose.translation) @ camera_from_head)

@@ -92,8 +92,8 @@ def _openseeface66() -> Scheme:
     return Scheme(
         name="openseeface66",
         canonical=_read_only(canonical_face().vertices[list(VERTICES_66)]),
-        # Nose, eye corners, and the ends of the jaw line for a base as wide as the head.
-        rigid=(0, 16, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 39, 42, 45),
+        # Nose, eye corners, and the jaw hinges for a base as wide as the head.
+        rigid=(1, 15, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 39, 42, 45),
         right_eye=Eye(outer=36, inner=39, lids=(36, 37, 38, 39, 40, 41), gap=((37, 38), (41, 40)), iris=()),
         left_eye=Eye(outer=45, inner=42, lids=(45, 44, 43, 42, 47, 46), gap=((44, 43), (46, 47)), iris=()),
         right_brow=(17, 18, 19, 20, 21),
