@@ -1,0 +1,127 @@
+"""The canvas that the built-in environments are painted on, and the strokes they share.
+
+Viewer axes: a latitude-longitude picture as somebody sees it who looks along −Z, where the background of the virtual
+camera lies. Its middle is −Z, right of it lies +X, row 0 is up. `bearing` is the angle from the middle to the right, in
+degrees; what lights the face from the front is at bearings beyond ±90.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.space.colour import srgb_decode
+from relit_camera.space.directions import direction_from_degrees
+
+HEIGHT, WIDTH = 512, 1024
+Canvas = NDArray[np.float32]
+"""(512, 1024, 3) linear RGB radiance, or (512, 1024) of one quantity, in viewer axes."""
+
+
+@lru_cache(maxsize=1)
+def bearings() -> tuple[Canvas, Canvas]:
+    """Bearing (512, 1024), −180 to 180, and elevation (512, 1024), 90 to −90, of the pixel centres in degrees."""
+    bearing = (np.arange(WIDTH) + 0.5) / WIDTH * 360 - 180
+    elevation = 90 - (np.arange(HEIGHT) + 0.5) / HEIGHT * 180
+    grid = np.meshgrid(bearing.astype(np.float32), elevation.astype(np.float32))
+    return grid[0], grid[1]
+
+
+@lru_cache(maxsize=1)
+def directions() -> Canvas:
+    """Unit vectors (512, 1024, 3) toward the pixel centres."""
+    bearing, elevation = bearings()
+    return direction_from_degrees(180 - bearing, elevation).astype(np.float32)
+
+
+def map_axes(canvas: Canvas) -> Canvas:
+    """A canvas as a map: mirrored, with the camera's side in the middle."""
+    return np.ascontiguousarray(np.roll(canvas[:, ::-1], WIDTH // 2, axis=1))
+
+
+def colour(code: str, strength: float = 1.0) -> NDArray[np.float32]:
+    """Linear RGB (3,) of a web colour such as "#ff8800", times `strength`."""
+    encoded = np.array([int(code[k : k + 2], 16) for k in (1, 3, 5)], np.float32) / 255
+    return srgb_decode(encoded) * np.float32(strength)
+
+
+def step(low: float, high: float, value: NDArray) -> Canvas:
+    """0 below `low`, 1 above `high` (or the other way round where low > high), smooth between (Hermite)."""
+    t = np.clip((value - low) / (high - low), 0, 1)
+    return np.asarray(t * t * (3 - 2 * t), np.float32)
+
+
+def ramp(value: NDArray, stops: Sequence[float], colours: list[NDArray[np.float32]]) -> Canvas:
+    """Colours (..., 3) at `value` (...), linear between rising `stops`."""
+    table = np.array(colours)
+    return np.stack([np.interp(value, stops, table[:, k]) for k in range(3)], axis=-1).astype(np.float32)
+
+
+def over(canvas: Canvas, mask: Canvas, paint: NDArray[np.float32]) -> Canvas:
+    """`paint` (3,) or (512, 1024, 3) laid over the canvas where the mask (512, 1024) is 1."""
+    return np.asarray(canvas + mask[..., None] * (paint - canvas), np.float32)
+
+
+def angle_from(azimuth_deg: float, elevation_deg: float) -> Canvas:
+    """Angle in degrees (512, 1024) from the direction AZ, EL (0 is toward the camera, 90 the picture's right)."""
+    cosine = directions() @ direction_from_degrees(azimuth_deg, elevation_deg).astype(np.float32)
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1, 1))), np.float32)
+
+
+def glow(azimuth_deg: float, elevation_deg: float, size_deg: float) -> Canvas:
+    """1 toward AZ, EL, falling off as a Gaussian with a sigma of `size_deg`."""
+    return np.asarray(np.exp(-0.5 * (angle_from(azimuth_deg, elevation_deg) / size_deg) ** 2), np.float32)
+
+
+def panel(
+    azimuth_deg: float, elevation_deg: float, width_deg: float, height_deg: float, soft_deg: float = 1.5
+) -> Canvas:
+    """Mask of an upright rectangle of light that faces the head, centred at AZ, EL, of these full angles."""
+    facing = direction_from_degrees(azimuth_deg, elevation_deg)
+    right = direction_from_degrees(azimuth_deg + 90, 0)
+    axes = np.stack([right, np.cross(facing, right), facing]).astype(np.float32)
+    u, v, depth = np.moveaxis(directions() @ axes.T, -1, 0)
+    inside = [
+        step(size / 2 + soft_deg, size / 2 - soft_deg, np.abs(np.degrees(np.arctan2(offset, np.maximum(depth, 1e-6)))))
+        for offset, size in ((u, width_deg), (v, height_deg))
+    ]
+    return np.where(depth > 0, inside[0] * inside[1], 0).astype(np.float32)
+
+
+def noise(u: NDArray, v: NDArray, seed: int, octaves: int = 5) -> Canvas:
+    """Fractal noise, about −1 to 1, of the shape of u and v; its coarsest grain has a size of 1, its period is 64."""
+    tile = np.random.default_rng(seed).standard_normal((64, 64)).astype(np.float32)
+    total = np.zeros(np.shape(u), np.float32)
+    for octave in range(octaves):
+        scale = 2.0**octave
+        x, y = (np.mod(np.asarray(w) * scale + 17.3 * octave, 64).astype(np.float32) for w in (u, v))
+        total += cv2.remap(tile, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_WRAP) / np.float32(scale)
+    return np.asarray(total / 1.6, np.float32)
+
+
+def stamp(canvas: Canvas, bearing: float, elevation: float, radius_deg: float, light: NDArray[np.float32]) -> None:
+    """Add a disc out of focus, evenly bright with a soft edge and a brighter rim, near the horizon. In place."""
+    scale = WIDTH / 360
+    x, y, radius = (bearing + 180) * scale - 0.5, (90 - elevation) * scale - 0.5, radius_deg * scale
+    reach = int(np.ceil(radius)) + 2
+    columns = np.arange(int(x) - reach, int(x) + reach + 1)
+    rows = np.arange(max(0, int(y) - reach), min(HEIGHT, int(y) + reach + 1))
+    distance = np.hypot(columns - x, rows[:, None] - y)
+    disc = np.clip(radius + 0.5 - distance, 0, 1) * (0.8 + 0.4 * np.clip(distance / radius, 0, 1) ** 4)
+    canvas[np.ix_(rows, columns % WIDTH)] += disc[..., None] * light
+
+
+def blur(canvas: Canvas, sigma_x_deg: float, sigma_y_deg: float) -> Canvas:
+    """The canvas, blurred by Gaussians of these sigmas at the horizon, wrapping round."""
+    scale = WIDTH / 360
+    margin = int(3 * sigma_x_deg * scale) + 1
+    wrapped = np.concatenate([canvas[:, -margin:], canvas, canvas[:, :margin]], axis=1)
+    soft = cv2.GaussianBlur(
+        wrapped, (0, 0), sigmaX=max(sigma_x_deg * scale, 0.1), sigmaY=max(sigma_y_deg * scale, 0.1),
+        borderType=cv2.BORDER_REPLICATE,
+    )  # fmt: skip
+    return np.ascontiguousarray(soft[:, margin:-margin], dtype=np.float32)

@@ -1,0 +1,132 @@
+"""A room with tall windows on the left: soft daylight from the side, a wooden floor, a lamp in the corner behind."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relit_camera.light.builtin.canvas import Canvas, blur, colour, directions, noise, over, ramp, step
+
+LEFT, RIGHT, BACK, FRONT, FLOOR, CEILING = -2.3, 2.9, -4.6, 3.4, -1.25, 1.75
+"""Walls of the room in metres from the head, in the project's axes."""
+SIDE_WINDOWS = ((-2.6, -1.2), (-0.2, 1.2), (1.6, 3.0))
+"""From and to along z on the left wall."""
+BACK_WINDOW = (-1.9, -0.75)
+"""From and to along x on the wall behind."""
+SILL, LINTEL = -0.55, 1.45
+DAYLIGHT = 7.0
+LAMP = np.array([2.25, 0.15, -4.1], np.float32)
+_SOFT = 0.015
+"""Metres over which edges fade: about half a pixel at the wall behind."""
+
+
+def paint() -> Canvas:
+    """Radiance (512, 1024, 3) in viewer axes."""
+    direction = directions()
+    low, high = np.array([LEFT, FLOOR, BACK], np.float32), np.array([RIGHT, CEILING, FRONT], np.float32)
+    with np.errstate(divide="ignore"):
+        reach = np.where(direction < 0, low, high) / direction
+    wall = np.argmin(reach, axis=-1)
+    point = (direction * np.min(reach, axis=-1, keepdims=True)).astype(np.float32)
+    back = (wall == 2) & (direction[..., 2] < 0)
+    canvas = _surfaces(point, wall, back) * _daylight(point, wall)[..., None] * colour("#f2f5ff")
+    canvas = canvas + _lamp_light(point, wall)
+    x, y, z = np.moveaxis(point, -1, 0)
+    for span in SIDE_WINDOWS:
+        canvas = _window(canvas, (wall == 0) & (x < 0), z, y, span)
+    canvas = _window(canvas, back, x, y, BACK_WINDOW)
+    return _lamp(blur(canvas, 0.12, 0.12))
+
+
+def _daylight(point: Canvas, wall: np.ndarray) -> Canvas:
+    """Irradiance over π (512, 1024) from the windows, as two patches each, and once more off the walls."""
+    height, middle = LINTEL - SILL, (LINTEL + SILL) / 2
+    patches = [((LEFT, middle + dy, (low + high) / 2), 0, (high - low) * height / 2)
+               for low, high in SIDE_WINDOWS for dy in (-height / 4, height / 4)]  # fmt: skip
+    patches.append(((sum(BACK_WINDOW) / 2, middle, BACK), 2, (BACK_WINDOW[1] - BACK_WINDOW[0]) * height))
+    total = np.zeros(wall.shape, np.float32)
+    for centre, axis, area in patches:
+        toward = np.array(centre, np.float32) - point
+        # Walls face inward and points lie inside, so both cosines are lengths along an axis.
+        received = np.abs(np.take_along_axis(toward, wall[..., None], axis=-1)[..., 0]) * np.abs(toward[..., axis])
+        total += np.float32(area / np.pi) * received / ((toward**2).sum(axis=-1) + np.float32(area / 2)) ** 2
+    # Light off the other walls: about even, a little less in the corners.
+    corner = np.full(wall.shape, 9, np.float32)
+    for axis, (low, high) in enumerate(((LEFT, RIGHT), (FLOOR, CEILING), (BACK, FRONT))):
+        distance = np.minimum(point[..., axis] - low, high - point[..., axis])
+        corner = np.where(wall == axis, corner, np.minimum(corner, distance))
+    bounce = 0.075 * (1 - 0.55 * np.exp(-corner / 0.5))
+    return np.asarray(DAYLIGHT * (total + bounce), np.float32)
+
+
+def _surfaces(point: Canvas, wall: np.ndarray, back: np.ndarray) -> Canvas:
+    """Albedo (512, 1024, 3) of walls, ceiling, planks, rug, skirting and the picture."""
+    x, y, z = np.moveaxis(point, -1, 0)
+    paint = np.where(back[..., None], colour("#c3cbc9"), colour("#d9cfc1"))
+    paint = paint * (1 + 0.02 * noise(3 * (x + z), 3 * y, 60, 3))[..., None]
+    paint = over(paint, step(FLOOR + 0.13, FLOOR + 0.11, y), colour("#e8e4dc"))
+    paint = _picture(paint, back, x, y)
+    flat = wall == 1
+    paint = np.where((flat & (y > 0))[..., None], colour("#ece8e0"), paint)
+    plank = np.floor(x / 0.16).astype(np.intp)
+    shade = np.random.default_rng(62).uniform(-0.5, 0.5, 64)[plank % 64] + 0.35 * noise(
+        14 * x, 1.2 * z + 5 * plank, 61, 4
+    )
+    seam = 1 - 0.5 * step(0.44, 0.5, np.abs(x / 0.16 - plank - 0.5))
+    wood = ramp(shade, [-1, 0, 1], [colour("#6e4a2e"), colour("#94683f"), colour("#b98a58")]) * seam[..., None]
+    from_middle = np.hypot(x - 0.3, z + 2.4)
+    rug = colour("#8f4b3a") * (1 + 0.15 * np.tanh(4 * np.sin(from_middle * 14)))[..., None]
+    wood = over(wood, step(1.32, 1.28, from_middle), rug)
+    return np.where((flat & (y < 0))[..., None], wood, paint).astype(np.float32)
+
+
+def _picture(paint: Canvas, back: np.ndarray, x: Canvas, y: Canvas) -> Canvas:
+    """A framed landscape on the wall behind."""
+    across, up = (x - 1.35) / 0.55, (y - 0.5) / 0.42
+    hills = ramp(up + 0.35 * noise(1.5 * across, 0.3 * up, 63, 4), [-1, -0.3, 0, 0.35, 1], [
+        colour("#23415a"), colour("#2f6d7c"), colour("#d98a53"), colour("#eec591"), colour("#a9c6cf"),
+    ])  # fmt: skip
+    for size, layer in ((1.12, colour("#2b2320")), (1.04, colour("#f1ede4")), (0.84, hills)):
+        edge = np.maximum(np.abs(x - 1.35) - 0.55 * size, np.abs(y - 0.5) - 0.42 * size)
+        paint = over(paint, back * step(_SOFT, -_SOFT, edge), layer)
+    return paint
+
+
+def _window(canvas: Canvas, wall: np.ndarray, along: Canvas, up: Canvas, span: tuple[float, float]) -> Canvas:
+    """A window let into a wall: frame, mullions, and the bright world outside."""
+    middle, half = (span[0] + span[1]) / 2, (span[1] - span[0]) / 2
+    height = (up - SILL) / (LINTEL - SILL)
+    edge = np.maximum(np.abs(along - middle) - half, np.abs(up - (SILL + LINTEL) / 2) - (LINTEL - SILL) / 2)
+    to_bar = np.minimum.reduce([
+        np.abs(along - middle), np.abs(np.abs(along - middle) - half),
+        np.abs(np.mod(height * 3 + 0.5, 1) - 0.5) * (LINTEL - SILL) / 3,
+    ])  # fmt: skip
+    outside = ramp(height + 0.10 * noise(5 * along, 4 * up, 64, 4), [0, 0.22, 0.34, 0.5, 1], [
+        colour("#5d7a4a", 0.3), colour("#86a06c", 0.4), colour("#d5e2e6", 0.8), colour("#e9f2fb", 1.0),
+        colour("#dcebff", 1.1),
+    ])  # fmt: skip
+    view = over(outside * np.float32(DAYLIGHT), step(0.025 + _SOFT, 0.025 - _SOFT, to_bar), colour("#e9e6df", 0.45))
+    canvas = over(canvas, wall * step(0.09 + _SOFT, 0.09 - _SOFT, edge), colour("#f4f1ea", 0.7))
+    return over(canvas, wall * step(_SOFT, -_SOFT, edge), view)
+
+
+def _lamp_light(point: Canvas, wall: np.ndarray) -> Canvas:
+    """Warm light on the walls from the lamp in the corner, behind on the right."""
+    squared = ((point - LAMP) ** 2).sum(axis=-1)
+    warm = np.where(wall == 2, 0.10 / (0.12 + squared), 0.05 / (0.2 + squared))
+    return np.asarray(warm[..., None] * colour("#ffb56b", 1.6), np.float32)
+
+
+def _lamp(canvas: Canvas) -> Canvas:
+    """The lamp's cloth shade, wider below, on its pole."""
+    direction = directions()
+    depth = LAMP[2] / np.minimum(direction[..., 2], -1e-3)
+    across, up = direction[..., 0] * depth - LAMP[0], direction[..., 1] * depth - LAMP[1]
+    ahead = direction[..., 2] < -0.1
+    pole = ahead * step(0.02 + _SOFT, 0.02 - _SOFT, np.abs(across)) * (up < 0) * (up > FLOOR - LAMP[1])
+    canvas = over(canvas, pole.astype(np.float32), colour("#1e1a18"))
+    half = 0.24 - 0.25 * up
+    edge = np.maximum(np.abs(across) - half, np.abs(up) - 0.18)
+    inner = 1.0 + 0.8 * np.exp(-((up / 0.1) ** 2) - (across / 0.15) ** 2)
+    return over(
+        canvas, ahead * step(_SOFT, -_SOFT, edge), (inner[..., None] * colour("#ffc98a", 2.2)).astype(np.float32)
+    )

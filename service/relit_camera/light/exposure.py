@@ -1,0 +1,27 @@
+"""The scale at which the light of an environment is shown."""
+
+from __future__ import annotations
+
+from relit_camera.light.maps import LightMap, irradiance, total
+from relit_camera.space.colour import LUMINANCE
+
+WHITE_BALL_READING = 0.8
+"""What a white diffuse ball reads, in luminance, at the point that faces the camera."""
+_FLOOR = 0.2
+"""Least share of the mean over the ball's whole surface that its facing point is taken to receive."""
+
+
+def display_scale(light_map: LightMap) -> float:
+    """The factor by which linear pictures under `light_map` are multiplied to be shown; 1 for no light at all.
+
+    With it the point of a white diffuse ball that faces the camera, irradiance Σ E·ω·max(0, z), has luminance 0.8, in
+    units where a white wall facing a lamp of unit irradiance reads 1.
+
+    Light from behind alone never reaches that point, and the scale would grow without bound. Below a fifth of the mean
+    irradiance of the ball's surface, Σ E·ω / 4, the facing point is taken to receive that fifth: such a face is shown
+    darker than others, a lamp right behind it at most 16 times its irradiance.
+    """
+    facing = float(irradiance(light_map, (0.0, 0.0, 1.0)) @ LUMINANCE)
+    mean = float(total(light_map) @ LUMINANCE) / 4
+    reference = max(facing, _FLOOR * mean)
+    return WHITE_BALL_READING / reference if reference > 0 else 1.0

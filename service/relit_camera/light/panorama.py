@@ -1,0 +1,148 @@
+"""Panorama files: light from all sides, as a latitude-longitude picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.errors import ImageError, PanoramaError
+from relit_camera.light.maps import resample_by_area
+from relit_camera.light.picture_size import picture_size
+from relit_camera.space.directions import texel_solid_angles
+from relit_camera.space.picture_files import read_linear
+from relit_camera.space.quiet import quiet_decoders
+
+Axes = Literal["picture", "map"]
+"""How a panorama file is laid out: `picture` as seen from inside the sphere, so that −X lies to the right of its middle
+(what cameras and renderers write); `map` as a light map is, +X to the right."""
+
+SUFFIXES = frozenset({".hdr", ".exr", ".png", ".jpg", ".jpeg"})
+MAX_PIXELS = 64_000_000
+_LARGEST = 1e9
+"""Radiance above this is no light (the sun is 3e4 to 1e5 times the sky) and would overflow sums in float32."""
+_ROUNDING = 1e-6
+"""Negative values down to this share of the maximum are rounding of the program that wrote the file, and become 0."""
+_CLIPPED = 0.99
+"""Linear value from which an 8-bit picture counts as clipped: codes 254 and 255, since JPEG wobbles by one."""
+
+
+@dataclass(frozen=True)
+class Panorama:
+    """Light from all sides at a file's resolution.
+
+    Attributes:
+        radiance: float32 (h, 2h, 3), linear RGB, non-negative, in map axes (row 0 up, the middle toward the camera).
+        clipped_fraction: share of the sphere where an LDR picture is clipped at white; 0 for HDR.
+        notes: what a person should know about it, one sentence each.
+    """
+
+    radiance: NDArray[np.float32]
+    clipped_fraction: float = 0.0
+    notes: tuple[str, ...] = field(default=())
+
+
+def read_panorama(path: Path, axes: Axes = "picture") -> Panorama:
+    """Read a .hdr, .exr, .png or .jpg panorama.
+
+    `.png` and `.jpg` are linearised by the sRGB curve; their clipped share is kept and said in a note. A picture in
+    `picture` axes is mirrored. A width that misses 2:1 by one or two pixels is resampled by area.
+
+    Raises:
+        PanoramaError: missing, damaged, of another format, not 2:1, too large, black, or with NaN, infinite or negative
+            values.
+    """
+    path = Path(path)
+    _check_header(path)
+    try:
+        with quiet_decoders():
+            image = read_linear(path)
+    except ImageError as error:
+        raise PanoramaError(error.what, error.cure) from error
+    except OSError as error:
+        raise _unreadable(path, error) from error
+    clipped = _clipped_fraction(image) if path.suffix.lower() not in (".hdr", ".exr") else 0.0
+    notes = () if clipped == 0 else (_clipped_note(clipped),)
+    return Panorama(_as_map(image, axes, str(path)), clipped, notes)
+
+
+def panorama_from_radiance(radiance: NDArray[np.float32], name: str = "panorama") -> Panorama:
+    """A panorama of radiance (h, about 2h, 3) in map axes, checked as a file's.
+
+    Raises:
+        PanoramaError: not 2:1, black, or with NaN, infinite or negative values.
+    """
+    height, width = radiance.shape[:2]
+    _check_size(width, height, name)
+    return Panorama(_as_map(radiance, "map", name))
+
+
+def _check_header(path: Path) -> None:
+    if path.is_dir() or not path.exists():
+        raise PanoramaError(f"no panorama at {path}", "check the path")
+    if path.suffix.lower() not in SUFFIXES:
+        raise PanoramaError(f"{path}: '{path.suffix}' is no panorama format known here", "use .hdr, .exr, .png or .jpg")
+    try:
+        with quiet_decoders():
+            width, height = picture_size(path)
+    except ValueError as error:
+        raise PanoramaError(f"{path} cannot be read: {error}", "save or download it again") from error
+    except OSError as error:
+        raise _unreadable(path, error) from error
+    _check_size(width, height, str(path))
+
+
+def _unreadable(path: Path, error: OSError) -> PanoramaError:
+    return PanoramaError(f"cannot read {path}: {error.strerror}", "check the path and your permission to read it")
+
+
+def _check_size(width: int, height: int, name: str) -> None:
+    size = f"{name} is {width}x{height} pixels"
+    if width < 2 or height < 1 or abs(width - 2 * height) > 2:
+        raise PanoramaError(
+            f"{size}, not twice as wide as high", "use a 360° latitude-longitude (equirectangular) panorama"
+        )
+    if width * height > MAX_PIXELS:
+        raise PanoramaError(f"{size}, more than {MAX_PIXELS // 10**6} million", "scale it down; 2048x1024 is plenty")
+
+
+def _as_map(image: NDArray[np.float32], axes: Axes, name: str) -> NDArray[np.float32]:
+    radiance = _checked(image, name)
+    height = max(1, image.shape[1] // 2)
+    if radiance.shape[:2] != (height, 2 * height):
+        radiance = resample_by_area(radiance, height, 2 * height)
+    return np.ascontiguousarray(radiance[:, ::-1] if axes == "picture" else radiance)
+
+
+def _checked(image: NDArray[np.float32], name: str) -> NDArray[np.float32]:
+    """The image, rounding below 0 cut; PanoramaError where it cannot be light."""
+    cure = "export it again from the program that made it"
+    usable = np.isfinite(image) & (np.abs(image) <= _LARGEST)
+    if not usable.all():
+        row, column = np.argwhere(~usable)[0][:2]
+        raise PanoramaError(
+            f"{name} holds NaN, infinity or values beyond 1e9, first at row {row}, column {column}", cure
+        )
+    lowest, highest = float(image.min()), float(image.max())
+    if highest <= 0 and lowest >= 0:
+        raise PanoramaError(f"{name} is all black", "use a panorama that has light in it")
+    if lowest < -_ROUNDING * highest:
+        row, column = np.unravel_index(int(image.argmin()), image.shape)[:2]
+        raise PanoramaError(f"{name} holds negative light, {lowest:.3g} at row {row}, column {column}", cure)
+    return np.maximum(image, 0).astype(np.float32)
+
+
+def _clipped_fraction(image: NDArray[np.float32]) -> float:
+    clipped = (image >= _CLIPPED).any(axis=2)
+    weights = texel_solid_angles(*image.shape[:2])
+    return float((clipped * weights).sum() / weights.sum())
+
+
+def _clipped_note(fraction: float) -> str:
+    return (
+        f"{100 * fraction:.2g} % of the sphere is clipped at white: its lamps and windows are dimmer here than they "
+        "were. A .hdr or .exr panorama keeps them."
+    )
