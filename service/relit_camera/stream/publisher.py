@@ -1,0 +1,166 @@
+"""Gives the sink a picture at every tick of its own clock, whatever the pipeline does."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from relit_camera.space.images import DisplayImage
+from relit_camera.stream.sinks.base import Sink
+from relit_camera.stream.slot import Slot
+from relit_camera.stream.status import FrameCounts, Percentiles
+from relit_camera.stream.timing import DurationWindow, Pacer, RateMeter
+
+log = logging.getLogger(__name__)
+
+RETRY_S = 1.0
+"""Pause after a failed write."""
+
+STOP_S = 1.0
+
+
+@dataclass(frozen=True)
+class PublishedPicture:
+    """A finished picture on its way to the sink.
+
+    Attributes:
+        image: uint8 sRGB RGB (height, width, 3), of the sink's size; not written to any more.
+        captured_at: monotonic seconds at which the frame it was made from arrived; latency is measured from here.
+        frame_index: that frame's index.
+    """
+
+    image: DisplayImage
+    captured_at: float
+    frame_index: int
+
+
+class Publisher:
+    """Writes to the sink at a steady rate: the newest picture, else the last again, else the placeholder.
+
+    It never waits for the pipeline, and a sink that fails is tried again every second. The sink belongs to the caller,
+    who closes it after `stop`.
+
+    Attributes:
+        pictures: the slot to put finished pictures in.
+        shown: what was written last, for previews: repeated pictures are not put again.
+        placeholder: uint8 sRGB RGB (height, width, 3), of the sink's size; may be replaced at any time.
+    """
+
+    def __init__(
+        self,
+        sink: Sink,
+        fps: float,
+        placeholder: DisplayImage,
+        *,
+        stale_after_s: float | None = None,
+        on_sink_error: Callable[[Exception | None], None] | None = None,
+    ) -> None:
+        """Set up; `start` begins.
+
+        Args:
+            sink: where pictures go.
+            fps: pictures a second.
+            placeholder: shown until the first picture comes.
+            stale_after_s: show the placeholder again when no picture came for this long; None repeats the last for
+                ever.
+            on_sink_error: called in the publisher's thread with the error when the sink begins to fail, and with None
+                when it works again.
+        """
+        self.pictures: Slot[PublishedPicture] = Slot()
+        self.shown: Slot[DisplayImage] = Slot()
+        self.placeholder = placeholder
+        self._sink = sink
+        self._fps = fps
+        self._stale_after_s = stale_after_s
+        self._on_sink_error = on_sink_error or (lambda error: None)
+        self._newest = self.pictures.reader()
+        self._last: PublishedPicture | None = None
+        self._failing = False
+        self._retry_at = 0.0
+        self._published = self._repeated = 0
+        self._rate = RateMeter()
+        self._latency = DurationWindow()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="publisher", daemon=True)
+
+    def start(self) -> None:
+        """Begin to publish."""
+        self._thread.start()
+
+    def stop(self) -> bool:
+        """End the thread. Returns whether it ended within a second: it does unless the sink is stuck."""
+        self._stopping.set()
+        if self._thread.ident is not None:
+            self._thread.join(STOP_S)
+        self.shown.close()
+        return not self._thread.is_alive()
+
+    @property
+    def counts(self) -> FrameCounts:
+        """Pictures written, those of them that were written before, and those passed over for newer ones."""
+        return FrameCounts(self._published, self._newest.dropped, self._repeated)
+
+    @property
+    def fps(self) -> float:
+        """Pictures written a second."""
+        return self._rate.rate()
+
+    @property
+    def latency_ms(self) -> Percentiles:
+        """From a frame's arrival to the end of writing its picture."""
+        return self._latency.percentiles()
+
+    def _run(self) -> None:
+        pacer = Pacer(self._fps, time.monotonic())
+        while not self._stopping.wait(max(0.0, pacer.deadline - time.monotonic())):
+            now = time.monotonic()
+            picture = self._newest.get(0)
+            self._tick(picture, now)
+            pacer.advance(time.monotonic(), None if picture is None else now - self._newest.put_at)
+
+    def _tick(self, picture: PublishedPicture | None, now: float) -> None:
+        if picture is not None:
+            self._last = picture
+        image = self._image(now)
+        if not self._write(image, now):
+            return
+        done = time.monotonic()
+        self._published += 1
+        self._rate.tick(done)
+        if picture is None:
+            self._repeated += 1
+        else:
+            self._latency.add(done - picture.captured_at)
+        self._show(image)
+
+    def _image(self, now: float) -> DisplayImage:
+        last = self._last
+        stale = self._stale_after_s is not None and now - self._newest.put_at > self._stale_after_s
+        return self.placeholder if last is None or stale else last.image
+
+    def _show(self, image: DisplayImage) -> None:
+        found = self.shown.newer(0, 0)
+        if found is None or found[1] is not image:
+            self.shown.put(image)
+
+    def _write(self, image: DisplayImage, now: float) -> bool:
+        """Write, unless the last failure is too recent. Whatever a sink raises must not end the picture."""
+        if self._failing and now < self._retry_at:
+            return False
+        try:
+            self._sink.write(image)
+        except Exception as error:
+            self._retry_at = time.monotonic() + RETRY_S
+            if not self._failing:
+                self._failing = True
+                log.warning("publishing fails, trying again every %.0f s: %s", RETRY_S, error)
+                self._on_sink_error(error)
+            return False
+        if self._failing:
+            self._failing = False
+            log.info("publishing works again")
+            self._on_sink_error(None)
+        return True

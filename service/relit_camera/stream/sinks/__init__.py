@@ -1,0 +1,1 @@
+"""Where finished pictures go: virtual camera, video file, nowhere, behind one protocol."""

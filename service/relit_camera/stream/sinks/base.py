@@ -1,0 +1,49 @@
+"""What every sink is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from relit_camera.space.images import DisplayImage
+
+
+@dataclass(frozen=True)
+class SinkInfo:
+    """What a sink is.
+
+    Attributes:
+        kind: camera, file or null.
+        id: device node, path, or empty.
+        size: width and height in pixels that it takes, fixed for its life.
+    """
+
+    kind: str
+    id: str
+    size: tuple[int, int]
+
+
+class Sink(Protocol):
+    """Takes pictures from one thread, all of one size. After a failure it may be written to again: it tries anew."""
+
+    def write(self, image: DisplayImage) -> None:
+        """Show or keep a picture, uint8 sRGB RGB (height, width, 3).
+
+        Raises:
+            DeviceError: the virtual camera is gone or in use.
+            StorageError: the file cannot be written.
+            ImageError: the picture has another size.
+        """
+        ...
+
+    def describe(self) -> SinkInfo:
+        """Say what the sink is."""
+        ...
+
+    def close(self) -> None:
+        """Finish. Harmless when repeated.
+
+        Raises:
+            StorageError: the end of the file cannot be written.
+        """
+        ...

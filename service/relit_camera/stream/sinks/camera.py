@@ -1,0 +1,139 @@
+"""The virtual camera as sink, through pyvirtualcam."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import numpy as np
+
+from relit_camera.errors import DeviceError, InputError
+from relit_camera.space.images import DisplayImage, check_image
+from relit_camera.stream.devices import (
+    OWN_LABEL,
+    SYSTEM,
+    DeviceTree,
+    find_virtual_camera,
+    load_command,
+    negotiated_size,
+)
+from relit_camera.stream.sinks.base import SinkInfo
+from relit_camera.stream.sinks.loopback import revive
+
+OpenCamera = Callable[..., Any]
+"""`pyvirtualcam.Camera` or a stand-in: (width, height, fps, device=node) → object with `send` and `close`."""
+
+
+class CameraSink:
+    """Shows pictures as the virtual camera of one label, at one fixed size.
+
+    A device that a reader still holds keeps its old size whatever is asked for; then pictures are scaled to it.
+    After a failed write the next one opens the device again.
+    """
+
+    def __init__(
+        self,
+        size: tuple[int, int],
+        fps: float,
+        label: str = OWN_LABEL,
+        *,
+        device: str | None = None,
+        tree: DeviceTree = SYSTEM,
+        open_camera: OpenCamera | None = None,
+    ) -> None:
+        """Open the device.
+
+        Args:
+            size: width and height of the pictures that will come, both even.
+            fps: frames a second, a hint for some systems' virtual cameras.
+            label: name of the device (Linux).
+            device: node such as /dev/video10, instead of the label.
+            tree: where devices are looked for.
+            open_camera: `pyvirtualcam.Camera` if not given.
+
+        Raises:
+            InputError: an odd size: readers of the camera would get no picture.
+            DeviceError: there is no such device, or it is in use; the cure says what to run.
+        """
+        if size[0] % 2 or size[1] % 2:
+            raise InputError(f"a virtual camera cannot be {size[0]}x{size[1]}", "use an even width and height")
+        self._size, self._fps, self._label, self._device, self._tree = size, fps, label, device, tree
+        self._by_node = sys.platform.startswith("linux") or tree is not SYSTEM
+        self._open_camera = open_camera or _pyvirtualcam
+        self._camera: Any = None
+        self._camera_size = size
+        self._node = ""
+        self._open()
+
+    def write(self, image: DisplayImage) -> None:
+        """Show a picture, uint8 sRGB RGB (height, width, 3).
+
+        Raises:
+            DeviceError: the device is gone or in use.
+            ImageError: the array is no picture.
+        """
+        check_image(image, np.uint8, "picture to show")
+        if self._camera is None:
+            self._open()
+        if (image.shape[1], image.shape[0]) != self._camera_size:
+            image = cv2.resize(image, self._camera_size, interpolation=cv2.INTER_AREA)
+        try:
+            self._camera.send(np.ascontiguousarray(image))
+        except (RuntimeError, OSError) as error:
+            self.close()
+            raise DeviceError(f"the virtual camera {self._node} takes no pictures: {error}") from error
+
+    def describe(self) -> SinkInfo:
+        """Say what the sink is."""
+        return SinkInfo("camera", self._node, self._camera_size)
+
+    def close(self) -> None:
+        """Let go of the device."""
+        camera, self._camera = self._camera, None
+        if camera is not None:
+            camera.close()
+
+    def _open(self) -> None:
+        node = None
+        if self._by_node:
+            node = self._device or find_virtual_camera(self._tree, self._label).node
+            if not os.access(node, os.R_OK | os.W_OK):
+                raise DeviceError(
+                    f"no permission to write to {node}", 'run: sudo usermod -aG video "$USER", log in again'
+                )
+            revive(node, self._tree)
+        self._camera, self._camera_size = self._open_at(self._size, node), self._size
+        actual = negotiated_size(node, self._tree) if node else None
+        if actual is not None and actual != self._size:
+            self.close()
+            self._camera, self._camera_size = self._open_at(actual, node), actual
+        self._node = node or str(getattr(self._camera, "device", ""))
+
+    def _open_at(self, size: tuple[int, int], node: str | None) -> Any:
+        try:
+            return self._open_camera(*size, self._fps, device=node)
+        except ImportError as error:
+            raise DeviceError(
+                f"pyvirtualcam cannot be used: {error}", "install it: pip install pyvirtualcam"
+            ) from error
+        except RuntimeError as error:
+            raise self._explained(str(error), node) from error
+
+    def _explained(self, message: str, node: str | None) -> DeviceError:
+        if node is None:
+            return DeviceError(
+                f"there is no virtual camera: {message}", "install OBS Studio and start its virtual camera once"
+            )
+        if "output device" in message or "in use" in message or "busy" in message.lower():
+            cure = f"stop it; if there is none, run: sudo modprobe -r v4l2loopback && {load_command(self._label)}"
+            return DeviceError(f"{node} is in use by another program that publishes to it", cure)
+        return DeviceError(f"{node} cannot be opened: {message}", f"run: {load_command(self._label)}")
+
+
+def _pyvirtualcam(width: int, height: int, fps: float, device: str | None) -> Any:
+    import pyvirtualcam
+
+    return pyvirtualcam.Camera(width, height, fps, device=device)

@@ -1,0 +1,36 @@
+"""From what a person writes after `--sink` to a sink."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from relit_camera.config.settings import OutputSettings
+from relit_camera.errors import InputError
+from relit_camera.stream.devices import SYSTEM, DeviceTree
+from relit_camera.stream.sinks.base import Sink
+from relit_camera.stream.sinks.camera import CameraSink
+from relit_camera.stream.sinks.file import FileSink
+from relit_camera.stream.sinks.null import NullSink
+from relit_camera.stream.video_writer import VIDEO_SUFFIXES
+
+
+def open_sink(settings: OutputSettings, tree: DeviceTree = SYSTEM) -> Sink:
+    """Open the sink that `settings.sink` names: `camera`, `null`, a node such as /dev/video10, or a video file.
+
+    Raises:
+        InputError: none of these.
+        DeviceError: the virtual camera is missing or in use.
+        StorageError: the file cannot be written.
+    """
+    text, size, fps = settings.sink, (settings.width, settings.height), settings.fps
+    if text == "null":
+        return NullSink(size)
+    if text == "camera":
+        return CameraSink(size, fps, settings.label, tree=tree)
+    if text.startswith(str(tree.dev / "video")):
+        return CameraSink(size, fps, settings.label, device=text, tree=tree)
+    path = Path(text).expanduser()
+    if path.suffix.lower() in VIDEO_SUFFIXES:
+        return FileSink(path, size, fps)
+    endings = ", ".join(sorted(VIDEO_SUFFIXES))
+    raise InputError(f"unknown sink '{text}'", f"use camera, null, /dev/videoN, or a file ending in {endings}")

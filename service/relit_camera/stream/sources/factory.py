@@ -1,0 +1,55 @@
+"""From what a person writes after `--source` to a source."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from relit_camera.config.settings import SourceSettings
+from relit_camera.errors import DeviceError, VideoError
+from relit_camera.space.picture_files import LDR_SUFFIXES
+from relit_camera.stream.devices import OWN_LABEL, SYSTEM, DeviceTree
+from relit_camera.stream.sources.base import Source
+from relit_camera.stream.sources.file import file_source
+from relit_camera.stream.sources.pattern import pattern_source
+from relit_camera.stream.sources.still import still_source
+from relit_camera.stream.sources.webcam import WebcamSource
+
+
+def open_source(
+    settings: SourceSettings,
+    *,
+    loop: bool = True,
+    realtime: bool = True,
+    own_label: str = OWN_LABEL,
+    tree: DeviceTree = SYSTEM,
+) -> Source:
+    """Make the source that `settings.source` names: `webcam`, a camera's id, `pattern`, a picture or a video file.
+
+    Args:
+        settings: source, and the size and rate to ask of a camera or pattern.
+        loop: a file begins anew after its end.
+        realtime: files, pictures and pattern keep their own time; otherwise they are as fast as their reader.
+        own_label: name of the virtual camera that is published to: never a source.
+        tree: where cameras are looked for.
+
+    Raises:
+        DeviceError: no such camera; the cure lists those that there are.
+        VideoError: the file is missing or is no video.
+        ImageError: the picture file cannot be read.
+    """
+    text, size = settings.source, (settings.width, settings.height)
+    path = Path(text).expanduser()
+    if text == "pattern":
+        return pattern_source(size, settings.fps, realtime=realtime)
+    if path.is_file():
+        if path.suffix.lower() in LDR_SUFFIXES:
+            return still_source(path, settings.fps, loop=loop, realtime=realtime)
+        return file_source(path, loop=loop, realtime=realtime)
+    try:
+        return WebcamSource(text, size, settings.fps, tree=tree, own_label=own_label)
+    except DeviceError as error:
+        if path.suffix and not text.startswith(str(tree.dev)):
+            raise VideoError(
+                f"there is no file {text}", "check the path, or see 'relit devices' for cameras"
+            ) from error
+        raise
