@@ -1,0 +1,115 @@
+"""Light from the virtual background: an environment guessed from a picture that is seen behind the person.
+
+A heuristic, and an honest one: a picture shows the light behind the person, never what lights the face from the front.
+The picture is placed where it is seen, its edges are drawn out round the sphere, softer with distance, and the half of
+the room that nobody sees is taken to mirror the half that is seen, very soft. So a bright window at the viewer's left
+lights the left rim, sharply, and the left of the face, softly. Thesis Fig. 1.1 is the motive.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.light.panorama import Panorama
+from relit_camera.space.directions import texel_directions
+from relit_camera.space.images import LinearImage
+
+HEIGHT_DEG = 35.0
+"""How high an environment is seen behind the person, in degrees."""
+
+_HEIGHT, _WIDTH = 256, 512
+_FINEST = 96
+"""Rows that the picture is shrunk to: about twice what it covers on the sphere."""
+_SOFTEST = 0.35
+"""Sigma, in picture heights, of the softest copy; it is reached `_SOFTEST_AT` degrees outside the picture."""
+_SOFTEST_AT = 70.0
+_COPIES = 6
+_BOOST = 7.0
+"""A clipped highlight is taken to be up to 1 + 7 times, three stops, as bright as white."""
+_LARGEST_LAMP = 0.25
+"""Where more than this share of the picture is clipped, it is a white wall or an overexposed sky: no boost."""
+_SEAM = 4.0
+"""A 2:1 picture counts as a panorama where its sides differ at most so much more than neighbouring columns do."""
+
+
+def environment_from_picture(picture: LinearImage, height_deg: float = HEIGHT_DEG) -> Panorama:
+    """The panorama that lights a person in front of `picture`, linear RGB (H, W, 3) as the viewer sees it.
+
+    The picture appears along −Z, `height_deg` high, its left at the viewer's left. A 2:1 panorama (its sides meet, its
+    top and bottom rows are each one colour) is used exactly, in `picture` axes.
+    """
+    if _is_panorama(picture):
+        return Panorama(
+            np.ascontiguousarray(picture[:, ::-1]), notes=("The background is a panorama: its light is exact.",)
+        )
+    bright = _with_highlights(_shrunk(picture))
+    radiance = _round_the_sphere(bright, height_deg)
+    return Panorama(radiance, notes=("Guessed from an ordinary picture: the light in front of it is not known.",))
+
+
+def _is_panorama(picture: LinearImage) -> bool:
+    height, width = picture.shape[:2]
+    if width != 2 * height or height < 16:
+        return False
+    encoded = np.sqrt(np.clip(picture, 0, 1))
+    neighbours = np.abs(np.diff(encoded, axis=1)).mean()
+    seam = np.abs(encoded[:, 0] - encoded[:, -1]).mean()
+    poles = encoded[[0, -1]].std(axis=1).mean()
+    return bool(seam <= _SEAM * neighbours + 0.01 and poles <= 0.05)
+
+
+def _shrunk(picture: LinearImage) -> LinearImage:
+    scale = min(1.0, _FINEST / picture.shape[0])
+    size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _with_highlights(picture: LinearImage) -> LinearImage:
+    """The picture with what is clipped at white raised toward what a lamp or window may have been."""
+    level = np.clip((picture.max(axis=2) - 0.85) / 0.15, 0, 1)
+    lamp = max(0.0, 1 - float(level.mean()) / _LARGEST_LAMP)
+    return np.asarray(picture * (1 + _BOOST * lamp * level**2)[..., None], np.float32)
+
+
+def _round_the_sphere(picture: LinearImage, height_deg: float) -> NDArray[np.float32]:
+    """Radiance (256, 512, 3) in map axes."""
+    rows, columns = picture.shape[:2]
+    x, y, z = np.moveaxis(texel_directions(_HEIGHT, _WIDTH), -1, 0)
+    half_height = np.tan(np.radians(height_deg) / 2)
+    half_width = half_height * columns / rows
+    # Seen from the front a direction lies at its mirror image in the unseen half. The floor under the depth keeps both
+    # coordinates smooth at the sides and poles, where only the picture's edges are seen.
+    depth = np.maximum(np.abs(z), 0.3)
+    unseen = np.clip((z + 0.6) / 1.2, 0, 1)
+    unseen = unseen * unseen * (3 - 2 * unseen)
+    across = (1 - unseen) * np.clip(x / (depth * half_width), -1, 1) + unseen * x
+    up = (1 - unseen) * np.clip(y / (depth * half_height), -1, 1) + unseen * y
+    softness = _outside(x, y, z, half_width, half_height) / _SOFTEST_AT
+    map_x = ((across + 1) / 2 * columns - 0.5).astype(np.float32)
+    map_y = ((1 - up) / 2 * rows - 0.5).astype(np.float32)
+    return _sample(picture, map_x, map_y, np.clip(softness, 0, 1))
+
+
+def _outside(x: NDArray, y: NDArray, z: NDArray, half_width: float, half_height: float) -> NDArray[np.float64]:
+    """Angle in degrees from each direction to the nearest one inside the picture."""
+    depth = np.maximum(-z, 1e-3)
+    nearest = np.stack([
+        np.clip(x / depth, -half_width, half_width), np.clip(y / depth, -half_height, half_height), -np.ones_like(z),
+    ])  # fmt: skip
+    cosine = (nearest * np.stack([x, y, z])).sum(axis=0) / np.linalg.norm(nearest, axis=0)
+    angle: NDArray[np.float64] = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    return angle
+
+
+def _sample(picture: LinearImage, map_x: NDArray, map_y: NDArray, softness: NDArray) -> NDArray[np.float32]:
+    """The picture at these pixels, from the copy as soft as asked for: 0 is the picture itself, 1 the softest copy."""
+    level = softness * (_COPIES - 1)
+    sampled = np.zeros((*softness.shape, 3), np.float32)
+    for copy in range(_COPIES):
+        weight = np.maximum(0, 1 - np.abs(level - copy)).astype(np.float32)
+        sigma = _SOFTEST * picture.shape[0] * copy / (_COPIES - 1)
+        soft = picture if copy == 0 else cv2.GaussianBlur(picture, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
+        sampled += weight[..., None] * cv2.remap(soft, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return sampled
