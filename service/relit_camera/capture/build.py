@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from relit_camera import __version__
+from relit_camera.capture.landmarks import find_landmarks
 from relit_camera.errors import InputError
 from relit_camera.reflectance.method import DEFAULT_METHOD, open_method
 from relit_camera.reflectance.samples import Samples
@@ -33,7 +34,8 @@ def build_subject(
         method: a name that `reflectance.method.open_method` knows.
         source: file name that the header should tell.
         gamma: the curve that the pictures were decoded with, for the header.
-        landmarks: known points of the face by scheme; where none are given, a tracker finds them when it needs them.
+        landmarks: known points of the face by scheme; where none are given, the
+            installed trackers look for them.
 
     Raises:
         NotFoundError: no such method.
@@ -43,6 +45,7 @@ def build_subject(
     field = open_method(method).build(samples)
     if not isinstance(field, FactoredField):
         raise InputError(f"the field of method '{method}' cannot be compressed yet", "use barycentric, planar or nearest")
+    still = neutral_picture(field, samples)
     compressed = compress(field, samples.matte)
     lights, height, width = samples.pictures.shape[:3]
     return Subject(
@@ -63,8 +66,8 @@ def build_subject(
         light_directions=samples.directions.astype(np.float32),
         light_coefficients=compressed.light_coefficients,
         matte=samples.matte,
-        neutral=neutral_picture(field, samples),
-        landmarks=landmarks or {},
+        neutral=still,
+        landmarks=landmarks or find_landmarks(still),
     )
 
 

@@ -5,6 +5,17 @@ from __future__ import annotations
 import math
 
 import typer
+from pydantic import ValidationError
+
+from relit_camera.config.look import (
+    Background,
+    BlurBackground,
+    ColorBackground,
+    EnvironmentBackground,
+    ImageBackground,
+    Mode,
+    NoBackground,
+)
 
 
 def numbers(text: str, count: int, option: str) -> list[float]:
@@ -20,3 +31,46 @@ def numbers(text: str, count: int, option: str) -> list[float]:
     if len(values) != count or not all(map(math.isfinite, values)):
         raise typer.BadParameter(f"'{text}' is not {count} numbers with commas between", param_hint=option)
     return values
+
+
+def background(text: str) -> Background:
+    """`none`, `blur`, `environment`, #RRGGBB, or the name of a stored picture.
+
+    Raises:
+        typer.BadParameter: a name that cannot be one (exit 2: usage).
+    """
+    kinds: dict[str, Background] = {
+        "none": NoBackground(),
+        "blur": BlurBackground(),
+        "environment": EnvironmentBackground(),
+    }
+    try:
+        if text in kinds:
+            return kinds[text]
+        return ColorBackground(color=text) if text.startswith("#") else ImageBackground(image=text)
+    except ValidationError as error:
+        raise typer.BadParameter(error.errors()[0]["msg"], param_hint="--background") from error
+
+
+def mode(text: str) -> Mode:
+    """`reenact` or `ratio`.
+
+    Raises:
+        typer.BadParameter: neither (exit 2: usage).
+    """
+    try:
+        return Mode(text)
+    except ValueError as error:
+        raise typer.BadParameter(f"'{text}' is not reenact or ratio", param_hint="--mode") from error
+
+
+def size(text: str) -> tuple[int, int]:
+    """WIDTHxHEIGHT in pixels.
+
+    Raises:
+        typer.BadParameter: not two whole numbers (exit 2: usage).
+    """
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise typer.BadParameter(f"'{text}' is not WIDTHxHEIGHT", param_hint="--size")
+    return int(width), int(height)

@@ -55,13 +55,11 @@ class FirstOrderReenactor:
         large = cv2.resize(premultiplied, None, fx=ENLARGE, fy=ENLARGE, interpolation=cv2.INTER_CUBIC)
         view = Warp(placed, patches).apply(np.maximum(large, 0), box, ENLARGE)
 
-        width, height = self._size
-        picture = np.zeros((height, width, 3), dtype=np.float32)
-        alpha = np.zeros((height, width), dtype=np.float32)
-        area = np.s_[box[1] : box[3], box[0] : box[2]]
-        picture[area], alpha[area] = view[..., :3], np.minimum(view[..., 3], 1)
-        self._mouth.draw(picture, alpha, relit, target.landmarks, target.pose, inverse_affine(placed))
-        return Moved(picture, alpha, box)
+        picture, alpha = np.ascontiguousarray(view[..., :3]), np.clip(view[..., 3], 0, 1)
+        to_box = inverse_affine(placed)
+        to_box[:, 2] -= box[:2]
+        self._mouth.draw(picture, alpha, relit, target.landmarks, target.pose, to_box)
+        return Moved(picture, alpha, box[:2])
 
 
 def moved_flow(

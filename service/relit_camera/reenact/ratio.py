@@ -56,7 +56,7 @@ class RatioReenactor:
         width, height = frame.size
         everything = (0, 0, width, height)
         if motion.pose is None:
-            return Moved(live, np.ones((height, width), np.float32), everything)
+            return Moved(live, np.ones((height, width), np.float32), (0, 0))
         room = self._probe.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
         self._since = frame.time_s if self._since is None else self._since
         if room.residual > STRANGER and frame.time_s - self._since > TRIAL_S:
@@ -74,7 +74,7 @@ class RatioReenactor:
         warped = self._warp(motion, frame.size).apply(
             np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32), everything
         )
-        return Moved(live * extended(warped), np.ones((height, width), np.float32), everything)
+        return Moved(live * extended(warped), np.ones((height, width), np.float32), (0, 0))
 
     def _warp(self, motion: FaceMotion, size: tuple[int, int]) -> Warp:
         """The still as it lies on the live face: one similarity for the head, a dense flow for the rest."""

@@ -38,17 +38,17 @@ class Stage:
 
 @dataclass(frozen=True)
 class Moved:
-    """A moved picture.
+    """A moved picture: the part of the output that it covers.
 
     Attributes:
         picture: (height, width, 3) float32 linear, premultiplied with `alpha`, in display exposure.
         alpha: (height, width) float32, the person.
-        box: (left, top, right, bottom) in output pixels outside which alpha is 0.
+        at: column and row of the output where its corner lies.
     """
 
     picture: LinearImage
     alpha: Mask
-    box: tuple[int, int, int, int]
+    at: tuple[int, int]
 
 
 class Reenactor(Protocol):

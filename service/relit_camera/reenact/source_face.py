@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +12,13 @@ from relit_camera.face.pose import fit_pose, unproject
 from relit_camera.face.landmarks import Scheme
 from relit_camera.face.schemes import landmark_scheme
 from relit_camera.face.state import HeadPose, Tracker
-from relit_camera.space.images import Frame, Points
+from relit_camera.face.still import look_at
+from relit_camera.face.trackers import open_tracker
+from relit_camera.space.images import Points
 from relit_camera.subject.subject import Subject
 
-SEARCH_FRAMES = 4
-"""A tracker sees the still this many times: it settles as it would on a video of a person sitting still."""
+SCHEME_TRACKERS = {"mesh478": "mesh", "openseeface66": "openseeface"}
+"""Who finds the landmarks of a scheme in a picture."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +45,14 @@ def source_face(subject: Subject, tracker: Tracker) -> SourceFace:
 
     Raises:
         SubjectError: the subject keeps no landmarks of the tracker's scheme and the tracker finds no face in it.
+        ModelError: a recorded track is played back, the subject keeps no landmarks, and the models are missing.
     """
     scheme = landmark_scheme(tracker.scheme)
     landmarks = subject.landmarks.get(scheme.name)
     if landmarks is None:
-        landmarks = _find(subject, tracker)
+        # A recording has not seen the still; the tracker that gives such landmarks finds them.
+        sees = open_tracker(SCHEME_TRACKERS[scheme.name]) if tracker.name == "recorded" else tracker
+        landmarks = _find(subject, sees)
     if len(landmarks) != scheme.count:
         raise SubjectError(
             f"the subject keeps {len(landmarks)} landmarks of scheme '{scheme.name}', which has {scheme.count}",
@@ -61,10 +65,7 @@ def source_face(subject: Subject, tracker: Tracker) -> SourceFace:
 
 
 def _find(subject: Subject, tracker: Tracker) -> Points:
-    tracker.reset()
-    for index in range(SEARCH_FRAMES):
-        state = tracker.track(Frame(subject.neutral, index, time.monotonic(), index / 30))
-    tracker.reset()
+    state = look_at(subject.neutral, tracker)
     if not state.visible:
         raise SubjectError(
             f"tracker '{tracker.name}' finds no face in the subject's still",

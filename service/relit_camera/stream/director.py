@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,7 +19,7 @@ from relit_camera.light.maps import resample
 from relit_camera.light.store import EnvironmentStore
 from relit_camera.space.colour import linear_from_uint8, uint8_from_linear
 from relit_camera.space.images import DisplayImage
-from relit_camera.space.picture_files import LDR_SUFFIXES, read_display
+from relit_camera.stream.backgrounds import BackgroundStore
 from relit_camera.stream.scene import Scene
 from relit_camera.subject.store import SubjectStore
 
@@ -34,8 +36,9 @@ class Director:
     def __init__(self, storage: StorageSettings) -> None:
         self.environments = EnvironmentStore(storage.environments)
         self.subjects = SubjectStore(storage.subjects)
-        self._backgrounds = storage.backgrounds
+        self.backgrounds = BackgroundStore(storage.backgrounds)
         self._change = threading.Lock()
+        self._guests: dict[str, Environment] = {}
         self.scene = Scene(Look())
 
     def set_look(self, look: Look) -> Scene:
@@ -45,9 +48,21 @@ class Director:
             NotFoundError: an environment or background of that name is not stored.
             InputError: `background` as environment while the background cannot light.
         """
+        return self.update_look(lambda _: look)
+
+    def update_look(self, change: Callable[[Look], Look]) -> Scene:
+        """Show what `change` makes of the present look; no other change comes between reading and replacing it.
+
+        Raises:
+            NotFoundError, InputError: as `set_look`.
+        """
         with self._change:
-            backdrop = self._backdrop(look.background)
-            environment = self._environment(look, backdrop)
+            look = change(self.scene.look)
+            # A slider sends dozens of changes a second: what it leaves alone is not read again.
+            backdrop = self.scene.backdrop if look.background == self.scene.look.background else None
+            if backdrop is None:
+                backdrop = self._backdrop(look.background)
+            environment = self._kept_environment(look) or self._environment(look, backdrop)
             return self._replace(look=look, environment=environment, backdrop=backdrop)
 
     def set_subject(self, name_or_path: str | None) -> Scene:
@@ -68,20 +83,43 @@ class Director:
         with self._change:
             return self._replace(frozen=frozen)
 
+    def admit_environment(self, name_or_path: str) -> str:
+        """The name under which an environment can be chosen: a stored one's own, or a file's, for this run only.
+
+        Raises:
+            NotFoundError: neither a stored name nor a file.
+            PanoramaError: the file cannot be used as light.
+        """
+        if name_or_path == LIT_BY_BACKGROUND or name_or_path in self.environments.names():
+            return name_or_path
+        environment = self.environments.resolve(name_or_path)
+        name = re.sub(r"[^A-Za-z0-9_-]+", "-", Path(name_or_path).stem).strip("-_")[:64] or "file"
+        with self._change:
+            self._guests[name] = environment
+        return name
+
     def background_names(self) -> list[str]:
         """Names that an `image` background may have: stored pictures and environments."""
-        return sorted({path.stem for path in self._background_files()} | set(self.environments.names()))
+        return sorted({*self.backgrounds.names(), *self.environments.names()})
 
     def _replace(self, **changes: object) -> Scene:
         self.scene = replace(self.scene, **changes, revision=self.scene.revision + 1)  # type: ignore[arg-type]
         return self.scene
+
+    def _kept_environment(self, look: Look) -> Environment | None:
+        before = self.scene.look
+        if look.lighting.environment != before.lighting.environment:
+            return None
+        stays = look.lighting.environment != LIT_BY_BACKGROUND or look.background == before.background
+        return self.scene.environment if stays else None
 
     def _environment(self, look: Look, backdrop: DisplayImage | None) -> Environment | None:
         name = look.lighting.environment
         if name is None:
             return None
         if name != LIT_BY_BACKGROUND:
-            return self.environments.resolve(name)
+            # Never `resolve`: a name that came over the API must not reach a file beside the program.
+            return self._guests[name] if name in self._guests else self.environments.load(name)
         background = look.background
         if isinstance(background, ImageBackground) and background.image in self.environments.names():
             return self.environments.load(background.image)
@@ -100,16 +138,10 @@ class Director:
     def _backdrop(self, background: Background) -> DisplayImage | None:
         if not isinstance(background, ImageBackground):
             return None
-        for path in self._background_files():
-            if path.stem == background.image:
-                return read_display(path)
+        if background.image in self.backgrounds.names():
+            return self.backgrounds.load(background.image)
         if background.image in self.environments.names():
             panorama = self.environments.load(background.image).panorama
             return uint8_from_linear(panorama.radiance[:, ::-1])
         known = ", ".join(self.background_names()) or "none"
         raise NotFoundError(f"no background picture '{background.image}'", f"stored are: {known}")
-
-    def _background_files(self) -> list[Path]:
-        if not self._backgrounds.is_dir():
-            return []
-        return sorted(path for path in self._backgrounds.iterdir() if path.suffix.lower() in LDR_SUFFIXES)

@@ -25,29 +25,31 @@ def display_light(environment: Environment | None, lighting: Lighting) -> LightM
 
 
 class EasedLight:
-    """Follows the scenes' light over each lighting's `transition_s`."""
+    """Follows the scenes' light over each lighting's `transition_s`: fast at first, so that a change is seen at once."""
 
     def __init__(self) -> None:
         self._key: tuple[Environment | None, Lighting] | None = None
         self._from: LightMap | None = None
         self._target: LightMap | None = None
-        self._since = 0.0
+        self._since = self._last = 0.0
 
     def update(self, scene: Scene, now: float) -> LightMap:
         """The room's light at `now` seconds; the first scene's is there at once."""
         key = (scene.environment, scene.look.lighting)
         if self._key is None or key[0] is not self._key[0] or key[1] != self._key[1]:
-            self._from = self._shown(now)
+            self._from = None if self._target is None else self._shown(self._last)
             self._target = display_light(*key)
-            self._key, self._since = key, now
-        return self._shown(now)  # type: ignore[return-value]
+            # The change began after the last frame: this one shows its first step already.
+            self._key, self._since = key, min(self._last, now)
+        self._last = now
+        return self._shown(now)
 
-    def _shown(self, now: float) -> LightMap | None:
-        if self._from is None or self._key is None or self._target is None:
-            return self._target
+    def _shown(self, now: float) -> LightMap:
+        assert self._target is not None
+        assert self._key is not None
         duration = self._key[1].transition_s
-        share = min((now - self._since) / duration, 1.0) if duration > 0 else 1.0
-        if share >= 1:
+        share = min(max(now - self._since, 0.0) / duration, 1.0) if duration > 0 else 1.0
+        if self._from is None or share >= 1:
             return self._target
-        smooth = np.float32(share * share * (3 - 2 * share))
-        return np.asarray(self._from + (self._target - self._from) * smooth, dtype=np.float32)
+        eased = np.float32(1 - (1 - share) ** 3)
+        return np.asarray(self._from + (self._target - self._from) * eased, dtype=np.float32)

@@ -1,0 +1,41 @@
+"""`relit run`: the camera."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+app = typer.Typer()
+
+
+@app.command()
+def run(
+    context: typer.Context,
+    source: Annotated[str | None, typer.Option(help="webcam, a camera's id, a video or picture file, pattern.")] = None,
+    sink: Annotated[str | None, typer.Option(help="camera, a video file, or null.")] = None,
+    subject: Annotated[str | None, typer.Option(help="A stored subject's name, or a .relit file.")] = None,
+    environment: Annotated[str | None, typer.Option(help="A stored environment's name, or a panorama file.")] = None,
+    mode: Annotated[str | None, typer.Option(help="reenact or ratio.")] = None,
+    tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
+    host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback only.")] = None,
+    port: Annotated[int | None, typer.Option(help="Port of API and panel; 0 picks one.")] = None,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of the output.")] = None,
+) -> None:
+    """Run the camera until it is told to stop (Ctrl-C or SIGTERM)."""
+    from relit_camera.cli.parse import mode as parse_mode
+    from relit_camera.cli.parse import size as parse_size
+    from relit_camera.cli.serving import run_camera
+    from relit_camera.cli.settings import settings_of
+
+    width, height = parse_size(size) if size else (None, None)
+    settings = settings_of(
+        context,
+        source={"source": source},
+        output={"sink": sink, "width": width, "height": height},
+        subject=subject,
+        look={"mode": str(parse_mode(mode)) if mode else None},
+        tracker={"name": tracker},
+        server={"host": host, "port": port},
+    )
+    run_camera(settings, environment)

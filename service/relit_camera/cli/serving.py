@@ -1,0 +1,58 @@
+"""Running the camera with its API: shared by `relit run` and everything like it."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+
+import typer
+
+from relit_camera.api.app import create_app
+from relit_camera.api.server import listen, serve
+from relit_camera.config.settings import RelitSettings
+from relit_camera.cores import share_cores
+from relit_camera.stream.assembly import make_tracker
+from relit_camera.stream.daemon import Daemon
+from relit_camera.stream.director import Director
+from relit_camera.stream.sinks.factory import open_sink
+from relit_camera.stream.sources.factory import open_source
+
+
+def run_camera(settings: RelitSettings, environment: str | None = None) -> None:
+    """Run the camera until SIGTERM or SIGINT, then end within 3 s.
+
+    Everything that can be wrong with the settings is found before a device is touched.
+
+    Args:
+        settings: of this run.
+        environment: a stored environment's name or a panorama file, in place of the settings' own.
+
+    Raises:
+        RelitError: the port is in use, a file, device or model is missing …
+    """
+    share_cores()
+    look, director = settings.look, Director(settings.storage)
+    if environment is not None:
+        named = look.lighting.model_copy(update={"environment": director.admit_environment(environment)})
+        look = look.model_copy(update={"lighting": named})
+    director.set_look(look)
+    director.set_subject(settings.subject)
+    stop = threading.Event()
+    with contextlib.ExitStack() as cleanup:
+        listener = cleanup.enter_context(listen(settings.server))
+        tracker = make_tracker(settings)
+        source = open_source(settings.source, own_label=settings.output.label)
+        cleanup.callback(source.close)
+        sink = open_sink(settings.output)
+        cleanup.callback(sink.close)
+        daemon = Daemon(settings, director, source, sink, tracker)
+        cleanup.callback(daemon.stop)
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, lambda *_: stop.set())
+        daemon.start()
+        server = serve(create_app(daemon, settings), settings.server, listener=listener)
+        cleanup.callback(server.stop)
+        typer.echo(f"Relit Camera runs; the panel is at {server.address.url}")
+        while not stop.wait(0.5):
+            pass

@@ -1,0 +1,40 @@
+"""`relit track`: what the tracker sees in a video."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer()
+
+
+@app.command()
+def track(
+    context: typer.Context,
+    video: Annotated[Path, typer.Argument(help="The video.")],
+    out: Annotated[Path, typer.Option(help="JSON to write; --tracker recorded:FILE plays it back.")],
+    tracker: Annotated[str | None, typer.Option(help="mesh or openseeface.")] = None,
+) -> None:
+    """Follow the face in a video and write, per frame, its pose, landmarks, eyes and mouth."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from relit_camera.cli.settings import settings_of
+    from relit_camera.errors import VideoError
+    from relit_camera.face.track_file import TrackRecorder
+    from relit_camera.stream.assembly import make_tracker
+    from relit_camera.stream.video import VideoReader
+
+    opened = make_tracker(settings_of(context, tracker={"name": tracker}))
+    with VideoReader(video) as reader, Progress(console=Console(stderr=True), transient=True) as progress:
+        recorder = TrackRecorder(opened, (reader.info.width, reader.info.height), reader.info.fps)
+        task = progress.add_task("Tracking", total=reader.info.frames or None)
+        for frame in reader:
+            recorder.add(opened.track(frame), frame.time_s)
+            progress.advance(task)
+    if not recorder.found_share:
+        raise VideoError(f"no face was found in {video}", "the face must look toward the camera, 60 pixels high or more")
+    recorder.write(out)
+    typer.echo(f"{out}: face found in {100 * recorder.found_share:.0f} % of the frames")

@@ -1,0 +1,31 @@
+"""Putting the parts together from the settings: the one place where names of plug-ins become objects."""
+
+from __future__ import annotations
+
+from relit_camera.config.settings import InferenceSettings, RelitSettings
+from relit_camera.face.state import Tracker
+from relit_camera.face.trackers import TrackerOptions, open_tracker
+from relit_camera.models.session import SessionOptions
+from relit_camera.stream.pipeline import Pipeline
+
+
+def session_options(inference: InferenceSettings) -> SessionOptions:
+    """How ONNX Runtime shall run every model."""
+    return SessionOptions(inference.provider, inference.threads, inference.strict)
+
+
+def make_tracker(settings: RelitSettings) -> Tracker:
+    """The tracker that the settings name.
+
+    Raises:
+        NotFoundError: no such tracker.
+        ModelError: its models are missing; `relit models pull` gets them.
+        TrackError: `recorded:FILE` names no usable track.
+    """
+    options = TrackerOptions(session=session_options(settings.inference), blendshapes=False)
+    return open_tracker(settings.tracker.name, options)
+
+
+def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, int]) -> Pipeline:
+    """The picture path for an output of `size` (width, height)."""
+    return Pipeline(tracker, size, settings.tracker, settings.reenact, session_options(settings.inference))

@@ -1,0 +1,190 @@
+"""The running camera: source → worker → publisher → sink, under the director's scene.
+
+Whatever fails, pictures keep coming: the worker notes the trouble and goes on, and the publisher shows the last picture
+or the placeholder.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+
+from relit_camera import __version__
+from relit_camera.config.settings import RelitSettings
+from relit_camera.errors import RelitError
+from relit_camera.face.state import FaceStatus, Tracker
+from relit_camera.models.session import session_report
+from relit_camera.space.images import DisplayImage, Frame
+from relit_camera.stream.assembly import make_pipeline
+from relit_camera.stream.director import Director
+from relit_camera.stream.events import EventHub
+from relit_camera.stream.pipeline import Finished
+from relit_camera.stream.placeholder import placeholder
+from relit_camera.stream.publisher import PublishedPicture, Publisher
+from relit_camera.stream.sinks.base import Sink
+from relit_camera.stream.sources.base import Source, SourceState
+from relit_camera.stream.status import CameraState, CameraStatus, Degradation, Rates, TrackerStatus
+from relit_camera.stream.timing import RateMeter
+
+log = logging.getLogger(__name__)
+
+READ_TIMEOUT_S = 0.2
+STALE_AFTER_S = 3.0
+"""Without a new picture for this long the placeholder is shown."""
+RETRY_S = 1.0
+"""Pause after a frame that could not be processed."""
+STOP_S = 1.5
+
+
+class Daemon:
+    """Implements `stream.control.CameraControl`. Owns source and sink: `stop` closes them."""
+
+    def __init__(
+        self, settings: RelitSettings, director: Director, source: Source, sink: Sink, tracker: Tracker
+    ) -> None:
+        """Set up; `start` begins.
+
+        Raises:
+            ImageError: the placeholder picture cannot be read.
+        """
+        self.director = director
+        self.events = EventHub()
+        self._source, self._sink, self._tracker = source, sink, tracker
+        size = (settings.output.width, settings.output.height)
+        self._pipeline = make_pipeline(settings, tracker, size)
+        self._publisher = Publisher(
+            sink,
+            settings.output.fps,
+            placeholder(size, "starting", settings.output.placeholder),
+            stale_after_s=STALE_AFTER_S,
+            on_sink_error=self._sink_changed,
+        )
+        self._waiting_picture = placeholder(size, "waiting for the camera", settings.output.placeholder)
+        self._troubles: dict[str, Degradation] = {}
+        self._face = FaceStatus.LOST
+        self._camera_rate, self._pipeline_rate = RateMeter(), RateMeter()
+        self._state = CameraState.STARTING
+        self._started_at = time.monotonic()
+        self._stopping = threading.Event()
+        self._worker = threading.Thread(target=self._run, name="worker", daemon=True)
+
+    def start(self) -> None:
+        """Begin to read, relight and publish."""
+        self._publisher.start()
+        self._worker.start()
+
+    def stop(self) -> None:
+        """End all threads and free the devices, within 3 s. Harmless when repeated."""
+        self._stopping.set()
+        self._set_state(CameraState.STOPPING)
+        if self._worker.ident is not None:
+            self._worker.join(STOP_S)
+        self._publisher.stop()
+        self._source.close()
+        self._sink.close()
+
+    def stopping(self) -> bool:
+        """Whether the camera is shutting down."""
+        return self._stopping.is_set()
+
+    def status(self) -> CameraStatus:
+        """What is going on."""
+        scene, source, sink = self.director.scene, self._source.describe(), self._sink.describe()
+        troubles = [*self._troubles.values(), *self._pipeline.troubles]
+        sessions = session_report()
+        troubles += [Degradation(f"model {s.name} runs on {s.provider}", s.why, s.cure) for s in sessions if s.why]
+        return CameraStatus(
+            state=CameraState.FROZEN if scene.frozen else self._state,
+            source=f"{source.kind} {source.id}".strip(),
+            sink=f"{sink.kind} {sink.id}".strip(),
+            subject=scene.subject_name,
+            mode=str(scene.look.mode),
+            tracker=TrackerStatus(self._tracker.name, str(self._face)),
+            fps=Rates(self._camera_rate.rate(), self._pipeline_rate.rate(), self._publisher.fps),
+            latency_ms=self._publisher.latency_ms,
+            stage_ms=self._pipeline.timer.percentiles(),
+            frames=self._publisher.counts,
+            providers={s.name: s.provider for s in sessions},
+            degraded=troubles,
+            version=__version__,
+            uptime_s=time.monotonic() - self._started_at,
+        )
+
+    def picture(self, after: int, timeout_s: float) -> tuple[int, DisplayImage] | None:
+        """The newest published picture and its count; see `CameraControl.picture`."""
+        found = self._publisher.shown.newer(after, timeout_s)
+        return None if found is None or self.stopping() else (found[0], found[1])
+
+    def reset_neutral_pose(self) -> None:
+        """Take the present head pose as neutral."""
+        self._pipeline.reset_neutral()
+        self.events.publish("neutral-pose")
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            frame = self._read()
+            if frame is None:
+                continue
+            self._camera_rate.tick()
+            scene = self.director.scene
+            if scene.frozen:
+                continue
+            try:
+                finished = self._pipeline.process(frame, scene)
+            except Exception as error:  # nothing that one frame does may end the camera
+                self._failed("picture", error)
+                self._stopping.wait(RETRY_S)
+                continue
+            self._recovered("picture")
+            self._pipeline_rate.tick()
+            self._publisher.pictures.put(PublishedPicture(finished.image, frame.captured_at, frame.index))
+            self._follow(finished)
+
+    def _read(self) -> Frame | None:
+        try:
+            frame = self._source.read(READ_TIMEOUT_S)
+        except RelitError as error:
+            self._failed("source", error)
+            self._stopping.wait(RETRY_S)
+            frame = None
+        if frame is not None:
+            self._recovered("source")
+        elif self._source.state is not SourceState.RUNNING and self._state is not CameraState.STARTING:
+            self._publisher.placeholder = self._waiting_picture
+            self._set_state(CameraState.WAITING)
+        return frame
+
+    def _follow(self, finished: Finished) -> None:
+        face = finished.motion.status if finished.motion else FaceStatus.LOST
+        if face is not self._face:
+            self._face = face
+            self.events.publish("tracking", state=str(face))
+        seen = finished.motion is None or face is not FaceStatus.LOST
+        self._set_state(CameraState.LIVE if seen else CameraState.SEARCHING)
+
+    def _set_state(self, state: CameraState) -> None:
+        if state is not self._state:
+            self._state = state
+            self.events.publish("state", state=str(state))
+
+    def _failed(self, what: str, error: Exception) -> None:
+        trouble = (
+            Degradation(f"{what} failed", error.what, error.cure)
+            if isinstance(error, RelitError)
+            else Degradation(f"{what} failed", f"{type(error).__name__}: {error}", "this is a fault of ours: report it")
+        )
+        if self._troubles.get(what) != trouble:
+            self._troubles[what] = trouble
+            log.error("%s: %s", trouble.what, trouble.why, exc_info=not isinstance(error, RelitError))
+            self.events.publish("degraded", what=trouble.what, why=trouble.why, cure=trouble.cure)
+
+    def _recovered(self, what: str) -> None:
+        if self._troubles.pop(what, None) is not None:
+            self.events.publish("recovered", what=what)
+
+    def _sink_changed(self, error: Exception | None) -> None:
+        if error is None:
+            self._recovered("sink")
+        else:
+            self._failed("sink", error)

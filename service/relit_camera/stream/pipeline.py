@@ -1,0 +1,189 @@
+"""One frame from left to right: track → light → relight → move → compose."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from relit_camera.compose.composer import Composer
+from relit_camera.config.look import Mode
+from relit_camera.config.settings import ReenactSettings, TrackerSettings
+from relit_camera.errors import RelitError, SubjectError
+from relit_camera.face.follow import FaceFollower, FaceMotion, FollowSettings
+from relit_camera.face.state import Tracker
+from relit_camera.light.maps import LightMap, rotate
+from relit_camera.models.session import SessionOptions
+from relit_camera.reenact.reenactor import Moved, Reenactor, Stage, open_reenactor
+from relit_camera.reenact.source_face import source_face
+from relit_camera.relight.basis import BasisRelighter
+from relit_camera.relight.relighter import Relighter
+from relit_camera.space.colour import linear_from_uint8
+from relit_camera.space.images import DisplayImage, Frame, LinearImage
+from relit_camera.stream.lighting import EasedLight
+from relit_camera.stream.scene import Scene
+from relit_camera.stream.status import Degradation
+from relit_camera.stream.timing import StageTimer
+from relit_camera.subject.subject import Subject
+
+log = logging.getLogger(__name__)
+
+REENACTOR_OF_MODE = {Mode.REENACT: "first-order", Mode.RATIO: "ratio"}
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A frame at the end of the line.
+
+    Attributes:
+        image: uint8 sRGB RGB of the output's size.
+        motion: what the face did; None while there is no tracker or no subject.
+    """
+
+    image: DisplayImage
+    motion: FaceMotion | None
+
+
+@dataclass(frozen=True)
+class _Cast:
+    """What belongs to one subject in one mode."""
+
+    subject: Subject
+    mode: Mode
+    relighter: Relighter
+    reenactor: Reenactor
+
+
+class Pipeline:
+    """Makes relit pictures of live frames. One thread; what may change reaches it as a `Scene` a frame.
+
+    Attributes:
+        timer: how long each stage took.
+    """
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        size: tuple[int, int],
+        tracking: TrackerSettings,
+        reenact: ReenactSettings,
+        options: SessionOptions,
+    ) -> None:
+        self.timer = StageTimer()
+        self._tracker = tracker
+        self._size = size
+        self._reenact = reenact
+        self._options = options
+        rotation = FollowSettings().rotation
+        self._follower = FaceFollower(
+            tracker.scheme,
+            FollowSettings(
+                reach_yaw_deg=tracking.reach_yaw_deg,
+                reach_pitch_deg=tracking.reach_pitch_deg,
+                rotation=type(rotation)(rotation.min_cutoff_hz, rotation.beta, tracking.dead_band_deg),
+            ),
+        )
+        self._light = EasedLight()
+        self._composer = Composer(size, options)
+        self._cast: _Cast | None = None
+        self._stranger: Subject | None = None
+        self._troubles: dict[str, Degradation] = {}
+
+    @property
+    def troubles(self) -> list[Degradation]:
+        """What works less well than asked."""
+        return list(self._troubles.values())
+
+    def reset_neutral(self) -> None:
+        """Take the neutral face anew. May be called from any thread."""
+        self._follower.reset_neutral()
+
+    def process(self, frame: Frame, scene: Scene) -> Finished:
+        """Make the picture of one live frame.
+
+        Raises:
+            SubjectError: no face is found in the subject's still.
+            ModelError: a model that the scene needs is missing.
+        """
+        subject, mode = scene.subject, self._mode(scene)
+        if mode is Mode.RATIO:
+            frame = fitted(frame, self._size)
+        if subject is None:
+            return Finished(self._composer.live(linear_from_uint8(fitted(frame, self._size).image), frame, scene), None)
+        cast = self._prepare(subject, mode)
+        with self.timer.stage("track"):
+            motion = self._follower.follow(self._tracker.track(frame), frame.size, frame.time_s)
+        with self.timer.stage("light"):
+            room = self._light.update(scene, frame.time_s)
+            light = rotate(room, motion.rotation)
+        with self.timer.stage("relight"):
+            relit = cast.relighter.relight(light)
+        with self.timer.stage("move"):
+            moved = self._move(cast, relit, motion, frame)
+        if moved is None:
+            return self.process(frame, scene)
+        with self.timer.stage("compose"):
+            image = self._compose(moved, mode, frame, scene)
+        return Finished(image, motion)
+
+    def _mode(self, scene: Scene) -> Mode:
+        """The mode asked for, or reenact where the live face is known not to be the subject's."""
+        if scene.subject is not self._stranger:
+            self._stranger = None
+            self._troubles.pop("ratio", None)
+        return Mode.REENACT if self._stranger is not None else scene.look.mode
+
+    def _prepare(self, subject: Subject, mode: Mode) -> _Cast:
+        cast = self._cast
+        if cast is not None and cast.subject is subject and cast.mode is mode:
+            return cast
+        same = cast is not None and cast.subject is subject
+        relighter = cast.relighter if cast is not None and same else BasisRelighter(subject)
+        face = source_face(subject, self._tracker)
+        stage = Stage(subject, relighter, face, self._size, self._options)
+        name = REENACTOR_OF_MODE[mode]
+        if mode is Mode.REENACT and self._reenact.model is not None:
+            from relit_camera.reenact.onnx_reenactor import OnnxReenactor
+
+            reenactor: Reenactor = OnnxReenactor(stage, self._reenact.model)
+        else:
+            reenactor = open_reenactor(name, stage)
+        self._cast = _Cast(subject, mode, relighter, reenactor)
+        return self._cast
+
+    def _move(self, cast: _Cast, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved | None:
+        """The moved picture, or None if the ratio cannot go on with this face: then reenact takes over."""
+        try:
+            return cast.reenactor.move(relit, motion, frame)
+        except SubjectError as error:
+            if cast.mode is not Mode.RATIO:
+                raise
+            log.warning("mode ratio falls back to reenact: %s", error)
+            self._stranger = cast.subject
+            self._troubles["ratio"] = Degradation("mode ratio shows the reenacted still", error.what, error.cure)
+            return None
+
+    def _compose(self, moved: Moved, mode: Mode, frame: Frame, scene: Scene) -> DisplayImage:
+        if mode is Mode.RATIO:
+            blend = np.float32(scene.look.lighting.blend)
+            picture = moved.picture
+            if blend < 1:
+                picture = linear_from_uint8(frame.image) * (1 - blend) + picture * blend
+            return self._composer.live(picture, frame, scene)
+        return self._composer.still(moved, frame, scene)
+
+
+def fitted(frame: Frame, size: tuple[int, int]) -> Frame:
+    """The frame scaled to cover `size` (width, height) and cut to it about its middle; the frame itself if it fits."""
+    if frame.size == size:
+        return frame
+    width, height = frame.size
+    scale = max(size[0] / width, size[1] / height)
+    shift = [(size[i] - scale * (width, height)[i]) / 2 for i in range(2)]
+    # cv2's pixel centres are integers: x' + ½ = s (x + ½) + shift.
+    affine = np.array([[scale, 0, shift[0] + (scale - 1) / 2], [0, scale, shift[1] + (scale - 1) / 2]])
+    flags = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+    image = cv2.warpAffine(frame.image, affine, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    return Frame(np.asarray(image, dtype=np.uint8), frame.index, frame.captured_at, frame.time_s)

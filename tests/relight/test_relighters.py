@@ -1,0 +1,123 @@
+"""Every relighter gives the same picture, and it is the integral of field times light."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from relit_camera.capture.build import build_subject
+from relit_camera.errors import NotFoundError
+from relit_camera.light.maps import rotate
+from relit_camera.relight.direction import relight_direction
+from relit_camera.relight.relighter import open_relighter
+from relit_camera.space.directions import direction_from_degrees, texel_directions, texel_solid_angles
+from relit_camera.space.quality import psnr
+from relit_camera.space.rotation import rotation_from_angles
+from relit_camera.subject.subject import Subject
+from tests.synthetic import render_sphere, sphere_samples, sphere_surface
+
+ALL = ["dense", "basis", "onnx-basis", "onnx-dense"]
+
+
+@pytest.fixture(scope="module")
+def sphere() -> Subject:
+    return build_subject(sphere_samples(400, 32), "barycentric", "sphere", landmarks={"none": np.zeros((1, 2), np.float32)})
+
+
+@pytest.fixture(scope="module")
+def coloured_light() -> np.ndarray:
+    rng = np.random.default_rng(3)
+    return rng.gamma(0.5, 1.0, (32, 64, 3)).astype(np.float32)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_agrees_with_the_field_summed_by_hand(sphere: Subject, coloured_light: np.ndarray, name: str) -> None:
+    field = np.einsum("ckhw,kl->hwlc", sphere.basis.astype(np.float64), sphere.coefficients)
+    weighted = (coloured_light * texel_solid_angles()[..., None]).reshape(-1, 3)
+    expected = np.einsum("hwlc,lc->hwc", field, weighted).astype(np.float32)
+    picture = open_relighter(name, sphere).relight(coloured_light)
+    assert picture.dtype == np.float32
+    assert psnr(picture, expected, sphere.matte) > 90
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_lit_sphere_reads_its_irradiance(sphere: Subject, name: str) -> None:
+    """Under uniform radiance 1 a Lambertian patch of unit response facing the camera reads ∫ max(0, n·l) dω = π."""
+    picture = open_relighter(name, sphere).relight(np.ones((32, 64, 3), np.float32))
+    assert picture[24, 8].mean() == pytest.approx(np.pi, rel=0.03)
+
+
+def test_white_light_gives_the_sum_picture(sphere: Subject) -> None:
+    field = np.einsum("ckhw,kl->hwlc", sphere.basis.astype(np.float64), sphere.coefficients)
+    summed = (field * texel_solid_angles().ravel()[:, None]).sum(axis=2).astype(np.float32)
+    assert psnr(open_relighter("basis", sphere).relight(np.ones((32, 64, 3), np.float32)), summed, sphere.matte) > 90
+
+
+def test_a_captured_direction_returns_the_captured_frame(sphere: Subject) -> None:
+    samples = sphere_samples(400, 32)
+    for index in range(0, len(samples.directions), 17):
+        if samples.directions[index, 2] > 0:
+            picture = relight_direction(sphere, samples.directions[index])
+            assert psnr(picture, samples.pictures[index], samples.matte) > 45
+
+
+POSES = [(30, 0, 0), (-30, 0, 0), (0, 25, 0), (0, -25, 0), (0, 0, 40), (0, 0, -40), (25, -15, 20), (-35, 20, -30)]
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_a_light_fixed_in_the_room_and_a_turned_head(sphere: Subject, pose: tuple[float, float, float]) -> None:
+    """Sign and amount of the counter-rotation, against a rendered sphere with a shadowing bump.
+
+    The head turns under a light that stays: in head axes the light has turned the other way, so the still must look
+    as rendered under R⁻¹·l. A sphere that shades right but shadows wrong would fail: the bump is off centre.
+    """
+    room_light = direction_from_degrees(35, 25)
+    head = rotation_from_angles(*pose)
+    truth = render_sphere(head.inv().apply(room_light), 32)
+    wrong = render_sphere(head.apply(room_light), 32)
+    exact = relight_direction(sphere, head.inv().apply(room_light))
+    assert psnr(exact, truth, sphere.matte) > 22
+    assert psnr(exact, truth, sphere.matte) > psnr(exact, wrong, sphere.matte) + 6
+
+    through_map = open_relighter("basis", sphere).relight(rotate(_lamp(room_light), head))
+    assert psnr(through_map, truth, sphere.matte) > 20
+    assert psnr(through_map, truth, sphere.matte) > psnr(through_map, wrong, sphere.matte) + 5
+
+
+def test_nearby_poses_beat_the_right_one_never(sphere: Subject) -> None:
+    """The amount: of all yaws the one that was rendered fits best."""
+    room_light = direction_from_degrees(-20, 10)
+    truth = render_sphere(rotation_from_angles(24).inv().apply(room_light), 32)
+    relighter = open_relighter("basis", sphere)
+    yaws = np.arange(0, 50, 4)
+    scores = [psnr(relighter.relight(rotate(_lamp(room_light), rotation_from_angles(y))), truth, sphere.matte) for y in yaws]
+    assert yaws[int(np.argmax(scores))] == 24
+
+
+def test_light_from_the_picture_right_lights_its_right_half(sphere: Subject) -> None:
+    picture = relight_direction(sphere, direction_from_degrees(90, 0))
+    assert picture[:, 16:].sum() > 10 * picture[:, :16].sum()
+    above = relight_direction(sphere, direction_from_degrees(0, 80))
+    assert above[:16].sum() > 3 * above[16:].sum()
+
+
+def test_pixels_outside_the_matte_stay_black(sphere: Subject, coloured_light: np.ndarray) -> None:
+    assert open_relighter("basis", sphere).relight(coloured_light)[~sphere_surface(32)[1]].max() == 0
+
+
+def test_an_unknown_relighter_lists_those_there_are(sphere: Subject) -> None:
+    with pytest.raises(NotFoundError, match="basis"):
+        open_relighter("magic", sphere)
+
+
+def _lamp(direction: np.ndarray) -> np.ndarray:
+    """A lamp of 8° as a light map of unit irradiance."""
+    cosine = texel_directions() @ direction
+    lobe = np.exp((cosine - 1) / (1 - np.cos(np.radians(4.0))))
+    lobe /= (lobe * texel_solid_angles()).sum()
+    return np.repeat(lobe[..., None], 3, axis=2).astype(np.float32)
+
+
+def test_rotation_helper_and_scipy_agree() -> None:
+    assert Rotation.identity().approx_equal(rotation_from_angles(0))
