@@ -127,7 +127,8 @@ class LandmarkTracker:
             return None
         reading = self._network.read(image, self._network.crop_from_points(self._points))
         if reading.confidence >= self._network.threshold and self._moved_far(self._points, reading.points):
-            # The crop was off by so much that the points are: look again from where they are now.
+            # The crop was off by so much that the points are: look again from where they are now, and have it checked.
+            self._frames_since_check = self._check_every
             reading = self._network.read(image, self._network.crop_from_points(reading.points))
         return reading if reading.confidence >= self._network.threshold else None
 

@@ -47,9 +47,9 @@ def is_frontal(pose: HeadPose) -> bool:
 class NeutralFinder:
     """Finds the neutral face among the first confident, near-frontal frames.
 
-    It looks at a second of them, leaves out blinks, takes the ten with the least open mouth, and their median: who
-    talks or blinks while the camera starts is still measured against a face at rest. Who sits aside and never looks
-    into the camera is taken as he is after three seconds.
+    It looks at a second of them, leaves out blinks, takes the ten calmest (mouth shut, head straight) and their median:
+    who talks, blinks or moves while the camera starts is still measured against a face at rest. Who sits aside and
+    never looks into the camera is taken as he is after three seconds.
     """
 
     def __init__(self, as_is: bool = False) -> None:
@@ -80,7 +80,13 @@ class NeutralFinder:
 def _calmest(samples: list[_Sample]) -> list[_Sample]:
     usual = float(np.median([sample.eyes for sample in samples]))
     awake = [sample for sample in samples if sample.eyes >= _OPEN_EYE_SHARE * usual]
-    return sorted(awake, key=lambda sample: sample.mouth)[:_FRAMES]
+    return sorted(awake, key=_unrest)[:_FRAMES]
+
+
+def _unrest(sample: _Sample) -> float:
+    # Ten degrees weigh as much as a mouth that speaks. Pitch says nothing: cameras stand above or below the eyes.
+    yaw, _, roll = angles_from_rotation(sample.neutral.pose.rotation)
+    return sample.mouth + (abs(yaw) + abs(roll)) / 100
 
 
 def _median(faces: list[Neutral]) -> Neutral:
