@@ -94,6 +94,16 @@ def test_pictures_are_scaled_to_the_size_that_the_device_kept(tree):
     assert sink.describe().size == (640, 360)
 
 
+def test_a_size_that_is_told_only_after_the_first_picture_is_followed_too(tree):
+    opener = Opener()
+    sink = CameraSink(SIZE, 30, tree=tree, open_camera=opener)
+    tree.set_format(10, "YU12:640x360@30\n")
+    for number in range(3):
+        sink.write(draw_pattern(SIZE, number))
+    assert [camera.size for camera in opener.cameras] == [SIZE, (640, 360)]
+    assert [read_number(image) for image in opener.cameras[1].sent] == [1, 2]
+
+
 def test_odd_sizes_are_refused(tree):
     with pytest.raises(InputError, match="641x480"):
         CameraSink((641, 480), 30, tree=tree, open_camera=Opener())
@@ -107,8 +117,8 @@ def test_a_missing_camera_comes_with_its_command(tmp_path):
 @pytest.mark.parametrize(
     ("error", "message"),
     [
-        (RuntimeError("'v4l2loopback' backend: Device /dev/video10 is not a video output device."), "is in use by"),
-        (RuntimeError("'v4l2loopback' backend: Device /dev/video10 is already in use."), "is in use by"),
+        (RuntimeError("'v4l2loopback' backend: Device /dev/video10 is not a video output device."), "is in use: another"),
+        (RuntimeError("'v4l2loopback' backend: Device /dev/video10 is already in use."), "is in use: another"),
         (RuntimeError("something else"), "cannot be opened: something else"),
         (ImportError("no such module"), "pip install pyvirtualcam"),
     ],

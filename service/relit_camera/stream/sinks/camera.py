@@ -65,6 +65,7 @@ class CameraSink:
         self._open_camera = open_camera or _pyvirtualcam
         self._camera: Any = None
         self._camera_size = size
+        self._size_is_known = False
         self._node = ""
         self._open()
 
@@ -85,6 +86,8 @@ class CameraSink:
         except (RuntimeError, OSError) as error:
             self.close()
             raise DeviceError(f"the virtual camera {self._node} takes no pictures: {error}") from error
+        if not self._size_is_known:  # some versions of the driver tell it only once a picture was written
+            self._follow_device_size()
 
     def describe(self) -> SinkInfo:
         """Say what the sink is."""
@@ -101,26 +104,33 @@ class CameraSink:
         if self._by_node:
             node = self._device or find_virtual_camera(self._tree, self._label).node
             if not os.access(node, os.R_OK | os.W_OK):
-                raise DeviceError(
-                    f"no permission to write to {node}", 'run: sudo usermod -aG video "$USER", log in again'
-                )
-            revive(node, self._tree)
-        self._camera, self._camera_size = self._open_at(self._size, node), self._size
-        actual = negotiated_size(node, self._tree) if node else None
-        if actual is not None and actual != self._size:
-            self.close()
-            self._camera, self._camera_size = self._open_at(actual, node), actual
+                cure = 'run: sudo usermod -aG video "$USER", and log in again'
+                raise DeviceError(f"no permission to write to {node}", cure)
+        self._open_at(self._size, node)
         self._node = node or str(getattr(self._camera, "device", ""))
+        self._size_is_known = node is None
+        self._follow_device_size()
 
-    def _open_at(self, size: tuple[int, int], node: str | None) -> Any:
+    def _follow_device_size(self) -> None:
+        """Open the device anew at the size that it really has, where it kept another than was asked for."""
+        actual = negotiated_size(self._node, self._tree)
+        if self._size_is_known or actual is None:
+            return
+        if actual != self._camera_size:
+            self.close()
+            self._open_at(actual, self._node)
+        self._size_is_known = True
+
+    def _open_at(self, size: tuple[int, int], node: str | None) -> None:
+        if node is not None:
+            revive(node, self._tree)
         try:
-            return self._open_camera(*size, self._fps, device=node)
+            self._camera = self._open_camera(*size, self._fps, device=node)
         except ImportError as error:
-            raise DeviceError(
-                f"pyvirtualcam cannot be used: {error}", "install it: pip install pyvirtualcam"
-            ) from error
+            raise DeviceError(f"pyvirtualcam cannot be used: {error}", "run: pip install pyvirtualcam") from error
         except RuntimeError as error:
             raise self._explained(str(error), node) from error
+        self._camera_size = size
 
     def _explained(self, message: str, node: str | None) -> DeviceError:
         if node is None:
@@ -128,8 +138,9 @@ class CameraSink:
                 f"there is no virtual camera: {message}", "install OBS Studio and start its virtual camera once"
             )
         if "output device" in message or "in use" in message or "busy" in message.lower():
-            cure = f"stop it; if there is none, run: sudo modprobe -r v4l2loopback && {load_command(self._label)}"
-            return DeviceError(f"{node} is in use by another program that publishes to it", cure)
+            what = f"{node} is in use: another program publishes to it, or an application still shows it"
+            reload = f"sudo modprobe -r v4l2loopback && {load_command(self._label)}"
+            return DeviceError(what, f"stop that program or switch its camera off; if there is none, run: {reload}")
         return DeviceError(f"{node} cannot be opened: {message}", f"run: {load_command(self._label)}")
 
 

@@ -19,7 +19,7 @@ def file_source(path: Path, *, loop: bool, realtime: bool) -> Source:
     info = probe(path)
 
     def play() -> Iterator[Timed]:
-        with VideoReader(path) as video:
+        with VideoReader(path, accurate=not realtime) as video:
             for frame in video:
                 yield frame.image, frame.time_s
 
