@@ -22,6 +22,7 @@ from relit_camera.space.images import DisplayImage
 from relit_camera.stream.backgrounds import BackgroundStore
 from relit_camera.stream.scene import Scene
 from relit_camera.subject.store import SubjectStore
+from relit_camera.subject.subject import Subject
 
 LIT_BY_BACKGROUND = "background"
 """The environment's reserved name for: lit by the virtual background."""
@@ -76,6 +77,11 @@ class Director:
             if name_or_path is None:
                 return self._replace(subject=None, subject_name=None)
             name, subject = self.subjects.resolve(name_or_path)
+            return self._replace(subject=subject, subject_name=name)
+
+    def show_subject(self, name: str, subject: Subject) -> Scene:
+        """Show a subject that is not stored, under `name`."""
+        with self._change:
             return self._replace(subject=subject, subject_name=name)
 
     def set_frozen(self, frozen: bool) -> Scene:

@@ -1,0 +1,93 @@
+"""Stored light from all sides."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from pathlib import PurePath
+from typing import Annotated
+
+from fastapi import APIRouter, Form, Request, UploadFile
+from starlette.responses import Response
+
+from relit_camera.api.context import ApiContext, Context
+from relit_camera.api.pictures import JPEG_RESPONSE, jpeg_answer, thumbnail_path
+from relit_camera.api.problems import ConflictError, responses
+from relit_camera.api.schemas import EnvironmentDetails, EnvironmentItem
+from relit_camera.api.uploads import read_upload
+from relit_camera.config.look import ImageBackground, Name
+from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
+from relit_camera.light.store import RESERVED_NAMES
+
+router = APIRouter(prefix="/environments", tags=["environments"])
+
+
+@router.get("")
+def list_environments(api: Context) -> list[EnvironmentItem]:
+    """The built-in and the stored environments."""
+    return [_item(api, name) for name in api.camera.director.environments.names()]
+
+
+@router.post("", status_code=HTTPStatus.CREATED, responses=responses(409, 413, 422, 503, 507))
+def add_environment(api: Context, name: Annotated[Name, Form()], file: UploadFile) -> EnvironmentDetails:
+    """Store a 360° panorama (.hdr, .exr, .png or .jpg, twice as wide as high), as seen from inside."""
+    director = api.camera.director
+    if name in RESERVED_NAMES or name in director.background_names():
+        raise ConflictError(f"an environment or background '{name}' exists already", "choose another name")
+    data = read_upload(file)
+    with api.slow_work():
+        director.environments.add(name, data, PurePath(file.filename or "").suffix)
+    api.changed("environments")
+    return _details(api, name)
+
+
+@router.get("/{name}", responses=responses(404, 422, 503))
+def get_environment(api: Context, name: Name) -> EnvironmentDetails:
+    """One environment and what is to be known of it."""
+    return _details(api, name)
+
+
+@router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT, responses=responses(404, 409, 422))
+def delete_environment(api: Context, name: Name) -> None:
+    """Delete a stored environment that is neither built in nor in use."""
+    if name in BUILTIN_NAMES:
+        raise ConflictError(f"environment '{name}' is built in", "only environments of your own can be deleted")
+    if _is_current(api, name):
+        raise ConflictError(f"environment '{name}' is in use", "choose another environment first")
+    api.camera.director.environments.remove(name)
+    api.changed("environments")
+
+
+@router.get("/{name}/thumbnail.jpg", response_class=Response, responses=JPEG_RESPONSE | responses(404, 422, 503))
+def get_environment_thumbnail(api: Context, request: Request, name: Name) -> Response:
+    """A small picture of an environment as seen from inside, in an exposure that suits it."""
+    with api.slow_work():
+        jpeg = api.camera.director.environments.thumbnail(name)
+    return jpeg_answer(request, jpeg)
+
+
+def _item(api: ApiContext, name: str) -> EnvironmentItem:
+    return EnvironmentItem(
+        name=name,
+        builtin=name in BUILTIN_NAMES,
+        is_current=_is_current(api, name),
+        thumbnail=thumbnail_path("environments", name),
+    )
+
+
+def _details(api: ApiContext, name: str) -> EnvironmentDetails:
+    with api.slow_work():
+        environment = api.camera.director.environments.load(name)
+    height, width = environment.panorama.radiance.shape[:2]
+    return EnvironmentDetails(
+        **dict(_item(api, name)),
+        width=width,
+        height=height,
+        clipped_fraction=environment.panorama.clipped_fraction,
+        notes=list(environment.notes),
+    )
+
+
+def _is_current(api: ApiContext, name: str) -> bool:
+    look = api.camera.director.scene.look
+    in_background = isinstance(look.background, ImageBackground) and look.background.image == name
+    return in_background or look.lighting.environment == name

@@ -1,0 +1,68 @@
+"""The published picture, for looking at."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Annotated, Any
+
+from anyio import to_thread
+from fastapi import APIRouter, Query
+from starlette.responses import Response, StreamingResponse
+
+from relit_camera.api.context import ApiContext, Context
+from relit_camera.api.pictures import JPEG_RESPONSE
+from relit_camera.api.preview import Variant
+from relit_camera.api.problems import NotReadyError, responses
+from relit_camera.space.picture_files import encode_display
+
+router = APIRouter(tags=["preview"])
+
+BOUNDARY = "picture"
+WAIT_S = 0.25
+"""How long to wait for a picture before looking whether to end."""
+FIRST_PICTURE_S = 2.0
+STREAM_RESPONSE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "JPEG pictures without end, until the viewer leaves or the camera stops",
+        "content": {f"multipart/x-mixed-replace; boundary={BOUNDARY}": {"schema": {"type": "string"}}},
+    }
+}
+
+Width = Annotated[int | None, Query(ge=64, le=8192, description="Scaled down to this width; as published if not given")]
+Mirror = Annotated[bool, Query(description="Left and right exchanged, as in a mirror")]
+Fps = Annotated[float, Query(ge=0.1, le=60, allow_inf_nan=False, description="At most so many pictures a second")]
+
+
+@router.get("/snapshot.jpg", response_class=Response, responses=JPEG_RESPONSE | responses(422, 503))
+def get_snapshot(api: Context) -> Response:
+    """The newest published picture, full size."""
+    published = api.camera.picture(-1, FIRST_PICTURE_S)
+    if published is None:
+        raise NotReadyError("no picture has been published yet", "try again when /readyz says ready")
+    return Response(encode_display(published[1], ".jpg", 95), media_type="image/jpeg")
+
+
+@router.get("/preview.mjpg", response_class=StreamingResponse, responses=STREAM_RESPONSE | responses(422, 503))
+async def get_preview(api: Context, width: Width = None, mirror: Mirror = False, fps: Fps = 30.0) -> StreamingResponse:
+    """The published pictures as motion JPEG, for an `<img>`."""
+    api.preview.check_room()
+    pictures = motion_jpeg(api, Variant(width, mirror, fps))
+    return StreamingResponse(pictures, media_type=f"multipart/x-mixed-replace; boundary={BOUNDARY}")
+
+
+async def motion_jpeg(api: ApiContext, variant: Variant) -> AsyncIterator[bytes]:
+    """The parts of a multipart/x-mixed-replace body (the server-push type of Netscape, kept by browsers).
+
+    Each part is followed at once by the next boundary: browsers show a part when they see its end. Cancelling it, which
+    is what happens when the client leaves, frees the viewer's place.
+    """
+    with api.preview.watch(variant) as channel:
+        count = -1
+        yield f"--{BOUNDARY}\r\n".encode()
+        while not api.ending():
+            picture = await to_thread.run_sync(channel.next, count, WAIT_S, abandon_on_cancel=True)
+            if picture is None:
+                continue
+            count = picture.count
+            head = f"Content-Type: image/jpeg\r\nContent-Length: {len(picture.jpeg)}\r\n\r\n"
+            yield b"".join((head.encode(), picture.jpeg, f"\r\n--{BOUNDARY}\r\n".encode()))

@@ -1,0 +1,163 @@
+"""Runs the application in a thread of this process, on an address that is taken before anything else starts."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+
+import uvicorn
+from fastapi import FastAPI
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from relit_camera.api.problems import NotReadyError, problem_of
+from relit_camera.config.settings import ServerSettings
+from relit_camera.errors import ConfigError, PortInUseError, RelitError
+
+START_S = 10.0
+GRACE_S = 1
+"""How long answers may take to end when the server stops, before they are cut off."""
+BACKLOG = 128
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where the server listens."""
+
+    host: str
+    port: int
+
+    @property
+    def url(self) -> str:
+        """The panel's address."""
+        return f"http://[{self.host}]:{self.port}/" if ":" in self.host else f"http://{self.host}:{self.port}/"
+
+
+class ApiServer:
+    """A server that runs until `stop`, or until the `with` block ends."""
+
+    def __init__(self, app: FastAPI, listener: socket.socket) -> None:
+        host, port = listener.getsockname()[:2]
+        self.address = Address(host, port)
+        self._closing: threading.Event = app.state.context.closing
+        config = uvicorn.Config(
+            _QuietEnd(app, self._closing),
+            log_config=None,
+            access_log=False,
+            lifespan="off",
+            ws="none",
+            server_header=False,
+            proxy_headers=False,
+            timeout_graceful_shutdown=GRACE_S,
+        )
+        self._server = uvicorn.Server(config)
+        # In a thread uvicorn leaves the signals to whoever owns the main thread. No daemon thread, nor are the workers
+        # that it starts: Python cuts those off inside C++ code when it exits, which aborts the process.
+        self._thread = threading.Thread(target=self._server.run, args=([listener],), name="api")
+
+    def start(self) -> None:
+        """Begin to answer; returns when it does.
+
+        Raises:
+            RelitError: it did not start within ten seconds.
+        """
+        self._thread.start()
+        deadline = time.monotonic() + START_S
+        while not self._server.started:
+            if not self._thread.is_alive() or time.monotonic() > deadline:
+                raise RelitError(f"the server at {self.address.url} did not start", "see the log")
+            time.sleep(0.01)
+
+    def stop(self, timeout_s: float = 2.5) -> None:
+        """End: long answers end within a moment, others get a second. Returns when all have, or when time is up."""
+        self._closing.set()
+        self._server.should_exit = True
+        self._thread.join(timeout_s)
+
+    def __enter__(self) -> ApiServer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+class _QuietEnd:
+    """ASGI wrapper: an answer that is cut off because the server ends is a 503, not a traceback in the log."""
+
+    def __init__(self, app: ASGIApp, closing: threading.Event) -> None:
+        self.app = app
+        self.closing = closing
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        started = False
+
+        async def send_watched(message: Message) -> None:
+            nonlocal started
+            started = True
+            await send(message)
+
+        try:
+            await self.app(scope, receive, send_watched)
+        except asyncio.CancelledError:
+            if not self.closing.is_set():
+                raise
+            if not started:
+                await problem_of(NotReadyError("the camera is stopping", "start it again"))(scope, receive, send)
+
+
+def listen(settings: ServerSettings) -> socket.socket:
+    """Take the address, so that nobody else can; answers begin with `serve`. Port 0 takes any free one.
+
+    Raises:
+        PortInUseError: another program listens there.
+        ConfigError: the address does not exist on this machine, or the port needs rights.
+    """
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    place = f"port {settings.port} on {settings.host}"
+    try:
+        return socket.create_server((settings.host, settings.port), family=family, backlog=BACKLOG)
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            cure = (
+                f"another program listens there (an open Relit Camera?): end it, or choose another with --port; {_FREE}"
+            )
+            raise PortInUseError(f"{place} is in use", cure) from error
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise ConfigError(
+            f"{place} cannot be used: {reason}", f"choose another with --host and --port; {_FREE}"
+        ) from error
+
+
+_FREE = "--port 0 picks a free one"
+
+
+def serve(
+    app: FastAPI,
+    settings: ServerSettings,
+    on_ready: Callable[[Address], None] | None = None,
+    listener: socket.socket | None = None,
+) -> ApiServer:
+    """Run the application of `create_app` in a thread; returns when it answers.
+
+    Args:
+        app: from `create_app`.
+        settings: host and port, used where no listener is given.
+        on_ready: called with the real address, once it answers.
+        listener: from `listen`, for a caller who wants to know early that the port is free.
+
+    Raises:
+        PortInUseError, ConfigError: as `listen`.
+    """
+    server = ApiServer(app, listener or listen(settings))
+    server.start()
+    if on_ready is not None:
+        on_ready(server.address)
+    return server
