@@ -1,0 +1,116 @@
+"""`python -m relit_studio.mannequin --out DIR`: writes the generated subject and its driving clip.
+
+DIR/olat/        one-light pictures, lights.lp, matte.png, landmarks.json, truth.npz
+DIR/clip.mp4     the mannequin in a soft room, 320x320, 24 frames a second
+DIR/track.json   the clip's true track, for the tracker `recorded`
+DIR/truth.json   the room's light map, and every frame's pose and expression
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from relit_camera.errors import RelitError, StorageError
+from relit_camera.files import make_folder, write_atomic
+from relit_studio.mannequin.clip import CLIP_SIZE, write_clip
+from relit_studio.mannequin.lights import room
+from relit_studio.mannequin.olat import write_olat
+from relit_studio.mannequin.performance import FPS, FRAMES, frame_times, posture_at
+
+_OUTPUTS = ("olat", "clip.mp4", "track.json", "truth.json")
+
+
+def generate(out: Path, size: int, lights: int, frames: int = FRAMES, *, quiet: bool = False) -> None:
+    """Write everything into folder `out`; what it held under the same names is replaced at the end.
+
+    Args:
+        out: made if missing.
+        size: of the one-light pictures, pixels.
+        lights: how many of them.
+        frames: of the clip, from its beginning.
+        quiet: show no progress.
+
+    Raises:
+        StorageError: the folder cannot be written.
+    """
+    make_folder(out)
+    try:
+        temporary = Path(tempfile.mkdtemp(prefix=".mannequin.", dir=out))
+    except OSError as error:
+        raise StorageError(f"cannot write in {out}: {error.strerror}", "choose a folder you may write to") from error
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    try:
+        with Progress(*columns, console=Console(stderr=True), disable=quiet) as shown:
+            task = shown.add_task("one-light pictures", total=lights)
+            make_folder(temporary / "olat")
+            write_olat(temporary / "olat", size, lights, lambda done, _: shown.update(task, completed=done))
+            clip_task = shown.add_task("driving clip", total=frames)
+            write_clip(
+                temporary / "clip.mp4",
+                temporary / "track.json",
+                room(),
+                frames,
+                lambda done, _: shown.update(clip_task, completed=done),
+            )
+        write_atomic(temporary / "truth.json", json.dumps(_truth(frames)))
+        for name in _OUTPUTS:
+            target = out / name
+            if target.is_dir():
+                shutil.rmtree(target)
+            (temporary / name).replace(target)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _truth(frames: int) -> dict[str, object]:
+    postures = [(float(time_s), posture_at(float(time_s))) for time_s in frame_times(frames)]
+    return {
+        "fps": FPS,
+        "size": CLIP_SIZE,
+        "light_map": room().round(5).astype(float).tolist(),
+        "frames": [
+            {"time_s": time_s, "pose": posture.angles._asdict(), "expression": asdict(posture.expression)}
+            for time_s, posture in postures
+        ],
+    }
+
+
+def _within(low: int, high: int) -> Callable[[str], int]:
+    def number(text: str) -> int:
+        value = int(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{value} is not within {low} and {high}")
+        return value
+
+    return number
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; 0 done, 1 it failed with one line on stderr, 2 usage."""
+    parser = argparse.ArgumentParser(prog="python -m relit_studio.mannequin", description="Write a generated subject.")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
+    parser.add_argument("--size", type=_within(32, 1024), default=192, help="of the one-light pictures, pixels")
+    parser.add_argument("--lights", type=_within(4, 999), default=96, help="how many, over the whole sphere")
+    parser.add_argument("--frames", type=_within(1, FRAMES), default=FRAMES, help="of the clip, from its beginning")
+    parser.add_argument("--quiet", action="store_true", help="show no progress")
+    options = parser.parse_args(arguments)
+    try:
+        generate(options.out, options.size, options.lights, options.frames, quiet=options.quiet)
+    except RelitError as error:
+        print(f"mannequin: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
