@@ -28,6 +28,9 @@ BACK_OFF_S = (0.25, 0.5, 1.0, 2.0, 4.0)
 """Pauses between attempts to open; the last one is repeated for ever."""
 
 
+LOG_ERRORS = 2
+
+
 class Capture(Protocol):
     """What is used of `cv2.VideoCapture`."""
 
@@ -152,7 +155,9 @@ def open_with_opencv(node: str, size: tuple[int, int], fps: float) -> Capture:
     """Open a device by OpenCV and ask for Motion-JPEG, this size and rate, and a queue of one."""
     # How long V4L2 lets `read` wait, which must not hold up closing; OpenCV looks at it when it first waits.
     os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # busy or away: we say so ourselves
+    # Errors only: that a camera is busy or away we say ourselves. OpenCV 5 moved the function.
+    set_log_level = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLevel
+    set_log_level(LOG_ERRORS)
     if node.isdigit():
         capture = cv2.VideoCapture(int(node))
     else:
