@@ -6,6 +6,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# A test's time depends on what else the machine does: pytest-timeout holds the whole, not each example.
+settings.register_profile("relit", deadline=None)
+settings.load_profile("relit")
 
 
 @pytest.fixture(scope="session")

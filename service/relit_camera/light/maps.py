@@ -25,8 +25,9 @@ LightMap = NDArray[np.float32]
 
 _SUBSAMPLES = 5
 """Samples a texel in φ, and in θ at the equator: a rotated one-texel lamp keeps its energy within 0.8 %."""
-_SMALL_ANGLE = np.radians(2.0)
-"""Below this angle a rotation is blended with the unrotated map, so that it ends in the identity without a jump."""
+_SMALL_ANGLE = np.radians(1.0)
+"""Below this angle a rotation is blended with the unrotated map, so that it ends in the identity without a jump; light
+then lags by at most a quarter of it."""
 
 
 def check_light_map(light_map: NDArray, name: str = "light map") -> None:

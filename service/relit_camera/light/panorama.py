@@ -58,8 +58,7 @@ def read_panorama(path: Path, axes: Axes = "picture") -> Panorama:
     path = Path(path)
     _check_header(path)
     try:
-        with quiet_decoders():
-            image = read_linear(path)
+        image = read_linear(path)
     except ImageError as error:
         raise PanoramaError(error.what, error.cure) from error
     except OSError as error:

@@ -44,7 +44,8 @@ def uint8_from_linear(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     table = _encode_table()
     scaled = np.nan_to_num(linear, nan=0.0, posinf=1.0, neginf=0.0) * np.float32(table.size - 1)
     index = np.clip(scaled + np.float32(0.5), 0, table.size - 1).astype(np.uint16)
-    return table[index]
+    coded: NDArray[np.uint8] = table[index]
+    return coded
 
 
 def linear_from_uint8(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:

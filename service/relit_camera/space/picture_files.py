@@ -12,6 +12,7 @@ from relit_camera.errors import ImageError
 from relit_camera.files import atomic_path, write_atomic
 from relit_camera.space.colour import Gamma, decode, uint8_from_linear
 from relit_camera.space.images import DisplayImage, LinearImage, Mask
+from relit_camera.space.quiet import quiet_decoders
 
 LDR_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff"})
 MAX_PIXELS = 64_000_000
@@ -112,10 +113,11 @@ def encode_display(image: DisplayImage, suffix: str = ".jpg", quality: int = 90)
 
 
 def _imread(path: Path) -> NDArray | None:
-    # From memory: cv2.imread writes warnings on stderr for paths and files that it cannot read.
+    # From memory: cv2.imread knows no paths beyond the locale's encoding.
     data = np.frombuffer(path.read_bytes(), np.uint8)
     try:
-        return cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+        with quiet_decoders():
+            return cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     except cv2.error:
         return None
 
@@ -136,9 +138,9 @@ def _read_coded(path: Path) -> NDArray[np.float32]:
 
 def _unit_range(coded: NDArray) -> NDArray[np.float32]:
     if coded.dtype == np.uint8:
-        return coded.astype(np.float32) / 255
+        return coded.astype(np.float32) / np.float32(255)
     if coded.dtype == np.uint16:
-        return coded.astype(np.float32) / 65535
+        return coded.astype(np.float32) / np.float32(65535)
     return coded.astype(np.float32)
 
 
@@ -146,19 +148,18 @@ def _read_exr(path: Path) -> NDArray[np.float32]:
     import OpenEXR
 
     try:
-        with OpenEXR.File(str(path)) as file:
-            channels = {name: np.asarray(c.pixels, np.float32) for name, c in file.channels().items()}
+        with quiet_decoders(), OpenEXR.File(str(path), separate_channels=True) as file:
+            planes = {name.lower(): np.asarray(c.pixels, np.float32) for name, c in file.channels().items()}
     except Exception as error:  # OpenEXR raises RuntimeError, ValueError or its own types for damaged files
         raise ImageError(f"{path} cannot be read as OpenEXR: {error}", "export it again") from error
     # Layers are named "layer.R"; the first complete set wins, the unnamed layer first.
-    for names in (("RGBA",), ("RGB",), ("R", "G", "B"), ("Y",), ("V",)):
-        for prefix in ("", *sorted({n.rpartition(".")[0] + "." for n in channels if "." in n})):
-            found = [channels.get(prefix + name) for name in names]
-            if all(part is not None for part in found):
-                planes = [p if p.ndim == 3 else p[..., None] for p in found if p is not None]
-                stacked = np.concatenate(planes, axis=2)[..., :3]
-                return np.ascontiguousarray(np.repeat(stacked, 3, 2) if stacked.shape[2] == 1 else stacked)
-    raise ImageError(f"{path} has channels {sorted(channels)}", "export it with R, G, B or Y")
+    layers = sorted({name.rpartition(".")[0] for name in planes})
+    for names in (("r", "g", "b"), ("red", "green", "blue"), ("y",), ("v",)):
+        for layer in layers:
+            found = [planes.get(f"{layer}.{name}" if layer else name) for name in names]
+            if all(plane is not None for plane in found):
+                return np.stack(found * (3 // len(found)), axis=-1)  # type: ignore[arg-type]
+    raise ImageError(f"{path} has channels {', '.join(sorted(planes))}", "export it with R, G, B or Y")
 
 
 def _write_exr(path: Path, image: LinearImage) -> None:
