@@ -78,9 +78,9 @@ class Rig:
         self.tracker = LandmarkTracker("fake", self.network, self.detector, check_every=check_every)  # type: ignore[arg-type]
         self.index = 0
 
-    def step(self) -> tuple[FaceStatus, float]:
+    def step(self, image: np.ndarray = IMAGE) -> tuple[FaceStatus, float]:
         """The next frame's status and the error of its landmarks in eye spans."""
-        state = self.tracker.track(Frame(IMAGE, self.index, 0.0, self.index / 30))
+        state = self.tracker.track(Frame(image, self.index, 0.0, self.index / 30))
         self.index += 1
         if not state.visible or self.world.points is None:
             return state.status, 0.0
@@ -142,6 +142,29 @@ def test_a_mesh_that_slipped_is_seeded_anew_although_it_is_sure():
     rig.world.points = FACE + np.array([0, 0.8 * EYE_SPAN], np.float32)
     errors = [rig.step()[1] for _ in range(4)]
     assert errors[-1] == 0
+
+
+def test_after_a_cut_the_face_is_found_in_the_same_frame_wherever_it_is():
+    noise = np.random.default_rng(0).integers(0, 256, (2, *IMAGE.shape)).astype(np.uint8)
+    rig = Rig(check_every=100)
+    rig.step(noise[0])
+    rig.world.points = FACE + np.array([0, 0.8 * EYE_SPAN], np.float32)
+    assert rig.step(noise[1]) == (FaceStatus.FOUND, 0)
+    rig.world.points = FACE + np.array([4 * EYE_SPAN, 0], np.float32)
+    assert rig.step(noise[0]) == (FaceStatus.FOUND, 0)
+
+
+def test_another_face_is_taken_over_only_when_the_first_stays_away():
+    rig = Rig(check_every=1)
+    rig.step()
+    other = FACE + np.array([4 * EYE_SPAN, 0], np.float32)
+    rig.detector.detect = lambda image, near=None: Detection(  # type: ignore[method-assign]
+        bounds(other), SCHEME.eye_centres(other), 0.9
+    )
+    statuses = [rig.step()[0] for _ in range(8)]
+    assert statuses == [FaceStatus.UNCERTAIN] * 8
+    rig.world.points = other
+    assert rig.step() == (FaceStatus.FOUND, 0)
 
 
 def test_a_face_the_detector_cannot_see_is_uncertain_and_lost_after_a_second():

@@ -14,6 +14,7 @@ import numpy as np
 
 from relit_camera.face.crop import Crop, bounds
 from relit_camera.face.detector import Detection, FaceDetector, is_same_face
+from relit_camera.face.glimpse import Glimpse
 from relit_camera.face.landmarks import Scheme
 from relit_camera.face.pose import fit_pose
 from relit_camera.face.state import LOST, FaceState, FaceStatus
@@ -84,17 +85,17 @@ class LandmarkTracker:
 
     def reset(self) -> None:
         """Forget the face: the next frame is searched whole."""
-        self._points: Points | None = None
+        self._last: Glimpse | None = None
         self._frames_since_check = 0
         self._failed_checks = 0
 
     def track(self, frame: Frame) -> FaceState:
         """Measure the face in `frame`."""
         status, reading = self._locate(frame.image)
-        self._points = reading.points if reading else None
         if reading is None:
             self.reset()
             return LOST
+        self._last = Glimpse(frame.image, reading.points)
         scheme = self._network.scheme
         pose = fit_pose(reading.points, scheme, frame.size, self._focal_px)
         if pose is None:
@@ -112,21 +113,20 @@ class LandmarkTracker:
         )
 
     def _locate(self, image: DisplayImage) -> tuple[FaceStatus, Reading | None]:
-        reading = self._follow(image)
-        if reading is None:
+        reading = self._follow(image, self._last.points) if self._last else None
+        if self._last is None or reading is None:
             detection = self._detector.detect(image)
             return self._start(image, detection) if detection else (FaceStatus.LOST, None)
         self._frames_since_check += 1
-        if self._failed_checks or self._frames_since_check >= self._check_every:
-            return self._check(image, reading)
+        cut = not self._last.still_there(image)
+        if cut or self._failed_checks or self._frames_since_check >= self._check_every:
+            return self._check(image, reading, cut)
         return FaceStatus.FOUND, reading
 
-    def _follow(self, image: DisplayImage) -> Reading | None:
-        """Read round the last points; None without any, or where there is no face."""
-        if self._points is None:
-            return None
-        reading = self._network.read(image, self._network.crop_from_points(self._points))
-        if reading.confidence >= self._network.threshold and self._moved_far(self._points, reading.points):
+    def _follow(self, image: DisplayImage, last: Points) -> Reading | None:
+        """Read round the last points; None where there is no face."""
+        reading = self._network.read(image, self._network.crop_from_points(last))
+        if reading.confidence >= self._network.threshold and self._moved_far(last, reading.points):
             # The crop was off by so much that the points are: look again from where they are now, and have it checked.
             self._frames_since_check = self._check_every
             reading = self._network.read(image, self._network.crop_from_points(reading.points))
@@ -141,15 +141,18 @@ class LandmarkTracker:
             return FaceStatus.LOST, None
         return self._judge(reading, agrees=self._agrees(reading, detection))
 
-    def _check(self, image: DisplayImage, reading: Reading) -> tuple[FaceStatus, Reading | None]:
-        """Compare a reading with the detector; start anew where they disagree."""
+    def _check(self, image: DisplayImage, reading: Reading, cut: bool) -> tuple[FaceStatus, Reading | None]:
+        """Compare a reading with the detector; start anew where they disagree.
+
+        After a `cut`, where the picture is suddenly another, a face elsewhere is the one to follow.
+        """
         self._frames_since_check = 0
         box = bounds(reading.points)
         detection = self._detector.detect(image, near=box)
         if detection is None or not is_same_face(detection.box, box):
             # The detector misses profiles, so this alone is no proof that the face is gone.
             status, kept = self._judge(reading, agrees=False)
-            if detection and self._failed_checks > _CHECKS_BEFORE_OTHER_FACE:
+            if detection and (cut or self._failed_checks > _CHECKS_BEFORE_OTHER_FACE):
                 return self._start(image, detection)
             return (status, kept) if self._failed_checks <= _CHECKS_BEFORE_LOST else (FaceStatus.LOST, None)
         if self._agrees(reading, detection):
