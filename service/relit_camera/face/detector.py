@@ -18,6 +18,7 @@ Box = tuple[float, float, float, float]
 """x, y, width, height in pixels."""
 
 _SAME_FACE_OVERLAP = 0.1
+_LOG_ERRORS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +84,10 @@ def is_same_face(first: Box, second: Box) -> bool:
 
 @contextmanager
 def _quiet_opencv() -> Iterator[None]:
-    # OpenCV 5 warns that its new graph engine has no targets, which nobody asked for.
-    logging = cv2.utils.logging
+    # OpenCV 5 warns that its new graph engine has no targets, which nobody asked for. It also moved these functions.
+    logging = getattr(cv2.utils, "logging", cv2)
     level = logging.getLogLevel()
-    logging.setLogLevel(logging.LOG_LEVEL_ERROR)
+    logging.setLogLevel(_LOG_ERRORS)
     try:
         yield
     finally:
