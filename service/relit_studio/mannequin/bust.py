@@ -20,7 +20,7 @@ _PROFILE = np.array(
         [-13.0, 6.9, 5.7, -5.0],
         [-11.0, 5.6, 5.3, -4.7],
         [-8.0, 5.2, 5.2, -4.3],
-        [-3.0, 5.2, 5.2, -4.2],
+        [-3.0, 4.8, 4.2, -4.6],
     ]
 )
 """Height, half width, half depth and middle Z of the body's cross sections, in centimetres."""

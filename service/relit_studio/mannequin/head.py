@@ -105,8 +105,8 @@ def _mouth(mesh: Mesh) -> Mesh:
     middle = lips.mean(axis=0)
     inner = middle + (lips - middle) * [0.98, 1.5, 1] - [0, 0, 0.5]
     wide = middle + (lips - middle) * [1.05, 4.0, 0.9] - [0, 0, 1.3]
-    deep = middle + (lips - middle) * [0.9, 4.0, 0.5] - [0, 0, 4.0]
-    return extrude(mesh, LIP_RIM, [inner, wide, deep], cap=middle - [0, 0, 4.5])
+    deep = middle + (lips - middle) * [0.9, 3.6, 0.6] - [0, 0, 2.9]
+    return extrude(mesh, LIP_RIM, [inner, wide, deep], cap=middle - [0, 0, 3.2])
 
 
 def _skull(mesh: Mesh) -> Mesh:

@@ -34,7 +34,7 @@ def posture_at(time_s: float) -> Posture:
     return Posture(
         Angles(turn, nod, tilt),
         Expression(
-            jaw=float(0.55 * speaking * syllables),
+            jaw=float(0.5 * speaking * syllables),
             blink_right=max(both, wink),
             blink_left=both,
             smile=smile,
