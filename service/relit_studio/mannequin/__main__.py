@@ -20,14 +20,18 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from relit_camera.compose.sheet import contact_sheet
 from relit_camera.errors import RelitError, StorageError
 from relit_camera.files import make_folder, write_atomic
+from relit_camera.space.images import DisplayImage
+from relit_camera.space.picture_files import read_display, write_display
+from relit_camera.stream.video import VideoReader
 from relit_studio.mannequin.clip import CLIP_SIZE, write_clip
 from relit_studio.mannequin.lights import room
 from relit_studio.mannequin.olat import write_olat
 from relit_studio.mannequin.performance import FPS, FRAMES, frame_times, posture_at
 
-_OUTPUTS = ("olat", "clip.mp4", "track.json", "truth.json")
+_OUTPUTS = ("olat", "clip.mp4", "track.json", "truth.json", "sheet.png")
 
 
 def generate(out: Path, size: int, lights: int, frames: int = FRAMES, *, quiet: bool = False) -> None:
@@ -63,6 +67,7 @@ def generate(out: Path, size: int, lights: int, frames: int = FRAMES, *, quiet: 
                 lambda done, _: shown.update(clip_task, completed=done),
             )
         write_atomic(temporary / "truth.json", json.dumps(_truth(frames)))
+        write_display(temporary / "sheet.png", _sheet(temporary))
         for name in _OUTPUTS:
             target = out / name
             if target.is_dir():
@@ -83,6 +88,20 @@ def _truth(frames: int) -> dict[str, object]:
             for time_s, posture in postures
         ],
     }
+
+
+def _sheet(folder: Path) -> DisplayImage:
+    """Six of the one-light pictures over twelve frames of the clip."""
+    pictures = [read_display(path) for path in sorted((folder / "olat").glob("[0-9]*.png"))]
+    with VideoReader(folder / "clip.mp4") as video:
+        frames = [frame.image for frame in video]
+    lit = sorted(pictures, key=lambda picture: -float(picture.mean()))[: len(pictures) // 2]
+    rows = [_evenly(lit, 6), *(_evenly(half, 6) for half in (frames[: len(frames) // 2], frames[len(frames) // 2 :]))]
+    return contact_sheet(rows, ("one light", "clip", ""), cell_width=256)
+
+
+def _evenly(pictures: Sequence[DisplayImage], count: int) -> list[DisplayImage]:
+    return list(pictures[:: max(1, len(pictures) // count)])[:count]
 
 
 def _within(low: int, high: int) -> Callable[[str], int]:
