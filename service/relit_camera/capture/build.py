@@ -12,12 +12,17 @@ from relit_camera.capture.landmarks import find_landmarks
 from relit_camera.errors import InputError
 from relit_camera.reflectance.method import DEFAULT_METHOD, open_method
 from relit_camera.reflectance.samples import Samples
-from relit_camera.space.colour import Gamma, uint8_from_linear
+from relit_camera.space.colour import Gamma, luminance, uint8_from_linear
 from relit_camera.space.directions import texel_directions, texel_solid_angles
-from relit_camera.space.images import DisplayImage, Points
+from relit_camera.space.images import DisplayImage, LinearImage, Mask, Points
 from relit_camera.subject.compress import compress
 from relit_camera.subject.field import FactoredField
 from relit_camera.subject.subject import Subject, SubjectMetadata
+
+BRIGHTEST_SKIN = 0.45
+"""Luminance that three quarters of a face do not exceed under frontal light where a white wall reads 1."""
+TYPICAL_SKIN = 0.36
+"""The same of light skin."""
 
 
 def build_subject(
@@ -34,7 +39,7 @@ def build_subject(
         method: a name that `reflectance.method.open_method` knows.
         source: file name that the header should tell.
         gamma: the curve that the pictures were decoded with, for the header.
-        landmarks: known points of the face by scheme; where none are given, the
+        landmarks: known points of the face by scheme; where it is None, the
             installed trackers look for them.
 
     Raises:
@@ -45,7 +50,8 @@ def build_subject(
     field = open_method(method).build(samples)
     if not isinstance(field, FactoredField):
         raise InputError(f"the field of method '{method}' cannot be compressed yet", "use barycentric, planar or nearest")
-    still = neutral_picture(field, samples)
+    frontal = frontal_picture(field)
+    still = neutral_picture(frontal, samples.matte)
     compressed = compress(field, samples.matte)
     lights, height, width = samples.pictures.shape[:3]
     return Subject(
@@ -58,6 +64,7 @@ def build_subject(
             source=source,
             psnr_db=min(compressed.psnr_db, 200.0),
             gamma=str(gamma),
+            display_gain=display_gain(frontal, samples.matte),
             created_by=f"relit-camera {__version__}",
             created_at=datetime.now(UTC).isoformat(timespec="seconds"),
         ),
@@ -67,13 +74,27 @@ def build_subject(
         light_coefficients=compressed.light_coefficients,
         matte=samples.matte,
         neutral=still,
-        landmarks=landmarks or find_landmarks(still),
+        landmarks=find_landmarks(still) if landmarks is None else landmarks,
     )
 
 
-def neutral_picture(field: FactoredField, samples: Samples) -> DisplayImage:
-    """The face under soft light from the front: a cosine lobe about the camera, scaled so that skin is well exposed."""
+def frontal_picture(field: FactoredField) -> LinearImage:
+    """The face under soft light from the front, a cosine lobe about the camera: a white wall facing it reads 1."""
     lobe = np.maximum(texel_directions()[..., 2], 0) * texel_solid_angles()
+    lobe /= (lobe * np.maximum(texel_directions()[..., 2], 0)).sum()
     mixed = np.tensordot(field.weights @ lobe.ravel().astype(np.float32), field.pictures, axes=(0, 0))
-    bright = float(np.percentile(mixed[samples.matte > 0.5], 95))
-    return uint8_from_linear(mixed * (0.7 / bright if bright > 0 else 1.0))
+    return np.asarray(mixed, dtype=np.float32)
+
+
+def display_gain(frontal: LinearImage, matte: Mask) -> float:
+    """1 for a calibrated capture. No skin is nearly as bright as a white wall: where the frames say so, their unit is
+    another (a strobe of unknown strength), and they are shown as bright as light skin is.
+    """
+    bright = float(np.percentile(luminance(frontal)[matte > 0.5], 75))
+    return 1.0 if bright <= BRIGHTEST_SKIN else TYPICAL_SKIN / bright
+
+
+def neutral_picture(frontal: LinearImage, matte: Mask) -> DisplayImage:
+    """The face as trackers like to see it: softly lit from the front, well exposed."""
+    bright = float(np.percentile(frontal[matte > 0.5], 95))
+    return uint8_from_linear(frontal * np.float32(0.7 / bright if bright > 0 else 1.0))

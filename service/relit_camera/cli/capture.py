@@ -43,7 +43,7 @@ def import_lights(
         samples = import_samples(lights, curve, lambda done, total: progress.update(reading, completed=done, total=total))
         progress.add_task("Building the field", total=None)
         points = read_landmarks(landmarks or lights.parent / "landmarks.json", required=landmarks is not None)
-        subject = build_subject(samples, method, lights.name, curve, points)
+        subject = build_subject(samples, method, lights.name, curve, points or None)
     write_subject(out, subject)
     meta = subject.metadata
     typer.echo(

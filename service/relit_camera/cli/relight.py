@@ -22,6 +22,8 @@ def relight(
     exposure_ev: Annotated[float, typer.Option(help="Brighter or darker than a white ball at 0.8.")] = 0.0,
 ) -> None:
     """Relight a subject's still by an environment, or by one distant light of unit irradiance."""
+    import numpy as np
+
     from relit_camera.cli.parse import numbers
     from relit_camera.cli.settings import settings_of
     from relit_camera.compose.display import display_from_linear
@@ -54,4 +56,4 @@ def relight(
     if linear:
         write_linear(out, picture)
     else:
-        write_display(out, display_from_linear(picture * (scale * 2**exposure_ev)))
+        write_display(out, display_from_linear(picture * np.float32(scale * opened.metadata.display_gain * 2**exposure_ev)))

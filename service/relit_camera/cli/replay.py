@@ -36,7 +36,8 @@ def replay(
     from relit_camera.cli.parse import background as parse_background
     from relit_camera.cli.parse import mode as parse_mode
     from relit_camera.cli.settings import settings_of
-    from relit_camera.compose.sheet import contact_sheet as draw_sheet
+    from relit_camera.cores import share_cores
+
     from relit_camera.config.look import Lighting, Look
     from relit_camera.files import write_atomic
     from relit_camera.space.picture_files import write_display
@@ -47,6 +48,7 @@ def replay(
 
     settings = settings_of(context, tracker={"name": tracker})
     yaw, pitch, roll = numbers(rotate, 3, "--rotate")
+    share_cores()
     chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
     info = probe(video)
     director = Director(settings.storage)
@@ -80,6 +82,8 @@ def replay(
     for trouble in pipelines[0].troubles:
         print(f"relit: {trouble.what}: {trouble.why}; {trouble.cure}", file=sys.stderr)
     if contact_sheet and kept:
+        from relit_camera.compose.sheet import contact_sheet as draw_sheet
+
         labels, before, after = zip(*kept, strict=True)
         write_display(contact_sheet, draw_sheet([list(before), list(after)], ["live", "relit"], list(labels)))
     if report:

@@ -22,11 +22,13 @@ def track(
     from rich.progress import Progress
 
     from relit_camera.cli.settings import settings_of
+    from relit_camera.cores import share_cores
     from relit_camera.errors import VideoError
     from relit_camera.face.track_file import TrackRecorder
     from relit_camera.stream.assembly import make_tracker
     from relit_camera.stream.video import VideoReader
 
+    share_cores()
     opened = make_tracker(settings_of(context, tracker={"name": tracker}))
     with VideoReader(video) as reader, Progress(console=Console(stderr=True), transient=True) as progress:
         recorder = TrackRecorder(opened, (reader.info.width, reader.info.height), reader.info.fps)

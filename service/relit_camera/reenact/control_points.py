@@ -37,7 +37,7 @@ class ControlPoints:
 
     Attributes:
         chosen: indices of the landmarks among them, (landmarks,) int.
-        source: (count, 2) float64 still pixels: chosen landmarks, skull ring, still anchors.
+        source: (count, 2) float64 still pixels: chosen landmarks, then anchors.
         radius: (count,) float64 still pixels.
         pairs: (count, 2) int control points of upper and lower lids and inner lips that lie over each other.
         irises: control points of each iris, with its eye's pairs as rows of `pairs`.
@@ -76,11 +76,10 @@ class ControlPoints:
         return Influence(target, centre, strength)
 
 
-def control_points(face: SourceFace) -> ControlPoints:
-    """The control points of a still."""
+def control_points(face: SourceFace, anchors: NDArray[np.float64]) -> ControlPoints:
+    """The control points of a still: chosen landmarks and `anchors` (count, 2), for what has no landmarks."""
     scheme = face.scheme
     chosen = choose_landmarks(scheme, face.landmarks.astype(np.float64))
-    anchors = np.vstack([skull_ring(face.pose, face.size), still_anchors(face.pose, face.size)])
     source = np.vstack([face.landmarks[chosen], anchors]).astype(np.float64)
     # A point reaches about as far as its neighbours are: fine on lips and lids, coarse on cheeks and hair.
     distance = KDTree(source).query(source, k=4)[0][:, 1:].mean(axis=1)
@@ -124,6 +123,11 @@ def choose_landmarks(scheme: Scheme, landmarks: NDArray[np.float64]) -> NDArray[
         kept.append(farthest)
         distance = np.minimum(distance, np.linalg.norm(landmarks - landmarks[farthest], axis=1))
     return np.array(sorted(kept))
+
+
+def head_anchors(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Anchors (count, 2) of a person seen whole: skull and hair, which follow the head, neck and shoulders."""
+    return np.vstack([skull_ring(pose, size), still_anchors(pose, size)])
 
 
 def skull_ring(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:

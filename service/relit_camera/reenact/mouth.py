@@ -17,7 +17,7 @@ from relit_camera.space.images import LinearImage
 
 CAVITY = np.array([0.035, 0.014, 0.012], dtype=np.float32)
 """Reflectance of the cavity relative to a white wall lit like the face: dark, and red rather than black."""
-TEETH = np.array([0.50, 0.47, 0.42], dtype=np.float32)
+TEETH = np.array([0.36, 0.33, 0.28], dtype=np.float32)
 """Teeth lie in the lips' shade, so they read well below white."""
 TEETH_BELOW_LIP_CM = 0.28
 """How far the upper teeth show below the closed upper lip's edge; they stay with the skull when the lip goes up."""
@@ -71,6 +71,9 @@ class Mouth:
         light = relit[self._lips[:, 1], self._lips[:, 0]].mean(axis=0) / SKIN_ALBEDO
         inside = np.broadcast_to(CAVITY * light, (*shape, 3)).copy()
         teeth = _polygon(self._teeth(pose, to_output) - low, shape, 1.5 * softness)[..., None]
+        # The row bends back toward the corners, out of the light.
+        across = (np.arange(shape[1]) - (opening[:, 0].mean() - low[0])) / max(float(np.ptp(opening[:, 0])) / 2, 1)
+        teeth *= np.clip(1.05 - 0.8 * across**2, 0, 1).astype(np.float32)[None, :, None]
         inside += teeth * (TEETH * light - inside)
         area = np.s_[low[1] : high[1], low[0] : high[0]]
         cover = (hole * alpha[area])[..., None]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relit_camera.errors import SubjectError
 from relit_camera.face.follow import FaceMotion
 from relit_camera.light.maps import rotate
-from relit_camera.reenact.control_points import control_points, skull_ring, still_anchors
+from relit_camera.reenact.control_points import control_points, head_anchors
 from relit_camera.reenact.dense_motion import DenseMotion
 from relit_camera.reenact.first_order import feathered, moved_flow
 from relit_camera.reenact.reenactor import Moved, Stage
@@ -40,7 +40,7 @@ class RatioReenactor:
     def __init__(self, stage: Stage) -> None:
         self._face = stage.face
         self._relighter = stage.relighter
-        self._points = control_points(stage.face)
+        self._points = control_points(stage.face, head_anchors(stage.face.pose, stage.face.size))
         self._motion = DenseMotion(stage.options)
         self._probe = RoomProbe(stage.subject, stage.face)
         self._weight = trusted(feathered(stage.subject.matte))
@@ -81,7 +81,7 @@ class RatioReenactor:
         assert motion.pose is not None
         face, chosen = self._face, self._points.chosen
         landmarks = motion.landmarks.astype(np.float64)
-        live = np.vstack([landmarks[chosen], skull_ring(motion.pose, size), still_anchors(motion.pose, size)])
+        live = np.vstack([landmarks[chosen], head_anchors(motion.pose, size)])
         still_from_live = similarity(landmarks[list(face.scheme.rigid)], face.landmarks[list(face.scheme.rigid)])
         target = live @ still_from_live[:, :2].T + still_from_live[:, 2]
         moved = landmarks @ still_from_live[:, :2].T + still_from_live[:, 2]

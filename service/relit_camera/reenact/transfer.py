@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from relit_camera.face.follow import FaceMotion
 from relit_camera.face.pose import project
@@ -15,6 +16,9 @@ from relit_camera.reenact.source_face import SourceFace
 
 MAX_SHIFT_CM = 12.0
 """A body moves aside by at most this much."""
+FACE_MIDDLE = np.array([0.0, 0.0, 3.5])
+"""Head axes, cm: it stays when a face turns in its place."""
+MAX_TURN_IN_FRAME_DEG = 22.0
 SCALE_RANGE = (0.85, 1.3)
 
 
@@ -40,16 +44,15 @@ class Target:
 
 
 def transfer(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> Target:
-    """Move the still's head as the driver's moved since neutral.
+    """Move the head of a still that shows the person whole, as the driver's head moved since neutral.
 
     The rotation and the expression (head-space displacements in cm of the same canonical face) are taken over as they
     are. The head's displacement is split: what turning on the neck explains bends the neck, the rest moves the body.
     """
     still = face.pose
-    rotation = motion.rotation * still.rotation
     pivot_camera = still.rotation.apply(NECK_PIVOT) + still.translation
-    turned = HeadPose(rotation, pivot_camera - rotation.apply(NECK_PIVOT), still.focal_px)
-    landmarks = project(face.head_points + motion.expression, turned, face.size)
+    turned = turned_about(NECK_PIVOT, still, motion.rotation)
+    landmarks = project(face.head_points + motion.expression, turned, face.size).astype(np.float64)
     moved = np.vstack([landmarks[points.chosen], skull_ring(turned, face.size), still_anchors(still, face.size)])
 
     body = still.translation + motion.translation - turned.translation
@@ -57,3 +60,24 @@ def transfer(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> Tar
     scale = float(np.clip(depth / max(depth - body[2], 1.0), *SCALE_RANGE))
     shift = np.clip(body[:2], -MAX_SHIFT_CM, MAX_SHIFT_CM) * [1, -1] * still.focal_px / depth
     return Target(moved, landmarks, turned, shift, scale, project(NECK_PIVOT[None], still, face.size)[0])
+
+
+def transfer_in_frame(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> Target:
+    """Move the face of a still that is cut off by its picture's border: it turns in its place, and less far.
+
+    Nothing beyond the border was captured, so turns are bent softly to what fits inside.
+    """
+    turn = motion.rotation.as_rotvec()
+    angle = float(np.linalg.norm(turn))
+    limit = np.radians(MAX_TURN_IN_FRAME_DEG)
+    bent = Rotation.from_rotvec(turn * (limit * np.tanh(angle / limit) / angle if angle > 0 else 1.0))
+    turned = turned_about(FACE_MIDDLE, face.pose, bent)
+    landmarks = project(face.head_points + motion.expression, turned, face.size).astype(np.float64)
+    return Target(landmarks[points.chosen], landmarks, turned, np.zeros(2), 1.0, np.zeros(2))
+
+
+def turned_about(pivot: NDArray[np.float64], pose: HeadPose, turn: Rotation) -> HeadPose:
+    """The pose after turning the head by `turn` (camera axes) about a point of it, (3,) cm in head axes."""
+    rotation = turn * pose.rotation
+    place = pose.rotation.apply(pivot) + pose.translation
+    return HeadPose(rotation, place - rotation.apply(pivot), pose.focal_px)

@@ -12,24 +12,28 @@ from relit_camera.subject.field import TEXELS
 from relit_camera.subject.subject import Subject
 
 
+class DenseRelighter:
+    """O = R · (E ω) with the matrix held in memory.
+
+    Attributes:
+        matrix: R as (3, pixels, 2048) float32: 737 MB for 150 x 200 pixels.
+    """
+
+    def __init__(self, subject: Subject) -> None:
+        self._shape = (subject.metadata.height, subject.metadata.width)
+        self.matrix = dense_matrix(subject)
+
+    def relight(self, light_map: LightMap) -> LinearImage:
+        """See `Relighter.relight`."""
+        light = weighted_light(light_map)
+        planes = [self.matrix[channel] @ light[:, channel] for channel in range(3)]
+        return np.stack(planes, axis=-1).reshape(*self._shape, 3)
+
+
 def dense_matrix(subject: Subject) -> NDArray[np.float32]:
-    """R as (3, pixels, 2048) float32: 737 MB for 150 x 200 pixels."""
+    """R as (3, pixels, 2048) float32."""
     basis = subject.basis.astype(np.float32).reshape(3, subject.metadata.components, -1)
     matrix = np.empty((3, basis.shape[2], TEXELS), dtype=np.float32)
     for channel in range(3):
         np.matmul(basis[channel].T, subject.coefficients, out=matrix[channel])
     return matrix
-
-
-class DenseRelighter:
-    """O = R · (E ω) with the matrix held in memory."""
-
-    def __init__(self, subject: Subject) -> None:
-        self._matrix = dense_matrix(subject)
-        self._shape = (subject.metadata.height, subject.metadata.width)
-
-    def relight(self, light_map: LightMap) -> LinearImage:
-        """See `Relighter.relight`."""
-        light = weighted_light(light_map)
-        planes = [self._matrix[channel] @ light[:, channel] for channel in range(3)]
-        return np.stack(planes, axis=-1).reshape(*self._shape, 3)

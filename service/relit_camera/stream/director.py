@@ -104,6 +104,10 @@ class Director:
             self._guests[name] = environment
         return name
 
+    def guest_environments(self) -> dict[str, Environment]:
+        """Environments that `admit_environment` took from files, for this run only."""
+        return dict(self._guests)
+
     def background_names(self) -> list[str]:
         """Names that an `image` background may have: stored pictures and environments."""
         return sorted({*self.backgrounds.names(), *self.environments.names()})

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from relit_camera.compose.composer import Composer
 from relit_camera.config.look import Mode
 from relit_camera.config.settings import ReenactSettings, TrackerSettings
-from relit_camera.errors import RelitError, SubjectError
+from relit_camera.errors import SubjectError
 from relit_camera.face.follow import FaceFollower, FaceMotion, FollowSettings
 from relit_camera.face.state import Tracker
-from relit_camera.light.maps import LightMap, rotate
+from relit_camera.light.maps import rotate
 from relit_camera.models.session import SessionOptions
 from relit_camera.reenact.reenactor import Moved, Reenactor, Stage, open_reenactor
 from relit_camera.reenact.source_face import source_face
@@ -22,6 +21,7 @@ from relit_camera.relight.basis import BasisRelighter
 from relit_camera.relight.relighter import Relighter
 from relit_camera.space.colour import linear_from_uint8
 from relit_camera.space.images import DisplayImage, Frame, LinearImage
+from relit_camera.stream.composer import Composer
 from relit_camera.stream.lighting import EasedLight
 from relit_camera.stream.scene import Scene
 from relit_camera.stream.status import Degradation
@@ -86,7 +86,7 @@ class Pipeline:
             ),
         )
         self._light = EasedLight()
-        self._composer = Composer(size, options)
+        self._composer = Composer(size, options, self.timer)
         self._cast: _Cast | None = None
         self._stranger: Subject | None = None
         self._troubles: dict[str, Degradation] = {}
@@ -111,7 +111,8 @@ class Pipeline:
         if mode is Mode.RATIO:
             frame = fitted(frame, self._size)
         if subject is None:
-            return Finished(self._composer.live(linear_from_uint8(fitted(frame, self._size).image), frame, scene), None)
+            frame = fitted(frame, self._size)
+            return Finished(self._composer.live(linear_from_uint8(frame.image), frame, scene), None)
         cast = self._prepare(subject, mode)
         with self.timer.stage("track"):
             motion = self._follower.follow(self._tracker.track(frame), frame.size, frame.time_s)
@@ -119,7 +120,7 @@ class Pipeline:
             room = self._light.update(scene, frame.time_s)
             light = rotate(room, motion.rotation)
         with self.timer.stage("relight"):
-            relit = cast.relighter.relight(light)
+            relit = cast.relighter.relight(light * np.float32(subject.metadata.display_gain))
         with self.timer.stage("move"):
             moved = self._move(cast, relit, motion, frame)
         if moved is None:
@@ -172,7 +173,7 @@ class Pipeline:
             if blend < 1:
                 picture = linear_from_uint8(frame.image) * (1 - blend) + picture * blend
             return self._composer.live(picture, frame, scene)
-        return self._composer.still(moved, frame, scene)
+        return self._composer.still(moved, scene, frame.time_s)
 
 
 def fitted(frame: Frame, size: tuple[int, int]) -> Frame:

@@ -35,6 +35,8 @@ class SubjectMetadata(BaseModel):
     psnr_db: float
     """Worst PSNR of the compressed field over the captured lights, each against its own frame."""
     gamma: str = "srgb"
+    display_gain: Annotated[float, Field(gt=0, le=100)] = 1.0
+    """What pictures are multiplied by to be shown, where the captured frames are not in units of a white wall."""
     created_by: str
     created_at: str
 

@@ -1,0 +1,57 @@
+"""A generated subject to measure on where none is given: a coloured, bumpy, glossy head under 64 lights."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from relit_camera.capture.build import build_subject
+from relit_camera.face.pose import guess_focal, project
+from relit_camera.face.schemes import landmark_scheme
+from relit_camera.face.state import HeadPose
+from relit_camera.reflectance.samples import Samples
+from relit_camera.space.images import Points
+from relit_camera.subject.subject import Subject
+
+LIGHTS = 64
+SCHEME = "mesh478"
+
+
+def sample_subject(width: int = 150, height: int = 200) -> Subject:
+    """An RGB subject of exactly 64 captured lights over the whole sphere, by default of the thesis's 150 x 200 pixels."""
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2)
+    rng = np.random.default_rng(0)
+    bumps = sum(
+        a * np.cos(fx * x + fy * y + p)
+        for a, fx, fy, p in zip(
+            rng.uniform(0.005, 0.02, 24), rng.uniform(-25, 25, 24), rng.uniform(-25, 25, 24), rng.uniform(0, 6, 24),
+            strict=True,
+        )  # fmt: skip
+    )
+    depth = np.sqrt(np.maximum(1.6 - x * x - y * y, 0.05)) + bumps
+    slope_y, slope_x = np.gradient(depth, 2 / height, 2 / width)
+    normal = np.dstack([-slope_x, slope_y, np.ones_like(depth)])
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    albedo = np.array([0.62, 0.42, 0.33]) * (0.8 + 0.4 * rng.random((height, width, 1)))
+    directions = _spread(LIGHTS)
+    pictures = np.empty((LIGHTS, height, width, 3), dtype=np.float32)
+    for index, light in enumerate(directions):
+        half = (light + [0, 0, 1]) / max(float(np.linalg.norm(light + [0, 0, 1])), 1e-6)
+        facing = np.maximum(normal @ light, 0)[..., None]
+        gloss = 0.3 * (facing > 0) * np.maximum(normal @ half, 0)[..., None] ** 40
+        pictures[index] = albedo * (facing + 0.02) + gloss
+    matte = np.ones((height, width), dtype=np.float32)
+    return build_subject(Samples(pictures, directions, matte), "barycentric", "generated", landmarks={SCHEME: _mean_face(width, height)})
+
+
+def _mean_face(width: int, height: int) -> Points:
+    """A mean face that looks into the camera from the picture's middle, so that the live chain can move it."""
+    pose = HeadPose(Rotation.identity(), np.array([0.0, 0.0, -32.0]), guess_focal((width, height)))
+    return project(landmark_scheme(SCHEME).canonical.copy(), pose, (width, height))
+
+
+def _spread(count: int) -> NDArray[np.float64]:
+    y = 1 - (2 * np.arange(count) + 1) / count
+    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    return np.stack([np.sqrt(1 - y * y) * np.sin(angle), y, np.sqrt(1 - y * y) * np.cos(angle)], axis=1)
