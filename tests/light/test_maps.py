@@ -117,15 +117,15 @@ def test_a_lamp_keeps_its_place_and_its_energy(texel: tuple[int, int], seed: int
 
 
 def energy_beside_a_witness(texel: tuple[int, int], rotation: Rotation) -> float:
-    """Share of its energy that a lamp keeps beside one 20 times as bright on the other side of the sphere.
+    """Share of its energy that a lamp keeps beside much more light, even, from the far third of the sphere.
 
-    The whole map is renormalised, to which the bright lamp fits: what the rotation itself takes from the weak one, or
-    what renormalising gives it of the other, shows.
+    The whole map is renormalised, which that light decides: what the rotation itself takes from the lamp shows. (A
+    second lamp as witness could hide it: at the antipodes every error is the same.)
     """
-    lamp = one_texel(*texel)
-    witness = 20 * one_texel(31 - texel[0], (texel[1] + 32) % 64)
+    lamp, toward = one_texel(*texel), texel_direction(*texel)
+    witness = np.where(texel_directions() @ toward < -0.4, 10, 0)[..., None].astype(np.float32)
     light = rotate(lamp + witness, rotation)[..., 0] * texel_solid_angles()
-    near = texel_directions() @ rotation.inv().apply(texel_direction(*texel)) > 0
+    near = texel_directions() @ rotation.inv().apply(toward) > 0
     return float(light[near].sum() / total(lamp)[0])
 
 

@@ -30,8 +30,8 @@ def paint() -> Canvas:
         colour("#120f14"), colour("#4a3a40", 0.8), colour("#251f33"), colour("#10121f"), colour("#0a0c16"),
     ])  # fmt: skip
     canvas = _houses(canvas, bearing, elevation)
-    canvas = blur(canvas, 0.25, 0.25)
     _lights(canvas)
+    canvas = blur(canvas, 0.2, 0.2)
     canvas = _shops(canvas)
     wet = blur(canvas[::-1], 0.35, 3.2)
     x, y, z = np.moveaxis(directions(), -1, 0)

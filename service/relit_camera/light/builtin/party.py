@@ -31,6 +31,7 @@ def paint() -> Canvas:
     canvas = (colour("#07060d") + 0.16 * haze * tint + 0.05 * haze * colour("#5a30ff")).astype(np.float32)
     canvas = _beams(canvas)
     _lights(canvas)
+    canvas = blur(canvas, 0.2, 0.2)
     # The floor is polished: it shows the room again, dimmer and drawn out.
     mirrored = blur(canvas[::-1], 0.8, 3.0) * np.float32(0.3)
     canvas = over(canvas, step(-7, -10, elevation), mirrored)
