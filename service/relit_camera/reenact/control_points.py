@@ -19,6 +19,8 @@ SKULL_CENTRE = np.array([0.0, 3.0, -5.0])
 """Middle of the skull in head axes, cm. The canonical face spans y −9…8 and z −3…8 with the nose in front."""
 SKULL_RADII = ((8.6, 11.5), (11.0, 14.5))
 """Half width and half height, cm, of two rings round the skull: the outline and beyond the hair."""
+SIDES = np.array([(s * x, y, z) for s in (-1, 1) for x, y, z in ((7.7, 2.5, -3.0), (7.9, -0.5, -3.0), (7.2, -4.0, -3.0), (6.2, -7.0, -2.5))])
+"""Ears and the jaw behind the face's outline, head axes, cm: they turn with the head."""
 NECK_PIVOT = np.array([0.0, -7.0, -7.0])
 """Where the head turns on the neck, head axes, cm."""
 STILL_ANCHORS = np.array([(x, y) for y in (-7.5, -12.0) for x in (-16.0, -11.0, -5.5, 0.0, 5.5, 11.0, 16.0)])
@@ -126,8 +128,13 @@ def choose_landmarks(scheme: Scheme, landmarks: NDArray[np.float64]) -> NDArray[
 
 
 def head_anchors(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
-    """Anchors (count, 2) of a person seen whole: skull and hair, which follow the head, neck and shoulders."""
-    return np.vstack([skull_ring(pose, size), still_anchors(pose, size)])
+    """Anchors (count, 2) of a person seen whole: what turns with the head, then neck and shoulders."""
+    return np.vstack([turning_anchors(pose, size), still_anchors(pose, size)])
+
+
+def turning_anchors(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Anchors (count, 2) of skull, hair, ears and jaw."""
+    return np.vstack([skull_ring(pose, size), project(SIDES, pose, size)])
 
 
 def skull_ring(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:

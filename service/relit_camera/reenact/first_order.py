@@ -47,7 +47,7 @@ class FirstOrderReenactor:
         anchors = head_anchors(stage.face.pose, stage.face.size) if self._whole else np.zeros((0, 2))
         self._points = control_points(stage.face, anchors)
         self._motion = DenseMotion(stage.options)
-        self._mouth = Mouth(stage.face)
+        self._mouth = Mouth(stage.face, stage.subject.neutral)
         self._placed = still_from_output(stage.subject.size, stage.size)
         self._alpha = feathered(stage.subject.matte)
 

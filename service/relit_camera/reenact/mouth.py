@@ -13,30 +13,32 @@ from numpy.typing import NDArray
 from relit_camera.face.pose import project
 from relit_camera.face.state import HeadPose
 from relit_camera.reenact.source_face import SourceFace
-from relit_camera.space.images import LinearImage
+from relit_camera.space.colour import linear_from_uint8
+from relit_camera.space.images import DisplayImage, LinearImage
 
 CAVITY = np.array([0.035, 0.014, 0.012], dtype=np.float32)
-"""Reflectance of the cavity relative to a white wall lit like the face: dark, and red rather than black."""
+"""The cavity, in the exposure of the still: dark, and red rather than black."""
 TEETH = np.array([0.36, 0.33, 0.28], dtype=np.float32)
 """Teeth lie in the lips' shade, so they read well below white."""
-TEETH_BELOW_LIP_CM = 0.28
+TEETH_BELOW_LIP_CM = 0.2
 """How far the upper teeth show below the closed upper lip's edge; they stay with the skull when the lip goes up."""
 FULL_AT = 0.05
 """Gap, in eye distances, from which the inside is fully shown; it fades in from 0."""
-SKIN_ALBEDO = 0.45
 SUBPIXEL = 4
 
 
 class Mouth:
     """Draws the inside of one still's mouth."""
 
-    def __init__(self, face: SourceFace) -> None:
+    def __init__(self, face: SourceFace, neutral: DisplayImage) -> None:
+        """`neutral` is the still, uint8 sRGB, softly lit from the front: what the lips look like in white light."""
         scheme = face.scheme
         self._face = face
         self._upper, self._lower = list(scheme.upper_lip_inner), list(scheme.lower_lip_inner)
         self._still_gap = self._gap(face.landmarks)
         lips = np.round(face.landmarks[list(scheme.lips)] - 0.5).astype(int)
         self._lips = np.clip(lips, 0, np.array(face.size) - 1)
+        self._white = np.maximum(linear_from_uint8(neutral)[self._lips[:, 1], self._lips[:, 0]].mean(axis=0), 0.02)
 
     def draw(
         self,
@@ -68,7 +70,7 @@ class Mouth:
         shape = (int(high[1] - low[1]), int(high[0] - low[0]))
         softness = max(0.02 * float(np.ptp(opening[:, 0])), 0.5)
         hole = _polygon(opening - low, shape, softness) * np.float32(shown)
-        light = relit[self._lips[:, 1], self._lips[:, 0]].mean(axis=0) / SKIN_ALBEDO
+        light = relit[self._lips[:, 1], self._lips[:, 0]].mean(axis=0) / self._white
         inside = np.broadcast_to(CAVITY * light, (*shape, 3)).copy()
         teeth = _polygon(self._teeth(pose, to_output) - low, shape, 1.5 * softness)[..., None]
         # The row bends back toward the corners, out of the light.

@@ -11,13 +11,14 @@ from scipy.spatial.transform import Rotation
 from relit_camera.face.follow import FaceMotion
 from relit_camera.face.pose import project
 from relit_camera.face.state import HeadPose
-from relit_camera.reenact.control_points import NECK_PIVOT, ControlPoints, skull_ring, still_anchors
+from relit_camera.reenact.control_points import NECK_PIVOT, ControlPoints, still_anchors, turning_anchors
 from relit_camera.reenact.source_face import SourceFace
 
 MAX_SHIFT_CM = 12.0
 """A body moves aside by at most this much."""
 FACE_MIDDLE = np.array([0.0, 0.0, 3.5])
 """Head axes, cm: it stays when a face turns in its place."""
+MAX_TURN_DEG = 40.0
 MAX_TURN_IN_FRAME_DEG = 22.0
 SCALE_RANGE = (0.85, 1.3)
 
@@ -51,9 +52,9 @@ def transfer(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> Tar
     """
     still = face.pose
     pivot_camera = still.rotation.apply(NECK_PIVOT) + still.translation
-    turned = turned_about(NECK_PIVOT, still, motion.rotation)
+    turned = turned_about(NECK_PIVOT, still, bent(motion.rotation, MAX_TURN_DEG))
     landmarks = project(face.head_points + motion.expression, turned, face.size).astype(np.float64)
-    moved = np.vstack([landmarks[points.chosen], skull_ring(turned, face.size), still_anchors(still, face.size)])
+    moved = np.vstack([landmarks[points.chosen], turning_anchors(turned, face.size), still_anchors(still, face.size)])
 
     body = still.translation + motion.translation - turned.translation
     depth = -pivot_camera[2]
@@ -67,13 +68,16 @@ def transfer_in_frame(face: SourceFace, points: ControlPoints, motion: FaceMotio
 
     Nothing beyond the border was captured, so turns are bent softly to what fits inside.
     """
-    turn = motion.rotation.as_rotvec()
-    angle = float(np.linalg.norm(turn))
-    limit = np.radians(MAX_TURN_IN_FRAME_DEG)
-    bent = Rotation.from_rotvec(turn * (limit * np.tanh(angle / limit) / angle if angle > 0 else 1.0))
-    turned = turned_about(FACE_MIDDLE, face.pose, bent)
+    turned = turned_about(FACE_MIDDLE, face.pose, bent(motion.rotation, MAX_TURN_IN_FRAME_DEG))
     landmarks = project(face.head_points + motion.expression, turned, face.size).astype(np.float64)
     return Target(landmarks[points.chosen], landmarks, turned, np.zeros(2), 1.0, np.zeros(2))
+
+
+def bent(turn: Rotation, limit_deg: float) -> Rotation:
+    """The turn, bent softly so that it never exceeds the limit: beyond it the still has nothing to show."""
+    vector, limit = turn.as_rotvec(), np.radians(limit_deg)
+    angle = float(np.linalg.norm(vector))
+    return Rotation.from_rotvec(vector * (limit * np.tanh(angle / limit) / angle if angle > 0 else 1.0))
 
 
 def turned_about(pivot: NDArray[np.float64], pose: HeadPose, turn: Rotation) -> HeadPose:
