@@ -127,8 +127,10 @@ def test_resolve_takes_a_stored_name_first_and_then_a_path(
     assert store.resolve("room.hdr") is stored
     assert store.resolve("./room.hdr").light_map.max() == pytest.approx(7, rel=0.01)
     assert store.resolve("./room.hdr").name == "room"
-    with pytest.raises(NotFoundError, match=r"no environment 'none\.hdr'"):
+    with pytest.raises(PanoramaError, match=r"no panorama at none\.hdr; check the path"):
         store.resolve("none.hdr")
+    with pytest.raises(NotFoundError, match="no environment 'none'"):
+        store.resolve("none")
 
 
 def test_foreign_files_in_the_folder_are_left_alone(store: EnvironmentStore) -> None:

@@ -56,10 +56,11 @@ class EnvironmentStore:
 
         Raises:
             NotFoundError: neither a stored name nor a file.
-            PanoramaError: the file cannot be used.
+            PanoramaError: the file is missing, by its suffix, or cannot be used.
         """
-        if name_or_path not in self.names() and Path(name_or_path).is_file():
-            return environment_from_panorama(Path(name_or_path).stem, read_panorama(Path(name_or_path)))
+        path = Path(name_or_path)
+        if name_or_path not in self.names() and (path.is_file() or path.suffix.lower() in SUFFIXES):
+            return environment_from_panorama(path.stem, read_panorama(path))
         return self.load(name_or_path)
 
     def thumbnail(self, name: str) -> bytes:
