@@ -1,0 +1,52 @@
+# Everything a developer types. Each target sets up what it needs first: `make demo` works in a fresh clone.
+
+VENV ?= .venv
+BIN := $(VENV)/bin
+PYTHON ?= python3
+INSTALLED := $(VENV)/.installed
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test check lint types floors generated pytest wheel docker-check clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(INSTALLED) ## install Relit Camera and the development tools into .venv
+
+$(INSTALLED): pyproject.toml scripts/setup.sh
+	PYTHON=$(PYTHON) sh scripts/setup.sh $(VENV)
+	@touch $@
+
+demo: setup ## relight a recorded video under three environments, into build/demo
+	BIN=$(BIN) sh scripts/demo.sh build/demo
+
+test: check ## all checks and tests, as CI runs them
+
+check: lint types floors generated wheel docker-check pytest
+
+lint: setup ## style and formatting
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+
+types: setup ## static types
+	$(BIN)/mypy
+
+floors: setup ## which part may import which
+	$(BIN)/lint-imports --no-logo
+
+generated: setup ## files that are built from code are what the code builds
+	$(BIN)/python models/first_order_motion/build.py --check
+	$(BIN)/python -m relit_camera.api.schema_file build/openapi.json
+	cmp docs/openapi.json build/openapi.json
+
+wheel: setup ## build the wheel and prove that it works when installed by itself
+	sh scripts/check-wheel.sh $(BIN)/python build/wheel
+
+docker-check: setup ## lint the Dockerfile and the compose file
+	$(BIN)/python scripts/check_docker.py
+
+pytest: setup ## the tests alone
+	$(BIN)/python -m pytest
+
+clean: ## remove what the targets made, the virtual environment too
+	rm -rf $(VENV) build dist test-failures .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
