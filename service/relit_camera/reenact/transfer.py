@@ -44,23 +44,43 @@ class Target:
     pivot: NDArray[np.float64]
 
 
+@dataclass(frozen=True)
+class BodyMotion:
+    """How the whole person moves, with the head turned on its neck.
+
+    Attributes:
+        turned: pose of the turned head, before the person moves.
+        shift, scale, pivot: as in `Target`.
+    """
+
+    turned: HeadPose
+    shift: NDArray[np.float64]
+    scale: float
+    pivot: NDArray[np.float64]
+
+
+def body_motion(face: SourceFace, motion: FaceMotion) -> BodyMotion:
+    """Split the head's displacement: what turning on the neck explains bends the neck, the rest moves the body."""
+    still = face.pose
+    turned = turned_about(NECK_PIVOT, still, bent(motion.rotation, MAX_TURN_DEG))
+    body = still.translation + motion.translation - turned.translation
+    depth = -(still.rotation.apply(NECK_PIVOT) + still.translation)[2]
+    scale = float(np.clip(depth / max(depth - body[2], 1.0), *SCALE_RANGE))
+    shift = np.clip(body[:2], -MAX_SHIFT_CM, MAX_SHIFT_CM) * [1, -1] * still.focal_px / depth
+    return BodyMotion(turned, shift, scale, project(NECK_PIVOT[None], still, face.size)[0])
+
+
 def transfer(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> Target:
     """Move the head of a still that shows the person whole, as the driver's head moved since neutral.
 
     The rotation and the expression (head-space displacements in cm of the same canonical face) are taken over as they
-    are. The head's displacement is split: what turning on the neck explains bends the neck, the rest moves the body.
+    are; see `body_motion` for the head's displacement.
     """
-    still = face.pose
-    pivot_camera = still.rotation.apply(NECK_PIVOT) + still.translation
-    turned = turned_about(NECK_PIVOT, still, bent(motion.rotation, MAX_TURN_DEG))
-    landmarks = project(face.head_points + motion.expression, turned, face.size).astype(np.float64)
-    moved = np.vstack([landmarks[points.chosen], turning_anchors(turned, face.size), still_anchors(still, face.size)])
-
-    body = still.translation + motion.translation - turned.translation
-    depth = -pivot_camera[2]
-    scale = float(np.clip(depth / max(depth - body[2], 1.0), *SCALE_RANGE))
-    shift = np.clip(body[:2], -MAX_SHIFT_CM, MAX_SHIFT_CM) * [1, -1] * still.focal_px / depth
-    return Target(moved, landmarks, turned, shift, scale, project(NECK_PIVOT[None], still, face.size)[0])
+    body = body_motion(face, motion)
+    landmarks = project(face.head_points + motion.expression, body.turned, face.size).astype(np.float64)
+    anchors = [turning_anchors(body.turned, face.size), still_anchors(face.pose, face.size)]
+    moved = np.vstack([landmarks[points.chosen], *anchors])
+    return Target(moved, landmarks, body.turned, body.shift, body.scale, body.pivot)
 
 
 def transfer_in_frame(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> Target:
