@@ -1,19 +1,37 @@
-"""How the machine's cores are shared among the libraries that start threads of their own."""
+"""How this process uses the machine: threads of the libraries that start their own, and memory of pictures."""
 
 from __future__ import annotations
 
 import os
 
 import cv2
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 OPENCV_THREADS = 2
 BLAS_THREADS = 1
 """OpenBLAS's threads spin while they wait: two of them gain a millisecond on an idle machine, and lose thirty when a
 call app wants the other core."""
+PICTURE_BYTES = 31 << 20
+"""More than any array of a frame, and less than the 32 MB up to which glibc adapts."""
 
 
 def share_cores() -> None:
-    """Give OpenCV and BLAS an explicit share, for the whole process. ONNX Runtime's is in each session's options."""
+    """Give OpenCV and BLAS an explicit share, for the whole process; ONNX Runtime's is in each session's options.
+
+    And keep the memory of pictures.
+    """
     cv2.setNumThreads(min(os.cpu_count() or 1, OPENCV_THREADS))
     threadpool_limits(limits=BLAS_THREADS, user_api="blas")
+    keep_picture_memory()
+
+
+def keep_picture_memory() -> None:
+    """Let freed arrays of a frame's size stay with the process.
+
+    glibc gives every large block back to the system and takes it again for the next frame, page by page: several
+    milliseconds a frame. Freeing one such block raises the size from which it does so (mallopt(3), M_MMAP_THRESHOLD).
+    Elsewhere it does nothing.
+    """
+    block = np.empty(PICTURE_BYTES, dtype=np.uint8)
+    del block

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from relit_camera.compose.display import linear_from_display
+from relit_camera.space.display import linear_from_display
 from relit_camera.compose.view import EnvironmentView
 from relit_camera.light.exposure import display_scale
 from relit_camera.light.maps import irradiance, resample

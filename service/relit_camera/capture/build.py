@@ -64,6 +64,7 @@ def build_subject(
             source=source,
             psnr_db=min(compressed.psnr_db, 200.0),
             gamma=str(gamma),
+            over_black=over_black(samples),
             display_gain=display_gain(frontal, samples.matte),
             created_by=f"relit-camera {__version__}",
             created_at=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -84,6 +85,12 @@ def frontal_picture(field: FactoredField) -> LinearImage:
     lobe /= (lobe * np.maximum(texel_directions()[..., 2], 0)).sum()
     mixed = np.tensordot(field.weights @ lobe.ravel().astype(np.float32), field.pictures, axes=(0, 0))
     return np.asarray(mixed, dtype=np.float32)
+
+
+def over_black(samples: Samples) -> bool:
+    """Whether everything outside the matte is black in every frame."""
+    outside = samples.matte == 0
+    return bool(outside.any() and samples.pictures[:, outside].max() < 0.02)
 
 
 def display_gain(frontal: LinearImage, matte: Mask) -> float:

@@ -26,7 +26,7 @@ def relight(
 
     from relit_camera.cli.parse import numbers
     from relit_camera.cli.settings import settings_of
-    from relit_camera.compose.display import display_from_linear
+    from relit_camera.space.display import display_from_linear
     from relit_camera.light.exposure import display_scale
     from relit_camera.light.maps import rotate as rotate_map
     from relit_camera.light.store import EnvironmentStore

@@ -12,7 +12,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from relit_camera.compose.display import display_curve, inverse_display_curve
+from relit_camera.space.display import display_curve, inverse_display_curve
 from relit_camera.compose.live_room import LiveRoom, blurred
 from relit_camera.compose.view import EnvironmentView
 from relit_camera.config.look import (

@@ -26,8 +26,10 @@ FLOOR = 0.03
 """Share of the room-lit face's mean that is added to both sides of the ratio: shadows stay bounded."""
 EDGE = 0.02
 """Share of the still's width at the matte's edge that is not trusted."""
-EXTEND = 16
-"""The extension beyond the still is computed at this fraction of the frame's size."""
+COARSE = 2
+"""The ratio is warped and extended at this fraction of the frame's size: it is as soft as the still."""
+EXTEND = 8
+"""The extension beyond the still is computed at this fraction of that."""
 STRANGER = 0.17
 """Residual of the room fit from which the live face is not the subject's."""
 TRIAL_S = 1.5
@@ -54,7 +56,6 @@ class RatioReenactor:
         """
         live = linear_from_uint8(frame.image)
         width, height = frame.size
-        everything = (0, 0, width, height)
         if motion.pose is None:
             return Moved(live, np.ones((height, width), np.float32), (0, 0))
         room = self._probe.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
@@ -71,13 +72,18 @@ class RatioReenactor:
 
         # Where nobody is tracked with confidence the picture eases back to the live one.
         ratio = 1 + (ratio - 1) * np.float32(motion.presence)
-        warped = self._warp(motion, frame.size).apply(
-            np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32), everything
-        )
-        return Moved(live * extended(warped), np.ones((height, width), np.float32), (0, 0))
+        small = (0, 0, -(-width // COARSE), -(-height // COARSE))
+        weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
+        ratio = extended(self._warp(motion, frame.size).apply(weighted, small))
+        large = cv2.resize(ratio, (small[2] * COARSE, small[3] * COARSE), interpolation=cv2.INTER_LINEAR)
+        relit_live = cv2.multiply(live, np.ascontiguousarray(large[:height, :width]))
+        return Moved(np.asarray(relit_live, dtype=np.float32), np.ones((height, width), np.float32), (0, 0))
 
     def _warp(self, motion: FaceMotion, size: tuple[int, int]) -> Warp:
-        """The still as it lies on the live face: one similarity for the head, a dense flow for the rest."""
+        """The still as it lies on the live face, for a picture smaller by COARSE.
+
+        One similarity for the head, a dense flow for the rest.
+        """
         assert motion.pose is not None
         face, chosen = self._face, self._points.chosen
         landmarks = motion.landmarks.astype(np.float64)
@@ -85,6 +91,7 @@ class RatioReenactor:
         still_from_live = similarity(landmarks[list(face.scheme.rigid)], face.landmarks[list(face.scheme.rigid)])
         target = live @ still_from_live[:, :2].T + still_from_live[:, 2]
         moved = landmarks @ still_from_live[:, :2].T + still_from_live[:, 2]
+        still_from_live = still_from_live @ np.diag([COARSE, COARSE, 1.0])
         return Warp(still_from_live, moved_flow(self._motion, face, self._points, target, moved))
 
 

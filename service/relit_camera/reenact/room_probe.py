@@ -16,7 +16,7 @@ from scipy.optimize import nnls
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
-from relit_camera.light.maps import LightMap
+from relit_camera.light.maps import LightMap, rotate
 from relit_camera.reenact.source_face import SourceFace
 from relit_camera.relight.relighter import weighted_light
 from relit_camera.space.colour import linear_from_uint8
@@ -61,6 +61,7 @@ class RoomProbe:
         self._samples = _sample_basis(subject, face.landmarks[self._triangles].mean(axis=1))
         self._coefficients = subject.coefficients
         self._amounts = np.zeros((LOBES, 3))
+        self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), dtype=np.float32)
         self._fitted_at = -np.inf
         self._residual = 1.0
 
@@ -77,7 +78,8 @@ class RoomProbe:
         if time_s - self._fitted_at > 1 / FITS_PER_S or time_s < self._fitted_at:
             self._fit(live, usable, rotation)
             self._fitted_at = time_s
-        light_map = (_lobes(Rotation.identity()) @ self._amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3).astype(np.float32)
+            light = _lobes(Rotation.identity()) @ self._amounts
+            self._light_map = light.reshape(MAP_HEIGHT, MAP_WIDTH, 3).astype(np.float32)
         predicted = self._predict(rotation)
         gain = np.ones(3, np.float32)
         if usable.sum() >= 20:
@@ -85,11 +87,10 @@ class RoomProbe:
             gain = np.clip(np.median(ratio, axis=0), 0.25, 4.0).astype(np.float32)
             deviation = np.abs(predicted * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
             self._residual += 0.1 * (float(np.median(deviation)) - self._residual)
-        return RoomLight(light_map, gain, self._residual)
+        return RoomLight(self._light_map, gain, self._residual)
 
-    def _predict(self, rotation: Rotation) -> NDArray[np.float64]:
-        light = (_lobes(rotation) @ self._amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3).astype(np.float32)
-        amounts = self._coefficients @ weighted_light(light)
+    def _predict(self, rotation: Rotation) -> NDArray[np.float32]:
+        amounts = self._coefficients @ weighted_light(rotate(self._light_map, rotation))
         return np.stack([self._samples[c] @ amounts[:, c] for c in range(3)], axis=1)
 
     def _fit(self, live: NDArray[np.float32], usable: NDArray[np.bool_], rotation: Rotation) -> None:

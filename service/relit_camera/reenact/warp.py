@@ -41,27 +41,37 @@ class Warp:
     affine: NDArray[np.float64]
     patches: tuple[FlowPatch, ...]
 
-    def map(self, box: Box) -> NDArray[np.float32]:
-        """Positions (height, width, 2) for cv2.remap, for the output pixels of `box` (left, top, right, bottom)."""
+    def map(self, box: Box, enlarged: int = 1, step: int = 1) -> NDArray[np.float32]:
+        """Positions (height, width, 2) for cv2.remap, for the output pixels of `box` (left, top, right, bottom).
+
+        Args:
+            box: in output pixels.
+            enlarged: by how much the still to be sampled is larger than the one that the warp was made for.
+            step: compute every `step`-th position and interpolate: the flow's grids are coarser still.
+        """
         width, height = box[2] - box[0], box[3] - box[1]
+        columns, rows = -(-width // step), -(-height // step)
         # cv2 counts pixel centres as integers: x_ours = x_cv + ½ on either side.
-        still_from_pixel = self.affine @ np.array([[1, 0, box[0] + 0.5], [0, 1, box[1] + 0.5], [0, 0, 1]])
-        flow = np.zeros((height, width, 2), dtype=np.float32)
+        first = box[0] + 0.5 * step, box[1] + 0.5 * step
+        still_from_pixel = self.affine @ np.array([[step, 0, first[0]], [0, step, first[1]], [0, 0, 1]])
+        flow = np.zeros((rows, columns, 2), dtype=np.float32)
         for patch in self.patches:
             _paste(flow, patch, still_from_pixel)
         a = still_from_pixel.astype(np.float32)
-        flow += (a[:, 0] * np.arange(width, dtype=np.float32)[:, None] + a[:, 2] - np.float32(0.5))[None]
-        flow += (a[:, 1] * np.arange(height, dtype=np.float32)[:, None])[:, None]
-        return flow
+        flow += (a[:, 0] * np.arange(columns, dtype=np.float32)[:, None] + a[:, 2])[None]
+        flow += (a[:, 1] * np.arange(rows, dtype=np.float32)[:, None])[:, None]
+        flow *= np.float32(enlarged)
+        flow -= np.float32(0.5)
+        if step > 1:
+            size = (columns * step, rows * step)
+            flow = cv2.resize(flow, size, interpolation=cv2.INTER_LINEAR)[:height, :width]
+        return np.asarray(flow, dtype=np.float32)
 
-    def apply(self, still: NDArray[np.float32], box: Box, enlarged: int = 1) -> NDArray[np.float32]:
-        """The still (height, width, channels ≤ 4) float32 as seen at the output pixels of `box`; 0 beyond its edges.
-
-        `enlarged`: by how much `still` is larger than the picture that the warp was made for.
-        """
-        positions = self.map(box)
-        if enlarged != 1:
-            positions = (positions + np.float32(0.5)) * np.float32(enlarged) - np.float32(0.5)
+    def apply(
+        self, still: NDArray[np.float32], box: Box, enlarged: int = 1, step: int = 1
+    ) -> NDArray[np.float32]:
+        """The still (height, width, channels ≤ 4) float32 as seen at the output pixels of `box`; 0 beyond its edges."""
+        positions = self.map(box, enlarged, step)
         view = cv2.remap(still, positions, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
         return np.asarray(view, dtype=np.float32)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -50,6 +51,9 @@ def uint8_from_linear(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
 
 def linear_from_uint8(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Linear light, float32, of an sRGB uint8 picture of any shape."""
+    # cv2.LUT is ten times as fast as indexing; it wants two or three dimensions.
+    if encoded.ndim in (2, 3) and encoded.size:
+        return np.asarray(cv2.LUT(encoded, _decode_table()), dtype=np.float32)
     return _decode_table()[encoded]
 
 

@@ -15,6 +15,7 @@ from relit_camera.config.settings import StorageSettings
 from relit_camera.errors import InputError, NotFoundError
 from relit_camera.light.backdrop import environment_from_picture
 from relit_camera.light.environment import Environment
+from relit_camera.light.exposure import display_scale
 from relit_camera.light.maps import resample
 from relit_camera.light.store import EnvironmentStore
 from relit_camera.space.colour import linear_from_uint8, uint8_from_linear
@@ -151,7 +152,9 @@ class Director:
         if background.image in self.backgrounds.names():
             return self.backgrounds.load(background.image)
         if background.image in self.environments.names():
-            panorama = self.environments.load(background.image).panorama
-            return uint8_from_linear(panorama.radiance[:, ::-1])
+            environment = self.environments.load(background.image)
+            # A white wall under irradiance 1 reads 1 and has radiance 1/π: so seen, background and face fit together.
+            shown = environment.panorama.radiance[:, ::-1] * np.float32(np.pi * display_scale(environment.light_map))
+            return uint8_from_linear(shown)
         known = ", ".join(self.background_names()) or "none"
         raise NotFoundError(f"no background picture '{background.image}'", f"stored are: {known}")

@@ -13,13 +13,13 @@ from relit_camera.config.settings import ReenactSettings, TrackerSettings
 from relit_camera.errors import SubjectError
 from relit_camera.face.follow import FaceFollower, FaceMotion, FollowSettings
 from relit_camera.face.state import Tracker
-from relit_camera.light.maps import rotate
+from relit_camera.light.maps import LightMap, rotate
 from relit_camera.models.session import SessionOptions
 from relit_camera.reenact.reenactor import Moved, Reenactor, Stage, open_reenactor
 from relit_camera.reenact.source_face import source_face
 from relit_camera.relight.basis import BasisRelighter
 from relit_camera.relight.relighter import Relighter
-from relit_camera.space.colour import linear_from_uint8
+from relit_camera.space.display import linear_from_display
 from relit_camera.space.images import DisplayImage, Frame, LinearImage
 from relit_camera.stream.composer import Composer
 from relit_camera.stream.lighting import EasedLight
@@ -88,6 +88,7 @@ class Pipeline:
         self._light = EasedLight()
         self._composer = Composer(size, options, self.timer)
         self._cast: _Cast | None = None
+        self._lit: tuple[_Cast, LightMap, LinearImage] | None = None
         self._stranger: Subject | None = None
         self._troubles: dict[str, Degradation] = {}
 
@@ -112,7 +113,7 @@ class Pipeline:
             frame = fitted(frame, self._size)
         if subject is None:
             frame = fitted(frame, self._size)
-            return Finished(self._composer.live(linear_from_uint8(frame.image), frame, scene), None)
+            return Finished(self._composer.live(linear_from_display(frame.image), frame, scene), None)
         cast = self._prepare(subject, mode)
         with self.timer.stage("track"):
             motion = self._follower.follow(self._tracker.track(frame), frame.size, frame.time_s)
@@ -120,7 +121,7 @@ class Pipeline:
             room = self._light.update(scene, frame.time_s)
             light = rotate(room, motion.rotation)
         with self.timer.stage("relight"):
-            relit = cast.relighter.relight(light * np.float32(subject.metadata.display_gain))
+            relit = self._relight(cast, light * np.float32(subject.metadata.display_gain))
         with self.timer.stage("move"):
             moved = self._move(cast, relit, motion, frame)
         if moved is None:
@@ -154,6 +155,12 @@ class Pipeline:
         self._cast = _Cast(subject, mode, relighter, reenactor)
         return self._cast
 
+    def _relight(self, cast: _Cast, light: LightMap) -> LinearImage:
+        """The still under `light`; the last picture again while neither the light nor the head has moved."""
+        if self._lit is None or self._lit[0] is not cast or not np.array_equal(self._lit[1], light):
+            self._lit = (cast, light, cast.relighter.relight(light))
+        return self._lit[2]
+
     def _move(self, cast: _Cast, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved | None:
         """The moved picture, or None if the ratio cannot go on with this face: then reenact takes over."""
         try:
@@ -171,7 +178,7 @@ class Pipeline:
             blend = np.float32(scene.look.lighting.blend)
             picture = moved.picture
             if blend < 1:
-                picture = linear_from_uint8(frame.image) * (1 - blend) + picture * blend
+                picture = linear_from_display(frame.image) * (1 - blend) + picture * blend
             return self._composer.live(picture, frame, scene)
         return self._composer.still(moved, scene, frame.time_s)
 

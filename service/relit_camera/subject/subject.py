@@ -37,6 +37,8 @@ class SubjectMetadata(BaseModel):
     gamma: str = "srgb"
     display_gain: Annotated[float, Field(gt=0, le=100)] = 1.0
     """What pictures are multiplied by to be shown, where the captured frames are not in units of a white wall."""
+    over_black: bool = False
+    """Whether the captured frames hold the person over black: then their colours carry the matte as a factor."""
     created_by: str
     created_at: str
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relit_camera.compose.display import (
+from relit_camera.space.display import (
     SHOULDER,
     display_curve,
     display_from_linear,
