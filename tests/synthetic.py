@@ -21,7 +21,7 @@ def fibonacci_directions(count: int, lowest_z: float = -1.0) -> NDArray[np.float
 
 
 def sphere_surface(size: int = 48) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Unit normals (size, size, 3), which are the positions as well, and the mask of a sphere that fills the picture."""
+    """Unit normals (size, size, 3), which are its positions as well, and the mask of a sphere."""
     x, y = np.meshgrid((np.arange(size) + 0.5) / size * 2 - 1, 1 - (np.arange(size) + 0.5) / size * 2)
     inside = x * x + y * y < 0.96
     z = np.sqrt(np.maximum(1 - x * x - y * y, 0))

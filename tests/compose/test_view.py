@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from relit_camera.space.display import linear_from_display
 from relit_camera.compose.view import EnvironmentView
 from relit_camera.light.exposure import display_scale
 from relit_camera.light.maps import irradiance, resample
 from relit_camera.light.panorama import Panorama, read_panorama
 from relit_camera.space.colour import luminance
 from relit_camera.space.directions import direction_from_degrees, texel_directions
+from relit_camera.space.display import linear_from_display
 from relit_camera.space.rotation import rotation_from_angles
 
 SIZE = (320, 180)

@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from relit_camera.errors import ImageError
+from relit_camera.space.colour import linear_from_uint8, srgb_encode
 from relit_camera.space.display import (
     SHOULDER,
     display_curve,
@@ -12,8 +14,6 @@ from relit_camera.space.display import (
     inverse_display_curve,
     linear_from_display,
 )
-from relit_camera.errors import ImageError
-from relit_camera.space.colour import linear_from_uint8, srgb_encode
 
 
 def grey_ramp(light: np.ndarray) -> np.ndarray:

@@ -35,7 +35,7 @@ def bench_relighting(subject: Subject, maps: Mapping[str, LightMap], options: Se
 
     def gemm() -> np.ndarray:
         planes = [cv2.gemm(matrix[c], light[:, c : c + 1], 1, None, 0) for c in range(3)]
-        return cv2.merge([plane.reshape(shape) for plane in planes])
+        return np.asarray(cv2.merge([plane.reshape(shape) for plane in planes]))
 
     def naive() -> None:
         for pixel in range(NAIVE_PIXELS):

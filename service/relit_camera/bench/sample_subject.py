@@ -19,16 +19,12 @@ SCHEME = "mesh478"
 
 
 def sample_subject(width: int = 150, height: int = 200) -> Subject:
-    """An RGB subject of exactly 64 captured lights over the whole sphere, by default of the thesis's 150 x 200 pixels."""
+    """An RGB subject of exactly 64 captured lights over the sphere, by default of the thesis's 150 x 200 pixels."""
     x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2)
     rng = np.random.default_rng(0)
-    bumps = sum(
-        a * np.cos(fx * x + fy * y + p)
-        for a, fx, fy, p in zip(
-            rng.uniform(0.005, 0.02, 24), rng.uniform(-25, 25, 24), rng.uniform(-25, 25, 24), rng.uniform(0, 6, 24),
-            strict=True,
-        )  # fmt: skip
-    )
+    amplitude, phase = rng.uniform(0.005, 0.02, 24), rng.uniform(0, 6, 24)
+    across, down = rng.uniform(-25, 25, (2, 24))
+    bumps = np.cos(x[..., None] * across + y[..., None] * down + phase) @ amplitude
     depth = np.sqrt(np.maximum(1.6 - x * x - y * y, 0.05)) + bumps
     slope_y, slope_x = np.gradient(depth, 2 / height, 2 / width)
     normal = np.dstack([-slope_x, slope_y, np.ones_like(depth)])
@@ -42,7 +38,9 @@ def sample_subject(width: int = 150, height: int = 200) -> Subject:
         gloss = 0.3 * (facing > 0) * np.maximum(normal @ half, 0)[..., None] ** 40
         pictures[index] = albedo * (facing + 0.02) + gloss
     matte = np.ones((height, width), dtype=np.float32)
-    return build_subject(Samples(pictures, directions, matte), "barycentric", "generated", landmarks={SCHEME: _mean_face(width, height)})
+    return build_subject(
+        Samples(pictures, directions, matte), "barycentric", "generated", landmarks={SCHEME: _mean_face(width, height)}
+    )
 
 
 def _mean_face(width: int, height: int) -> Points:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from relit_camera.bench.timing import median_ms
@@ -35,7 +37,7 @@ def bench_transfer(options: SessionOptions) -> dict[str, object] | None:
         if session.provider == "cpu":
             return None
         feed = {"a": a, "b": b} if name == "sent_ms" else {"b": b}
-        result[name] = median_ms(lambda s=session, f=feed: s.run(f)) * PRODUCTS
+        result[name] = median_ms(partial(session.run, feed)) * PRODUCTS
         result["provider"] = session.provider
     result["numpy_ms"] = median_ms(lambda: a @ b, 10) * PRODUCTS
     return result

@@ -49,7 +49,9 @@ def build_subject(
     method = DEFAULT_METHOD if method == "default" else method
     field = open_method(method).build(samples)
     if not isinstance(field, FactoredField):
-        raise InputError(f"the field of method '{method}' cannot be compressed yet", "use barycentric, planar or nearest")
+        raise InputError(
+            f"the field of method '{method}' cannot be compressed yet", "use barycentric, planar or nearest"
+        )
     frontal = frontal_picture(field)
     still = neutral_picture(frontal, samples.matte)
     compressed = compress(field, samples.matte)
@@ -94,8 +96,10 @@ def over_black(samples: Samples) -> bool:
 
 
 def display_gain(frontal: LinearImage, matte: Mask) -> float:
-    """1 for a calibrated capture. No skin is nearly as bright as a white wall: where the frames say so, their unit is
-    another (a strobe of unknown strength), and they are shown as bright as light skin is.
+    """What the pictures are multiplied by to be shown: 1 for a calibrated capture.
+
+    No skin is nearly as bright as a white wall. Where the frames say so, their unit is another (a strobe of unknown
+    strength), and they are shown as bright as light skin is.
     """
     bright = float(np.percentile(luminance(frontal)[matte > 0.5], 75))
     return 1.0 if bright <= BRIGHTEST_SKIN else TYPICAL_SKIN / bright

@@ -32,7 +32,9 @@ def read_lights(path: Path) -> list[LightPicture]:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = "not a text file" if isinstance(error, UnicodeDecodeError) else error.strerror
-        raise LightsError(f"cannot read {path}: {reason}", "name an .lp file: a count, then 'file x y z' lines") from error
+        raise LightsError(
+            f"cannot read {path}: {reason}", "name an .lp file: a count, then 'file x y z' lines"
+        ) from error
     rows = [(number, line.strip()) for number, line in enumerate(lines, 1) if line.strip()]
     if not rows or not rows[0][1].isdecimal():
         first = rows[0][1][:40] if rows else ""

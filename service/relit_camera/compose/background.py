@@ -12,7 +12,6 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from relit_camera.space.display import display_curve, inverse_display_curve
 from relit_camera.compose.live_room import LiveRoom, blurred
 from relit_camera.compose.view import EnvironmentView
 from relit_camera.config.look import (
@@ -29,6 +28,7 @@ from relit_camera.light.exposure import display_scale
 from relit_camera.light.panorama import Panorama
 from relit_camera.light.room import room_light
 from relit_camera.space.colour import linear_from_uint8, srgb_encode, uint8_from_linear
+from relit_camera.space.display import display_curve, inverse_display_curve
 from relit_camera.space.images import DisplayImage
 from relit_camera.space.rotation import rotation_from_angles
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from relit_camera.space.display import display_from_linear
 from relit_camera.light.panorama import Panorama
 from relit_camera.space.directions import map_position_from_direction
+from relit_camera.space.display import display_from_linear
 from relit_camera.space.images import DisplayImage, LinearImage
 
 RADIANCE_TO_PICTURE = np.pi

@@ -109,7 +109,9 @@ def _check_environment() -> None:
             continue
         top = variable.removeprefix("RELIT_").split("__")[0].lower()
         if top not in known:
-            raise ConfigError(f"environment variable {variable} is no setting", f"known are: {', '.join(sorted(known))}")
+            raise ConfigError(
+                f"environment variable {variable} is no setting", f"known are: {', '.join(sorted(known))}"
+            )
 
 
 def _without_none(values: Nested) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a person changes while the camera runs: lighting, background, mode. The API, presets and config.yaml share it."""
+"""What a person changes while the camera runs: lighting, background, mode. API, presets and config.yaml share it."""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from relit_camera.face.pose import project
 from relit_camera.face.landmarks import Scheme
+from relit_camera.face.pose import project
 from relit_camera.face.state import HeadPose
 from relit_camera.reenact.dense_motion import Influence, Region, region_around
 from relit_camera.reenact.source_face import SourceFace
@@ -19,7 +19,13 @@ SKULL_CENTRE = np.array([0.0, 3.0, -5.0])
 """Middle of the skull in head axes, cm. The canonical face spans y −9…8 and z −3…8 with the nose in front."""
 SKULL_RADII = ((8.6, 11.5), (11.0, 14.5))
 """Half width and half height, cm, of two rings round the skull: the outline and beyond the hair."""
-SIDES = np.array([(s * x, y, z) for s in (-1, 1) for x, y, z in ((7.7, 2.5, -3.0), (7.9, -0.5, -3.0), (7.2, -4.0, -3.0), (6.2, -7.0, -2.5))])
+SIDES = np.array(
+    [
+        (s * x, y, z)
+        for s in (-1, 1)
+        for x, y, z in ((7.7, 2.5, -3.0), (7.9, -0.5, -3.0), (7.2, -4.0, -3.0), (6.2, -7.0, -2.5))
+    ]
+)
 """Ears and the jaw behind the face's outline, head axes, cm: they turn with the head."""
 NECK_PIVOT = np.array([0.0, -7.0, -7.0])
 """Where the head turns on the neck, head axes, cm."""
@@ -84,7 +90,7 @@ def control_points(face: SourceFace, anchors: NDArray[np.float64]) -> ControlPoi
     chosen = choose_landmarks(scheme, face.landmarks.astype(np.float64))
     source = np.vstack([face.landmarks[chosen], anchors]).astype(np.float64)
     # A point reaches about as far as its neighbours are: fine on lips and lids, coarse on cheeks and hair.
-    distance = KDTree(source).query(source, k=4)[0][:, 1:].mean(axis=1)
+    distance = np.asarray(KDTree(source).query(source, k=4)[0])[:, 1:].mean(axis=1)
     span = scheme.eye_span(face.landmarks)
     place = {int(landmark): index for index, landmark in enumerate(chosen)}
     pairs: list[tuple[int, int]] = []

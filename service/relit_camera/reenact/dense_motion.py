@@ -81,7 +81,7 @@ class DenseMotion:
         middle = influence.target.mean(axis=0)
 
         def scaled(points: NDArray[np.float64]) -> NDArray[np.float32]:
-            return ((points - middle) / unit).astype(np.float32)
+            return np.asarray((points - middle) / unit, dtype=np.float32)
 
         flow = self._session.run(
             {

@@ -28,7 +28,7 @@ from relit_camera.reenact.warp import Box, FlowPatch, Warp
 from relit_camera.space.images import Frame, LinearImage, Mask
 
 ENLARGE = 2
-"""The still is enlarged by bicubic interpolation before the bilinear warp: as sharp as a bicubic warp, a third of its time."""
+"""The still is enlarged by bicubic interpolation before the bilinear warp: as sharp as a bicubic one, and quicker."""
 STEP = 2
 """Warp positions are computed for every other pixel of each row and column."""
 HOLD = 0.08

@@ -91,7 +91,7 @@ class Mouth:
         return _transform(to_output, project(band, pose, self._face.size))
 
 
-def _transform(affine: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _transform(affine: NDArray[np.float64], points: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.asarray(points @ affine[:, :2].T + affine[:, 2])
 
 
@@ -99,4 +99,4 @@ def _polygon(points: NDArray[np.float64], shape: tuple[int, int], softness: floa
     mask = np.zeros(shape, dtype=np.uint8)
     corners = np.round((points - 0.5) * (1 << SUBPIXEL)).astype(np.int32)
     cv2.fillPoly(mask, [corners], 255, lineType=cv2.LINE_AA, shift=SUBPIXEL)
-    return np.asarray(cv2.GaussianBlur(mask, (0, 0), softness), dtype=np.float32) / 255
+    return np.asarray(cv2.GaussianBlur(mask, (0, 0), softness).astype(np.float32) / np.float32(255), dtype=np.float32)

@@ -96,7 +96,7 @@ class RatioReenactor:
 
 
 def trusted(matte: Mask) -> Mask:
-    """How far the still's ratio counts: inside the matte, less toward its edge, where the still's rim is not the live one's."""
+    """How far the still's ratio counts: inside the matte, and less toward its edge, whose rim light is not the live one's."""
     reach = max(round(EDGE * matte.shape[1]), 1)
     inner = cv2.erode(matte, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
     return np.asarray(cv2.GaussianBlur(inner, (0, 0), reach / 2), dtype=np.float32)

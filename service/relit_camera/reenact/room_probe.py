@@ -138,10 +138,13 @@ def _skin_triangles(face: SourceFace) -> NDArray[np.intp]:
     """Triangles (count, 3) of landmark indices that lie on skin: not in the eyes, nor between the lips."""
     scheme = face.scheme
     triangles = np.asarray(Delaunay(face.landmarks).simplices, dtype=np.intp)
-    holes = [set(scheme.right_eye.lids) | set(scheme.right_eye.iris), set(scheme.left_eye.lids) | set(scheme.left_eye.iris)]
+    holes = [
+        set(scheme.right_eye.lids) | set(scheme.right_eye.iris),
+        set(scheme.left_eye.lids) | set(scheme.left_eye.iris),
+    ]
     holes.append(set(scheme.lips))
     keep = [not any(set(map(int, t)) <= hole for hole in holes) for t in triangles]
-    return triangles[np.array(keep)]
+    return np.asarray(triangles[np.array(keep)])
 
 
 def _sample_basis(subject: Subject, points: Points) -> NDArray[np.float32]:

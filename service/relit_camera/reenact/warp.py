@@ -67,9 +67,7 @@ class Warp:
             flow = cv2.resize(flow, size, interpolation=cv2.INTER_LINEAR)[:height, :width]
         return np.asarray(flow, dtype=np.float32)
 
-    def apply(
-        self, still: NDArray[np.float32], box: Box, enlarged: int = 1, step: int = 1
-    ) -> NDArray[np.float32]:
+    def apply(self, still: NDArray[np.float32], box: Box, enlarged: int = 1, step: int = 1) -> NDArray[np.float32]:
         """The still (height, width, channels ≤ 4) float32 as seen at the output pixels of `box`; 0 beyond its edges."""
         positions = self.map(box, enlarged, step)
         view = cv2.remap(still, positions, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)

@@ -110,14 +110,14 @@ def spherical_barycentric(points: NDArray[np.float64], corners: NDArray[np.float
     """
     areas = np.stack([_area(points, corners[:, (i + 1) % 3], corners[:, (i + 2) % 3]) for i in range(3)], axis=1)
     areas = np.maximum(areas, 0)
-    return areas / np.maximum(areas.sum(axis=1, keepdims=True), 1e-300)
+    return np.asarray(areas / np.maximum(areas.sum(axis=1, keepdims=True), 1e-300))
 
 
 def _area(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> NDArray[np.float64]:
     """Signed solid angle of spherical triangles (van Oosterom and Strackee 1983)."""
     volume = np.einsum("ij,ij->i", a, np.cross(b, c))
     ab, bc, ca = (np.einsum("ij,ij->i", u, v) for u, v in ((a, b), (b, c), (c, a)))
-    return 2 * np.arctan2(volume, 1 + ab + bc + ca)
+    return np.asarray(2 * np.arctan2(volume, 1 + ab + bc + ca))
 
 
 def _degenerate(count: int) -> LightsError:

@@ -1,4 +1,4 @@
-"""Things that happened, for whoever listens: a bounded queue a listener, so that a slow one loses events, never time."""
+"""Things that happened, for whoever listens: a bounded queue each, so that a slow one loses events, never time."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def display_light(environment: Environment | None, lighting: Lighting) -> LightM
 
 
 class EasedLight:
-    """Follows the scenes' light over each lighting's `transition_s`: fast at first, so that a change is seen at once."""
+    """Follows the scenes' light over each lighting's `transition_s`: fast at first: a change is seen at once."""
 
     def __init__(self) -> None:
         self._key: tuple[Environment | None, Lighting] | None = None

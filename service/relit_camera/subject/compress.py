@@ -72,7 +72,7 @@ def _project(
     size: tuple[int, int],
 ) -> CompressedField:
     lights, rank = vectors.shape
-    # picture_n · importance_n ≈ Σ_k component_k · vectors[n, k], with component_k = Σ_n vectors[n, k] importance_n picture_n.
+    # picture_n · importance_n ≈ Σ_k component_k · vectors[n, k], component_k = Σ_n vectors[n, k] importance_n picture_n
     analysis = (vectors * importance[:, None]).T.astype(np.float32)
     components = (analysis @ field.pictures.reshape(lights, -1)).reshape(rank, *size, 3)
     scale = np.abs(components).reshape(rank, -1).max(axis=1) + 1e-20

@@ -61,4 +61,4 @@ class FactoredField:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
         lights = self.pictures.shape[0]
         block = self.pictures.reshape(lights, -1, 3)[:, start:stop]
-        return np.einsum("npc,nl->plc", block, self.weights, optimize=True)
+        return np.asarray(np.einsum("npc,nl->plc", block, self.weights, optimize=True), dtype=np.float32)

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from relit_camera.space.images import DisplayImage, Mask, Points
 from relit_camera.subject.field import TEXELS
 
-FORMAT_VERSION = 1
+FORMAT_VERSION: Literal[1] = 1
 
 
 class SubjectMetadata(BaseModel):
@@ -83,7 +83,7 @@ class Subject:
         """
         meta = self.metadata
         picture = (meta.height, meta.width)
-        expected = {
+        expected: dict[str, tuple[NDArray | None, tuple[int, ...]]] = {
             "basis": (self.basis, (3, meta.components, *picture)),
             "coefficients": (self.coefficients, (meta.components, TEXELS)),
             "light_directions": (self.light_directions, (meta.lights, 3)),
