@@ -6,7 +6,8 @@ PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test check lint types floors generated pytest wheel docker-check clean
+.NOTPARALLEL:
+.PHONY: help setup demo test check lint types floors scripts generated image-steps pytest clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -22,7 +23,7 @@ demo: setup ## relight a recorded video under three environments, into build/dem
 
 test: check ## all checks and tests, as CI runs them
 
-check: lint types floors generated wheel docker-check pytest
+check: lint types floors scripts generated image-steps pytest ## the same
 
 lint: setup ## style and formatting
 	$(BIN)/ruff check
@@ -36,14 +37,21 @@ floors: setup ## which part may import which
 
 generated: setup ## files that are built from code are what the code builds
 	$(BIN)/python models/first_order_motion/build.py --check
+	@mkdir -p build
 	$(BIN)/python -m relit_camera.api.schema_file build/openapi.json
 	cmp docs/openapi.json build/openapi.json
 
-wheel: setup ## build the wheel and prove that it works when installed by itself
-	sh scripts/check-wheel.sh $(BIN)/python build/wheel
+scripts: setup ## shell scripts, Dockerfile and compose files
+	$(BIN)/shellcheck scripts/*.sh docker/*.sh .ci/run
+	$(BIN)/hadolint docker/Dockerfile
+	$(BIN)/check-jsonschema --builtin-schema vendor.compose-spec docker/compose*.yaml
 
-docker-check: setup ## lint the Dockerfile and the compose file
-	$(BIN)/python scripts/check_docker.py
+image-steps: setup ## the image's build without Docker: a wheel, installed by itself, holds everything and works
+	rm -rf build/image
+	$(BIN)/virtualenv --quiet build/image
+	sh docker/build-steps.sh build/image
+	build/image/bin/python scripts/check_installed.py
+	rm -rf build/image
 
 pytest: setup ## the tests alone
 	$(BIN)/python -m pytest
