@@ -8,7 +8,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
-from relit_camera.api.problems import MEDIA_TYPE
+from relit_camera.api.problems import KINDS, MEDIA_TYPE
 
 TAGS = [
     {"name": "lighting", "description": "The light that falls on the face."},
@@ -38,9 +38,13 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
         routes=app.routes,
         tags=TAGS,
     )
-    for path in document["paths"].values():
-        for operation in path.values():
-            for status, answer in operation["responses"].items():
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            answers = operation["responses"]
+            for status in ("400", "413") if "requestBody" in operation else ():
+                answers.setdefault(status, {"description": KINDS[int(status)][1]})
+            answers["default"] = {"description": "Any other error: 403 another site, 421 wrong host, 500 a fault"}
+            for status, answer in answers.items():
                 if status >= "400":
                     answer["content"] = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     return document

@@ -36,7 +36,7 @@ def thumbnail(picture: DisplayImage) -> bytes:
     height, width = picture.shape[:2]
     if width > THUMBNAIL_WIDTH:
         size = THUMBNAIL_WIDTH, max(1, round(height * THUMBNAIL_WIDTH / width))
-        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     return encode_display(picture, ".jpg", THUMBNAIL_QUALITY)
 
 

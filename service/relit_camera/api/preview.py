@@ -129,7 +129,7 @@ def encode(picture: DisplayImage, variant: Variant) -> bytes:
     height, width = picture.shape[:2]
     if variant.width is not None and variant.width < width:
         size = variant.width, max(1, round(height * variant.width / width))
-        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
     if variant.mirror:
         picture = np.ascontiguousarray(picture[:, ::-1])
     return encode_display(picture, ".jpg", JPEG_QUALITY)

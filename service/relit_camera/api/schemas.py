@@ -63,6 +63,8 @@ class EnvironmentItem(Body):
     name: str
     builtin: bool
     """Ours: it can be neither replaced nor deleted."""
+    temporary: bool
+    """From a file named on the command line, for this run only."""
     is_current: bool
     thumbnail: str
     """Path of a JPEG picture, as seen from inside."""

@@ -74,7 +74,7 @@ class ApiServer:
                 raise RelitError(f"the server at {self.address.url} did not start", "see the log")
             time.sleep(0.01)
 
-    def stop(self, timeout_s: float = 2.5) -> None:
+    def stop(self, timeout_s: float = 2.0) -> None:
         """End: long answers end within a moment, others get a second. Returns when all have, or when time is up."""
         self._closing.set()
         self._server.should_exit = True

@@ -112,18 +112,19 @@ def encode_display(image: DisplayImage, suffix: str = ".jpg", quality: int = 90)
     return bytes(data)
 
 
-def _imread(path: Path) -> NDArray | None:
+def _imread(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> NDArray | None:
     # From memory: cv2.imread knows no paths beyond the locale's encoding.
     data = np.frombuffer(path.read_bytes(), np.uint8)
     try:
         with quiet_decoders():
-            return cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+            return cv2.imdecode(data, flags) if data.size else None
     except cv2.error:
         return None
 
 
 def _read_coded(path: Path) -> NDArray[np.float32]:
-    coded = _imread(path)
+    # These flags turn the picture upright as its EXIF says, which UNCHANGED does not; they drop alpha.
+    coded = _imread(path, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
     if coded is None:
         raise ImageError(f"{path} cannot be read as a picture", "it may be truncated; save or download it again")
     if coded.shape[0] * coded.shape[1] > MAX_PIXELS:

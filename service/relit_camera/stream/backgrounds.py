@@ -13,7 +13,6 @@ from relit_camera.errors import ImageError, NotFoundError
 from relit_camera.files import make_folder, write_atomic
 from relit_camera.space.images import DisplayImage
 from relit_camera.space.picture_files import LDR_SUFFIXES, encode_display, read_display
-from relit_camera.space.quiet import quiet_decoders
 
 LONGEST_SIDE = 3840
 """A stored picture is scaled down to this: no output is larger."""
@@ -87,8 +86,7 @@ def _decoded(data: bytes) -> DisplayImage:
         path = Path(folder) / "picture.png"  # decoders go by the content, not by the suffix
         path.write_bytes(data)
         try:
-            with quiet_decoders():
-                return read_display(path)
+            return read_display(path)
         except ImageError as error:
             raise ImageError(error.what.replace(str(path), "the file"), error.cure) from error
 
@@ -99,4 +97,4 @@ def _fitted(picture: DisplayImage) -> DisplayImage:
     if scale >= 1:
         return picture
     size = max(1, round(width * scale)), max(1, round(height * scale))
-    return cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.uint8, copy=False)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)

@@ -58,7 +58,7 @@ export class Library {
         picture: item.thumbnail,
         chosen: item.name === chosen,
         onChoose: () => use(item.name),
-        onDelete: item.builtin ? null : () => remove("environments", item.name),
+        onDelete: item.builtin || item.temporary ? null : () => remove("environments", item.name),
       }),
     );
     tiles.push(tile({ name: "Background", title: "Lit by the virtual background", symbol: "▣", chosen: chosen === "background", onChoose: () => use("background") }));

@@ -17,21 +17,26 @@ from relit_camera.api.uploads import read_upload
 from relit_camera.config.look import ImageBackground, Name
 from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
 from relit_camera.light.store import RESERVED_NAMES
+from relit_camera.light.tone import thumbnail_image
+from relit_camera.space.picture_files import encode_display
 
 router = APIRouter(prefix="/environments", tags=["environments"])
 
 
 @router.get("")
 def list_environments(api: Context) -> list[EnvironmentItem]:
-    """The built-in and the stored environments."""
-    return [_item(api, name) for name in api.camera.director.environments.names()]
+    """The built-in and the stored environments, and one from a file named on the command line."""
+    director = api.camera.director
+    return [
+        _item(api, name) for name in dict.fromkeys([*director.environments.names(), *director.guest_environments()])
+    ]
 
 
 @router.post("", status_code=HTTPStatus.CREATED, responses=responses(409, 413, 422, 503, 507))
 def add_environment(api: Context, name: Annotated[Name, Form()], file: UploadFile) -> EnvironmentDetails:
     """Store a 360° panorama (.hdr, .exr, .png or .jpg, twice as wide as high), as seen from inside."""
     director = api.camera.director
-    if name in RESERVED_NAMES or name in director.background_names():
+    if name in RESERVED_NAMES or name in {*director.background_names(), *director.guest_environments()}:
         raise ConflictError(f"an environment or background '{name}' exists already", "choose another name")
     data = read_upload(file)
     with api.slow_work():
@@ -61,7 +66,9 @@ def delete_environment(api: Context, name: Name) -> None:
 def get_environment_thumbnail(api: Context, request: Request, name: Name) -> Response:
     """A small picture of an environment as seen from inside, in an exposure that suits it."""
     with api.slow_work():
-        jpeg = api.camera.director.environments.thumbnail(name)
+        director = api.camera.director
+        guest = director.guest_environments().get(name)
+        jpeg = encode_display(thumbnail_image(guest.panorama)) if guest else director.environments.thumbnail(name)
     return jpeg_answer(request, jpeg)
 
 
@@ -69,6 +76,7 @@ def _item(api: ApiContext, name: str) -> EnvironmentItem:
     return EnvironmentItem(
         name=name,
         builtin=name in BUILTIN_NAMES,
+        temporary=name in api.camera.director.guest_environments(),
         is_current=_is_current(api, name),
         thumbnail=thumbnail_path("environments", name),
     )
@@ -76,7 +84,8 @@ def _item(api: ApiContext, name: str) -> EnvironmentItem:
 
 def _details(api: ApiContext, name: str) -> EnvironmentDetails:
     with api.slow_work():
-        environment = api.camera.director.environments.load(name)
+        director = api.camera.director
+        environment = director.guest_environments().get(name) or director.environments.load(name)
     height, width = environment.panorama.radiance.shape[:2]
     return EnvironmentDetails(
         **dict(_item(api, name)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from http import HTTPStatus
 
 from fastapi import APIRouter
+from starlette.responses import Response
 
 from relit_camera.api.context import Context
 from relit_camera.api.problems import responses
@@ -38,7 +39,8 @@ def set_freeze(api: Context, body: FreezeBody) -> FreezeBody:
     return FreezeBody(frozen=api.camera.director.set_frozen(body.frozen).frozen)
 
 
-@router.post("/neutral-pose", status_code=HTTPStatus.ACCEPTED)
-def reset_neutral_pose(api: Context) -> None:
+@router.post("/neutral-pose", status_code=HTTPStatus.ACCEPTED, response_class=Response)
+def reset_neutral_pose(api: Context) -> Response:
     """Take the present head pose as neutral, from the next frame in which the face is found."""
     api.camera.reset_neutral_pose()
+    return Response(status_code=HTTPStatus.ACCEPTED)

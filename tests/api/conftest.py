@@ -1,0 +1,43 @@
+"""A fake camera, the application around it, and a client."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from api_client import Client
+from fake_camera import FakeCamera
+from fastapi import FastAPI
+
+from relit_camera.api.app import create_app
+from relit_camera.api.server import ApiServer, serve
+from relit_camera.config.settings import RelitSettings, ServerSettings, StorageSettings
+
+
+@pytest.fixture
+def camera(tmp_path: Path) -> Iterator[FakeCamera]:
+    camera = FakeCamera(tmp_path / "data")
+    yield camera
+    camera.stop()
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> RelitSettings:
+    return RelitSettings(storage=StorageSettings(data_dir=tmp_path / "data"))
+
+
+@pytest.fixture
+def app(camera: FakeCamera, settings: RelitSettings) -> FastAPI:
+    return create_app(camera, settings)
+
+
+@pytest.fixture
+def client(app: FastAPI) -> Client:
+    return Client(app)
+
+
+@pytest.fixture
+def server(app: FastAPI) -> Iterator[ApiServer]:
+    with serve(app, ServerSettings(port=0)) as server:
+        yield server

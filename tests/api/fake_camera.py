@@ -1,0 +1,93 @@
+"""A camera that the API can drive without any device: a moving picture at 30 frames a second."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from relit_camera.config.look import Look
+from relit_camera.config.settings import StorageSettings
+from relit_camera.space.images import DisplayImage
+from relit_camera.stream.director import Director
+from relit_camera.stream.events import EventHub
+from relit_camera.stream.status import (
+    CameraState,
+    CameraStatus,
+    Degradation,
+    FrameCounts,
+    Percentiles,
+    Rates,
+    TrackerStatus,
+)
+
+FPS = 30
+STATUS = CameraStatus(
+    state=CameraState.LIVE,
+    source="pattern",
+    sink="null",
+    subject=None,
+    mode="reenact",
+    tracker=TrackerStatus("mesh", "found"),
+    fps=Rates(29.9, 29.8, 30.0),
+    latency_ms=Percentiles(31.0, 44.0),
+    stage_ms={"track": Percentiles(5.0, 7.5)},
+    frames=FrameCounts(900, 3, 4),
+    providers={"face_mesh": "CPUExecutionProvider"},
+    version="0.1.0",
+    uptime_s=30.0,
+)
+
+
+class FakeCamera:
+    """Implements `stream.control.CameraControl` around a real director."""
+
+    def __init__(self, data_dir: Path, image: DisplayImage | None = None) -> None:
+        self.director = Director(StorageSettings(data_dir=data_dir))
+        self.director.set_look(Look())
+        self.events = EventHub()
+        self.image = picture() if image is None else image
+        self.publishing = True
+        self.degraded: list[Degradation] = []
+        self.neutral_resets = 0
+        self.base = STATUS
+        self._started = time.monotonic()
+        self._stop = threading.Event()
+
+    def status(self) -> CameraStatus:
+        scene = self.director.scene
+        state = CameraState.FROZEN if scene.frozen else self.base.state
+        return replace(
+            self.base, state=state, subject=scene.subject_name, mode=scene.look.mode.value, degraded=self.degraded
+        )
+
+    def picture(self, after: int, timeout_s: float) -> tuple[int, DisplayImage] | None:
+        deadline = time.monotonic() + timeout_s
+        while not self._stop.is_set():
+            count = int((time.monotonic() - self._started) * FPS)
+            if self.publishing and count > after:
+                return count, self.image
+            if time.monotonic() >= deadline:
+                return None
+            time.sleep(0.004)
+        return None
+
+    def reset_neutral_pose(self) -> None:
+        self.neutral_resets += 1
+
+    def stopping(self) -> bool:
+        return self._stop.is_set()
+
+    def stop(self) -> None:
+        self._stop.set()
+
+
+def picture(width: int = 320, height: int = 180) -> DisplayImage:
+    """Red grows to the right, green downward; the left edge is dark, so that mirroring shows."""
+    image = np.zeros((height, width, 3), np.uint8)
+    image[..., 0] = np.linspace(0, 255, width, dtype=np.uint8)
+    image[..., 1] = np.linspace(0, 255, height, dtype=np.uint8)[:, None]
+    return image

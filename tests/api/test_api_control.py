@@ -1,0 +1,60 @@
+"""Mode, freezing, neutral pose."""
+
+from __future__ import annotations
+
+import pytest
+from api_client import Client, check_problem
+from fake_camera import FakeCamera
+
+
+def test_mode_is_changed_and_told(client: Client, camera: FakeCamera) -> None:
+    assert client.get("/api/v1/mode").json() == {"mode": "reenact"}
+    assert client.put("/api/v1/mode", {"mode": "ratio"}).json() == {"mode": "ratio"}
+    assert client.get("/api/v1/mode").json() == {"mode": "ratio"}
+    assert camera.director.scene.look.mode == "ratio"
+
+
+def test_freeze_is_changed_and_told(client: Client, camera: FakeCamera) -> None:
+    assert client.get("/api/v1/freeze").json() == {"frozen": False}
+    assert client.put("/api/v1/freeze", {"frozen": True}).json() == {"frozen": True}
+    assert camera.director.scene.frozen
+    assert client.get("/api/v1/status").json()["state"] == "frozen"
+    assert client.put("/api/v1/freeze", {"frozen": False}).json() == {"frozen": False}
+
+
+def test_neutral_pose_is_asked_for(client: Client, camera: FakeCamera) -> None:
+    answer = client.post("/api/v1/neutral-pose")
+    assert (answer.status_code, answer.content) == (202, b"")
+    assert camera.neutral_resets == 1
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "field"),
+    [
+        ("mode", {"mode": "disco"}, "mode"),
+        ("mode", {}, "mode"),
+        ("mode", {"mode": "ratio", "speed": 1}, "speed"),
+        ("freeze", {"frozen": "perhaps"}, "frozen"),
+        ("freeze", None, ""),
+    ],
+)
+def test_bad_bodies_name_their_field(client: Client, path: str, body: object, field: str) -> None:
+    problem = check_problem(client.put(f"/api/v1/{path}", body), 422)
+    assert problem["errors"][0]["field"] == field
+
+
+@pytest.mark.parametrize(
+    "path", ["mode", "freeze", "lighting", "status", "environments", "neutral-pose", "presets/x/apply"]
+)
+def test_reading_changes_nothing(client: Client, camera: FakeCamera, path: str) -> None:
+    before = camera.director.scene
+    client.get(f"/api/v1/{path}")
+    client.request("HEAD", f"/api/v1/{path}")
+    assert camera.director.scene is before
+    assert camera.neutral_resets == 0
+
+
+def test_head_answers_as_get_without_a_body(client: Client) -> None:
+    head, get = client.request("HEAD", "/api/v1/mode"), client.get("/api/v1/mode")
+    assert (head.status_code, head.content) == (200, b"")
+    assert head.headers["content-length"] == get.headers["content-length"]

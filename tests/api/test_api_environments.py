@@ -1,0 +1,120 @@
+"""Stored environments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from api_client import Client, check_problem, hdr, png
+from fake_camera import FakeCamera
+
+from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
+
+ENVIRONMENTS = "/api/v1/environments"
+
+
+def test_the_built_in_ones_are_listed(client: Client) -> None:
+    listed = client.get(ENVIRONMENTS).json()
+    assert [item["name"] for item in listed] == list(BUILTIN_NAMES)
+    assert all(item["builtin"] and not item["temporary"] for item in listed)
+    assert [item["name"] for item in listed if item["is_current"]] == ["studio"]
+
+
+def test_a_panorama_is_stored_used_and_deleted(client: Client, camera: FakeCamera) -> None:
+    answer = client.upload(ENVIRONMENTS, "my room", hdr(), "IMG 1.HDR")
+    assert answer.status_code == 201, answer.text
+    details = answer.json()
+    assert (details["width"], details["height"], details["builtin"], details["notes"]) == (64, 32, False, [])
+    assert client.get(f"{ENVIRONMENTS}/my room").json() == details
+    assert client.get(ENVIRONMENTS).json()[-1]["name"] == "my room"
+
+    assert client.patch("/api/v1/lighting", {"environment": "my room"}).status_code == 200
+    assert camera.director.scene.environment is not None
+    assert camera.director.scene.environment.name == "my room"
+    check_problem(client.delete(f"{ENVIRONMENTS}/my room"), 409)
+
+    client.patch("/api/v1/lighting", {"environment": None})
+    assert client.delete(f"{ENVIRONMENTS}/my room").status_code == 204
+    check_problem(client.get(f"{ENVIRONMENTS}/my room"), 404)
+    check_problem(client.delete(f"{ENVIRONMENTS}/my room"), 404)
+
+
+def test_clipped_highlights_are_said(client: Client) -> None:
+    details = client.upload(ENVIRONMENTS, "white", png(64, 32, 255), "white.png").json()
+    assert details["clipped_fraction"] == pytest.approx(1)
+    assert "clipped" in details["notes"][0]
+
+
+def test_thumbnails_are_kept_by_clients(client: Client) -> None:
+    first = client.get(f"{ENVIRONMENTS}/studio/thumbnail.jpg")
+    picture = cv2.imdecode(np.frombuffer(first.content, np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape == (128, 256, 3)
+    assert picture.std() > 10
+    known = {"if-none-match": f'"other", W/{first.headers["etag"]}'}
+    again = client.get(f"{ENVIRONMENTS}/studio/thumbnail.jpg", headers=known)
+    assert (again.status_code, again.content) == (304, b"")
+    assert again.headers["etag"] == first.headers["etag"]
+    assert "no-store" not in first.headers["cache-control"]
+
+
+def test_a_file_of_this_run_is_listed_but_not_stored(client: Client, camera: FakeCamera, tmp_path: Path) -> None:
+    path = tmp_path / "guest room.hdr"
+    path.write_bytes(hdr())
+    name = camera.director.admit_environment(str(path))
+    item = client.get(ENVIRONMENTS).json()[-1]
+    assert (item["name"], item["temporary"], item["builtin"]) == (name, True, False)
+    assert client.get(item["thumbnail"]).headers["content-type"] == "image/jpeg"
+    assert client.get(f"{ENVIRONMENTS}/{name}").json()["width"] == 64
+    assert client.patch("/api/v1/lighting", {"environment": name}).status_code == 200
+    check_problem(client.upload(ENVIRONMENTS, name, hdr(), "other.hdr"), 409)
+
+
+@pytest.mark.parametrize("name", ["studio", "background"])
+def test_a_taken_name_is_in_conflict(client: Client, name: str) -> None:
+    check_problem(client.upload(ENVIRONMENTS, name, hdr(), "a.hdr"), 409)
+
+
+def test_the_built_in_ones_stay(client: Client) -> None:
+    problem = check_problem(client.delete(f"{ENVIRONMENTS}/sunset"), 409)
+    assert "built in" in problem["what"]
+
+
+def nan_panorama() -> bytes:
+    radiance = np.full((8, 16, 3), np.nan, np.float32)
+    return bytes(cv2.imencode(".tiff", radiance)[1])
+
+
+@pytest.mark.parametrize(
+    ("data", "file_name"),
+    [
+        (b"", "empty.hdr"),
+        (b"#?RADIANCE\nnothing", "broken.hdr"),
+        (hdr()[:200], "truncated.hdr"),
+        (png(32, 32), "square.png"),
+        (png(64, 32, 0), "black.png"),
+        (png(), "panorama.txt"),
+        (png(), "panorama"),
+        (nan_panorama(), "nan.exr"),
+    ],
+)
+def test_what_cannot_light_is_refused_and_leaves_nothing(
+    client: Client, tmp_path: Path, data: bytes, file_name: str
+) -> None:
+    problem = check_problem(client.upload(ENVIRONMENTS, "bad", data, file_name), 422)
+    assert problem["cure"]
+    assert str(tmp_path) not in problem["detail"]
+    assert "/tmp" not in problem["detail"]
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+@pytest.mark.parametrize("name", ["nowhere", "studi"])
+def test_unknown_names_are_not_found(client: Client, name: str) -> None:
+    check_problem(client.get(f"{ENVIRONMENTS}/{name}"), 404)
+    check_problem(client.get(f"{ENVIRONMENTS}/{name}/thumbnail.jpg"), 404)
+
+
+def test_a_name_that_is_no_name_is_refused(client: Client) -> None:
+    check_problem(client.get(f"{ENVIRONMENTS}/.hidden"), 422)
+    check_problem(client.get(f"{ENVIRONMENTS}/%2e%2e%2f%2e%2e%2fetc"), 404)

@@ -1,0 +1,151 @@
+"""Server-sent events."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+from api_client import Client, hdr, png
+from fake_camera import FakeCamera
+
+from relit_camera.api.routes import events
+from relit_camera.api.server import ApiServer
+from relit_camera.config.look import Lighting, Look
+
+Happening = tuple[str, dict[str, Any]]
+
+
+class Listener:
+    """Reads a text/event-stream as the HTML standard says: fields until an empty line."""
+
+    def __init__(self, body: httpx.Response) -> None:
+        self.lines = body.iter_lines()
+        self.comments = 0
+
+    def __iter__(self) -> Iterator[Happening]:
+        kind, data = "message", ""
+        for line in self.lines:
+            name, _, value = line.partition(":")
+            if line.startswith(":"):
+                self.comments += 1
+            elif name == "event":
+                kind = value.strip()
+            elif name == "data":
+                data += value.strip()
+            elif not line and data:
+                yield kind, json.loads(data)
+                kind, data = "message", ""
+
+    def wait_for(self, kind: str, **expected: object) -> dict[str, Any]:
+        for found, data in self:
+            if found == kind and all(data.get(name) == value for name, value in expected.items()):
+                return data
+        raise AssertionError(f"the stream ended without {kind} {expected}")
+
+
+@pytest.fixture
+def listener(server: ApiServer) -> Iterator[Listener]:
+    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
+        assert body.headers["content-type"].startswith("text/event-stream")
+        yield Listener(body)
+
+
+def test_a_listener_first_gets_what_stands(listener: Listener, camera: FakeCamera) -> None:
+    stream = iter(listener)
+    kind, scene = next(stream)
+    assert kind == "scene"
+    assert scene == {
+        "revision": camera.director.scene.revision,
+        "lighting": Lighting().model_dump(mode="json"),
+        "background": {"kind": "none"},
+        "mode": "reenact",
+        "subject": None,
+        "frozen": False,
+    }
+    kind, status = next(stream)
+    assert kind == "status"
+    assert status["tracker"] == {"name": "mesh", "state": "found"}
+
+
+def test_two_listeners_hear_a_change_at_once(server: ApiServer, listener: Listener, client: Client) -> None:
+    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
+        other = Listener(body)
+        listener.wait_for("status")
+        other.wait_for("status")
+        started = time.monotonic()
+        client.patch("/api/v1/lighting", {"yaw_deg": 25})
+        for heard in (listener, other):
+            assert heard.wait_for("scene")["lighting"]["yaw_deg"] == 25
+        assert time.monotonic() - started < 0.6
+
+
+def test_changes_that_did_not_come_over_the_api_are_heard_too(listener: Listener, camera: FakeCamera) -> None:
+    listener.wait_for("status")
+    camera.director.set_look(Look(lighting=Lighting(blend=0.25)))
+    assert listener.wait_for("scene")["lighting"]["blend"] == 0.25
+    camera.director.set_frozen(True)
+    assert listener.wait_for("scene")["frozen"] is True
+
+
+def test_what_the_camera_tells_is_passed_on(listener: Listener, camera: FakeCamera) -> None:
+    listener.wait_for("status")
+    camera.events.publish("tracking", state="lost")
+    assert listener.wait_for("tracking")["state"] == "lost"
+
+
+@pytest.mark.parametrize(
+    ("collection", "data", "file_name"), [("environments", hdr(), "a.hdr"), ("backgrounds", png(), "a.png")]
+)
+def test_collections_that_change_are_named(
+    listener: Listener, client: Client, collection: str, data: bytes, file_name: str
+) -> None:
+    listener.wait_for("status")
+    client.upload(f"/api/v1/{collection}", "new", data, file_name)
+    listener.wait_for("collection", name=collection)
+    client.delete(f"/api/v1/{collection}/new")
+    listener.wait_for("collection", name=collection)
+
+
+def test_presets_that_change_are_named(listener: Listener, client: Client) -> None:
+    listener.wait_for("status")
+    client.request("PUT", "/api/v1/presets/new")
+    listener.wait_for("collection", name="presets")
+
+
+def test_status_comes_every_second(listener: Listener, monkeypatch: pytest.MonkeyPatch) -> None:
+    listener.wait_for("status")
+    started = time.monotonic()
+    listener.wait_for("status")
+    assert time.monotonic() - started == pytest.approx(events.STATUS_EVERY_S, abs=0.4)
+
+
+def test_the_heart_beats(server: ApiServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(events, "HEARTBEAT_S", 0.2)
+    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
+        listener = Listener(body)
+        listener.wait_for("status")
+        listener.wait_for("status")
+        assert listener.comments >= 2
+
+
+def test_the_stream_ends_when_the_camera_does(listener: Listener, camera: FakeCamera) -> None:
+    listener.wait_for("status")
+    camera.stop()
+    started = time.monotonic()
+    assert [kind for kind, _ in listener if kind == "scene"] == []
+    assert time.monotonic() - started < 1
+
+
+def test_a_listener_who_left_is_forgotten(server: ApiServer, camera: FakeCamera) -> None:
+    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
+        listener = Listener(body)  # held: the answer is closed with the last reference to its lines
+        listener.wait_for("status")
+        assert len(camera.events._listeners) == 1
+    deadline = time.monotonic() + 3
+    while camera.events._listeners and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not camera.events._listeners

@@ -1,0 +1,94 @@
+"""Stored looks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+from api_client import Client, check_problem
+from fake_camera import FakeCamera
+
+from relit_camera.api.presets import PresetStore
+from relit_camera.config.look import ColorBackground, Lamp, Lighting, Look, Mode
+from relit_camera.errors import InputError, NotFoundError
+
+PRESETS = "/api/v1/presets"
+LOOK = Look(
+    lighting=Lighting(environment="sunset", yaw_deg=-40, lamps=(Lamp(color=(1, 0.5, 0.25)),)),
+    background=ColorBackground(color="#112233"),
+    mode=Mode.RATIO,
+)
+
+
+def test_a_look_is_stored_listed_applied_and_deleted(client: Client, camera: FakeCamera) -> None:
+    body = LOOK.model_dump(mode="json")
+    first = client.put(f"{PRESETS}/Late evening", body)
+    assert (first.status_code, first.json()) == (201, body)
+    assert client.put(f"{PRESETS}/Late evening", body).status_code == 200
+    assert client.get(PRESETS).json() == [{"name": "Late evening"}]
+    assert client.get(f"{PRESETS}/Late evening").json() == body
+
+    assert client.post(f"{PRESETS}/Late evening/apply").json() == body
+    assert camera.director.scene.look == LOOK
+
+    assert client.delete(f"{PRESETS}/Late evening").status_code == 204
+    assert client.get(PRESETS).json() == []
+
+
+def test_without_a_body_the_present_look_is_stored(client: Client, camera: FakeCamera) -> None:
+    camera.director.set_look(LOOK)
+    assert client.request("PUT", f"{PRESETS}/now").json() == LOOK.model_dump(mode="json")
+    assert PresetStore(camera.director.backgrounds.folder.parent / "presets").load("now") == LOOK
+
+
+@pytest.mark.parametrize(("method", "path"), [("GET", ""), ("DELETE", ""), ("POST", "/apply")])
+def test_unknown_names_are_not_found(client: Client, method: str, path: str) -> None:
+    client.request("PUT", f"{PRESETS}/evening")
+    problem = check_problem(client.request(method, f"{PRESETS}/evenink{path}"), 404)
+    assert "evening" in problem["cure"]
+
+
+def test_a_preset_of_what_is_gone_changes_nothing(client: Client, camera: FakeCamera) -> None:
+    client.put(f"{PRESETS}/gone", {"lighting": {"environment": "gone"}})
+    before = camera.director.scene
+    check_problem(client.post(f"{PRESETS}/gone/apply"), 404)
+    assert camera.director.scene is before
+
+
+@pytest.mark.parametrize("body", [{"lighting": {"blend": 2}}, {"light": {}}, {"mode": "disco"}])
+def test_bad_looks_are_refused(client: Client, body: object) -> None:
+    check_problem(client.put(f"{PRESETS}/bad", body), 422)
+    assert client.get(PRESETS).json() == []
+
+
+def test_a_folder_that_cannot_be_written_is_said_without_its_place(client: Client, tmp_path: Path) -> None:
+    (tmp_path / "data").write_text("a file where the data folder should be")
+    answer = client.request("PUT", f"{PRESETS}/evening")
+    problem = check_problem(answer, 507)
+    assert problem["cure"]
+    assert str(tmp_path) not in answer.text
+
+
+def test_files_are_yaml_that_people_can_read(tmp_path: Path) -> None:
+    PresetStore(tmp_path).save("evening", LOOK)
+    assert [path.name for path in tmp_path.iterdir()] == ["evening.yaml"]
+    assert yaml.safe_load((tmp_path / "evening.yaml").read_text())["lighting"]["yaw_deg"] == -40
+
+
+@pytest.mark.parametrize("text", ["mode: disco", "lighting: [", "- 1", "", "\x00"])
+def test_damaged_files_are_named_and_do_not_hide_the_others(tmp_path: Path, text: str) -> None:
+    store = PresetStore(tmp_path)
+    store.save("good", LOOK)
+    (tmp_path / "bad.yaml").write_text(text)
+    assert store.names() == ["bad", "good"]
+    with pytest.raises(InputError, match="'bad'"):
+        store.load("bad")
+    assert store.load("good") == LOOK
+
+
+def test_a_store_without_a_folder_is_empty(tmp_path: Path) -> None:
+    store = PresetStore(tmp_path / "none")
+    assert store.names() == []
+    with pytest.raises(NotFoundError, match="'x'"):
+        store.remove("x")

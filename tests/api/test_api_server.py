@@ -1,0 +1,189 @@
+"""Listening, being ready, ending."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+from fake_camera import FakeCamera
+from fastapi import FastAPI
+
+from relit_camera.api.server import Address, ApiServer, listen, serve
+from relit_camera.config.settings import ServerSettings
+from relit_camera.errors import ConfigError, PortInUseError
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port: int = taken.getsockname()[1]
+        return port
+
+
+def test_port_0_picks_one_and_says_which(app: FastAPI) -> None:
+    told: list[Address] = []
+    with serve(app, ServerSettings(port=0), told.append) as server:
+        assert told == [server.address]
+        assert server.address.port > 0
+        assert server.address.url == f"http://127.0.0.1:{server.address.port}/"
+        assert httpx.get(f"{told[0].url}healthz").json() == {"status": "alive"}
+
+
+def test_the_port_asked_for_is_the_port(app: FastAPI) -> None:
+    port = free_port()
+    with serve(app, ServerSettings(port=port)) as server:
+        assert server.address.port == port
+
+
+def test_an_ipv6_address_is_written_in_brackets() -> None:
+    assert Address("::1", 8470).url == "http://[::1]:8470/"
+
+
+def test_a_port_in_use_is_named_with_a_cure(server: ApiServer, app: FastAPI) -> None:
+    port = server.address.port
+    with pytest.raises(PortInUseError, match=rf"port {port} on 127\.0\.0\.1 is in use") as caught:
+        serve(app, ServerSettings(port=port))
+    assert "--port 0" in caught.value.cure
+
+
+def test_a_port_can_be_taken_early(app: FastAPI) -> None:
+    settings = ServerSettings(port=free_port())
+    listener = listen(settings)
+    with pytest.raises(PortInUseError):
+        listen(settings)
+    with serve(app, settings, listener=listener) as server:
+        assert server.address.port == settings.port
+
+
+def test_the_port_is_free_again_after_the_end(app: FastAPI) -> None:
+    with serve(app, ServerSettings(port=0)) as server:
+        httpx.get(f"{server.address.url}healthz")
+    listen(ServerSettings(port=server.address.port)).close()
+
+
+def test_an_address_that_cannot_be_used_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> socket.socket:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(socket, "create_server", refuse)
+    with pytest.raises(ConfigError, match=r"port 80 on 127\.0\.0\.1 cannot be used: Permission denied"):
+        listen(ServerSettings(port=80))
+
+
+def test_it_ends_within_a_second_with_streams_open(app: FastAPI) -> None:
+    """The camera does not say that it stops here: the server alone must end its streams."""
+    server = serve(app, ServerSettings(port=0))
+    opened = threading.Barrier(4)
+    ended: list[str] = []
+
+    def look(path: str) -> None:
+        with httpx.stream("GET", f"{server.address.url}api/v1/{path}", timeout=5) as body:
+            chunks = body.iter_bytes()
+            next(chunks)
+            opened.wait(5)
+            for _ in chunks:
+                pass
+        ended.append(path)
+
+    paths = ["preview.mjpg", "preview.mjpg?mirror=true", "events"]
+    viewers = [threading.Thread(target=look, args=(path,)) for path in paths]
+    for viewer in viewers:
+        viewer.start()
+    opened.wait(5)
+    started = time.monotonic()
+    server.stop()
+    assert time.monotonic() - started < 1
+    for viewer in viewers:
+        viewer.join(2)
+    assert sorted(ended) == sorted(paths)  # whole answers: no viewer saw a broken connection
+
+
+def test_an_answer_that_takes_too_long_is_a_503_not_a_traceback(
+    app: FastAPI, camera: FakeCamera, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    begun, release = threading.Event(), threading.Event()
+
+    def slow() -> None:
+        begun.set()
+        release.wait(10)
+
+    monkeypatch.setattr(camera, "reset_neutral_pose", slow)
+    answers: list[httpx.Response] = []
+    server = serve(app, ServerSettings(port=0))
+    url = f"{server.address.url}api/v1/neutral-pose"
+    asking = threading.Thread(target=lambda: answers.append(httpx.post(url, timeout=10)))
+    asking.start()
+    assert begun.wait(5)
+    started = time.monotonic()
+    with caplog.at_level(logging.ERROR):
+        server.stop(5)
+    assert time.monotonic() - started < 2
+    release.set()
+    asking.join(5)
+    assert answers[0].status_code == 503
+    assert "stopping" in answers[0].json()["what"]
+    assert not any(record.exc_info for record in caplog.records)
+
+
+PROGRAM = """
+import signal, sys, threading, time
+from pathlib import Path
+import cv2, numpy as np
+from fake_camera import FakeCamera
+from relit_camera.api.app import create_app
+from relit_camera.api.server import serve
+from relit_camera.config.settings import RelitSettings, ServerSettings, StorageSettings
+
+def work_in_opencv():
+    picture = np.zeros((720, 1280, 3), np.float32)
+    until = time.monotonic() + 2
+    print("at work", flush=True)
+    while time.monotonic() < until:
+        cv2.GaussianBlur(picture, (0, 0), 3)
+
+folder = Path(sys.argv[1])
+stop = threading.Event()
+for number in (signal.SIGTERM, signal.SIGINT):
+    signal.signal(number, lambda *_: stop.set())
+camera = FakeCamera(folder)
+camera.reset_neutral_pose = work_in_opencv
+app = create_app(camera, RelitSettings(storage=StorageSettings(data_dir=folder)))
+with serve(app, ServerSettings(port=0), lambda address: print(address.url, flush=True)):
+    while not stop.wait(0.1):
+        pass
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signals_are_the_program_s_and_it_exits_clean(tmp_path: Path, number: signal.Signals) -> None:
+    """Also while an answer is being worked on: Python cuts daemon threads off inside C++ code, which aborts."""
+    process = subprocess.Popen(
+        [sys.executable, "-W", "error", "-c", PROGRAM, str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=Path(__file__).parent,
+    )
+    try:
+        assert process.stdout is not None
+        url = process.stdout.readline().strip()
+        asking = threading.Thread(target=lambda: httpx.post(f"{url}api/v1/neutral-pose", timeout=20))
+        asking.start()
+        assert process.stdout.readline() == "at work\n"
+        with httpx.stream("GET", f"{url}api/v1/preview.mjpg", timeout=10) as body:
+            next(body.iter_bytes())
+            process.send_signal(number)
+            _, errors = process.communicate(timeout=20)
+        asking.join(5)
+    finally:
+        process.kill()
+        process.wait()
+    assert process.returncode == 0
+    assert "Traceback" not in errors

@@ -1,0 +1,105 @@
+"""Who is shown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from api_client import Client, check_problem
+from fake_camera import FakeCamera
+
+from relit_camera.subject.field import TEXELS
+from relit_camera.subject.file import write_subject
+from relit_camera.subject.subject import Subject, SubjectMetadata
+
+
+@pytest.fixture
+def stored(camera: FakeCamera) -> Path:
+    """The folder of subjects, with one called ada."""
+    folder = camera.director.subjects.folder
+    folder.mkdir(parents=True)
+    write_subject(folder / "ada.relit", small_subject())
+    return folder
+
+
+def small_subject() -> Subject:
+    neutral = np.full((24, 16, 3), 90, np.uint8)
+    return Subject(
+        metadata=SubjectMetadata(
+            width=16,
+            height=24,
+            method="nearest",
+            lights=2,
+            components=1,
+            source="lights.lp",
+            psnr_db=60.0,
+            created_by="test",
+            created_at="2026-01-01",
+        ),
+        basis=np.ones((3, 1, 24, 16), np.float16),
+        coefficients=np.ones((1, TEXELS), np.float32),
+        light_directions=np.array([[0, 0, 1], [1, 0, 0]], np.float32),
+        light_coefficients=np.ones((1, 2), np.float32),
+        matte=np.ones((24, 16), np.float32),
+        neutral=neutral,
+    )
+
+
+def test_nobody_and_no_subjects_at_first(client: Client) -> None:
+    assert client.get("/api/v1/subjects").json() == []
+    assert client.get("/api/v1/subject").json() == {"name": None}
+
+
+def test_a_subject_is_listed_chosen_and_deleted(client: Client, camera: FakeCamera, stored: Path) -> None:
+    item = {"name": "ada", "is_current": False, "thumbnail": "/api/v1/subjects/ada/thumbnail.jpg"}
+    assert client.get("/api/v1/subjects").json() == [item]
+    details = client.get("/api/v1/subjects/ada").json()
+    assert details["metadata"]["method"] == "nearest"
+    assert (details["metadata"]["width"], details["metadata"]["height"]) == (16, 24)
+
+    assert client.put("/api/v1/subject", {"name": "ada"}).json() == {"name": "ada"}
+    assert client.get("/api/v1/subject").json() == {"name": "ada"}
+    assert client.get("/api/v1/status").json()["subject"] == "ada"
+    assert camera.director.scene.subject is not None
+    check_problem(client.delete("/api/v1/subjects/ada"), 409)
+
+    assert client.put("/api/v1/subject", {"name": None}).json() == {"name": None}
+    assert camera.director.scene.subject is None
+    assert client.delete("/api/v1/subjects/ada").status_code == 204
+    assert not (stored / "ada.relit").exists()
+    check_problem(client.delete("/api/v1/subjects/ada"), 404)
+
+
+def test_thumbnail_is_the_neutral_picture(client: Client, stored: Path) -> None:
+    answer = client.get("/api/v1/subjects/ada/thumbnail.jpg")
+    picture = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape == (24, 16, 3)
+    assert abs(picture.mean() - 90) < 2
+
+
+def test_unknown_subjects_are_not_found(client: Client, camera: FakeCamera, stored: Path) -> None:
+    problem = check_problem(client.put("/api/v1/subject", {"name": "adaa"}), 404)
+    assert "'ada'" in problem["cure"]
+    check_problem(client.get("/api/v1/subjects/bob"), 404)
+    check_problem(client.get("/api/v1/subjects/bob/thumbnail.jpg"), 404)
+    assert camera.director.scene.subject_name is None
+
+
+def test_a_path_is_no_name(client: Client, camera: FakeCamera, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line takes files beside the program; the API must not reach them."""
+    monkeypatch.chdir(stored)
+    check_problem(client.put("/api/v1/subject", {"name": str(stored / "ada.relit")}), 422)
+    check_problem(client.put("/api/v1/subject", {"name": "ada.relit"}), 404)
+    assert camera.director.scene.subject is None
+
+
+def test_a_damaged_subject_is_said_without_its_place(client: Client, camera: FakeCamera, stored: Path) -> None:
+    (stored / "broken.relit").write_bytes(b"not a subject")
+    answer = client.put("/api/v1/subject", {"name": "broken"})
+    problem = check_problem(answer, 422)
+    assert "broken.relit" in problem["what"]
+    assert str(stored) not in answer.text
+    assert camera.director.scene.subject is None
+    assert [item["name"] for item in client.get("/api/v1/subjects").json()] == ["ada", "broken"]
