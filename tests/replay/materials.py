@@ -1,0 +1,110 @@
+"""What cases are played with: generated data, data beside the checkout, imported subjects, pulled models."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from relit_camera.capture.build import build_subject
+from relit_camera.capture.importing import import_samples
+from relit_camera.capture.landmarks_file import read_landmarks
+from relit_camera.models.registry import FOLDER_VARIABLE, Registry, State
+from relit_camera.space.colour import parse_gamma
+from relit_camera.subject.file import SUFFIX, write_subject
+from relit_studio.mannequin.__main__ import generate
+
+ROOT = Path(__file__).resolve().parents[2]
+MODELS = ("face_mesh", "face_detector_yunet", "openseeface", "selfie_landscape", "selfie_square")
+MANNEQUIN = "generated:mannequin"
+SHARED = "shared:"
+
+_scratch = TemporaryDirectory(prefix="relit-replay-tests.")
+"""Made once a process, gone when it ends."""
+
+
+class UnavailableError(Exception):
+    """Data that a case needs is not on this machine: no fault, the case is left out."""
+
+
+def shared_folder() -> Path:
+    """The folder of data beside the checkout, or where RELIT_SHARED says.
+
+    Raises:
+        UnavailableError: there is none.
+    """
+    folder = Path(os.environ.get("RELIT_SHARED", ROOT.parent / "shared"))
+    if not (folder / "driving").is_dir():
+        raise UnavailableError(f"no shared data at {folder} (set RELIT_SHARED)")
+    return folder
+
+
+@cache
+def mannequin() -> Path:
+    """The generated person: `olat/lights.lp`, `clip.mp4` and its true track, two seconds long and small."""
+    folder = Path(_scratch.name) / "mannequin"
+    generate(folder, size=160, lights=48, frames=48, quiet=True)
+    return folder
+
+
+@cache
+def models() -> Path:
+    """A folder with the public models: the user's own, else filled from the mirror in the shared data.
+
+    Raises:
+        UnavailableError: they are in neither place.
+    """
+    own = Registry()
+    if all(own.state(name) is State.PULLED for name in MODELS):
+        return own.folder
+    try:
+        mirror = shared_folder() / "models"
+    except UnavailableError as error:
+        raise UnavailableError(f"the public models are not pulled (relit models pull), and {error}") from error
+    folder = Path(_scratch.name) / "models"
+    Registry(folder).pull(MODELS, mirror)
+    return folder
+
+
+def use_models() -> None:
+    """Let everything that follows in this process, and in those that it starts, find the public models.
+
+    Raises:
+        UnavailableError: they are not on this machine.
+    """
+    os.environ[FOLDER_VARIABLE] = str(models())
+
+
+def find(place: str, folder: Path, part: str) -> Path:
+    """The file that a place means.
+
+    Args:
+        place: relative to `folder`, `shared:PATH`, or `generated:mannequin`.
+        folder: of the case.
+        part: of the mannequin that is meant: `olat/lights.lp`, `clip.mp4`, `track.json`.
+
+    Raises:
+        UnavailableError: it is in the shared data, and they are not here.
+    """
+    if place == MANNEQUIN:
+        return mannequin() / part
+    if place.startswith(SHARED):
+        return shared_folder() / place.removeprefix(SHARED)
+    return folder / place
+
+
+@cache
+def subject_file(lights: Path, gamma: str = "srgb") -> Path:
+    """The subject file of one-light pictures, as `relit capture import` makes it; a .relit file is given as it is.
+
+    Raises:
+        RelitError: the pictures cannot be imported.
+    """
+    if lights.suffix == SUFFIX:
+        return lights
+    curve = parse_gamma(gamma)
+    known = read_landmarks(lights.parent / "landmarks.json", required=False)
+    path = Path(_scratch.name) / f"{lights.parent.name}-{lights.stem}-{gamma}{SUFFIX}"
+    write_subject(path, build_subject(import_samples(lights, curve), "default", lights.name, curve, known or None))
+    return path

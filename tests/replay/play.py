@@ -1,0 +1,91 @@
+"""Plays a case: the picture path of `relit replay`, its frames kept instead of encoded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from relit_camera.cli.parse import background
+from relit_camera.config.look import Lighting, Look
+from relit_camera.config.settings import RelitSettings, StorageSettings
+from relit_camera.face.state import FaceStatus
+from relit_camera.space.images import DisplayImage
+from relit_camera.space.rotation import Angles
+from relit_camera.stream.assembly import make_pipeline, make_tracker
+from relit_camera.stream.director import Director
+from relit_camera.stream.pipeline import Pipeline
+from relit_camera.stream.replay import ReplayedFrame, replay
+from relit_camera.stream.status import Degradation
+from tests.replay.case import Case
+from tests.replay.materials import find, subject_file, use_models
+
+RECORDED = "recorded:"
+
+
+@dataclass(frozen=True)
+class Played:
+    """What came out.
+
+    Attributes:
+        frames: what each frame was.
+        live: uint8 sRGB pictures of the clip.
+        relit: uint8 sRGB pictures that the replay made of them.
+        troubles: what worked less well than asked.
+    """
+
+    frames: list[ReplayedFrame]
+    live: list[DisplayImage]
+    relit: list[DisplayImage]
+    troubles: list[Degradation]
+
+    @property
+    def found(self) -> float:
+        """Share of the frames in which the face was found."""
+        return sum(status(frame) is FaceStatus.FOUND for frame in self.frames) / len(self.frames)
+
+    @property
+    def angles(self) -> list[Angles | None]:
+        """Each frame's pose relative to neutral, degrees; None where the picture path followed no face."""
+        return [frame.motion.angles if frame.motion else None for frame in self.frames]
+
+
+def status(frame: ReplayedFrame) -> FaceStatus:
+    """Whether the face was found in a frame."""
+    return frame.motion.status if frame.motion else FaceStatus.LOST
+
+
+def play(case: Case, folder: Path) -> Played:
+    """Play the case of a folder.
+
+    Raises:
+        UnavailableError: data or models that it needs are not on this machine.
+        RelitError: as `relit replay` would say.
+    """
+    clip = find(case.clip, folder, "clip.mp4")
+    lights = find(case.subject, folder, "olat/lights.lp")
+    tracker = case.tracker
+    if tracker.startswith(RECORDED):
+        tracker = RECORDED + str(find(tracker.removeprefix(RECORDED), folder, "track.json"))
+    else:
+        use_models()
+    settings = RelitSettings(storage=StorageSettings(data_dir=folder / "data"), tracker={"name": tracker}, subject=None)
+    director = Director(settings.storage)
+    director.set_subject(str(subject_file(lights, case.gamma)))
+    named = case.environment if case.environment in director.environments.names() else None
+    environment = director.admit_environment(named or str(find(case.environment, folder, "")))
+    lighting = Lighting(environment=environment, yaw_deg=case.yaw_deg)
+    director.set_look(Look(lighting=lighting, background=background(case.background), mode=case.mode))
+    live: list[DisplayImage] = []
+    relit: list[DisplayImage] = []
+    pipelines: list[Pipeline] = []
+
+    def pipeline_for(size: tuple[int, int]) -> Pipeline:
+        pipelines.append(make_pipeline(settings, make_tracker(settings), size))
+        return pipelines[0]
+
+    def watch(_: int, before: DisplayImage, after: DisplayImage) -> None:
+        live.append(before)
+        relit.append(after)
+
+    frames = replay(clip, None, pipeline_for, lambda _: director.scene, watch)
+    return Played(frames, live, relit, pipelines[0].troubles)

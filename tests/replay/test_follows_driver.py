@@ -1,0 +1,72 @@
+"""The result follows its driver, measured by the tracker that did not drive it: adam_talk, both modes."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from relit_camera.config.settings import RelitSettings
+from relit_camera.face.state import FaceState
+from relit_camera.face.trackers import TrackerOptions, open_tracker
+from relit_camera.space.images import DisplayImage, Frame
+from relit_camera.space.rotation import angles_from_rotation
+from tests.replay.case import CASES, read_case
+from tests.replay.materials import UnavailableError
+from tests.replay.play import Played, play
+
+FPS = 24
+REACH_DEG = 30
+LEAST_CORRELATION = 0.9
+
+
+@cache
+def played(mode: str) -> Played:
+    folder = CASES / f"adam-{mode}"
+    return play(read_case(folder), folder)
+
+
+@cache
+def measured(mode: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Yaw in degrees and mouth opening, (frames, 2), of the driver and of the result; NaN where no face is found."""
+    found = played(mode)
+    return track(found.live), track(found.relit)
+
+
+def track(pictures: list[DisplayImage]) -> NDArray[np.float64]:
+    assert RelitSettings().tracker.name == "mesh"  # what drives: measured is with the other
+    tracker = open_tracker("openseeface", TrackerOptions(blendshapes=False))
+    states = [tracker.track(Frame(picture, i, 0.0, i / FPS)) for i, picture in enumerate(pictures)]
+    return np.array([yaw_and_mouth(state) for state in states])
+
+
+def yaw_and_mouth(state: FaceState) -> tuple[float, float]:
+    if state.pose is None:
+        return np.nan, np.nan
+    return angles_from_rotation(state.pose.rotation).yaw, state.mouth
+
+
+def correlation(mode: str, column: int) -> float:
+    try:
+        driver, result = measured(mode)
+    except UnavailableError as reason:
+        pytest.skip(str(reason))
+    both = np.isfinite(driver[:, column]) & np.isfinite(result[:, column])
+    both &= np.abs(driver[:, 0] - np.nanmedian(driver[:5, 0])) < REACH_DEG
+    assert both.mean() > 0.9, f"the other tracker finds a face in {both.mean():.0%} of the frames"
+    x, y = driver[both, column], result[both, column]
+    r = float(np.corrcoef(x, y)[0, 1])
+    print(f"{mode}: r = {r:.3f}, spread {x.std():.3f} and {y.std():.3f}, {both.sum()} frames")
+    return r
+
+
+@pytest.mark.parametrize("mode", ["reenact", "ratio"])
+def test_head_turns_with_the_driver(mode: str) -> None:
+    assert correlation(mode, 0) >= LEAST_CORRELATION
+
+
+@pytest.mark.parametrize("mode", ["reenact", "ratio"])
+def test_mouth_opens_with_the_driver(mode: str) -> None:
+    assert correlation(mode, 1) >= LEAST_CORRELATION
