@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
@@ -29,12 +29,15 @@ def decoded(jpeg: bytes) -> DisplayImage:
     return picture
 
 
-def parts(body: httpx.Response, count: int) -> list[bytes]:
-    """The first JPEG files of a multipart/x-mixed-replace body, read as RFC 2046 says."""
+def parts(body: httpx.Response, chunks: Iterator[bytes], count: int) -> list[bytes]:
+    """The first JPEG files of a multipart/x-mixed-replace body, read as RFC 2046 says.
+
+    `chunks` are the body's, held by the caller: the answer is closed with the last reference to them.
+    """
     boundary = b"--" + body.headers["content-type"].partition("boundary=")[2].encode()
     found: list[bytes] = []
     data = b""
-    for chunk in body.iter_bytes():
+    for chunk in chunks:
         data += chunk
         while len(pieces := data.split(boundary + b"\r\n", 2)) == 3:
             head, _, content = pieces[1].partition(b"\r\n\r\n")
@@ -172,7 +175,8 @@ def test_a_viewer_gets_pictures_and_leaves(server: ApiServer, app: FastAPI) -> N
     feed = app.state.context.preview
     with httpx.stream("GET", f"{server.address.url}{PREVIEW}?mirror=true&width=160&fps=60", timeout=5) as body:
         assert body.headers["content-type"].startswith("multipart/x-mixed-replace")
-        pictures = parts(body, 3)
+        chunks = body.iter_bytes()
+        pictures = parts(body, chunks, 3)
         assert feed.viewers == 1
     for picture in pictures:
         assert decoded(picture).shape == (90, 160, 3)
@@ -185,8 +189,11 @@ def test_a_viewer_who_leaves_while_nothing_comes_is_noticed(
 ) -> None:
     feed = app.state.context.preview
     with httpx.stream("GET", f"{server.address.url}{PREVIEW}", timeout=5) as body:
-        parts(body, 1)
+        chunks = body.iter_bytes()
+        parts(body, chunks, 1)
         camera.publishing = False
+        time.sleep(0.1)
+        assert feed.viewers == 1
     assert wait_until(lambda: feed.viewers == 0)
 
 
