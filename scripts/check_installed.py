@@ -1,7 +1,7 @@
 """Checks an installed Relit Camera against this checkout: run it with the Python of the environment to check.
 
-The wheel must hold every file of the package, byte for byte (networks, meshes, panel, licences too), its plug-ins must load,
-and its own licence must be with it.
+The wheel must hold every file of the package, byte for byte, data and licences too; its plug-ins must load;
+its own licence must be with it.
 """
 
 from __future__ import annotations
