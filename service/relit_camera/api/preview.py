@@ -129,7 +129,7 @@ def encode(picture: DisplayImage, variant: Variant) -> bytes:
     if variant.width is not None and variant.width < picture.shape[1]:
         picture = _scaled_down(picture, variant.width)
     if variant.mirror:
-        picture = np.ascontiguousarray(picture[:, ::-1])
+        picture = np.asarray(cv2.flip(picture, 1), dtype=np.uint8)
     return encode_display(picture, ".jpg", JPEG_QUALITY)
 
 
