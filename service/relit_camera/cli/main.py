@@ -78,7 +78,7 @@ def options(
 
 
 def run() -> None:
-    """Entry point. Exit 0: done; 1: the input is at fault, one line on stderr; 2: usage. Our own faults show a traceback."""
+    """Exit with 0: done; 1: the input is at fault, one line on stderr; 2: usage. Our own faults show a traceback."""
     try:
         app()
     except RelitError as error:

@@ -59,7 +59,9 @@ def load_settings(path: Path | None = None, overrides: Nested | None = None) -> 
         raise ConfigError(f"{found}: expected keys and values, found {type(document).__name__}", "see config.yaml")
     _check_environment()
     try:
-        return _settings_class(document)(**_without_none(overrides or {}))
+        # A section whose every line is commented out reads as null: its defaults.
+        given = {key: value for key, value in document.items() if value is not None}
+        return _settings_class(given)(**_without_none(overrides or {}))
     except ValidationError as error:
         raise _config_error(error, found, text) from error
 

@@ -33,6 +33,8 @@ ROUNDS = 3
 FITS_PER_S = 4.0
 FOLLOW = 0.5
 """Share of the way from the last light to the newly fitted one."""
+RESIDUAL_FOLLOW = 0.1
+"""Share of the way that the reported residual goes to that of each frame."""
 CLIPPED = 250
 OUTLIER = 0.25
 """Relative residual from which a sample loses weight (Huber)."""
@@ -63,7 +65,7 @@ class RoomProbe:
         self._amounts = np.zeros((LOBES, 3))
         self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), dtype=np.float32)
         self._fitted_at = -np.inf
-        self._residual = 1.0
+        self._residual: float | None = None
 
     def update(self, image: DisplayImage, landmarks: Points, rotation: Rotation, time_s: float) -> RoomLight:
         """Follow the light in one live frame.
@@ -86,8 +88,11 @@ class RoomProbe:
             ratio = live[usable] / np.maximum(predicted[usable], 1e-4)
             gain = np.clip(np.median(ratio, axis=0), 0.25, 4.0).astype(np.float32)
             deviation = np.abs(predicted * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
-            self._residual += 0.1 * (float(np.median(deviation)) - self._residual)
-        return RoomLight(self._light_map, gain, self._residual)
+            now = float(np.median(deviation))
+            self._residual = (
+                now if self._residual is None else self._residual + RESIDUAL_FOLLOW * (now - self._residual)
+            )
+        return RoomLight(self._light_map, gain, 0.0 if self._residual is None else self._residual)
 
     def _predict(self, rotation: Rotation) -> NDArray[np.float32]:
         amounts = self._coefficients @ weighted_light(rotate(self._light_map, rotation))
