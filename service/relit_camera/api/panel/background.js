@@ -21,7 +21,7 @@ export class BackgroundControls {
 
   /** The library of pictures, given after construction: each needs the other. */
   use(library) {
-    this.library = library;
+    this.collections = library;
   }
 
   /** Replace the background; the answer comes as the next `scene` event. */
@@ -31,7 +31,7 @@ export class BackgroundControls {
 
   show(background) {
     this.current = background;
-    const pictures = this.library.stored.backgrounds.map((item) => item.name).join("|");
+    const pictures = this.collections.stored.backgrounds.map((item) => item.name).join("|");
     const drawn = `${background.kind}|${background.kind === "image" ? `${background.image}|${pictures}` : ""}`;
     choose(this.kinds, background.kind);
     document.getElementById("background-upload").hidden = background.kind !== "image";
@@ -48,7 +48,7 @@ export class BackgroundControls {
       this.send({ kind });
       return;
     }
-    const [first] = this.library.stored.backgrounds;
+    const [first] = this.collections.stored.backgrounds;
     if (first) {
       this.send({ kind, image: first.name });
       return;
@@ -81,7 +81,7 @@ export class BackgroundControls {
         if (document.activeElement !== input) input.value = now.color.toLowerCase();
       });
     } else if (background.kind === "image") {
-      this.#fill([make("div", { className: "tiles small" }, ...this.library.backgroundTiles(background.image))]);
+      this.#fill([make("div", { className: "tiles small" }, ...this.collections.backgroundTiles(background.image))]);
     } else {
       this.#fill([make("p", { className: "hint" }, "A dark neutral in reenact mode, the live room in ratio mode.")]);
     }
