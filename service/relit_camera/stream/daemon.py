@@ -123,6 +123,7 @@ class Daemon:
 
     def _run(self) -> None:
         while not self._stopping.is_set():
+            self._publisher.hold = self.director.scene.frozen
             frame = self._read()
             if frame is None:
                 continue

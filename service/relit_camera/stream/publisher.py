@@ -47,6 +47,7 @@ class Publisher:
         pictures: the slot to put finished pictures in.
         shown: what was written last, for previews: repeated pictures are not put again.
         placeholder: uint8 sRGB RGB (height, width, 3), of the sink's size; may be replaced at any time.
+        hold: while this is true the last picture stays, however old it is.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class Publisher:
         self.pictures: Slot[PublishedPicture] = Slot()
         self.shown: Slot[DisplayImage] = Slot()
         self.placeholder = placeholder
+        self.hold = False
         self._sink = sink
         self._fps = fps
         self._stale_after_s = stale_after_s
@@ -79,7 +81,7 @@ class Publisher:
         self._newest = self.pictures.reader()
         self._last: PublishedPicture | None = None
         self._failing = False
-        self._retry_at = 0.0
+        self._retry_at = self._held_at = 0.0
         self._published = self._repeated = 0
         self._rate = RateMeter()
         self._latency = DurationWindow()
@@ -138,7 +140,10 @@ class Publisher:
 
     def _image(self, now: float) -> DisplayImage:
         last = self._last
-        stale = self._stale_after_s is not None and now - self._newest.put_at > self._stale_after_s
+        if self.hold:
+            self._held_at = now
+        fresh_at = max(self._newest.put_at, self._held_at)
+        stale = self._stale_after_s is not None and now - fresh_at > self._stale_after_s
         return self.placeholder if last is None or stale else last.image
 
     def _show(self, image: DisplayImage) -> None:
