@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.synthetic import fibonacci_directions, sphere_samples
 
 from relit_camera.errors import LightsError, NotFoundError
 from relit_camera.reflectance.barycentric import PlanarBarycentric, SphericalBarycentric, spherical_barycentric
 from relit_camera.reflectance.method import LinearMethod, method_names, open_method
 from relit_camera.reflectance.nearest import Nearest
 from relit_camera.space.directions import direction_from_degrees, texel_directions
-from tests.synthetic import fibonacci_directions, sphere_samples
 
 METHODS = [SphericalBarycentric(), PlanarBarycentric(), Nearest()]
 
@@ -59,7 +59,9 @@ def test_spherical_is_nearer_to_the_truth_than_planar_and_nearest() -> None:
     assert errors["SphericalBarycentric"] < errors["PlanarBarycentric"] < errors["Nearest"]
 
 
-@pytest.mark.parametrize("directions", [np.eye(3), np.stack([np.cos(np.arange(8)), np.sin(np.arange(8)), np.zeros(8)], 1)])
+@pytest.mark.parametrize(
+    "directions", [np.eye(3), np.stack([np.cos(np.arange(8)), np.sin(np.arange(8)), np.zeros(8)], 1)]
+)
 def test_directions_without_extent_are_refused(directions: np.ndarray) -> None:
     with pytest.raises(LightsError, match="span no region"):
         SphericalBarycentric().weights(directions, np.eye(3))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tests.synthetic import render_sphere, sphere_samples, sphere_surface
 
 from relit_camera.capture.build import build_subject
 from relit_camera.errors import NotFoundError
@@ -15,14 +16,15 @@ from relit_camera.space.directions import direction_from_degrees, texel_directio
 from relit_camera.space.quality import psnr
 from relit_camera.space.rotation import rotation_from_angles
 from relit_camera.subject.subject import Subject
-from tests.synthetic import render_sphere, sphere_samples, sphere_surface
 
 ALL = ["dense", "basis", "onnx-basis", "onnx-dense"]
 
 
 @pytest.fixture(scope="module")
 def sphere() -> Subject:
-    return build_subject(sphere_samples(400, 32), "barycentric", "sphere", landmarks={"none": np.zeros((1, 2), np.float32)})
+    return build_subject(
+        sphere_samples(400, 32), "barycentric", "sphere", landmarks={"none": np.zeros((1, 2), np.float32)}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +93,9 @@ def test_nearby_poses_beat_the_right_one_never(sphere: Subject) -> None:
     truth = render_sphere(rotation_from_angles(24).inv().apply(room_light), 32)
     relighter = open_relighter("basis", sphere)
     yaws = np.arange(0, 50, 4)
-    scores = [psnr(relighter.relight(rotate(_lamp(room_light), rotation_from_angles(y))), truth, sphere.matte) for y in yaws]
+    scores = [
+        psnr(relighter.relight(rotate(_lamp(room_light), rotation_from_angles(y))), truth, sphere.matte) for y in yaws
+    ]
     assert yaws[int(np.argmax(scores))] == 24
 
 

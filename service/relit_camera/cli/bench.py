@@ -16,7 +16,9 @@ def bench(
     as_json: Annotated[bool, typer.Option("--json", help="Machine-readable.")] = False,
     subject: Annotated[str | None, typer.Option(help="Subject to measure; a generated one if not given.")] = None,
     environments: Annotated[Path | None, typer.Option(help="Folder of panoramas besides our own.")] = None,
-    video: Annotated[str | None, typer.Option(help="Live source; the test pattern with a made-up face if not given.")] = None,
+    video: Annotated[
+        str | None, typer.Option(help="Live source; the test pattern with a made-up face if not given.")
+    ] = None,
     tracker: Annotated[str | None, typer.Option(help="Tracker for the video.")] = None,
     mode: Annotated[str, typer.Option(help="Mode of the live chain.")] = "reenact",
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the live chain.")] = "1280x720",

@@ -22,7 +22,8 @@ def import_lights(
     method: Annotated[str, typer.Option(help="Reflectance method.")] = "default",
     gamma: Annotated[str, typer.Option(help="Curve of the pictures: srgb, linear, or an exponent.")] = "srgb",
     landmarks: Annotated[
-        Path | None, typer.Option(help="JSON of known landmarks: {scheme: [[x, y], …]}; landmarks.json is found by itself.")
+        Path | None,
+        typer.Option(help="JSON of known landmarks: {scheme: [[x, y], …]}; landmarks.json is found by itself."),
     ] = None,
 ) -> None:
     """Build a subject from aligned pictures, each under one light whose direction is known."""
@@ -40,7 +41,9 @@ def import_lights(
     open_method(method)
     with Progress(console=Console(stderr=True), transient=True) as progress:
         reading = progress.add_task("Reading pictures", total=None)
-        samples = import_samples(lights, curve, lambda done, total: progress.update(reading, completed=done, total=total))
+        samples = import_samples(
+            lights, curve, lambda done, total: progress.update(reading, completed=done, total=total)
+        )
         progress.add_task("Building the field", total=None)
         points = read_landmarks(landmarks or lights.parent / "landmarks.json", required=landmarks is not None)
         subject = build_subject(samples, method, lights.name, curve, points or None)

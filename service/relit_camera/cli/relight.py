@@ -26,13 +26,13 @@ def relight(
 
     from relit_camera.cli.parse import numbers
     from relit_camera.cli.settings import settings_of
-    from relit_camera.space.display import display_from_linear
     from relit_camera.light.exposure import display_scale
     from relit_camera.light.maps import rotate as rotate_map
     from relit_camera.light.store import EnvironmentStore
     from relit_camera.relight.basis import BasisRelighter
     from relit_camera.relight.direction import relight_direction
     from relit_camera.space.directions import direction_from_degrees
+    from relit_camera.space.display import display_from_linear
     from relit_camera.space.picture_files import write_display, write_linear
     from relit_camera.space.rotation import rotation_from_angles
     from relit_camera.subject.store import SubjectStore
@@ -56,4 +56,6 @@ def relight(
     if linear:
         write_linear(out, picture)
     else:
-        write_display(out, display_from_linear(picture * np.float32(scale * opened.metadata.display_gain * 2**exposure_ev)))
+        write_display(
+            out, display_from_linear(picture * np.float32(scale * opened.metadata.display_gain * 2**exposure_ev))
+        )

@@ -32,13 +32,12 @@ def replay(
     from rich.console import Console
     from rich.progress import Progress
 
-    from relit_camera.cli.parse import numbers
     from relit_camera.cli.parse import background as parse_background
     from relit_camera.cli.parse import mode as parse_mode
+    from relit_camera.cli.parse import numbers
     from relit_camera.cli.settings import settings_of
-    from relit_camera.cores import share_cores
-
     from relit_camera.config.look import Lighting, Look
+    from relit_camera.cores import share_cores
     from relit_camera.files import write_atomic
     from relit_camera.space.picture_files import write_display
     from relit_camera.stream.assembly import make_pipeline, make_tracker

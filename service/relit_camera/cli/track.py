@@ -37,6 +37,8 @@ def track(
             recorder.add(opened.track(frame), frame.time_s)
             progress.advance(task)
     if not recorder.found_share:
-        raise VideoError(f"no face was found in {video}", "the face must look toward the camera, 60 pixels high or more")
+        raise VideoError(
+            f"no face was found in {video}", "the face must look toward the camera, 60 pixels high or more"
+        )
     recorder.write(out)
     typer.echo(f"{out}: face found in {100 * recorder.found_share:.0f} % of the frames")

@@ -9,8 +9,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Rgb = tuple[Annotated[float, Field(ge=0, le=100)], Annotated[float, Field(ge=0, le=100)],
             Annotated[float, Field(ge=0, le=100)]]  # fmt: skip
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]{0,63}$")]
-"""A stored thing's name: letters, digits, space, dot, dash and underscore, so that it is safe as a file name."""
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9 _.-]{0,62}[A-Za-z0-9_-])?$")]
+"""A stored thing's name, safe as a file name everywhere: letters, digits, space, dot, dash, underscore; no dot or space last."""
 
 
 class Settings(BaseModel):

@@ -29,8 +29,6 @@ from relit_camera.space.images import Frame, LinearImage, Mask
 
 ENLARGE = 2
 """The still is enlarged by bicubic interpolation before the bilinear warp: as sharp as a bicubic one, and quicker."""
-STEP = 2
-"""Warp positions are computed for every other pixel of each row and column."""
 HOLD = 0.08
 """Share of the still's shorter side over which a face that is cut off by the border comes to rest there."""
 FEATHER = 0.06
@@ -86,7 +84,7 @@ def warped_person(relit: LinearImage, alpha: Mask, warp: Warp, box: Box) -> tupl
     """
     premultiplied = np.dstack([relit * alpha[..., None], alpha])
     large = cv2.resize(premultiplied, None, fx=ENLARGE, fy=ENLARGE, interpolation=cv2.INTER_CUBIC)
-    view = warp.apply(np.maximum(large, 0), box, ENLARGE, STEP)
+    view = warp.apply(np.maximum(large, 0), box, ENLARGE)
     return np.ascontiguousarray(view[..., :3]), np.clip(view[..., 3], 0, 1)
 
 

@@ -9,8 +9,8 @@ from typing import Protocol
 from relit_camera.errors import NotFoundError
 from relit_camera.face.follow import FaceMotion
 from relit_camera.models.session import SessionOptions
-from relit_camera.relight.relighter import Relighter
 from relit_camera.reenact.source_face import SourceFace
+from relit_camera.relight.relighter import Relighter
 from relit_camera.space.images import Frame, LinearImage, Mask
 from relit_camera.subject.subject import Subject
 
@@ -73,4 +73,3 @@ def open_reenactor(name: str, stage: Stage) -> Reenactor:
         return reenactor
     known = ", ".join(sorted(point.name for point in entry_points(group=GROUP)))
     raise NotFoundError(f"no reenactor '{name}'", f"there are: {known}")
-

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.errors import SubjectError
-from relit_camera.face.pose import fit_pose, unproject
 from relit_camera.face.landmarks import Scheme
+from relit_camera.face.pose import fit_pose, unproject
 from relit_camera.face.schemes import landmark_scheme
 from relit_camera.face.state import HeadPose, Tracker
 from relit_camera.face.still import look_at

@@ -14,6 +14,8 @@ Box = tuple[int, int, int, int]
 
 FADE = 0.1
 """Share of a patch's side over which it gives way to what lies under it."""
+STEP = 8
+"""Positions outside the fine patches are computed for every eighth output pixel and interpolated."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,14 @@ class FlowPatch:
     flow: Flow
     region: NDArray[np.float64]
 
+    @property
+    def positions(self) -> NDArray[np.float32]:
+        """Where each grid point looks: its own place plus the flow, (rows, columns, 2) still pixels."""
+        rows, columns = self.flow.shape[:2]
+        x = np.linspace(self.region[0], self.region[2], columns, dtype=np.float32)
+        y = np.linspace(self.region[1], self.region[3], rows, dtype=np.float32)
+        return np.asarray(self.flow + np.dstack(np.meshgrid(x, y)), dtype=np.float32)
+
 
 @dataclass(frozen=True)
 class Warp:
@@ -41,58 +51,65 @@ class Warp:
     affine: NDArray[np.float64]
     patches: tuple[FlowPatch, ...]
 
-    def map(self, box: Box, enlarged: int = 1, step: int = 1) -> NDArray[np.float32]:
+    def map(self, box: Box, enlarged: int = 1) -> NDArray[np.float32]:
         """Positions (height, width, 2) for cv2.remap, for the output pixels of `box` (left, top, right, bottom).
 
-        Args:
-            box: in output pixels.
-            enlarged: by how much the still to be sampled is larger than the one that the warp was made for.
-            step: compute every `step`-th position and interpolate: the flow's grids are coarser still.
+        `enlarged`: by how much the still to be sampled is larger than the one that the warp was made for.
         """
         width, height = box[2] - box[0], box[3] - box[1]
-        columns, rows = -(-width // step), -(-height // step)
-        # cv2 counts pixel centres as integers: x_ours = x_cv + ½ on either side.
-        first = box[0] + 0.5 * step, box[1] + 0.5 * step
-        still_from_pixel = self.affine @ np.array([[step, 0, first[0]], [0, step, first[1]], [0, 0, 1]])
-        flow = np.zeros((rows, columns, 2), dtype=np.float32)
-        for patch in self.patches:
-            _paste(flow, patch, still_from_pixel)
-        a = still_from_pixel.astype(np.float32)
-        flow += (a[:, 0] * np.arange(columns, dtype=np.float32)[:, None] + a[:, 2])[None]
-        flow += (a[:, 1] * np.arange(rows, dtype=np.float32)[:, None])[:, None]
-        flow *= np.float32(enlarged)
-        flow -= np.float32(0.5)
-        if step > 1:
-            size = (columns * step, rows * step)
-            flow = cv2.resize(flow, size, interpolation=cv2.INTER_LINEAR)[:height, :width]
-        return np.asarray(flow, dtype=np.float32)
+        # Few positions, interpolated: the head's grid is no finer. One beyond each side, so that none is extrapolated.
+        columns, rows = -(-width // STEP) + 2, -(-height // STEP) + 2
+        coarse = np.zeros((rows, columns, 2), dtype=np.float32)
+        from_coarse = self._still_from_pixel(box[0] - 0.5 * STEP, box[1] - 0.5 * STEP, STEP)
+        for patch in self.patches[:1]:
+            _paste(coarse, patch.flow, patch.region, from_coarse)
+        a = from_coarse.astype(np.float32)
+        coarse += (a[:, 0] * np.arange(columns, dtype=np.float32)[:, None] + a[:, 2])[None]
+        coarse += (a[:, 1] * np.arange(rows, dtype=np.float32)[:, None])[:, None]
+        # cv2 counts pixel centres as integers: x_ours = x_cv + ½.
+        coarse = coarse * np.float32(enlarged) - np.float32(0.5)
+        fine = cv2.resize(coarse, (columns * STEP, rows * STEP), interpolation=cv2.INTER_LINEAR)
+        positions = np.ascontiguousarray(fine[STEP : STEP + height, STEP : STEP + width])
+        from_pixel = self._still_from_pixel(box[0] + 0.5, box[1] + 0.5, 1)
+        for patch in self.patches[1:]:
+            _paste(positions, patch.positions * np.float32(enlarged) - np.float32(0.5), patch.region, from_pixel)
+        return positions
 
-    def apply(self, still: NDArray[np.float32], box: Box, enlarged: int = 1, step: int = 1) -> NDArray[np.float32]:
+    def _still_from_pixel(self, left: float, top: float, step: float) -> NDArray[np.float64]:
+        """The affine map (2, 3) from array indices to still pixels, index 0 at output position (left, top)."""
+        return np.asarray(self.affine @ np.array([[step, 0, left], [0, step, top], [0, 0, 1]]))
+
+    def apply(self, still: NDArray[np.float32], box: Box, enlarged: int = 1) -> NDArray[np.float32]:
         """The still (height, width, channels ≤ 4) float32 as seen at the output pixels of `box`; 0 beyond its edges."""
-        positions = self.map(box, enlarged, step)
+        positions = self.map(box, enlarged)
         view = cv2.remap(still, positions, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
         return np.asarray(view, dtype=np.float32)
 
 
-def _paste(flow: NDArray[np.float32], patch: FlowPatch, still_from_pixel: NDArray[np.float64]) -> None:
-    """Blend a patch into the flow of a box of output pixels, in place."""
-    rows, columns = patch.flow.shape[:2]
-    spacing = (patch.region[2:] - patch.region[:2]) / [columns - 1, rows - 1]
+def _paste(
+    onto: NDArray[np.float32],
+    values: NDArray[np.float32],
+    region: NDArray[np.float64],
+    still_from_index: NDArray[np.float64],
+) -> None:
+    """Blend a grid of values (rows, columns, 2) over a region of the still into an array of positions, in place."""
+    rows, columns = values.shape[:2]
+    spacing = (region[2:] - region[:2]) / [columns - 1, rows - 1]
     grid_from_still = np.array([[1 / spacing[0], 0, 0], [0, 1 / spacing[1], 0], [0, 0, 1]])
-    grid_from_still[:2, 2] = -patch.region[:2] / spacing
-    grid_from_pixel = grid_from_still @ np.vstack([still_from_pixel, [0, 0, 1]])
+    grid_from_still[:2, 2] = -region[:2] / spacing
+    grid_from_index = grid_from_still @ np.vstack([still_from_index, [0, 0, 1]])
     corners = np.array([[0, 0, 1], [columns - 1, 0, 1], [0, rows - 1, 1], [columns - 1, rows - 1, 1]], dtype=float)
-    seen = (corners @ np.linalg.inv(grid_from_pixel).T)[:, :2]
+    seen = (corners @ np.linalg.inv(grid_from_index).T)[:, :2]
     left, top = np.maximum(np.floor(seen.min(axis=0)).astype(int), 0)
-    right, bottom = np.minimum(np.ceil(seen.max(axis=0)).astype(int) + 1, flow.shape[1::-1])
+    right, bottom = np.minimum(np.ceil(seen.max(axis=0)).astype(int) + 1, onto.shape[1::-1])
     if right <= left or bottom <= top:
         return
-    local = (grid_from_pixel @ np.array([[1, 0, left], [0, 1, top], [0, 0, 1]]))[:2]
+    local = (grid_from_index @ np.array([[1, 0, left], [0, 1, top], [0, 0, 1]]))[:2]
     edges = [np.clip(np.minimum(np.arange(n), np.arange(n)[::-1]) / (FADE * n), 0, 1) for n in (rows, columns)]
     cover = np.minimum.outer(*edges).astype(np.float32)
-    stacked = np.dstack([patch.flow * cover[..., None], cover])
+    stacked = np.dstack([values * cover[..., None], cover])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     pasted = cv2.warpAffine(stacked, local, (int(right - left), int(bottom - top)), flags=flags)
-    area = flow[top:bottom, left:right]
+    area = onto[top:bottom, left:right]
     area *= 1 - pasted[..., 2:]
     area += pasted[..., :2]

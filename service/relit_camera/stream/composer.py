@@ -6,11 +6,11 @@ import numpy as np
 
 from relit_camera.compose.background import Backdrop, Wanted, needs_room
 from relit_camera.compose.composite import foreground_colours, over, straight
-from relit_camera.space.display import display_from_linear
 from relit_camera.compose.live_room import LiveRoom
 from relit_camera.compose.matte import PersonMatte
 from relit_camera.models.session import SessionOptions
 from relit_camera.reenact.reenactor import Moved
+from relit_camera.space.display import display_from_linear
 from relit_camera.space.images import DisplayImage, Frame, LinearImage
 from relit_camera.stream.scene import Scene
 from relit_camera.stream.timing import StageTimer

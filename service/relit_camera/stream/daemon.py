@@ -67,7 +67,8 @@ class Daemon:
         self._state = CameraState.STARTING
         self._started_at = time.monotonic()
         self._stopping = threading.Event()
-        self._worker = threading.Thread(target=self._run, name="worker", daemon=True)
+        # No daemon thread: one that is inside OpenCV when the interpreter ends would abort the process.
+        self._worker = threading.Thread(target=self._run, name="worker")
 
     def start(self) -> None:
         """Begin to read, relight and publish."""
