@@ -131,9 +131,11 @@ def running_camera(
     daemon = Daemon(settings, director, source or memory_source(), sink, tracker or SteadyTracker())
     daemon.start()
     try:
-        with serve(create_app(daemon, settings), settings.server) as server:
-            with httpx.Client(base_url=f"{server.address.url}api/v1/", timeout=WAIT_S) as http:
-                yield Camera(daemon, director, sink, http)
+        with (
+            serve(create_app(daemon, settings), settings.server) as server,
+            httpx.Client(base_url=f"{server.address.url}api/v1/", timeout=WAIT_S) as http,
+        ):
+            yield Camera(daemon, director, sink, http)
     finally:
         daemon.stop()
 

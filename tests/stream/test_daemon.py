@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -173,10 +174,19 @@ def test_a_source_that_fails_is_told_with_its_cure(tmp_path: Path, monkeypatch: 
         wait_until(lambda: camera.troubles() == "")
 
 
+class LongFaceTracker(SteadyTracker):
+    """Sees another person: a face a fifth longer than the subject's."""
+
+    def track(self, frame: Frame) -> FaceState:
+        state = super().track(frame)
+        middle = state.landmarks.mean(axis=0)
+        return replace(state, landmarks=(middle + (state.landmarks - middle) * np.float32([1, 1.2])))
+
+
 def test_ratio_falls_back_with_a_word_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     source = memory_source(noise.repeat(4, axis=0).repeat(4, axis=1))
-    with running_camera(tmp_path, source=source, look=Look(mode=Mode.RATIO)) as camera:
+    with running_camera(tmp_path, source, LongFaceTracker(), look=Look(mode=Mode.RATIO)) as camera:
         wait_until(lambda: "mode ratio shows the reenacted still" in camera.troubles())
         assert camera.status()["mode"] == "ratio"
         degraded = camera.status()["degraded"]
