@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import pkgutil
 import re
 import subprocess
 from importlib.metadata import entry_points
@@ -94,6 +96,14 @@ def test_pages_name_commands_that_exist() -> None:
     assert unknown == set()
 
 
+def test_the_architecture_page_names_what_there_is() -> None:
+    parts = "|".join(path.stem for path in (ROOT / "service/relit_camera").iterdir() if path.name[0] != "_")
+    names = re.findall(rf"\b(?<![./_])(?:{parts})(?:\.[A-Za-z_]+)+", (ROOT / "docs/architecture.md").read_text())
+    named = {name for name in names if name.rpartition(".")[2] not in ("py", "md", "onnx", "lp", "hdr", "yaml")}
+    assert len(named) > 20
+    assert {name for name in named if not _exists(name)} == set()
+
+
 def test_the_readme_begins_with_targets_that_the_makefile_has() -> None:
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     named = re.findall(r"^\s*make ([a-z-]+)", (ROOT / "README.md").read_text(), re.MULTILINE)
@@ -127,6 +137,17 @@ def _code(text: str) -> str:
     fenced = re.findall(r"^```.*?^```", text, re.MULTILINE | re.DOTALL)
     indented = re.findall(r"^ {4}.*$", text, re.MULTILINE)
     return "\n".join([*fenced, *indented, *re.findall(r"`[^`\n]+`", text)])
+
+
+def _exists(dotted: str) -> bool:
+    """Whether a dotted name below relit_camera is a module or something in one; what a class gives itself counts."""
+    try:
+        pkgutil.resolve_name(f"relit_camera.{dotted}")
+    except AttributeError:
+        owner, _, name = dotted.rpartition(".")
+        holder = pkgutil.resolve_name(f"relit_camera.{owner}")
+        return inspect.isclass(holder) and f"self.{name} = " in inspect.getsource(holder)
+    return True
 
 
 def _settings_names(model: type[BaseModel]) -> set[str]:
