@@ -35,8 +35,8 @@ UP_CM = 6.0
 ASIDE = 3.0
 """Radii by which the influence of closed lids and lips is centred off their slit: they hand over within r / 3."""
 COARSE_GRID = (64, 64)
-FINE_GRID = (40, 48)
-"""Rows and columns: a lid's gap is some ten rows."""
+FINE_GRID = (30, 38)
+"""Rows and columns: a lid's gap is some seven rows."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ them, and the relit picture is warped at full output resolution.
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,21 +17,18 @@ from relit_camera.reenact.control_points import (
     fine_regions,
     head_anchors,
 )
+from relit_camera.reenact.cutout import Cutout
 from relit_camera.reenact.dense_motion import DenseMotion, region_around
 from relit_camera.reenact.mouth import Mouth
 from relit_camera.reenact.placement import inverse_affine, moved_body, still_from_output, visible_box
 from relit_camera.reenact.reenactor import Moved, Stage
 from relit_camera.reenact.source_face import SourceFace
 from relit_camera.reenact.transfer import transfer, transfer_in_frame
-from relit_camera.reenact.warp import Box, FlowPatch, Warp
-from relit_camera.space.images import Frame, LinearImage, Mask
+from relit_camera.reenact.warp import FlowPatch, Warp
+from relit_camera.space.images import Frame, LinearImage
 
-ENLARGE = 2
-"""The still is enlarged by bicubic interpolation before the bilinear warp: as sharp as a bicubic one, and quicker."""
 HOLD = 0.08
 """Share of the still's shorter side over which a face that is cut off by the border comes to rest there."""
-FEATHER = 0.06
-"""Share of the still's width over which a person who is cut off by its side fades out."""
 
 
 class FirstOrderReenactor:
@@ -41,51 +37,28 @@ class FirstOrderReenactor:
     def __init__(self, stage: Stage) -> None:
         self._face = stage.face
         self._size = stage.size
-        self._whole = seen_whole(stage.subject.matte)
-        anchors = head_anchors(stage.face.pose, stage.face.size) if self._whole else np.zeros((0, 2))
+        self._person = Cutout(stage.subject)
+        anchors = head_anchors(stage.face.pose, stage.face.size) if self._person.whole else np.zeros((0, 2))
         self._points = control_points(stage.face, anchors)
         self._motion = DenseMotion(stage.options)
         self._mouth = Mouth(stage.face, stage.subject.neutral)
         self._placed = still_from_output(stage.subject.size, stage.size)
-        self._alpha = feathered(stage.subject.matte)
-        over_black = stage.subject.metadata.over_black
-        self._colour_share = (feathered(np.ones_like(self._alpha)) if over_black else self._alpha)[..., None]
 
     def move(self, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved:
         """See `Reenactor.move`."""
         face = self._face
-        target = (transfer if self._whole else transfer_in_frame)(face, self._points, motion)
+        target = (transfer if self._person.whole else transfer_in_frame)(face, self._points, motion)
         patches = moved_flow(self._motion, face, self._points, target.points, target.landmarks)
-        if not self._whole:
+        if not self._person.whole:
             patches = tuple(held_at_border(patch, face.size) for patch in patches)
         placed = moved_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
         box = visible_box(placed, face.size, self._size)
 
-        picture, alpha = warped_person(relit, self._alpha, Warp(placed, patches), box)
+        picture, alpha = self._person.warped(relit, Warp(placed, patches), box)
         to_box = inverse_affine(placed)
         to_box[:, 2] -= box[:2]
         self._mouth.draw(picture, alpha, relit, target.landmarks, target.pose, to_box)
         return Moved(picture, alpha, box[:2])
-
-
-def seen_whole(matte: Mask) -> bool:
-    """Whether there is background beside the head; else the picture's border cuts the face off."""
-    return bool(matte[: len(matte) // 2, [0, -1]].mean() < 0.5)
-
-
-def warped_person(relit: LinearImage, alpha: Mask, warp: Warp, box: Box) -> tuple[LinearImage, Mask]:
-    """The relit still under `warp` at the output pixels of `box`: premultiplied picture, and alpha.
-
-    Args:
-        relit: (height, width, 3) linear.
-        alpha: (height, width) straight alpha of the still.
-        warp: output → still.
-        box: left, top, right, bottom in output pixels.
-    """
-    premultiplied = np.dstack([relit * alpha[..., None], alpha])
-    large = cv2.resize(premultiplied, None, fx=ENLARGE, fy=ENLARGE, interpolation=cv2.INTER_CUBIC)
-    view = warp.apply(np.maximum(large, 0), box, ENLARGE)
-    return np.ascontiguousarray(view[..., :3]), np.clip(view[..., 3], 0, 1)
 
 
 def moved_flow(
@@ -119,13 +92,3 @@ def held_at_border(patch: FlowPatch, size: tuple[int, int]) -> FlowPatch:
     inward = np.minimum.outer(np.minimum(y, size[1] - y), np.minimum(x, size[0] - x))
     share = np.clip(inward / (HOLD * min(size)), 0, 1)
     return FlowPatch(patch.flow * (share * share * (3 - 2 * share)).astype(np.float32)[..., None], patch.region)
-
-
-def feathered(matte: Mask) -> Mask:
-    """The matte, faded out toward the sides and the top of the picture where it would be cut off hard."""
-    height, width = matte.shape
-    reach = max(FEATHER * width, 1.0)
-    across = np.clip((np.minimum(np.arange(width), np.arange(width)[::-1]) + 0.5) / reach, 0, 1)
-    down = np.clip((np.arange(height) + 0.5) / reach, 0, 1)
-    smooth = np.minimum.outer(down, across)
-    return np.asarray(matte * (smooth * smooth * (3 - 2 * smooth)), dtype=np.float32)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from relit_camera.face.crop import Crop
 from relit_camera.face.follow import FaceMotion
 from relit_camera.reenact.contract import Answer, Network, unmoved_grid
-from relit_camera.reenact.first_order import feathered, held_at_border, seen_whole, warped_person
+from relit_camera.reenact.cutout import Cutout
+from relit_camera.reenact.first_order import held_at_border
 from relit_camera.reenact.head_crop import DrivingHead, cut_square, head_crop
 from relit_camera.reenact.placement import inverse_affine, moved_body, still_from_output, visible_box
 from relit_camera.reenact.reenactor import Moved, Stage
@@ -42,8 +43,7 @@ class OnnxReenactor:
         self._source = cut_square(stage.subject.neutral, self._crop, self._network.side)
         self._network.check_at_rest(self._source)
         self._driver = DrivingHead(self._network.side)
-        self._whole = seen_whole(stage.subject.matte)
-        self._alpha = feathered(stage.subject.matte)
+        self._person = Cutout(stage.subject)
         self._placed = still_from_output(stage.subject.size, stage.size)
 
     def move(self, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved:
@@ -53,13 +53,13 @@ class OnnxReenactor:
             ModelError: the network fails on this frame, or breaks the contract.
         """
         placed = self._placed
-        if self._whole:
+        if self._person.whole:
             body = body_motion(self._face, motion)
             placed = moved_body(placed, body.pivot, body.shift, body.scale, self._face.size[1])
         box = visible_box(placed, self._face.size, self._size)
         answer = self._ask(relit, motion, frame)
         patches = () if answer is None or answer.flow is None else (self._patch(answer.flow, motion.presence),)
-        picture, alpha = warped_person(relit, self._alpha, Warp(placed, patches), box)
+        picture, alpha = self._person.warped(relit, Warp(placed, patches), box)
         if answer is not None and answer.picture is not None:
             affine = box_from_picture(self._crop, answer.picture.shape[:2], placed, box)
             _lay_over(picture, alpha, answer, motion.presence, affine)
@@ -82,7 +82,7 @@ class OnnxReenactor:
         displacement = (flow - unmoved_grid(*flow.shape[:2])) * np.float32(half * share)
         middle = np.array(self._crop.centre)
         patch = FlowPatch(displacement, np.concatenate([middle - half, middle + half]))
-        return patch if self._whole else held_at_border(patch, self._face.size)
+        return patch if self._person.whole else held_at_border(patch, self._face.size)
 
 
 def box_from_picture(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.float64], box: Box) -> NDArray[np.float64]:

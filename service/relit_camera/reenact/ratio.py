@@ -13,12 +13,13 @@ from relit_camera.errors import SubjectError
 from relit_camera.face.follow import FaceMotion
 from relit_camera.light.maps import rotate
 from relit_camera.reenact.control_points import control_points, head_anchors
+from relit_camera.reenact.cutout import feathered
 from relit_camera.reenact.dense_motion import DenseMotion
-from relit_camera.reenact.first_order import feathered, moved_flow
+from relit_camera.reenact.first_order import moved_flow
 from relit_camera.reenact.reenactor import Moved, Stage
 from relit_camera.reenact.room_probe import RoomProbe
 from relit_camera.reenact.source_face import SourceFace
-from relit_camera.reenact.warp import Warp
+from relit_camera.reenact.warp import Warp, sampled
 from relit_camera.space.colour import linear_from_uint8
 from relit_camera.space.images import Frame, LinearImage, Mask
 
@@ -74,7 +75,7 @@ class RatioReenactor:
         ratio = 1 + (ratio - 1) * np.float32(motion.presence)
         small = (0, 0, -(-width // COARSE), -(-height // COARSE))
         weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
-        ratio = extended(self._warp(motion, frame.size).apply(weighted, small))
+        ratio = extended(sampled(weighted, self._warp(motion, frame.size).map(small), cv2.BORDER_REPLICATE))
         large = cv2.resize(ratio, (small[2] * COARSE, small[3] * COARSE), interpolation=cv2.INTER_LINEAR)
         relit_live = cv2.multiply(live, np.ascontiguousarray(large[:height, :width]))
         return Moved(np.asarray(relit_live, dtype=np.float32), np.ones((height, width), np.float32), (0, 0))

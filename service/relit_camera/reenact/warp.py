@@ -80,10 +80,16 @@ class Warp:
         return np.asarray(self.affine @ np.array([[step, 0, left], [0, step, top], [0, 0, 1]]))
 
     def apply(self, still: NDArray[np.float32], box: Box, enlarged: int = 1) -> NDArray[np.float32]:
-        """The still (height, width, channels ≤ 4) float32 as seen at the output pixels of `box`; 0 beyond its edges."""
-        positions = self.map(box, enlarged)
-        view = cv2.remap(still, positions, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
-        return np.asarray(view, dtype=np.float32)
+        """The still (height, width[, channels ≤ 4]) as seen at the output pixels of `box`; 0 beyond its edges."""
+        return sampled(still, self.map(box, enlarged))
+
+
+def sampled(
+    still: NDArray[np.float32], positions: NDArray[np.float32], beyond: int = cv2.BORDER_CONSTANT
+) -> NDArray[np.float32]:
+    """The still at `positions` (height, width, 2) from `Warp.map`, bilinear; beyond its edges 0, or as cv2 names it."""
+    view = cv2.remap(still, positions, None, cv2.INTER_LINEAR, borderMode=beyond, borderValue=0)
+    return np.asarray(view, dtype=np.float32)
 
 
 def _paste(
