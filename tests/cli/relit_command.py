@@ -1,0 +1,127 @@
+"""Calling `relit`: as a process of its own where that matters, else in this one, which is much faster."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from functools import cache
+from io import StringIO
+from pathlib import Path
+from unittest.mock import patch
+
+import numpy as np
+
+from relit_camera.bench.live import NoddingTracker
+from relit_camera.bench.sample_subject import sample_subject
+from relit_camera.cli.main import run
+from relit_camera.face.track_file import TrackRecorder
+from relit_camera.space.images import Frame
+from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.subject.file import write_subject
+from relit_camera.subject.subject import Subject
+
+COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'relit'; from relit_camera.cli.main import run; run()"]
+CLIP_SIZE, CLIP_FPS = (128, 96), 20.0
+
+
+@dataclass(frozen=True)
+class Answer:
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+    def complains(self, *words: str, code: int = 1) -> None:
+        """It ended with one line on stderr that says all the words, and with no traceback.
+
+        Raises:
+            AssertionError: otherwise.
+        """
+        assert self.code == code, self
+        lines = self.err.strip().splitlines()
+        assert len(lines) == 1, self.err
+        assert lines[0].startswith("relit: "), lines[0]
+        assert ";" in lines[0], f"no cure: {lines[0]}"
+        for word in words:
+            assert word in lines[0], f"{word!r} is not in: {lines[0]}"
+
+
+def call(*arguments: object) -> Answer:
+    """Run a command in this process, as its entry point does. A fault of ours is raised, not printed."""
+    out, err = StringIO(), StringIO()
+    code = 0
+    with patch.object(sys, "argv", ["relit", *map(str, arguments)]), redirect_stdout(out), redirect_stderr(err):
+        try:
+            run()
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+    return Answer(code, out.getvalue(), err.getvalue())
+
+
+def start(*arguments: object, folder: Path) -> subprocess.Popen[str]:
+    """Start a command in a process of its own, which keeps its data in `folder`."""
+    return subprocess.Popen(
+        [*COMMAND, *map(str, arguments)],
+        env=environment(folder),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def finish(*arguments: object, folder: Path, timeout_s: float = 60) -> Answer:
+    """Run a command in a process of its own to its end."""
+    done = subprocess.run(
+        [*COMMAND, *map(str, arguments)],
+        env=environment(folder), capture_output=True, text=True, timeout=timeout_s, check=False,
+    )  # fmt: skip
+    return Answer(done.returncode, done.stdout, done.stderr)
+
+
+def environment(folder: Path) -> dict[str, str]:
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("RELIT_")}
+    models = {name: value for name, value in os.environ.items() if name == "RELIT_MODELS_DIR"}
+    return {**kept, **models, "RELIT_STORAGE__DATA_DIR": str(folder / "data")}
+
+
+def files(folder: Path) -> set[str]:
+    """Every file and folder below, hidden ones too."""
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+@cache
+def small_subject() -> Subject:
+    return sample_subject(64, 80)
+
+
+@dataclass(frozen=True)
+class Material:
+    """A subject file, a clip of grey frames, and a track of a face that nods in it."""
+
+    subject: Path
+    clip: Path
+    track: Path
+
+    @property
+    def tracker(self) -> str:
+        """The tracker that plays the track."""
+        return f"recorded:{self.track}"
+
+
+def write_material(folder: Path, frames: int = 40) -> Material:
+    """Write what a replay or a run needs, without any model."""
+    material = Material(folder / "small.relit", folder / "clip.mp4", folder / "track.json")
+    write_subject(material.subject, small_subject())
+    recorder = TrackRecorder(NoddingTracker(), CLIP_SIZE, CLIP_FPS)
+    with VideoWriter(material.clip, CLIP_SIZE, CLIP_FPS) as video:
+        for index in range(frames):
+            picture = np.full((CLIP_SIZE[1], CLIP_SIZE[0], 3), 90 + index % 20, np.uint8)
+            video.write(picture)
+            time_s = index / CLIP_FPS
+            recorder.add(NoddingTracker().track(Frame(picture, index, 0.0, time_s)), time_s)
+    recorder.write(material.track)
+    return material

@@ -1,0 +1,127 @@
+"""`relit run` as a process: it serves, obeys, and ends when it is told to."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+from relit_command import Material, finish, start
+
+END_S = 3.0
+START_S = 20.0
+
+
+def arguments(material: Material, *more: object) -> list[object]:
+    return [
+        "run", "--source", material.clip, "--sink", "null", "--port", 0, "--subject", material.subject,
+        "--tracker", material.tracker, "--size", "128x96", *more,
+    ]  # fmt: skip
+
+
+@contextmanager
+def running(material: Material, folder: Path, *more: object) -> Iterator[tuple[subprocess.Popen[str], httpx.Client]]:
+    process = start(*arguments(material, *more), folder=folder)
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert "the panel is at http://127.0.0.1:" in line, (line, process.stderr and process.stderr.read())
+        with httpx.Client(base_url=line.split()[-1] + "api/v1/", timeout=START_S) as http:
+            yield process, http
+    finally:
+        process.kill()
+        process.communicate()
+
+
+class Viewer(threading.Thread):
+    """Reads a motion-JPEG preview until it ends."""
+
+    def __init__(self, http: httpx.Client) -> None:
+        super().__init__(daemon=True)
+        self._http = http
+        self.began = threading.Event()
+        self.bytes = 0
+        self.error = ""
+
+    def run(self) -> None:
+        try:
+            with self._http.stream("GET", "preview.mjpg") as answer:
+                answer.raise_for_status()
+                for chunk in answer.iter_bytes():
+                    self.bytes += len(chunk)
+                    if self.bytes > 10_000:
+                        self.began.set()
+        except httpx.HTTPError as error:
+            self.error = repr(error)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signal_ends_it_within_three_seconds_with_two_previews_open(
+    number: signal.Signals, material: Material, tmp_path: Path
+) -> None:
+    with running(material, tmp_path) as (process, http):
+        viewers = [Viewer(http), Viewer(http)]
+        for viewer in viewers:
+            viewer.start()
+        for viewer in viewers:
+            assert viewer.began.wait(START_S), (viewer.bytes, viewer.error)
+        began = time.monotonic()
+        process.send_signal(number)
+        assert process.wait(10) == 0
+        took_s = time.monotonic() - began
+        assert took_s < END_S, f"it took {took_s:.1f} s"
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+        for viewer in viewers:
+            viewer.join(5)
+            assert not viewer.is_alive()
+
+
+def test_light_changes_while_it_runs_and_the_clip_loops(material: Material, tmp_path: Path) -> None:
+    with running(material, tmp_path) as (_, http):
+        first = http.get("snapshot.jpg").raise_for_status().content
+        assert first.startswith(b"\xff\xd8")
+        body = {"environment": None, "lamps": [{"azimuth_deg": 90}], "transition_s": 0}
+        assert http.put("lighting", json=body).status_code == 200
+        deadline = time.monotonic() + START_S
+        while (status := http.get("status").json())["uptime_s"] < 3.5:  # the clip lasts two seconds
+            assert time.monotonic() < deadline
+            time.sleep(0.2)
+        assert status["state"] == "live"
+        assert status["frames"]["published"] > 20
+        assert status["degraded"] == []
+        assert status["source"].startswith("file ")
+        assert http.get("lighting").json()["lamps"][0]["azimuth_deg"] == 90
+
+
+def test_environment_of_a_file_lights_this_run(material: Material, tmp_path: Path) -> None:
+    with running(material, tmp_path, "--environment", "sunset", "--mode", "ratio") as (_, http):
+        assert http.get("lighting").json()["environment"] == "sunset"
+        assert http.get("mode").json() == {"mode": "ratio"}
+
+
+def test_port_in_use(material: Material, tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        answer = finish(*arguments(material)[:6], port, *arguments(material)[7:], folder=tmp_path)
+    answer.complains(f"port {port}", "in use", "--port")
+
+
+def test_missing_camera(material: Material, tmp_path: Path) -> None:
+    options = arguments(material)
+    options[2] = "No Such Camera"
+    finish(*options, folder=tmp_path).complains("No Such Camera")
+
+
+def test_missing_virtual_camera(material: Material, tmp_path: Path) -> None:
+    options = arguments(material)
+    options[4] = "/dev/video97"
+    finish(*options, folder=tmp_path).complains("/dev/video97")
+    assert not (tmp_path / "data").exists()
