@@ -35,8 +35,9 @@ class Looker:
 
 @cache
 def close_up() -> Subject:
-    """A face that fills its picture, 96 x 128, cut off by the border."""
-    return sample_subject(96, 128)
+    """A face that fills its picture, 96 x 128, cut off by the border; not taken over black."""
+    subject = sample_subject(96, 128)
+    return dataclasses.replace(subject, metadata=subject.metadata.model_copy(update={"over_black": False}))
 
 
 @cache

@@ -1,0 +1,53 @@
+"""The person cut out of the still: soft edges, and picture and matte that go together."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from relit_camera.reenact.cutout import Cutout, feathered, seen_whole
+from relit_camera.reenact.warp import Warp
+from tests.reenact.people import close_up, person
+
+
+def with_edges(over_black):
+    """The small person, said to be taken over black or not."""
+    subject = person()
+    return dataclasses.replace(subject, metadata=subject.metadata.model_copy(update={"over_black": over_black}))
+
+
+def test_a_cut_out_person_is_premultiplied():
+    subject = with_edges(over_black=False)
+    relit = np.full((*subject.matte.shape, 3), 0.5, np.float32)
+    box = (0, 0, *subject.size)
+    picture, alpha = Cutout(subject).warped(relit, Warp(np.eye(2, 3), ()), box)
+    assert picture.dtype == alpha.dtype == np.float32
+    np.testing.assert_allclose(alpha, feathered(subject.matte), atol=0.06)
+    np.testing.assert_allclose(picture, 0.5 * np.repeat(alpha[..., None], 3, axis=2), atol=0.01)
+
+
+def test_frames_taken_over_black_carry_the_matte_already():
+    """Their soft edge is the person times the matte: it is not darkened a second time."""
+    subject = with_edges(over_black=True)
+    captured = np.repeat(0.5 * subject.matte[..., None], 3, axis=2)
+    box = (0, 0, *subject.size)
+    picture, alpha = Cutout(subject).warped(captured, Warp(np.eye(2, 3), ()), box)
+    np.testing.assert_allclose(picture, 0.5 * np.repeat(alpha[..., None], 3, axis=2), atol=0.03)
+
+
+def test_who_is_seen_whole():
+    assert seen_whole(person().matte)
+    assert not seen_whole(close_up().matte)
+
+
+def test_feathered_fades_at_sides_and_top_and_not_at_the_bottom():
+    matte = feathered(np.ones((100, 200), np.float32))
+    assert matte.dtype == np.float32
+    assert matte[:, [0, -1]].max() < 0.02
+    assert matte[0].max() < 0.02
+    assert matte[-1, 20:-20].min() == 1
+    assert matte[20:, 20:-20].min() == 1
+    np.testing.assert_allclose(matte, matte[:, ::-1], atol=1e-6)
+    ours = person().matte
+    assert (feathered(ours) <= ours + 1e-6).all()
