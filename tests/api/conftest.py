@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from api_client import Client
-from fake_camera import FakeCamera
 from fastapi import FastAPI
 
 from relit_camera.api.app import create_app
 from relit_camera.api.server import ApiServer, serve
 from relit_camera.config.settings import RelitSettings, ServerSettings, StorageSettings
+from tests.api.api_client import Client
+from tests.api.fake_camera import FakeCamera
 
 
 @pytest.fixture

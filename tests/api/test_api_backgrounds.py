@@ -7,8 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from api_client import Client, check_problem, png
-from fake_camera import FakeCamera
+
+from tests.api.api_client import Client, check_problem, png
+from tests.api.fake_camera import FakeCamera
 
 BACKGROUND = "/api/v1/background"
 

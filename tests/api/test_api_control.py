@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from api_client import Client, check_problem
-from fake_camera import FakeCamera
+
+from tests.api.api_client import Client, check_problem
+from tests.api.fake_camera import FakeCamera
 
 
 def test_mode_is_changed_and_told(client: Client, camera: FakeCamera) -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from api_client import Client, check_problem, hdr, png
-from fake_camera import FakeCamera
 
 from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
+from tests.api.api_client import Client, check_problem, hdr, png
+from tests.api.fake_camera import FakeCamera
 
 ENVIRONMENTS = "/api/v1/environments"
 

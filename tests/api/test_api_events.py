@@ -9,12 +9,12 @@ from typing import Any
 
 import httpx
 import pytest
-from api_client import Client, hdr, png
-from fake_camera import FakeCamera
 
 from relit_camera.api.routes import events
 from relit_camera.api.server import ApiServer
 from relit_camera.config.look import Lighting, Look
+from tests.api.api_client import Client, hdr, png
+from tests.api.fake_camera import FakeCamera
 
 Happening = tuple[str, dict[str, Any]]
 

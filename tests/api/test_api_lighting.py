@@ -5,10 +5,10 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from api_client import Client, check_problem
-from fake_camera import FakeCamera
 
 from relit_camera.config.look import Lighting
+from tests.api.api_client import Client, check_problem
+from tests.api.fake_camera import FakeCamera
 
 LIGHTING = "/api/v1/lighting"
 LAMP = {"azimuth_deg": 90, "elevation_deg": 0, "kelvin": 3200, "intensity": 2}

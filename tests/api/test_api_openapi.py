@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from api_client import Client
 
 from relit_camera.api.problems import MEDIA_TYPE
 from relit_camera.api.schema_file import schema_text
+from tests.api.api_client import Client
 
 KEPT = Path(__file__).resolve().parents[2] / "docs" / "openapi.json"
 FIXED = {  # what the design promises

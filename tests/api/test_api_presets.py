@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 import yaml
-from api_client import Client, check_problem
-from fake_camera import FakeCamera
 
 from relit_camera.api.presets import PresetStore
 from relit_camera.config.look import ColorBackground, Lamp, Lighting, Look, Mode
 from relit_camera.errors import InputError, NotFoundError
+from tests.api.api_client import Client, check_problem
+from tests.api.fake_camera import FakeCamera
 
 PRESETS = "/api/v1/presets"
 LOOK = Look(

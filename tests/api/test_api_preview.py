@@ -12,14 +12,14 @@ import cv2
 import httpx
 import numpy as np
 import pytest
-from api_client import Client, check_problem
-from fake_camera import FPS, FakeCamera
 from fastapi import FastAPI
 
 from relit_camera.api import preview as module
 from relit_camera.api.preview import MAX_VIEWERS, Channel, PreviewFeed, Variant, encode
 from relit_camera.api.server import ApiServer
 from relit_camera.space.images import DisplayImage
+from tests.api.api_client import Client, check_problem
+from tests.api.fake_camera import FPS, FakeCamera
 
 PREVIEW = "api/v1/preview.mjpg"
 

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from api_client import Client, check_problem
-from fake_camera import FakeCamera
 from fastapi import FastAPI
 
 from relit_camera.api.bodies import MAX_FORM_BYTES, MAX_JSON_BYTES
 from relit_camera.api.problems import ConflictError, problem_of, status_of, without_folders
 from relit_camera.errors import DeviceError, ImageError, NotFoundError, RelitError, StorageError
+from tests.api.api_client import Client, check_problem
+from tests.api.fake_camera import FakeCamera
 
 
 def test_unknown_paths_are_not_found(client: Client) -> None:

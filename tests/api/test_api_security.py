@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 
 import pytest
-from api_client import BASE_URL, Client, check_problem
-from fake_camera import FakeCamera
 
 from relit_camera.api.app import PANEL
 from relit_camera.api.security import is_ours
+from tests.api.api_client import BASE_URL, Client, check_problem
+from tests.api.fake_camera import FakeCamera
 
 PAGES = [f"/panel/{path.name}" for path in sorted(PANEL.iterdir())]
 

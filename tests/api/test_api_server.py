@@ -13,12 +13,12 @@ from pathlib import Path
 
 import httpx
 import pytest
-from fake_camera import FakeCamera
 from fastapi import FastAPI
 
 from relit_camera.api.server import Address, ApiServer, listen, serve
 from relit_camera.config.settings import ServerSettings
 from relit_camera.errors import ConfigError, PortInUseError
+from tests.api.fake_camera import FakeCamera
 
 
 def free_port() -> int:
@@ -136,7 +136,7 @@ PROGRAM = """
 import signal, sys, threading, time
 from pathlib import Path
 import cv2, numpy as np
-from fake_camera import FakeCamera
+from tests.api.fake_camera import FakeCamera
 from relit_camera.api.app import create_app
 from relit_camera.api.server import serve
 from relit_camera.config.settings import RelitSettings, ServerSettings, StorageSettings

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from api_client import Client, check_problem
-from fake_camera import STATUS, FakeCamera
 from prometheus_client.parser import text_string_to_metric_families
 
 from relit_camera.stream.status import CameraState, Degradation, Percentiles
+from tests.api.api_client import Client, check_problem
+from tests.api.fake_camera import STATUS, FakeCamera
 
 
 def test_status_tells_everything(client: Client, camera: FakeCamera) -> None:

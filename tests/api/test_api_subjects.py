@@ -7,12 +7,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from api_client import Client, check_problem
-from fake_camera import FakeCamera
 
 from relit_camera.subject.field import TEXELS
 from relit_camera.subject.file import write_subject
 from relit_camera.subject.subject import Subject, SubjectMetadata
+from tests.api.api_client import Client, check_problem
+from tests.api.fake_camera import FakeCamera
 
 
 @pytest.fixture

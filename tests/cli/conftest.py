@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from relit_command import Material, write_material
+
+from tests.cli.relit_command import Material, write_material
 
 
 @pytest.fixture(autouse=True)

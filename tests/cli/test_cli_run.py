@@ -13,7 +13,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from relit_command import Material, finish, start
+
+from tests.cli.relit_command import Material, finish, start
 
 END_S = 3.0
 START_S = 20.0

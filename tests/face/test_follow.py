@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from faces import RATE, SCHEME, SIZE, face, open_mouth, shut_eyes
 
 from relit_camera.errors import NotFoundError, TrackError
 from relit_camera.face.follow import FaceFollower, FaceMotion
 from relit_camera.face.state import LOST, FaceState, FaceStatus
 from relit_camera.space.rotation import angles_from_rotation, rotation_from_angles
+from tests.face.faces import RATE, SCHEME, SIZE, face, open_mouth, shut_eyes
 
 SETTLED = 90
 """Frames after which a follower has its neutral face and has eased into it."""

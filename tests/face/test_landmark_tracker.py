@@ -4,13 +4,13 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from faces import SCHEME, SIZE, face
 
 from relit_camera.face.crop import Crop, bounds
 from relit_camera.face.detector import Detection
 from relit_camera.face.landmark_tracker import LandmarkTracker, Reading
 from relit_camera.face.state import LOST, FaceStatus
 from relit_camera.space.images import Frame
+from tests.face.faces import SCHEME, SIZE, face
 
 FACE = face(at=(0, 0, -80)).landmarks
 EYE_SPAN = SCHEME.eye_span(FACE)

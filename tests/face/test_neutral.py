@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from faces import RATE, SCHEME, SIZE, face, open_mouth, shut_eyes
 
 from relit_camera.face.neutral import Neutral, NeutralFinder
 from relit_camera.face.pose import unproject
 from relit_camera.face.state import FaceState, FaceStatus
 from relit_camera.space.rotation import angles_from_rotation
+from tests.face.faces import RATE, SCHEME, SIZE, face, open_mouth, shut_eyes
 
 
 def feed(finder: NeutralFinder, states: list[FaceState], start: int = 0) -> tuple[Neutral | None, int]:

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from faces import face
 
 from relit_camera.face.crop import bounds
 from relit_camera.face.detector import Detection
 from relit_camera.face.openseeface import OpenSeeFaceNetwork, decode_heat_maps
+from tests.face.faces import face
 
 
 def sigmoid(value: float) -> float:

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from faces import SCHEME, SIZE, face
 
 from relit_camera.errors import NotFoundError, StorageError, TrackError
 from relit_camera.face.state import LOST, FaceState, FaceStatus
 from relit_camera.face.track_file import TrackRecorder, read_track
 from relit_camera.face.trackers import open_tracker
 from relit_camera.space.images import Frame
+from tests.face.faces import SCHEME, SIZE, face
 
 
 class NamedTracker:

@@ -20,7 +20,6 @@ import pooch
 import pytest
 from filelock import FileLock
 from onnx import TensorProto, helper
-from tflite_writer import NetworkWriter, Operator
 
 from relit_camera.errors import ModelError, NotFoundError, StorageError
 from relit_camera.models import registry as registry_module
@@ -28,6 +27,7 @@ from relit_camera.models.manifest import Manifest, public_manifest
 from relit_camera.models.registry import Registry, State, model_path, models_folder
 from relit_camera.models.session import open_session
 from relit_camera.models.tflite.convert import convert
+from tests.models.tflite_writer import NetworkWriter, Operator
 
 FLOATS = np.array([1, -2], np.float32)
 

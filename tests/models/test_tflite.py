@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from tflite_writer import NetworkWriter, Operator
 
 from relit_camera.errors import ModelError
 from relit_camera.models.session import SessionOptions, open_session
 from relit_camera.models.tflite.convert import OPERATORS, convert
+from tests.models.tflite_writer import NetworkWriter, Operator
 
 Array = NDArray[np.float32]
 SAME, VALID = 0, 1

@@ -9,15 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_camera import (
-    FPS,
-    SIZE,
-    SteadyTracker,
-    difference,
-    memory_source,
-    running_camera,
-    wait_until,
-)
 
 from relit_camera.config.look import Look, Mode
 from relit_camera.errors import VideoError
@@ -26,6 +17,15 @@ from relit_camera.models.registry import FOLDER_VARIABLE
 from relit_camera.space.images import Frame
 from relit_camera.stream import daemon as daemon_module
 from relit_camera.stream.placeholder import placeholder
+from tests.stream.small_camera import (
+    FPS,
+    SIZE,
+    SteadyTracker,
+    difference,
+    memory_source,
+    running_camera,
+    wait_until,
+)
 
 LAMP_LEFT = {"azimuth_deg": -90, "elevation_deg": 0, "intensity": 1.5}
 LAMP_RIGHT = {"azimuth_deg": 90, "elevation_deg": 0, "intensity": 1.5}

@@ -1,7 +1,6 @@
 import json
 
 import pytest
-from fake_devices import FakeTree
 from typer.testing import CliRunner
 
 from relit_camera.cli import devices as command
@@ -16,6 +15,7 @@ from relit_camera.stream.devices import (
     list_webcams,
     negotiated_size,
 )
+from tests.stream.fake_devices import FakeTree
 
 C920 = "usb-046d_HD_Pro_Webcam_C920_2B31-video-index0"
 

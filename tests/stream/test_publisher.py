@@ -3,13 +3,13 @@ import time
 
 import numpy as np
 import pytest
-from fake_devices import wait_until
 
 from relit_camera.errors import DeviceError, ImageError
 from relit_camera.stream import publisher as module
 from relit_camera.stream.placeholder import BACKDROP, placeholder
 from relit_camera.stream.publisher import PublishedPicture, Publisher
 from relit_camera.stream.sinks.null import NullSink
+from tests.stream.fake_devices import wait_until
 
 SIZE = (64, 48)
 PLACEHOLDER = np.full((48, 64, 3), 7, np.uint8)

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from fake_devices import FakeTree
 
 from relit_camera.config.settings import OutputSettings
 from relit_camera.errors import DeviceError, ImageError, InputError, StorageError, VideoError
@@ -14,6 +13,7 @@ from relit_camera.stream.sinks.file import FileSink
 from relit_camera.stream.sinks.null import NullSink
 from relit_camera.stream.sources.pattern import draw_pattern, read_number
 from relit_camera.stream.video import VideoReader
+from tests.stream.fake_devices import FakeTree
 
 SIZE = (320, 180)
 

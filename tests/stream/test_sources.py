@@ -5,7 +5,6 @@ import time
 import cv2
 import numpy as np
 import pytest
-from fake_devices import FakeCapture, FakeTree, wait_until
 
 from relit_camera.config.settings import SourceSettings
 from relit_camera.errors import DeviceError, ImageError, InputError, VideoError
@@ -17,6 +16,7 @@ from relit_camera.stream.sources.playback import playback
 from relit_camera.stream.sources.webcam import WebcamSource
 from relit_camera.stream.video import VideoReader
 from relit_camera.stream.video_writer import VideoWriter
+from tests.stream.fake_devices import FakeCapture, FakeTree, wait_until
 
 S = SourceState
 INFO = SourceInfo("test", "test", (64, 48), 50.0)
