@@ -32,14 +32,19 @@ GROUPS = {
 class _LazyGroup(TyperGroup):
     """Imports a command's module only when it is needed, so that `relit --help` answers at once."""
 
+    _listing = False
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        self._listing = True
+        super().format_help(ctx, formatter)
+
     def list_commands(self, ctx: Any) -> list[str]:
         return list(GROUPS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         if cmd_name not in GROUPS:
             return None
-        wanted_help = ctx.info_name is not None and not ctx.resilient_parsing and cmd_name not in sys.argv[1:2]
-        if wanted_help:
+        if self._listing:
             return typer.core.TyperCommand(cmd_name, callback=lambda: None, help=GROUPS[cmd_name][1])
         command = typer.main.get_command(import_module(GROUPS[cmd_name][0]).app)
         command.name = cmd_name

@@ -63,7 +63,7 @@ def display_from_linear(linear: LinearImage) -> DisplayImage:
     table = _table()
     shown = np.empty(linear.shape, dtype=np.uint8)
     for top in range(0, len(linear), _STRIPE):
-        root = np.clip(linear[top : top + _STRIPE], 0, _PEAK)
+        root = np.clip(linear[top : top + _STRIPE], 0, _PEAK, order="C")  # OpenCV writes to no other order
         cv2.sqrt(root, dst=root)
         index = cv2.multiply(root, _STEPS / _PEAK**0.5, dtype=cv2.CV_16U)
         np.take(table, index, out=shown[top : top + _STRIPE], mode="clip")  # other modes would make a copy of `out`
