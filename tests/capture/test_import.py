@@ -7,11 +7,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tests.synthetic import sphere_samples, write_lights
 
 from relit_camera.capture.importing import import_samples
 from relit_camera.capture.lights_file import read_lights
 from relit_camera.errors import ImageError, LightsError
+from tests.synthetic import sphere_samples, write_lights
 
 
 @pytest.fixture

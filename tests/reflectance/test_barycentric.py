@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.synthetic import fibonacci_directions, sphere_samples
 
 from relit_camera.errors import LightsError, NotFoundError
 from relit_camera.reflectance.barycentric import PlanarBarycentric, SphericalBarycentric, spherical_barycentric
 from relit_camera.reflectance.method import LinearMethod, method_names, open_method
 from relit_camera.reflectance.nearest import Nearest
 from relit_camera.space.directions import direction_from_degrees, texel_directions
+from tests.synthetic import fibonacci_directions, sphere_samples
 
 METHODS = [SphericalBarycentric(), PlanarBarycentric(), Nearest()]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.synthetic import render_sphere, sphere_samples, sphere_surface
 
 from relit_camera.capture.build import build_subject
 from relit_camera.errors import NotFoundError
@@ -16,6 +15,7 @@ from relit_camera.space.directions import direction_from_degrees, texel_directio
 from relit_camera.space.quality import psnr
 from relit_camera.space.rotation import rotation_from_angles
 from relit_camera.subject.subject import Subject
+from tests.synthetic import render_sphere, sphere_samples, sphere_surface
 
 ALL = ["dense", "basis", "onnx-basis", "onnx-dense"]
 

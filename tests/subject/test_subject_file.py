@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from safetensors.numpy import load_file, save_file
-from tests.synthetic import sphere_samples
 
 from relit_camera.capture.build import build_subject
 from relit_camera.errors import NotFoundError, StorageError, SubjectError
@@ -17,6 +16,7 @@ from relit_camera.subject.field import FactoredField
 from relit_camera.subject.file import HEADER_KEY, read_subject, write_subject
 from relit_camera.subject.store import SubjectStore
 from relit_camera.subject.subject import Subject
+from tests.synthetic import sphere_samples
 
 
 @pytest.fixture(scope="module")

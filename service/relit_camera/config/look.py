@@ -7,10 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Rgb = tuple[Annotated[float, Field(ge=0, le=100)], Annotated[float, Field(ge=0, le=100)],
-            Annotated[float, Field(ge=0, le=100)]]  # fmt: skip
+Channel = Annotated[float, Field(ge=0, le=100)]
+Rgb = tuple[Channel, Channel, Channel]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9 _.-]{0,62}[A-Za-z0-9_-])?$")]
-"""A stored thing's name, safe as a file name everywhere: letters, digits, space, dot, dash, underscore; no dot or space last."""
+"""A stored thing's name: letters, digits, space, dot, dash, underscore; no dot or space last, so that it is safe as a
+file name everywhere."""
 
 
 class Settings(BaseModel):
