@@ -17,7 +17,8 @@ from relit_camera.subject.field import FactoredField
 MAX_GAP_DEG = 60.0
 """A circle of this angular radius with no light in it bounds the sampled region: wider triangles are no data."""
 
-TOLERANCE = 1e-9
+TOLERANCE = np.radians(0.1)
+"""So far outside of the sampled region a direction still counts as on its edge: people and files round directions."""
 
 
 @dataclass(frozen=True)
