@@ -169,7 +169,7 @@ def test_signals_are_the_program_s_and_it_exits_clean(tmp_path: Path, number: si
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        cwd=Path(__file__).parent,
+        cwd=Path(__file__).parents[2],
     )
     try:
         assert process.stdout is not None
