@@ -1,0 +1,116 @@
+"""Python, packages, cores, and the folders that are written to."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import sys
+import tempfile
+from importlib import metadata
+from pathlib import Path
+
+import psutil
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+from relit_camera.config.settings import RelitSettings
+from relit_camera.doctor.findings import Finding, fine, problem, warning
+
+PACKAGE = "relit-camera"
+REPLACEMENTS = {
+    "onnxruntime": ("onnxruntime-gpu", "onnxruntime-directml", "onnxruntime-openvino"),
+    "opencv-contrib-python-headless": ("opencv-contrib-python",),
+}
+"""Packages that bring the same module as the one that is asked for."""
+LITTLE_SPACE, TOO_LITTLE_SPACE = 1 << 30, 50 << 20
+"""Bytes: a subject of the default size has some 20 MB, the models 12 MB."""
+ENOUGH_CORES = 2
+
+
+def check_python() -> Finding:
+    """The interpreter's version."""
+    found, needed = platform.python_version(), _needed_python()
+    if needed.contains(found, prereleases=True):
+        return fine("python", f"{found} at {sys.executable}")
+    return problem("python", f"{found} at {sys.executable}, not {needed}", "install a newer Python")
+
+
+def check_packages() -> Finding:
+    """Every package that we depend on, in a version that we take."""
+    try:
+        wanted = [Requirement(text) for text in metadata.requires(PACKAGE) or []]
+    except metadata.PackageNotFoundError:
+        return problem("packages", f"{PACKAGE} is not installed", "run: pip install -e . in its folder")
+    needed = [
+        requirement for requirement in wanted if not requirement.marker or requirement.marker.evaluate({"extra": ""})
+    ]
+    wrong = [text for text in map(_fault, needed) if text]
+    if not wrong:
+        return fine("packages", f"{len(needed)} packages, {', '.join(map(_shown, ('onnxruntime', 'numpy')))}")
+    return problem("packages", "; ".join(wrong), f"run: pip install --upgrade {PACKAGE}")
+
+
+def check_cores(settings: RelitSettings) -> Finding:
+    """Cores and memory for one network thread beside the picture arithmetic."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    memory = psutil.virtual_memory()
+    threads = settings.inference.threads
+    free = f"{memory.available >> 20} of {memory.total >> 20} MB memory free"
+    seen = f"{cores} cores, {free}, inference.threads is {threads}"
+    if cores < ENOUGH_CORES:
+        return warning("cores", seen, "give it two cores: with one the picture will not keep up with the camera")
+    if threads > cores:
+        return warning("cores", seen, f"set it to at most {cores}")
+    return fine("cores", seen)
+
+
+def check_folder(topic: str, folder: Path, cure: str) -> Finding:
+    """Whether a folder, or the one that it would be made in, can be written to, and has space."""
+    place = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+    try:
+        if not place.is_dir():
+            return problem(topic, f"{place} is a file, not a folder", cure)
+        with tempfile.TemporaryFile(dir=place):
+            pass
+        free = shutil.disk_usage(place).free
+    except OSError as error:
+        return problem(topic, f"{folder} cannot be written to: {error.strerror}", cure)
+    seen = f"{folder}{'' if folder.exists() else ' (will be made)'}, {free >> 20} MB free"
+    if free < TOO_LITTLE_SPACE:
+        return problem(topic, seen, "free some space on the disk")
+    if free < LITTLE_SPACE:
+        return warning(topic, seen, "free some space on the disk")
+    return fine(topic, seen)
+
+
+def _needed_python() -> SpecifierSet:
+    try:
+        return SpecifierSet(metadata.metadata(PACKAGE)["Requires-Python"])
+    except metadata.PackageNotFoundError:
+        return SpecifierSet(">=3.11")
+
+
+def _fault(requirement: Requirement) -> str:
+    """What is wrong with an installed package, or ""."""
+    name, version = _installed(requirement.name)
+    if version is None:
+        return f"{requirement.name} is missing"
+    return (
+        ""
+        if requirement.specifier.contains(version, prereleases=True)
+        else f"{name} is {version}, not {requirement.specifier}"
+    )
+
+
+def _installed(name: str) -> tuple[str, str | None]:
+    for candidate in (name, *REPLACEMENTS.get(name, ())):
+        try:
+            return candidate, metadata.version(candidate)
+        except metadata.PackageNotFoundError:
+            continue
+    return name, None
+
+
+def _shown(name: str) -> str:
+    return " ".join(filter(None, _installed(name)))
