@@ -38,7 +38,7 @@ def shown(*arguments):
 def test_check_says_which_file_is_right(elsewhere):
     answer = call("config", "check", write(elsewhere, "server:\n  port: 9000\n"))
     assert (answer.code, answer.out) == (0, f"{elsewhere / 'mine.yaml'} is right\n")
-    assert call("config", "check").out == "no configuration file: the defaults is right\n"
+    assert call("config", "check").out == "there is no configuration file: the defaults hold\n"
 
 
 def test_check_takes_the_global_option_too(elsewhere):

@@ -60,10 +60,10 @@ def load_settings(path: Path | None = None, overrides: Nested | None = None) -> 
     _check_environment()
     try:
         # A section whose every line is commented out reads as null: its defaults.
-        given = {key: value for key, value in document.items() if value is not None}
+        given = {k: v for k, v in document.items() if v is not None or k not in RelitSettings.model_fields}
         return _settings_class(given)(**_without_none(overrides or {}))
     except ValidationError as error:
-        raise _config_error(error, found, text) from error
+        raise _config_error(error, overrides or {}, found, text) from error
 
 
 def _settings_class(document: Nested) -> type[RelitSettings]:
@@ -121,27 +121,42 @@ def _without_none(values: Nested) -> dict[str, Any]:
     return {k: v for k, v in cleaned.items() if v is not None and v != {}}
 
 
-def _config_error(error: ValidationError, path: Path | None, text: str) -> ConfigError:
+def _config_error(error: ValidationError, overrides: Nested, path: Path | None, text: str) -> ConfigError:
     first = error.errors(include_url=False)[0]
     location = [part for part in first["loc"] if not str(part).startswith("function-")]
     key = ".".join(map(str, location))
-    line = _line_of(text, location)
-    place = f"{path} line {line}: " if path and line else ""
     message = first["msg"].removeprefix("Value error, ")
     shown = f" (is {first['input']!r:.60})" if not isinstance(first["input"], dict) else ""
+    place = _place_of(location, overrides, path, text, missing=first["type"] == "missing")
     return ConfigError(f"{place}{key}: {message}{shown}", "see 'relit config schema'")
 
 
+def _place_of(location: list[Any], overrides: Nested, path: Path | None, text: str, missing: bool) -> str:
+    """Where the value that holds was given: command line, then environment, then the file's line."""
+    given: Any = overrides
+    for part in location:
+        given = given.get(part) if isinstance(given, Mapping) else None
+    if given is not None:
+        return "command line: "
+    wanted = "RELIT_" + "__".join(map(str, location)).upper()
+    variable = next((name for name in os.environ if name.upper() == wanted), None)
+    if variable:
+        return f"environment variable {variable}: "
+    line = _line_of(text, location[:-1] if missing else location)
+    return f"{path} line {line}: " if path and line else ""
+
+
 def _line_of(text: str, location: list[Any]) -> int | None:
-    """Line of a key in the YAML text, or None where the value came from elsewhere."""
+    """Line of a key in the YAML text, or None where it is not there."""
     node = yaml.compose(text)
     line = None
     for part in location:
         if isinstance(node, yaml.MappingNode):
             found = next(((k, v) for k, v in node.value if k.value == str(part)), None)
-            if found is None:
-                return line if part is location[-1] else None
-            line, node = found[0].start_mark.line + 1, found[1]
+            if found is not None:
+                line, node = found[0].start_mark.line + 1, found[1]
+            elif all(v.value != part for k, v in node.value if k.value == "kind"):
+                return None  # else the part is no key: it says which kind of thing the keys after it belong to
         elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
             node = node.value[part]
             line = node.start_mark.line + 1

@@ -39,6 +39,11 @@ class OutputSettings(Settings):
     placeholder: Path | None = None
     """Picture shown while there is nothing else to show; ours if not given."""
 
+    @field_validator("sink", mode="before")
+    @classmethod
+    def _null_is_a_name(cls, sink: object) -> object:
+        return "null" if sink is None else sink  # YAML reads the bare word as no value
+
 
 class TrackerSettings(Settings):
     """How the face is followed."""
