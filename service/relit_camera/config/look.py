@@ -68,7 +68,7 @@ class Lighting(Settings):
     face_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
     background_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
     blend: Annotated[float, Field(ge=0, le=1)] = 1.0
-    """0 the live picture, 1 fully relit."""
+    """0 the live picture (in reenact, where that stays private, the still as captured), 1 fully relit."""
     transition_s: Annotated[float, Field(ge=0, le=60)] = 0.4
     """Seconds over which a change is eased."""
 

@@ -19,6 +19,7 @@ from relit_camera.reenact.reenactor import Moved, Reenactor, Stage, open_reenact
 from relit_camera.reenact.source_face import source_face
 from relit_camera.relight.basis import BasisRelighter
 from relit_camera.relight.relighter import Relighter
+from relit_camera.space.colour import linear_from_uint8
 from relit_camera.space.display import linear_from_display
 from relit_camera.space.images import DisplayImage, Frame, LinearImage
 from relit_camera.stream.composer import Composer
@@ -122,6 +123,8 @@ class Pipeline:
             light = rotate(room, motion.rotation)
         with self.timer.stage("relight"):
             relit = self._relight(cast, light * np.float32(subject.metadata.display_gain))
+            if mode is Mode.REENACT and scene.look.lighting.blend < 1:
+                relit = blended(subject, relit, scene.look.lighting.blend)
         with self.timer.stage("move"):
             moved = self._move(cast, relit, motion, frame)
         if moved is None:
@@ -181,6 +184,14 @@ class Pipeline:
                 picture = linear_from_display(frame.image) * (1 - blend) + picture * blend
             return self._composer.live(picture, frame, scene)
         return self._composer.still(moved, scene, frame.time_s)
+
+
+def blended(subject: Subject, relit: LinearImage, share: float) -> LinearImage:
+    """A `share` of the relit still, and for the rest the still as it was captured, in soft light from the front.
+
+    Reenact has no live picture to blend with: that stays private.
+    """
+    return np.asarray(linear_from_uint8(subject.neutral) * (1 - share) + relit * share, dtype=np.float32)
 
 
 def fitted(frame: Frame, size: tuple[int, int]) -> Frame:
