@@ -10,6 +10,6 @@ from threadpoolctl import threadpool_limits
 
 @pytest.fixture(scope="session", autouse=True)
 def one_blas_thread() -> Iterator[None]:
-    """As in the running camera: on a busy machine BLAS's threads wait for each other many times longer than they work."""
+    """As in the running camera: on a busy machine BLAS's threads wait for each other far longer than they work."""
     with threadpool_limits(limits=1, user_api="blas"):
         yield
