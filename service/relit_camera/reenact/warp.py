@@ -14,8 +14,8 @@ Box = tuple[int, int, int, int]
 
 FADE = 0.1
 """Share of a patch's side over which it gives way to what lies under it."""
-STEP = 8
-"""Positions outside the fine patches are computed for every eighth output pixel and interpolated."""
+MAX_STEP = 8
+"""Positions outside the fine patches are computed for at least every eighth output pixel and interpolated."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +57,11 @@ class Warp:
         `enlarged`: by how much the still to be sampled is larger than the one that the warp was made for.
         """
         width, height = box[2] - box[0], box[3] - box[1]
-        # Few positions, interpolated: the head's grid is no finer. One beyond each side, so that none is extrapolated.
-        columns, rows = -(-width // STEP) + 2, -(-height // STEP) + 2
+        # Few positions, interpolated. One beyond each side, so that none is extrapolated.
+        step = self._step()
+        columns, rows = -(-width // step) + 2, -(-height // step) + 2
         coarse = np.zeros((rows, columns, 2), dtype=np.float32)
-        from_coarse = self._still_from_pixel(box[0] - 0.5 * STEP, box[1] - 0.5 * STEP, STEP)
+        from_coarse = self._still_from_pixel(box[0] - 0.5 * step, box[1] - 0.5 * step, step)
         for patch in self.patches[:1]:
             _paste(coarse, patch.flow, patch.region, from_coarse)
         a = from_coarse.astype(np.float32)
@@ -68,12 +69,21 @@ class Warp:
         coarse += (a[:, 1] * np.arange(rows, dtype=np.float32)[:, None])[:, None]
         # cv2 counts pixel centres as integers: x_ours = x_cv + ½.
         coarse = coarse * np.float32(enlarged) - np.float32(0.5)
-        fine = cv2.resize(coarse, (columns * STEP, rows * STEP), interpolation=cv2.INTER_LINEAR)
-        positions = np.ascontiguousarray(fine[STEP : STEP + height, STEP : STEP + width])
+        fine = cv2.resize(coarse, (columns * step, rows * step), interpolation=cv2.INTER_LINEAR)
+        positions = np.ascontiguousarray(fine[step : step + height, step : step + width])
         from_pixel = self._still_from_pixel(box[0] + 0.5, box[1] + 0.5, 1)
         for patch in self.patches[1:]:
             _paste(positions, patch.positions * np.float32(enlarged) - np.float32(0.5), patch.region, from_pixel)
         return positions
+
+    def _step(self) -> int:
+        """Output pixels between computed positions: no more than between the points of the first patch's grid."""
+        if not self.patches:
+            return MAX_STEP
+        first = self.patches[0]
+        spacing = (first.region[2:] - first.region[:2]) / (np.array(first.flow.shape[1::-1]) - 1)
+        still_per_output = np.sqrt(abs(np.linalg.det(self.affine[:, :2])))
+        return int(np.clip(spacing.min() / still_per_output, 1, MAX_STEP))
 
     def _still_from_pixel(self, left: float, top: float, step: float) -> NDArray[np.float64]:
         """The affine map (2, 3) from array indices to still pixels, index 0 at output position (left, top)."""
