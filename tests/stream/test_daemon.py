@@ -180,7 +180,7 @@ class LongFaceTracker(SteadyTracker):
     def track(self, frame: Frame) -> FaceState:
         state = super().track(frame)
         middle = state.landmarks.mean(axis=0)
-        return replace(state, landmarks=(middle + (state.landmarks - middle) * np.float32([1, 1.2])))
+        return replace(state, landmarks=middle + (state.landmarks - middle) * np.array([1, 1.2], np.float32))
 
 
 def test_ratio_falls_back_with_a_word_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:

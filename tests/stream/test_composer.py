@@ -1,0 +1,114 @@
+"""The last stop: person over background, as the display shows it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relit_camera.config.look import ColorBackground, Lighting, Look, NoBackground
+from relit_camera.models.session import SessionOptions
+from relit_camera.reenact.reenactor import Moved
+from relit_camera.space.display import display_from_linear
+from relit_camera.space.images import Frame, Mask
+from relit_camera.stream import composer as composer_module
+from relit_camera.stream.composer import Composer
+from relit_camera.stream.scene import Scene
+from relit_camera.stream.timing import StageTimer
+
+SIZE = (64, 48)
+GREEN = ColorBackground(color="#00ff00")
+
+
+def composer(timer: StageTimer | None = None) -> Composer:
+    return Composer(SIZE, SessionOptions("cpu"), timer or StageTimer())
+
+
+def scene(background: object = GREEN, **lighting: object) -> Scene:
+    return Scene(Look.model_validate({"background": background, "lighting": {"environment": None, **lighting}}))
+
+
+def square(alpha: float, at: tuple[int, int] = (20, 10), light: float = 0.4) -> Moved:
+    """A grey square of 16 x 16 pixels, premultiplied."""
+    mask = np.full((16, 16), alpha, np.float32)
+    return Moved(np.full((16, 16, 3), light * alpha, np.float32), mask, at)
+
+
+def live_frame(time_s: float = 0.0) -> Frame:
+    return Frame(np.full((SIZE[1], SIZE[0], 3), 128, np.uint8), 0, 0.0, time_s)
+
+
+def test_an_opaque_person_hides_the_background_at_its_place() -> None:
+    picture = composer().still(square(1.0), scene(), 0.0)
+    expected = display_from_linear(np.full((1, 1, 3), 0.4, np.float32))[0, 0]
+    assert (picture[10:26, 20:36] == expected).all()
+    picture[10:26, 20:36] = [0, 255, 0]
+    assert (picture == [0, 255, 0]).all()
+
+
+def test_half_alpha_mixes_in_linear_light() -> None:
+    picture = composer().still(square(0.5), scene(), 0.0)
+    expected = display_from_linear(np.array([[[0.2, 0.7, 0.2]]], np.float32))[0, 0].astype(int)
+    assert np.abs(picture[18, 28].astype(int) - expected).max() <= 1
+
+
+@pytest.mark.parametrize("at", [(-8, -8), (56, 40), (200, 200), (-40, 3)])
+def test_a_person_may_leave_the_picture(at: tuple[int, int]) -> None:
+    picture = composer().still(square(1.0, at), scene(), 0.0)
+    columns, rows = (min(at[i] + 16, SIZE[i]) - max(at[i], 0) for i in range(2))
+    assert (picture != [0, 255, 0]).any(axis=2).sum() == max(columns, 0) * max(rows, 0)
+
+
+def test_a_new_background_is_faded_in() -> None:
+    made = composer()
+    made.still(square(0.0), scene(transition_s=1.0), 0.0)
+    blue = ColorBackground(color="#0000ff")
+    made.still(square(0.0), scene(blue, transition_s=1.0), 1.0)
+    half = made.still(square(0.0), scene(blue, transition_s=1.0), 1.5)
+    assert (np.abs(half.astype(int) - [0, 128, 128]) <= 2).all()
+    assert (made.still(square(0.0), scene(blue, transition_s=1.0), 2.1) == [0, 0, 255]).all()
+
+
+def test_the_live_room_passes_without_a_matte(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(composer_module, "PersonMatte", pytest.fail)
+    light = np.full((SIZE[1], SIZE[0], 3), 0.3, np.float32)
+    timer = StageTimer()
+    picture = composer(timer).live(light, live_frame(), scene(NoBackground()))
+    np.testing.assert_array_equal(picture, display_from_linear(light))
+    assert "matte" not in timer.latest_ms()
+
+
+class LeftHalf:
+    """A matte that takes the left half of the picture for the person."""
+
+    made = 0
+
+    def __init__(self, options: SessionOptions) -> None:
+        type(self).made += 1
+
+    def matte(self, frame: Frame) -> Mask:
+        alpha = np.zeros((frame.size[1], frame.size[0]), np.float32)
+        alpha[:, : frame.size[0] // 2] = 1
+        return alpha
+
+
+def test_a_live_person_stands_before_the_chosen_background(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(composer_module, "PersonMatte", LeftHalf)
+    LeftHalf.made = 0
+    light, timer = np.full((SIZE[1], SIZE[0], 3), 0.3, np.float32), StageTimer()
+    made = composer(timer)
+    for time_s in (0.0, 0.1):
+        picture = made.live(light, live_frame(time_s), scene())
+    assert LeftHalf.made == 1
+    assert timer.latest_ms()["matte"] > 0
+    np.testing.assert_array_equal(picture[:, :32], display_from_linear(light)[:, :32])
+    assert (picture[:, 32:] == [0, 255, 0]).all()
+
+
+def test_background_gain_dims_the_room_and_not_the_person(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(composer_module, "PersonMatte", LeftHalf)
+    light = np.full((SIZE[1], SIZE[0], 3), 0.3, np.float32)
+    dimmed = scene(NoBackground(), **Lighting(background_gain_ev=-1).model_dump(include={"background_gain_ev"}))
+    picture = composer().live(light, live_frame(), dimmed)
+    expected = display_from_linear(np.full((1, 1, 3), 0.15, np.float32))[0, 0].astype(int)
+    assert np.abs(picture[:, 40:].astype(int) - expected).max() <= 1
+    np.testing.assert_array_equal(picture[:, :24], display_from_linear(light)[:, :24])
