@@ -9,8 +9,10 @@ import pytest
 from hypothesis import settings
 
 # A test's time depends on what else the machine does: pytest-timeout holds the whole, not each example.
-settings.register_profile("relit", deadline=None)
-settings.load_profile("relit")
+# The same examples on every run, so that a red run is of the change it tests; HYPOTHESIS_PROFILE=explore seeks others.
+settings.register_profile("relit", deadline=None, derandomize=True)
+settings.register_profile("explore", deadline=None, max_examples=500)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "relit"))
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.cli.relit_command import Material, finish, start
+from tests.cli.relit_command import Material, call, finish, start
 
 END_S = 3.0
 START_S = 20.0
@@ -126,3 +126,16 @@ def test_missing_virtual_camera(material: Material, tmp_path: Path) -> None:
     options[4] = "/dev/video97"
     finish(*options, folder=tmp_path).complains("/dev/video97")
     assert not (tmp_path / "data").exists()
+
+
+def test_missing_subject_model_and_track(material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
+    for changed, words in (
+        (("--subject", "nobody"), ("nobody", "stored are")),
+        (("--tracker", "mesh"), ("relit models pull",)),
+        (("--tracker", "recorded:none.json"), ("none.json",)),
+        (("--environment", "stuido"), ("stuido", "studio")),
+        (("--source", "none.mp4"), ("none.mp4",)),
+        (("--sink", "picture.gif"), ("picture.gif", ".mp4")),
+    ):
+        call(*arguments(material, *changed)).complains(*words)

@@ -34,6 +34,9 @@ STILL_ANCHORS = np.array([(x, y) for y in (-7.5, -12.0) for x in (-16.0, -11.0, 
 UP_CM = 6.0
 ASIDE = 3.0
 """Radii by which the influence of closed lids and lips is centred off their slit: they hand over within r / 3."""
+FEATURE_REACH = 0.6
+"""Radius of landmarks inside the outline by the distance of their neighbours: with 1 the nose, nearer to the camera
+than all round it, falls 15 % short when the head turns. Of outline and anchors it is 1, or the hairline tears."""
 COARSE_GRID = (64, 64)
 FINE_GRID = (30, 38)
 """Rows and columns: a lid's gap is some seven rows."""
@@ -91,6 +94,8 @@ def control_points(face: SourceFace, anchors: NDArray[np.float64]) -> ControlPoi
     source = np.vstack([face.landmarks[chosen], anchors]).astype(np.float64)
     # A point reaches about as far as its neighbours are: fine on lips and lids, coarse on cheeks and hair.
     distance = np.asarray(KDTree(source).query(source, k=4)[0])[:, 1:].mean(axis=1)
+    reach = np.ones(len(source))
+    reach[: len(chosen)][~np.isin(chosen, scheme.oval)] = FEATURE_REACH
     span = scheme.eye_span(face.landmarks)
     place = {int(landmark): index for index, landmark in enumerate(chosen)}
     pairs: list[tuple[int, int]] = []
@@ -103,9 +108,8 @@ def control_points(face: SourceFace, anchors: NDArray[np.float64]) -> ControlPoi
         irises.append((np.array([place[i] for i in eye.iris], dtype=np.intp), rows))
     lips = zip(scheme.upper_lip_inner, scheme.lower_lip_inner, strict=True)
     pairs += [(place[u], place[v]) for u, v in lips if u != v]
-    return ControlPoints(
-        chosen, source, np.clip(distance, 0.03 * span, 0.5 * span), np.array(pairs), tuple(irises), span
-    )
+    radius = np.clip(reach * distance, 0.03 * span, 0.5 * span)
+    return ControlPoints(chosen, source, radius, np.array(pairs), tuple(irises), span)
 
 
 def fine_regions(face: SourceFace, target: NDArray[np.float64]) -> list[Region]:

@@ -1,0 +1,99 @@
+"""`relit replay`, `track`, `capture import`, `subject info` and the help: what they write and say when all is well."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from relit_camera.cli.main import GROUPS
+from relit_camera.space.picture_files import read_display
+from relit_camera.stream.video import VideoReader
+from tests.cli.relit_command import CLIP_FPS, CLIP_SIZE, Answer, Material, call, files, finish
+from tests.synthetic import sphere_samples, write_lights
+
+FRAMES = 40
+
+
+def done(answer: Answer) -> Answer:
+    assert answer.code == 0, answer.err
+    assert "Traceback" not in answer.err
+    return answer
+
+
+@pytest.mark.parametrize("mode", ["reenact", "ratio"])
+def test_replay_writes_video_report_and_sheet(mode: str, material: Material, tmp_path: Path) -> None:
+    answer = done(
+        call(
+            "replay", material.clip, "--subject", material.subject, "--environment", "window", "--mode", mode,
+            "--tracker", material.tracker, "--out", tmp_path / "out.mp4", "--report", tmp_path / "report.json",
+            "--contact-sheet", tmp_path / "sheet.png", "--rotate=40,0,0",
+        )
+    )  # fmt: skip
+    assert f"{FRAMES} frames, face found in {FRAMES}" in answer.out
+    assert files(tmp_path) == {"out.mp4", "report.json", "sheet.png"}
+    with VideoReader(tmp_path / "out.mp4") as video:
+        assert (video.info.width, video.info.height, video.info.fps) == (*CLIP_SIZE, CLIP_FPS)
+        assert len(list(video)) == FRAMES
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert [frame["index"] for frame in report["frames"]] == list(range(FRAMES))
+    assert {frame["state"] for frame in report["frames"]} == {"found"}
+    yaws = [frame["pose"]["yaw"] for frame in report["frames"]]
+    assert max(yaws) - min(yaws) > 20  # the made-up face turns by 20 degrees to either side
+    assert report["mode"] == mode
+    assert report["degraded"] == []
+    assert all(value > 0 for value in report["frames"][1]["stage_ms"].values())
+    assert read_display(tmp_path / "sheet.png").std() > 10
+
+
+def test_track_plays_back_as_it_was_recorded(material: Material, tmp_path: Path) -> None:
+    again = tmp_path / "again.json"
+    done(call("track", material.clip, "--tracker", material.tracker, "--out", again))
+    first, second = (json.loads(path.read_text()) for path in (material.track, again))
+    assert second["tracker"] == "recorded"
+    for a, b in zip(first["frames"], second["frames"], strict=True):
+        assert b["found"]
+        np.testing.assert_allclose(list(b["pose"].values()), list(a["pose"].values()), atol=1e-6)
+        np.testing.assert_allclose(b["landmarks"], a["landmarks"], atol=1e-4)
+        assert b["mouth"] == pytest.approx(a["mouth"])
+
+
+@pytest.mark.parametrize("method", ["planar", "barycentric", "nearest", "default"])
+def test_import_and_info(method: str, tmp_path: Path) -> None:
+    lights = write_lights(tmp_path / "capture", sphere_samples(40, 24))
+    subject = tmp_path / "sphere.relit"
+    answer = done(call("capture", "import", lights, "--out", subject, "--method", method))
+    assert "40 lights" in answer.out
+    told = json.loads(done(call("subject", "info", subject, "--json")).out)
+    assert (told["width"], told["height"], told["lights"], told["source"]) == (24, 24, 40, "lights.lp")
+    assert told["psnr_db"] > 45
+    assert "sphere" in done(call("subject", "info", subject)).out
+
+
+@pytest.mark.parametrize("command", GROUPS)
+def test_every_command_has_help(command: str) -> None:
+    answer = call(command, "--help")
+    assert answer.code == 0, answer.err
+    assert "Usage: " in answer.out
+
+
+def test_help_lists_every_command_and_a_process_says_the_same(tmp_path: Path) -> None:
+    answer = done(call("--help"))
+    assert all(name in answer.out for name in GROUPS)
+    assert done(finish("--help", folder=tmp_path)).out.split()[:3] == ["Usage:", "relit", "[OPTIONS]"]
+
+
+def test_global_options_come_before_the_command(material: Material, tmp_path: Path) -> None:
+    done(call("--log-level", "error", "subject", "info", material.subject))
+    config = tmp_path / "config.yaml"
+    config.write_text("tracker:\n  dead_band_deg: 0.5\n")
+    done(call("--config", config, "relight", material.subject, "--light=0,0", "--out", tmp_path / "x.png"))
+
+
+def test_usage_errors_exit_with_two(material: Material) -> None:
+    for wrong in (["dance"], ["relight"], ["replay", material.clip, "--subjct", "x"], ["run", "--mode", "dance"]):
+        answer = call(*wrong)
+        assert answer.code == 2, wrong
+        assert "Traceback" not in answer.err
