@@ -78,6 +78,11 @@ NOBODY = FaceMotion(
 )  # fmt: skip
 
 
+def moved_by(reenactor, relit, motion, frame):
+    """A frame as the pipeline does it: follow the face, then move the relit picture."""
+    return reenactor.follow(motion, frame)(relit)
+
+
 def live_frame(image=None, index=0) -> Frame:
     """A frame of the live size: grey noise unless given."""
     if image is None:

@@ -17,11 +17,15 @@ def with_edges(over_black):
     return dataclasses.replace(subject, metadata=subject.metadata.model_copy(update={"over_black": over_black}))
 
 
+def unmoved(cutout, relit):
+    """Picture and alpha of the still as it lies."""
+    return cutout.sampled(relit, cutout.positions(Warp(np.eye(2, 3), ()), (0, 0, relit.shape[1], relit.shape[0])))
+
+
 def test_a_cut_out_person_is_premultiplied():
     subject = with_edges(over_black=False)
     relit = np.full((*subject.matte.shape, 3), 0.5, np.float32)
-    box = (0, 0, *subject.size)
-    picture, alpha = Cutout(subject).warped(relit, Warp(np.eye(2, 3), ()), box)
+    picture, alpha = unmoved(Cutout(subject), relit)
     assert picture.dtype == alpha.dtype == np.float32
     np.testing.assert_allclose(alpha, feathered(subject.matte), atol=0.06)
     np.testing.assert_allclose(picture, 0.5 * np.repeat(alpha[..., None], 3, axis=2), atol=0.01)
@@ -31,8 +35,7 @@ def test_frames_taken_over_black_carry_the_matte_already():
     """Their soft edge is the person times the matte: it is not darkened a second time."""
     subject = with_edges(over_black=True)
     captured = np.repeat(0.5 * subject.matte[..., None], 3, axis=2)
-    box = (0, 0, *subject.size)
-    picture, alpha = Cutout(subject).warped(captured, Warp(np.eye(2, 3), ()), box)
+    picture, alpha = unmoved(Cutout(subject), captured)
     np.testing.assert_allclose(picture, 0.5 * np.repeat(alpha[..., None], 3, axis=2), atol=0.03)
 
 

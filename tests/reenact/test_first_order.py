@@ -14,7 +14,7 @@ from relit_camera.reenact.reenactor import open_reenactor
 from relit_camera.reenact.transfer import body_motion, transfer
 from relit_camera.reenact.warp import FlowPatch
 from relit_camera.space.rotation import rotation_from_angles
-from tests.reenact.people import NOBODY, SCHEME, close_up, live_frame, motion, person, stage_of
+from tests.reenact.people import NOBODY, SCHEME, close_up, live_frame, motion, moved_by, person, stage_of
 
 SIZE = (480, 360)
 FEATURES = {"nose": 1, "chin": 152, "brow": 105, "cheek": 50, "mouth corner": 61}
@@ -68,7 +68,7 @@ def test_a_face_at_rest_gives_back_the_still(subject, at_rest):
     colours = relit_picture(subject)
     over_black = colours * (subject.matte[..., None] if subject.metadata.over_black else 1)
     reenactor = open_reenactor("first-order", stage_of(subject, SIZE))
-    picture, alpha = in_output(reenactor.move(over_black, at_rest, live_frame()))
+    picture, alpha = in_output(moved_by(reenactor, over_black, at_rest, live_frame()))
     matte = feathered(subject.matte)
     expected = placed_still(colours * matte[..., None], subject)[0]
     assert 10 * np.log10(1 / np.mean((picture - expected) ** 2)) > 35
@@ -82,7 +82,7 @@ def test_features_go_where_the_turned_head_has_them(feature, angles):
     stage = stage_of(subject, SIZE)
     index = FEATURES[feature]
     moving = motion(rotation_from_angles(*angles))
-    moved = FirstOrderReenactor(stage).move(marked(subject, stage.face.landmarks[index]), moving, live_frame())
+    moved = moved_by(FirstOrderReenactor(stage), marked(subject, stage.face.landmarks[index]), moving, live_frame())
     body = body_motion(stage.face, moving)
     in_still = project(stage.face.head_points, body.turned, stage.face.size)[index]
     placed = moved_body(still_from_output(subject.size, SIZE), body.pivot, body.shift, body.scale, subject.size[1])
@@ -105,8 +105,8 @@ def test_brows_go_up_with_the_drivers():
     expression[brow, 1] = 0.6
     relit = marked(subject, stage.face.landmarks[brow].mean(axis=0))
     reenactor = FirstOrderReenactor(stage)
-    rest = centroid(reenactor.move(relit, motion(), live_frame()))
-    raised = centroid(reenactor.move(relit, motion(expression=expression), live_frame()))
+    rest = centroid(moved_by(reenactor, relit, motion(), live_frame()))
+    raised = centroid(moved_by(reenactor, relit, motion(expression=expression), live_frame()))
     points = reenactor._points
     expected = transfer(stage.face, points, motion(expression=expression)).landmarks[brow] - stage.face.landmarks[brow]
     np.testing.assert_allclose(raised - rest, expected.mean(axis=0) * SIZE[1] / subject.size[1], atol=1.5)
@@ -121,8 +121,8 @@ def test_an_opening_mouth_shows_a_dark_inside():
     expression[list(SCHEME.lower_lip_outer[1:-1]), 1] = -2.0
     relit = np.full((*subject.matte.shape, 3), 0.5, np.float32)
     reenactor = FirstOrderReenactor(stage)
-    shut, _ = in_output(reenactor.move(relit, motion(), live_frame()))
-    opened, alpha = in_output(reenactor.move(relit, motion(expression=expression), live_frame()))
+    shut, _ = in_output(moved_by(reenactor, relit, motion(), live_frame()))
+    opened, alpha = in_output(moved_by(reenactor, relit, motion(expression=expression), live_frame()))
     lips = stage.face.landmarks[[13, 14]].mean(axis=0) + [0, 6]
     column, row = (inverse_affine(still_from_output(subject.size, SIZE)) @ [*lips, 1]).astype(int)
     assert shut[row, column].min() > 0.4
@@ -135,7 +135,7 @@ def test_no_motion_lets_the_body_hover_and_all_stays_in_the_output():
     reenactor = FirstOrderReenactor(stage_of(subject, SIZE))
     relit = relit_picture(subject)
     for shift in ((0, 9, 0), (-12, 5, 4), (12, -6, -20), (0, 0, 12)):
-        moved = reenactor.move(relit, motion(rotation_from_angles(10, -8, 4), shift=shift), live_frame())
+        moved = moved_by(reenactor, relit, motion(rotation_from_angles(10, -8, 4), shift=shift), live_frame())
         height, width = moved.alpha.shape
         assert moved.picture.shape == (height, width, 3)
         assert moved.picture.dtype == moved.alpha.dtype == np.float32
@@ -154,7 +154,7 @@ def test_light_and_picture_are_proportional():
     relit = relit_picture(subject)
     reenactor = FirstOrderReenactor(stage_of(subject, SIZE))
     moving = motion(rotation_from_angles(10, 5, 0))
-    once, twice = (reenactor.move(relit * gain, moving, live_frame()).picture for gain in (1, 2))
+    once, twice = (moved_by(reenactor, relit * gain, moving, live_frame()).picture for gain in (1, 2))
     np.testing.assert_allclose(twice, 2 * once, atol=1e-5)
 
 

@@ -30,6 +30,7 @@ from tests.reenact.people import (
     face_of,
     live_frame,
     motion,
+    moved_by,
     person,
     stage_of,
 )
@@ -108,14 +109,16 @@ def texture(subject):
 
 def unmoved(subject, relit):
     """The still as it stands in the output when nothing moves, through a network that is never asked."""
-    return Cutout(subject).warped(relit, Warp(still_from_output(subject.size, SIZE), ()), (0, 0, *SIZE))
+    person_alone = Cutout(subject)
+    warp = Warp(still_from_output(subject.size, SIZE), ())
+    return person_alone.sampled(relit, person_alone.positions(warp, (0, 0, *SIZE)))
 
 
 def test_a_flow_that_moves_nothing_gives_the_still(path):
     subject = person()
     relit = texture(subject)
     reenactor = OnnxReenactor(stage_of(subject, SIZE), flow_network(path))
-    moved = reenactor.move(relit, motion(), live_frame())
+    moved = moved_by(reenactor, relit, motion(), live_frame())
     picture, alpha = unmoved(subject, relit)
     assert moved.at == (0, 0)
     np.testing.assert_allclose(moved.picture, picture, atol=2e-4)
@@ -129,8 +132,8 @@ def test_a_shift_of_the_flow_is_that_share_of_the_crop(path, shift):
     stage = stage_of(subject, SIZE)
     reenactor = OnnxReenactor(stage, flow_network(path, shift, inputs=INPUTS))
     relit = texture(subject)
-    reenactor.move(relit, motion(), live_frame(np.zeros_like(RED)))  # neutral: the driving face is black
-    view = reenactor.move(relit, motion(), live_frame(RED, 1))
+    moved_by(reenactor, relit, motion(), live_frame(np.zeros_like(RED)))  # neutral: the driving face is black
+    view = moved_by(reenactor, relit, motion(), live_frame(RED, 1))
     crop = head_crop(stage.face.pose, stage.face.size)
     pixels = np.array(shift) * crop.width / 2 * (1 - 1 / SIDE) * SIZE[0] / subject.size[0]
     picture, _ = unmoved(subject, relit)
@@ -146,28 +149,28 @@ def test_a_flow_is_eased_by_presence(path):
     reenactor = OnnxReenactor(stage, flow_network(path, (0.2, 0.0), inputs=INPUTS))
     half = OnnxReenactor(stage, flow_network(path, (0.1, 0.0), inputs=INPUTS))
     for one in (reenactor, half):
-        one.move(relit, motion(), live_frame(np.zeros_like(RED)))
-    eased = reenactor.move(relit, motion(presence=0.5), live_frame(RED, 1)).picture
-    np.testing.assert_allclose(eased, half.move(relit, motion(), live_frame(RED, 1)).picture, atol=1e-4)
+        moved_by(one, relit, motion(), live_frame(np.zeros_like(RED)))
+    eased = moved_by(reenactor, relit, motion(presence=0.5), live_frame(RED, 1)).picture
+    np.testing.assert_allclose(eased, moved_by(half, relit, motion(), live_frame(RED, 1)).picture, atol=1e-4)
 
 
 def test_a_lost_face_is_driven_by_what_was_seen_last_and_then_rests(path):
     stage = stage_of(person(), SIZE)
     relit = texture(stage.subject)
     reenactor = OnnxReenactor(stage, flow_network(path, (0.2, 0.0), inputs=INPUTS))
-    reenactor.move(relit, motion(), live_frame(np.zeros_like(RED)))
-    seen = reenactor.move(relit, motion(), live_frame(RED, 1)).picture
+    moved_by(reenactor, relit, motion(), live_frame(np.zeros_like(RED)))
+    seen = moved_by(reenactor, relit, motion(), live_frame(RED, 1)).picture
     noise = live_frame(index=2)
-    lost = reenactor.move(relit, motion(status=FaceStatus.LOST), noise).picture
+    lost = moved_by(reenactor, relit, motion(status=FaceStatus.LOST), noise).picture
     np.testing.assert_array_equal(lost, seen)
-    gone = reenactor.move(relit, motion(status=FaceStatus.LOST, presence=0.0), noise).picture
+    gone = moved_by(reenactor, relit, motion(status=FaceStatus.LOST, presence=0.0), noise).picture
     np.testing.assert_allclose(gone, unmoved(stage.subject, relit)[0], atol=1e-4)
 
 
 def test_before_the_first_face_the_still_stands_unmoved(path):
     stage = stage_of(person(), SIZE)
     relit = texture(stage.subject)
-    picture = OnnxReenactor(stage, mix_network(path, 1.0)).move(relit, NOBODY, live_frame()).picture
+    picture = moved_by(OnnxReenactor(stage, mix_network(path, 1.0)), relit, NOBODY, live_frame()).picture
     np.testing.assert_allclose(picture, unmoved(stage.subject, relit)[0], atol=1e-4)
 
 
@@ -175,7 +178,7 @@ def test_a_picture_is_laid_over_the_still_in_its_place(path):
     """Half source, half red: sRGB code values are mixed, inside the crop, within the still's matte."""
     stage = stage_of(person(), SIZE)
     relit = texture(stage.subject)
-    moved = OnnxReenactor(stage, mix_network(path)).move(relit, motion(), live_frame(RED))
+    moved = moved_by(OnnxReenactor(stage, mix_network(path)), relit, motion(), live_frame(RED))
     picture, alpha = unmoved(stage.subject, relit)
     middle = np.s_[110:150, 80:112]
     expected = srgb_decode((srgb_encode(picture[middle]) + [1, 0, 0]) / 2)
@@ -188,8 +191,8 @@ def test_a_picture_is_laid_over_the_still_in_its_place(path):
 
 def test_an_alpha_of_its_own_cuts_the_picture_out(path):
     stage = stage_of(person(), SIZE)
-    moved = OnnxReenactor(stage, mix_network(path, 1.0, alpha=0.25)).move(
-        texture(stage.subject), motion(), live_frame(RED)
+    moved = moved_by(
+        OnnxReenactor(stage, mix_network(path, 1.0, alpha=0.25)), texture(stage.subject), motion(), live_frame(RED)
     )
     middle = np.s_[110:150, 80:112]
     np.testing.assert_allclose(moved.alpha[middle], 0.25, atol=1e-3)
@@ -200,9 +203,9 @@ def test_the_body_follows_the_neck_and_never_hovers(path):
     stage = stage_of(person(), SIZE)
     reenactor = OnnxReenactor(stage, flow_network(path))
     relit = np.ones((*stage.subject.matte.shape, 3), np.float32)
-    rest = reenactor.move(relit, motion(), live_frame()).alpha
-    right = reenactor.move(relit, motion(shift=(4, 0, 0)), live_frame())
-    up = reenactor.move(relit, motion(shift=(0, 6, 0)), live_frame())
+    rest = moved_by(reenactor, relit, motion(), live_frame()).alpha
+    right = moved_by(reenactor, relit, motion(shift=(4, 0, 0)), live_frame())
+    up = moved_by(reenactor, relit, motion(shift=(0, 6, 0)), live_frame())
 
     def column(moved, at=(0, 0)):
         return at[0] + (moved[-20:].sum(axis=0) * np.arange(moved.shape[1])).sum() / moved[-20:].sum()
@@ -216,8 +219,8 @@ def test_a_face_cut_off_by_its_border_stays_there(path):
     stage = stage_of(close_up(), SIZE)
     relit = texture(stage.subject)
     reenactor = OnnxReenactor(stage, flow_network(path, (0.1, 0.0), 64, INPUTS))
-    reenactor.move(relit, motion(), live_frame(np.zeros_like(RED)))
-    moved = reenactor.move(relit, motion(shift=(5, 0, 0)), live_frame(RED, 1))
+    moved_by(reenactor, relit, motion(), live_frame(np.zeros_like(RED)))
+    moved = moved_by(reenactor, relit, motion(shift=(5, 0, 0)), live_frame(RED, 1))
     rest, alpha = unmoved(stage.subject, relit)
     assert moved.at == (0, 0)
     assert moved.picture.shape == rest.shape

@@ -11,7 +11,7 @@ from relit_camera.reenact.reenactor import open_reenactor
 from relit_camera.reenact.room_probe import RoomLight
 from relit_camera.space.colour import linear_from_uint8
 from relit_camera.space.quality import psnr
-from tests.reenact.people import NOBODY, close_up, face_of, stage_of
+from tests.reenact.people import NOBODY, close_up, face_of, moved_by, stage_of
 from tests.reenact.rooms import (
     EVENING,
     WINDOW,
@@ -51,7 +51,7 @@ def inner(picture):
 
 def test_the_rooms_own_light_gives_back_the_live_frame():
     image = live_picture(WINDOW)
-    moved = reenactor(WINDOW).move(still_under(WINDOW), before_the_camera(), live_frame(image, 0))
+    moved = moved_by(reenactor(WINDOW), still_under(WINDOW), before_the_camera(), live_frame(image, 0))
     live = linear_from_uint8(image)
     assert moved.at == (0, 0)
     assert moved.picture.shape == live.shape
@@ -62,7 +62,7 @@ def test_the_rooms_own_light_gives_back_the_live_frame():
 def test_another_light_gives_the_person_in_that_light():
     """Truth: the same person, the same pose, photographed in the other room."""
     image = live_picture(WINDOW)
-    moved = reenactor(WINDOW).move(still_under(EVENING), before_the_camera(), live_frame(image, 0))
+    moved = moved_by(reenactor(WINDOW), still_under(EVENING), before_the_camera(), live_frame(image, 0))
     truth = linear_from_uint8(live_picture(EVENING))
     unchanged = psnr(inner(linear_from_uint8(image)), inner(truth))
     assert psnr(inner(moved.picture), inner(truth)) > max(24, unchanged + 8)
@@ -71,7 +71,7 @@ def test_another_light_gives_the_person_in_that_light():
 def test_a_measured_room_does_nearly_as_well():
     image, ours = live_picture(WINDOW), reenactor()
     for step in range(12):
-        moved = ours.move(still_under(EVENING), before_the_camera(), live_frame(image, step / 5))
+        moved = moved_by(ours, still_under(EVENING), before_the_camera(), live_frame(image, step / 5))
     assert psnr(inner(moved.picture), inner(linear_from_uint8(live_picture(EVENING)))) > 20
 
 
@@ -81,7 +81,7 @@ def test_presence_eases_to_the_live_frame():
 
     def picture(presence):
         motion = before_the_camera(presence=presence)
-        return reenactor(WINDOW).move(still_under(EVENING), motion, live_frame(image, 0)).picture
+        return moved_by(reenactor(WINDOW), still_under(EVENING), motion, live_frame(image, 0)).picture
 
     np.testing.assert_allclose(picture(0.0), live, atol=1e-4)
     np.testing.assert_allclose(picture(0.5), (picture(1.0) + live) / 2, atol=0.01)
@@ -89,14 +89,14 @@ def test_presence_eases_to_the_live_frame():
 
 def test_without_a_face_the_live_frame_is_shown():
     image = live_picture(WINDOW)
-    moved = reenactor().move(still_under(EVENING), NOBODY, live_frame(image, 0))
+    moved = moved_by(reenactor(), still_under(EVENING), NOBODY, live_frame(image, 0))
     np.testing.assert_array_equal(moved.picture, linear_from_uint8(image))
     np.testing.assert_array_equal(moved.alpha, 1)
 
 
 def test_odd_sizes_keep_their_size():
     image = np.ascontiguousarray(live_picture(WINDOW)[:-1, :-3])
-    moved = reenactor(WINDOW).move(still_under(WINDOW), before_the_camera(), live_frame(image, 0))
+    moved = moved_by(reenactor(WINDOW), still_under(WINDOW), before_the_camera(), live_frame(image, 0))
     assert moved.picture.shape == image.shape
 
 
@@ -113,18 +113,18 @@ def test_a_stranger_is_refused_after_a_while():
     image = np.ascontiguousarray(noise.repeat(16, axis=0).repeat(16, axis=1))
     assert image.shape == live_picture(WINDOW).shape
     ours, stranger = reenactor(), before_the_camera(points=stranger_points())
-    ours.move(still_under(WINDOW), stranger, live_frame(image, 0.0))
+    moved_by(ours, still_under(WINDOW), stranger, live_frame(image, 0.0))
     for time_s in (0.5, 1.0):
-        ours.move(still_under(WINDOW), stranger, live_frame(image, time_s))
+        moved_by(ours, still_under(WINDOW), stranger, live_frame(image, time_s))
     with pytest.raises(SubjectError, match="the live face is not the subject's") as error:
-        ours.move(still_under(WINDOW), stranger, live_frame(image, 2.0))
+        moved_by(ours, still_under(WINDOW), stranger, live_frame(image, 2.0))
     assert "mode reenact" in error.value.cure
 
 
 def test_the_person_is_not_refused():
     image, ours = live_picture(WINDOW), reenactor()
     for step in range(16):
-        ours.move(still_under(EVENING), before_the_camera(), live_frame(image, step / 5))
+        moved_by(ours, still_under(EVENING), before_the_camera(), live_frame(image, step / 5))
 
 
 def test_shape_difference_is_of_shape_only():
@@ -132,6 +132,8 @@ def test_shape_difference_is_of_shape_only():
     points = face.head_points
     assert shape_difference(points, face) == pytest.approx(0, abs=1e-9)
     assert shape_difference(points * 1.3 + [5, -2, 1], face) == pytest.approx(0, abs=1e-6)
+    too_near = points * np.stack([1 + 0.02 * points[:, 2], 1 + 0.02 * points[:, 2], np.ones(len(points))], axis=1)
+    assert shape_difference(too_near, face) < 0.05  # as a wrong focal length has it
     speaking = points.copy()
     speaking[list(face.scheme.lips)] += [0, -1.5, 0]
     assert shape_difference(speaking, face) == pytest.approx(0, abs=1e-9)

@@ -7,6 +7,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import httpx
 import numpy as np
 import pytest
 
@@ -17,6 +18,7 @@ from relit_camera.models.registry import FOLDER_VARIABLE
 from relit_camera.space.images import Frame
 from relit_camera.stream import daemon as daemon_module
 from relit_camera.stream.placeholder import placeholder
+from relit_camera.stream.sources.base import SourceState
 from tests.stream.small_camera import (
     FPS,
     SIZE,
@@ -71,7 +73,7 @@ def test_status_tells_what_runs(tmp_path: Path) -> None:
         assert status["source"] == "still memory"
         assert status["tracker"] == {"name": "nodding", "state": "found"}
         assert status["degraded"] == []
-        assert {"track", "light", "relight", "move", "compose"} <= status["stage_ms"].keys()  # type: ignore[attr-defined]
+        assert {"track", "light", "relight", "follow", "move", "compose"} <= status["stage_ms"].keys()  # type: ignore[attr-defined]
         found = camera.daemon.status()
         assert 0 < found.latency_ms.p50 <= found.latency_ms.p95
         assert found.frames.published >= found.frames.repeated >= 0
@@ -172,6 +174,34 @@ def test_a_source_that_fails_is_told_with_its_cure(tmp_path: Path, monkeypatch: 
         wait_until(lambda: camera.sink.count > count + 3)
         source.broken = False
         wait_until(lambda: camera.troubles() == "")
+
+
+class SilentSource(BrokenSource):
+    """A camera that another program holds: it never gives a frame and says why."""
+
+    state = SourceState.RECONNECTING
+    reason = "HD Webcam cannot be opened: another program may be using it"
+
+    def read(self, timeout_s: float) -> Frame | None:
+        time.sleep(0.01)
+        return None
+
+
+def test_a_camera_that_never_came_is_told_and_waited_for(tmp_path: Path) -> None:
+    with running_camera(tmp_path, source=SilentSource()) as camera:  # type: ignore[arg-type]
+        wait_until(lambda: "another program may be using it" in camera.troubles())
+        wait_until(lambda: camera.status()["state"] == "waiting")
+        assert "relit devices" in camera.troubles()
+        wait_until(lambda: difference(camera.sink.new[-1], placeholder(SIZE, "waiting for the camera")) == 0)
+
+
+def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
+    with running_camera(tmp_path) as camera:
+        camera.sink.wait_for(3)
+        camera.put("freeze", frozen=True)
+        wait_until(lambda: camera.status()["state"] == "frozen")
+        time.sleep(2 / FPS)
+        assert httpx.get(camera.http.base_url.join("/readyz")).json() == {"status": "ready"}
 
 
 class LongFaceTracker(SteadyTracker):

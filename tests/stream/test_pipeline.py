@@ -129,7 +129,7 @@ def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None
 def test_stages_are_timed() -> None:
     made = pipeline()
     made.process(frame(), scene())
-    assert set(made.timer.latest_ms()) == {"track", "light", "relight", "move", "compose"}
+    assert set(made.timer.latest_ms()) == {"track", "light", "relight", "follow", "move", "compose"}
     assert all(value > 0 for value in made.timer.latest_ms().values())
 
 

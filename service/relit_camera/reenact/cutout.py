@@ -33,11 +33,14 @@ class Cutout:
         self._share = share[..., None]
         self._large_alpha = _enlarged(self.alpha)
 
-    def warped(self, relit: LinearImage, warp: Warp, box: Box) -> tuple[LinearImage, Mask]:
-        """The relit still (height, width, 3) under `warp` at the output pixels of `box`: premultiplied, and alpha."""
+    def positions(self, warp: Warp, box: Box) -> NDArray[np.float32]:
+        """Where the output pixels of `box` look under `warp`: (height, width, 2), for `sampled`."""
+        return warp.map(box, ENLARGE)
+
+    def sampled(self, relit: LinearImage, positions: NDArray[np.float32]) -> tuple[LinearImage, Mask]:
+        """The relit still (height, width, 3) at `positions`: premultiplied, and alpha."""
         # Colours and alpha go apart through the same positions: taking four channels apart afterwards costs more.
         # The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing.
-        positions = warp.map(box, ENLARGE)
         picture = sampled(_enlarged(relit * self._share), positions, cv2.BORDER_REPLICATE)
         alpha = sampled(self._large_alpha, positions, cv2.BORDER_REPLICATE)
         return picture, np.minimum(alpha, np.float32(1))

@@ -21,7 +21,7 @@ from relit_camera.reenact.cutout import Cutout
 from relit_camera.reenact.dense_motion import DenseMotion, region_around
 from relit_camera.reenact.mouth import Mouth
 from relit_camera.reenact.placement import inverse_affine, moved_body, still_from_output, visible_box
-from relit_camera.reenact.reenactor import Moved, Stage
+from relit_camera.reenact.reenactor import Move, Moved, Stage
 from relit_camera.reenact.source_face import SourceFace
 from relit_camera.reenact.transfer import transfer, transfer_in_frame
 from relit_camera.reenact.warp import FlowPatch, Warp
@@ -44,8 +44,8 @@ class FirstOrderReenactor:
         self._mouth = Mouth(stage.face, stage.subject.neutral)
         self._placed = still_from_output(stage.subject.size, stage.size)
 
-    def move(self, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved:
-        """See `Reenactor.move`."""
+    def follow(self, motion: FaceMotion, frame: Frame) -> Move:
+        """See `Reenactor.follow`."""
         face = self._face
         target = (transfer if self._person.whole else transfer_in_frame)(face, self._points, motion)
         patches = moved_flow(self._motion, face, self._points, target.points, target.landmarks)
@@ -53,12 +53,16 @@ class FirstOrderReenactor:
             patches = tuple(held_at_border(patch, face.size) for patch in patches)
         placed = moved_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
         box = visible_box(placed, face.size, self._size)
-
-        picture, alpha = self._person.warped(relit, Warp(placed, patches), box)
+        positions = self._person.positions(Warp(placed, patches), box)
         to_box = inverse_affine(placed)
         to_box[:, 2] -= box[:2]
-        self._mouth.draw(picture, alpha, relit, target.landmarks, target.pose, to_box)
-        return Moved(picture, alpha, box[:2])
+
+        def move(relit: LinearImage) -> Moved:
+            picture, alpha = self._person.sampled(relit, positions)
+            self._mouth.draw(picture, alpha, relit, target.landmarks, target.pose, to_box)
+            return Moved(picture, alpha, box[:2])
+
+        return move
 
 
 def moved_flow(

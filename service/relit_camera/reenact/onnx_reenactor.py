@@ -18,7 +18,7 @@ from relit_camera.reenact.cutout import Cutout
 from relit_camera.reenact.first_order import held_at_border
 from relit_camera.reenact.head_crop import DrivingHead, cut_square, head_crop
 from relit_camera.reenact.placement import inverse_affine, moved_body, still_from_output, visible_box
-from relit_camera.reenact.reenactor import Moved, Stage
+from relit_camera.reenact.reenactor import Move, Moved, Stage
 from relit_camera.reenact.transfer import body_motion
 from relit_camera.reenact.warp import Box, FlowPatch, Warp
 from relit_camera.space.colour import srgb_decode, uint8_from_linear
@@ -46,34 +46,36 @@ class OnnxReenactor:
         self._person = Cutout(stage.subject)
         self._placed = still_from_output(stage.subject.size, stage.size)
 
-    def move(self, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved:
-        """See `Reenactor.move`.
+    def follow(self, motion: FaceMotion, frame: Frame) -> Move:
+        """See `Reenactor.follow`.
 
         Raises:
-            ModelError: the network fails on this frame, or breaks the contract.
+            ModelError: the network fails on this frame, or breaks the contract; so does the move.
         """
         placed = self._placed
         if self._person.whole:
             body = body_motion(self._face, motion)
             placed = moved_body(placed, body.pivot, body.shift, body.scale, self._face.size[1])
         box = visible_box(placed, self._face.size, self._size)
-        answer = self._ask(relit, motion, frame)
-        patches = () if answer is None or answer.flow is None else (self._patch(answer.flow, motion.presence),)
-        picture, alpha = self._person.warped(relit, Warp(placed, patches), box)
-        if answer is not None and answer.picture is not None:
-            affine = box_from_picture(self._crop, answer.picture.shape[:2], placed, box)
-            _lay_over(picture, alpha, answer, motion.presence, affine)
-        return Moved(picture, alpha, box[:2])
-
-    def _ask(self, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Answer | None:
         self._driver.update(motion, frame)
         driving, initial = self._driver.driving, self._driver.initial
-        if driving is None or initial is None or motion.presence == 0:
-            return None
-        source = self._source
-        if not self._network.gives_flow:
-            source = cut_square(uint8_from_linear(relit), self._crop, self._network.side)
-        return self._network.answer(source, driving, initial)
+        seen = None if driving is None or initial is None or motion.presence == 0 else (driving, initial)
+        # The flow is that of the still as it was captured, and known at once; a picture is made of the relit one.
+        flow = self._network.answer(self._source, *seen).flow if seen and self._network.gives_flow else None
+        patches = () if flow is None else (self._patch(flow, motion.presence),)
+        positions = self._person.positions(Warp(placed, patches), box)
+
+        def move(relit: LinearImage) -> Moved:
+            picture, alpha = self._person.sampled(relit, positions)
+            if seen and not self._network.gives_flow:
+                source = cut_square(uint8_from_linear(relit), self._crop, self._network.side)
+                answer = self._network.answer(source, *seen)
+                assert answer.picture is not None
+                affine = box_from_picture(self._crop, answer.picture.shape[:2], placed, box)
+                _lay_over(picture, alpha, answer, motion.presence, affine)
+            return Moved(picture, alpha, box[:2])
+
+        return move
 
     def _patch(self, flow: NDArray[np.float32], share: float) -> FlowPatch:
         """A `share` of the network's flow, in still pixels."""

@@ -16,7 +16,7 @@ from relit_camera.reenact.control_points import control_points, head_anchors
 from relit_camera.reenact.cutout import feathered
 from relit_camera.reenact.dense_motion import DenseMotion
 from relit_camera.reenact.first_order import moved_flow
-from relit_camera.reenact.reenactor import Moved, Stage
+from relit_camera.reenact.reenactor import Move, Moved, Stage
 from relit_camera.reenact.room_probe import RoomProbe
 from relit_camera.reenact.source_face import SourceFace
 from relit_camera.reenact.warp import Warp, sampled
@@ -35,8 +35,8 @@ EXTEND = 8
 SHAPE_CM, RESIDUAL = 0.14, 0.12
 """What a stranger reaches: a face of another shape (RMS of landmarks), that no light explains (relative deviation).
 
-Measured: the same person .07 to .18 cm and .05 to .09, others .15 to .76 cm and .11 to .20. Either alone can mislead
-(a wrong focal length, a cap), so their product decides.
+Measured: the same person .04 cm and .08 to .10 (a generated one .18 and .08), others .14 to .29 cm and .10 to .20.
+Either alone can mislead (a beard, a cap), so their product decides.
 """
 TRIAL_S = 1.5
 """The face is judged after this long."""
@@ -54,31 +54,39 @@ class RatioReenactor:
         self._weight = trusted(feathered(stage.subject.matte))
         self._since: float | None = None
 
-    def move(self, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved:
-        """See `Reenactor.move`.
+    def follow(self, motion: FaceMotion, frame: Frame) -> Move:
+        """See `Reenactor.follow`.
 
         Raises:
             SubjectError: the live face is not the subject's: no light explains it.
         """
         live = linear_from_uint8(frame.image)
         width, height = frame.size
+        everywhere = np.ones((height, width), np.float32)
         if motion.pose is None:
-            return Moved(live, np.ones((height, width), np.float32), (0, 0))
+            return lambda relit: Moved(live, everywhere, (0, 0))
         room = self._probe.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
         self._check_person(room.residual, motion, frame.time_s)
         under_room = self._relighter.relight(rotate(room.light_map, motion.rotation)) * room.gain
-        inside = self._weight > 0.5
-        floor = FLOOR * under_room[inside].mean(axis=0)
-        ratio = np.clip((relit + floor) / (np.maximum(under_room, 0) + floor), *RATIO_RANGE)
-
-        # Where nobody is tracked with confidence the picture eases back to the live one.
-        ratio = 1 + (ratio - 1) * np.float32(motion.presence)
         small = (0, 0, -(-width // COARSE), -(-height // COARSE))
-        weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
-        ratio = extended(sampled(weighted, self._warp(motion, frame.size).map(small), cv2.BORDER_REPLICATE))
-        large = cv2.resize(ratio, (small[2] * COARSE, small[3] * COARSE), interpolation=cv2.INTER_LINEAR)
-        relit_live = cv2.multiply(live, np.ascontiguousarray(large[:height, :width]))
-        return Moved(np.asarray(relit_live, dtype=np.float32), np.ones((height, width), np.float32), (0, 0))
+        positions = self._warp(motion, frame.size).map(small)
+
+        def move(relit: LinearImage) -> Moved:
+            # Where nobody is tracked with confidence the picture eases back to the live one.
+            ratio = 1 + (self._ratio(relit, under_room) - 1) * np.float32(motion.presence)
+            weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
+            everywhere_known = extended(sampled(weighted, positions, cv2.BORDER_REPLICATE))
+            large = cv2.resize(everywhere_known, (small[2] * COARSE, small[3] * COARSE), interpolation=cv2.INTER_LINEAR)
+            relit_live = cv2.multiply(live, np.ascontiguousarray(large[:height, :width]))
+            return Moved(np.asarray(relit_live, dtype=np.float32), everywhere, (0, 0))
+
+        return move
+
+    def _ratio(self, relit: LinearImage, under_room: LinearImage) -> LinearImage:
+        """How much brighter the still is relit than under the room's light."""
+        floor = FLOOR * under_room[self._weight > 0.5].mean(axis=0)
+        ratio = (relit + floor) / (np.maximum(under_room, 0) + floor)
+        return np.asarray(np.clip(ratio, *RATIO_RANGE), dtype=np.float32)
 
     def _check_person(self, residual: float, motion: FaceMotion, time_s: float) -> None:
         self._since = time_s if self._since is None else min(self._since, time_s)
@@ -109,15 +117,19 @@ class RatioReenactor:
 
 
 def shape_difference(points: NDArray[np.float64], face: SourceFace) -> float:
-    """RMS distance in cm, seen from the front, of head-space points (count, 3) from the still's, size and place aside.
+    """RMS distance in cm, seen from the front, of head-space points (count, 3) from the still's.
 
-    Eyes and lips are left out: they move.
+    Size, place and what a wrong focal length does (near parts too large) are aside. Eyes and lips are left out: they
+    move.
     """
     moving = {*face.scheme.eyes, *face.scheme.lips}
     firm = [index for index in range(face.scheme.count) if index not in moving]
-    live, still = (p[firm, :2] - p[firm, :2].mean(axis=0) for p in (points, face.head_points))
-    scale = (live * still).sum() / max((live * live).sum(), 1e-12)
-    return float(np.sqrt(((scale * live - still) ** 2).sum(axis=1).mean()))
+    live, still = (p[firm] - p[firm].mean(axis=0) for p in (points, face.head_points))
+    seen = live[:, :2]
+    sizes = np.stack([seen.ravel(), (seen * live[:, 2:]).ravel()], axis=1)
+    goal = still[:, :2].ravel()
+    share = np.linalg.lstsq(sizes, goal)[0]
+    return float(np.sqrt(((sizes @ share - goal) ** 2).sum() / len(firm)))
 
 
 def trusted(matte: Mask) -> Mask:

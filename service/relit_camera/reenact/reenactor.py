@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Protocol
@@ -51,13 +52,18 @@ class Moved:
     at: tuple[int, int]
 
 
+Move = Callable[[LinearImage], Moved]
+"""Moves a relit picture (subject's size, linear, display exposure). Called at most once."""
+
+
 class Reenactor(Protocol):
     """Moves a relit still as the live face moves. Keeps state between frames; not thread-safe."""
 
-    def move(self, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved:
-        """The still's relit picture (subject's size, linear, display exposure), moved as `motion` says.
+    def follow(self, motion: FaceMotion, frame: Frame) -> Move:
+        """Find out how the still must move as `motion` says.
 
-        `frame` is the live picture, for reenactors that build on it.
+        All that can be done without the relit picture belongs here: it runs while that is being made. `frame` is the
+        live picture, for reenactors that build on it.
         """
         ...
 

@@ -19,7 +19,7 @@ GROUP = "relit_camera.relighters"
 
 
 class Relighter(Protocol):
-    """Relights one subject. Holds its data in the form that its arithmetic wants; not thread-safe."""
+    """Relights one subject. Holds its data in the form that its arithmetic wants. Thread-safe."""
 
     def relight(self, light_map: LightMap) -> LinearImage:
         """The subject under a light map (32, 64, 3): float32 linear (height, width, 3), unscaled and unclipped."""

@@ -1,8 +1,9 @@
-"""One frame from left to right: track → light → relight → move → compose."""
+"""One frame from left to right: track → light → relight, and beside it follow → move → compose."""
 
 from __future__ import annotations
 
 import logging
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import cv2
@@ -15,7 +16,7 @@ from relit_camera.face.follow import FaceFollower, FaceMotion, FollowSettings
 from relit_camera.face.state import Tracker
 from relit_camera.light.maps import LightMap, rotate
 from relit_camera.models.session import SessionOptions
-from relit_camera.reenact.reenactor import Moved, Reenactor, Stage, open_reenactor
+from relit_camera.reenact.reenactor import Move, Moved, Reenactor, Stage, open_reenactor
 from relit_camera.reenact.source_face import source_face
 from relit_camera.relight.basis import BasisRelighter
 from relit_camera.relight.relighter import Relighter
@@ -58,7 +59,10 @@ class _Cast:
 
 
 class Pipeline:
-    """Makes relit pictures of live frames. One thread; what may change reaches it as a `Scene` a frame.
+    """Makes relit pictures of live frames. One thread calls; what may change reaches it as a `Scene` a frame.
+
+    How the still must move is found out while it is relit: each takes milliseconds on one core, and neither needs the
+    other.
 
     Attributes:
         timer: how long each stage took.
@@ -88,6 +92,7 @@ class Pipeline:
         )
         self._light = EasedLight()
         self._composer = Composer(size, options, self.timer)
+        self._beside = ThreadPoolExecutor(1, "follow")
         self._cast: _Cast | None = None
         self._lit: tuple[_Cast, LightMap, LinearImage] | None = None
         self._stranger: Subject | None = None
@@ -118,6 +123,7 @@ class Pipeline:
         cast = self._prepare(subject, mode)
         with self.timer.stage("track"):
             motion = self._follower.follow(self._tracker.track(frame), frame.size, frame.time_s)
+        following = self._beside.submit(self._follow, cast, motion, frame)
         with self.timer.stage("light"):
             room = self._light.update(scene, frame.time_s)
             light = rotate(room, motion.rotation)
@@ -126,7 +132,8 @@ class Pipeline:
             if mode is Mode.REENACT and scene.look.lighting.blend < 1:
                 relit = blended(subject, relit, scene.look.lighting.blend)
         with self.timer.stage("move"):
-            moved = self._move(cast, relit, motion, frame)
+            move = following.result()
+            moved = move(relit) if move else None
         if moved is None:
             return self.process(frame, scene)
         with self.timer.stage("compose"):
@@ -164,10 +171,11 @@ class Pipeline:
             self._lit = (cast, light, cast.relighter.relight(light))
         return self._lit[2]
 
-    def _move(self, cast: _Cast, relit: LinearImage, motion: FaceMotion, frame: Frame) -> Moved | None:
-        """The moved picture, or None if the ratio cannot go on with this face: then reenact takes over."""
+    def _follow(self, cast: _Cast, motion: FaceMotion, frame: Frame) -> Move | None:
+        """How to move the relit still, or None if the ratio cannot go on with this face: then reenact takes over."""
         try:
-            return cast.reenactor.move(relit, motion, frame)
+            with self.timer.stage("follow"):
+                return cast.reenactor.follow(motion, frame)
         except SubjectError as error:
             if cast.mode is not Mode.RATIO:
                 raise
