@@ -108,8 +108,18 @@ def test_a_panorama_is_used_exactly(name: str) -> None:
     shown = builtin_environment(name).panorama.radiance[:, ::-1]
     picture = linear_from_uint8(uint8_from_linear(shown))
     panorama = environment_from_picture(picture)
-    np.testing.assert_array_equal(panorama.radiance, picture[:, ::-1])
     assert "exact" in panorama.notes[0]
+    height, width = picture.shape[:2]
+    for row, column in ((100, 30), (256, 512), (300, 700), (400, 1000)):
+        bearing, elevation = (column + 0.5) / width * 360 - 180, 90 - (row + 0.5) / height * 180
+        np.testing.assert_array_equal(seen(panorama.radiance, bearing, elevation), picture[row, column])
+
+
+@pytest.mark.parametrize("where", [0.15, 0.35])
+def test_a_window_at_the_left_of_a_panorama_lights_the_left_rim(where: float) -> None:
+    picture = with_window(where, shape=(256, 512))
+    assert "exact" in environment_from_picture(picture).notes[0]
+    assert reading(picture, -120) > 1.3 * reading(picture, 120)
 
 
 def test_an_ordinary_picture_of_two_to_one_is_no_panorama() -> None:

@@ -38,12 +38,13 @@ def environment_from_picture(picture: LinearImage, height_deg: float = HEIGHT_DE
     """The panorama that lights a person in front of `picture`, linear RGB (H, W, 3) as the viewer sees it.
 
     The picture appears along −Z, `height_deg` high, its left at the viewer's left. A 2:1 panorama (its sides meet, its
-    top and bottom rows are each one colour) is used exactly, in `picture` axes.
+    top and bottom rows are each one colour) is used exactly, turned so that its middle, too, lies along −Z.
     """
     if _is_panorama(picture):
-        return Panorama(
-            np.ascontiguousarray(picture[:, ::-1]), notes=("The background is a panorama: its light is exact.",)
-        )
+        # It is shown as it is: what stands at its left is seen at the left, and must light from there. A file of an
+        # environment has its middle before the person instead.
+        radiance = np.roll(picture[:, ::-1], picture.shape[1] // 2, axis=1)
+        return Panorama(np.ascontiguousarray(radiance), notes=("The background is a panorama: its light is exact.",))
     bright = _with_highlights(_shrunk(picture))
     radiance = _round_the_sphere(bright, height_deg)
     return Panorama(radiance, notes=("Guessed from an ordinary picture: the light in front of it is not known.",))
