@@ -9,7 +9,12 @@ from relit_camera.errors import LightsError, NotFoundError
 from relit_camera.reflectance.barycentric import PlanarBarycentric, SphericalBarycentric, spherical_barycentric
 from relit_camera.reflectance.method import LinearMethod, method_names, open_method
 from relit_camera.reflectance.nearest import Nearest
-from relit_camera.space.directions import direction_from_degrees, texel_directions
+from relit_camera.space.directions import (
+    direction_from_degrees,
+    direction_from_spherical,
+    spherical_from_direction,
+    texel_directions,
+)
 from tests.synthetic import fibonacci_directions, sphere_samples
 
 METHODS = [SphericalBarycentric(), PlanarBarycentric(), Nearest()]
@@ -35,6 +40,24 @@ def test_a_frontal_capture_says_nothing_of_the_back() -> None:
     front = direction_from_degrees([0, 20, -20], [0, 20, -20])
     weights = SphericalBarycentric().weights(directions, np.vstack([front, back]))
     np.testing.assert_allclose(weights.sum(axis=0), [1, 1, 1, 0, 0, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda m: type(m).__name__)
+def test_rounded_directions_at_the_edge_of_a_capture_are_covered(method: LinearMethod) -> None:
+    """People give directions in tenths of a degree; half of those at the edge then lie a little outside."""
+    directions = fibonacci_directions(400, lowest_z=0.1)
+    azimuth, elevation = (np.round(np.degrees(angle), 1) for angle in spherical_from_direction(directions))
+    weights = method.weights(directions, direction_from_degrees(azimuth, elevation))
+    np.testing.assert_allclose(weights.sum(axis=0), 1, atol=1e-5)
+    np.testing.assert_array_equal(weights.argmax(axis=0), np.arange(len(directions)))
+
+
+def test_planar_weights_reproduce_position_in_the_plane() -> None:
+    directions = fibonacci_directions(90, lowest_z=0.1)
+    plane = np.stack(spherical_from_direction(directions), axis=1)
+    wanted = np.radians([[10, 5], [-33, 20], [41, -12]])
+    weights = PlanarBarycentric().weights(directions, direction_from_spherical(wanted[:, 0], wanted[:, 1]))
+    np.testing.assert_allclose(weights.T @ plane, wanted, atol=1e-6)
 
 
 def test_areas_of_the_octant_at_its_middle_and_edge() -> None:

@@ -68,13 +68,21 @@ class PlanarBarycentric:
         except (QhullError, ValueError) as error:
             raise _degenerate(len(directions)) from error
         points = np.stack(spherical_from_direction(queries), axis=1)
-        found = triangulation.find_simplex(points, tol=TOLERANCE)
-        covered = np.flatnonzero(found >= 0)
-        transform = triangulation.transform[found[covered]]
-        first = np.einsum("qij,qj->qi", transform[:, :2], points[covered] - transform[:, 2])
-        local = np.clip(np.column_stack([first, 1 - first.sum(axis=1)]), 0, None)
+        # Not `find_simplex`: its tolerance is a share of each triangle, not an angle. The triangles turn
+        # counter-clockwise, so a point inside lies to the left of every side.
+        corners = plane[triangulation.simplices]
+        sides = np.roll(corners, -1, axis=1) - corners
+        lengths = np.linalg.norm(sides, axis=2)
+        offsets = points[:, None, None] - corners
+        doubled_areas = sides[..., 0] * offsets[..., 1] - sides[..., 1] * offsets[..., 0]
+        inside = (doubled_areas / lengths).min(axis=2)
+        chosen = inside.argmax(axis=1)
+        covered = np.flatnonzero(inside[np.arange(len(queries)), chosen] >= -TOLERANCE)
+        # A corner's weight is the area between the point and the side opposite to it, which starts at the next corner.
+        local = np.maximum(np.roll(doubled_areas[covered, chosen[covered]], -1, axis=1), 0)
+        local /= np.maximum(local.sum(axis=1, keepdims=True), 1e-300)
         weights = np.zeros((len(directions), len(queries)), dtype=np.float32)
-        vertices = triangulation.simplices[found[covered]]
+        vertices = triangulation.simplices[chosen[covered]]
         np.add.at(weights, (vertices.T, covered[None, :]), local.T.astype(np.float32))
         return weights
 
