@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import mmap
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,16 @@ def test_what_is_written_is_read(subject: Subject, path: Path) -> None:
     np.testing.assert_array_equal(read.landmarks["mesh478"], subject.landmarks["mesh478"])
 
 
+def test_what_is_read_stays_in_the_file(path: Path) -> None:
+    read = read_subject(path)
+    for array in (read.basis, read.coefficients, read.landmarks["mesh478"]):
+        assert not array.flags.writeable
+        owner: object = array
+        while isinstance(owner, np.ndarray):
+            owner = owner.base
+        assert isinstance(owner, mmap.mmap)
+
+
 def _rewrite(path: Path, change: dict[str, np.ndarray] | None = None, header: dict[str, object] | None = None) -> None:
     tensors = load_file(path)
     metadata = json.loads(read_subject(path).metadata.model_dump_json())
@@ -57,9 +68,10 @@ def test_another_version_is_one_clear_error(path: Path) -> None:
         {"coefficients": np.full((3, 2048), np.nan, np.float32)},
         {"matte": np.zeros((3, 3), np.float32)},
         {"basis": np.zeros((3, 1, 16, 16), np.float32)},
+        {"neutral": np.zeros((16, 16, 3), np.int64)},
         {"landmarks.mesh478": np.zeros((5, 3), np.float32)},
     ],
-    ids=["nan", "shape", "dtype", "landmarks"],
+    ids=["nan", "shape", "dtype", "foreign dtype", "landmarks"],
 )
 def test_wrong_tensors_are_refused(path: Path, change: dict[str, np.ndarray]) -> None:
     _rewrite(path, change)

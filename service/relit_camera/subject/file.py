@@ -26,6 +26,8 @@ REQUIRED = ("basis", "coefficients", "light_directions", "light_coefficients", "
 OPTIONAL = ("normals", "albedo", "depth")
 DTYPES = {"basis": np.float16, "neutral": np.uint8}
 """Every other tensor is float32."""
+STORED: dict[str, type[np.generic]] = {"F16": np.float16, "F32": np.float32, "U8": np.uint8}
+"""What safetensors calls the types that a subject may hold."""
 
 
 def write_subject(path: Path, subject: Subject) -> None:
@@ -49,7 +51,7 @@ def write_subject(path: Path, subject: Subject) -> None:
 
 
 def read_subject(path: Path) -> Subject:
-    """Open a subject; its basis stays memory-mapped until it is used.
+    """Open a subject; its arrays are read-only views of the mapped file, which the system may drop and read again.
 
     Raises:
         SubjectError: missing, damaged, of another version, or with values that are not finite.
@@ -64,7 +66,7 @@ def read_subject(path: Path) -> Subject:
             names = list(file.keys())
             if len(names) > MAX_TENSORS:
                 raise _damaged(path, f"it holds {len(names)} tensors")
-            tensors = {name: file.get_tensor(name) for name in names}
+        tensors = _mapped(path, names)
     except (SafetensorError, OSError) as error:
         raise _damaged(path, str(error)) from error
     _check(path, tensors)
@@ -92,6 +94,24 @@ def _metadata(path: Path, header: Mapping[str, str]) -> SubjectMetadata:
     except ValidationError as error:
         first = error.errors()[0]
         raise _damaged(path, f"header field {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def _mapped(path: Path, names: list[str]) -> dict[str, NDArray]:
+    """The tensors of a file that `safe_open` found sound; its own `get_tensor` would copy them into memory.
+
+    Layout (github.com/huggingface/safetensors): the header's length as 8 bytes, the header as JSON, the tensors.
+    """
+    mapped = np.asarray(np.memmap(path, np.uint8, mode="r"))
+    start = 8 + int.from_bytes(mapped[:8].tobytes(), "little")
+    header = json.loads(mapped[8:start].tobytes())
+    tensors = {}
+    for name in names:
+        kind, (first, last) = header[name]["dtype"], header[name]["data_offsets"]
+        if kind not in STORED:
+            raise _damaged(path, f"'{name}' is {kind}, which no tensor of a subject is")
+        stored = mapped[start + first : start + last]
+        tensors[name] = stored.view(STORED[kind]).reshape(header[name]["shape"])
+    return tensors
 
 
 def _check(path: Path, tensors: Mapping[str, NDArray]) -> None:

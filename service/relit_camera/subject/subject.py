@@ -51,7 +51,7 @@ class Subject:
 
     Attributes:
         metadata: the file's header.
-        basis: (3, components, height, width) float16, memory-mapped when it comes from a file.
+        basis: (3, components, height, width) float16; like all arrays memory-mapped when it comes from a file.
         coefficients: (components, 2048) float32.
         light_directions: (lights, 3) float32 unit vectors, the captured directions.
         light_coefficients: (components, lights) float32: the captured frames in the same basis.
