@@ -53,7 +53,7 @@ def read_display(path: Path) -> DisplayImage:
 
 
 def read_mask(path: Path) -> Mask:
-    """Read a matte as float32 (height, width) in 0..1: the alpha channel where there is one, else the grey value.
+    """Read a matte as float32 (height, width) in 0..1: the alpha channel where it marks anything, else the grey value.
 
     Raises:
         ImageError: missing or unreadable.
@@ -65,7 +65,9 @@ def read_mask(path: Path) -> Mask:
         raise ImageError(f"{path} cannot be read as a picture", "save it again as PNG")
     scaled = _unit_range(coded)
     if scaled.ndim == 3:
-        scaled = scaled[..., 3] if scaled.shape[2] == 4 else scaled[..., :3].mean(axis=2)
+        # Editors add an opaque alpha to grey pictures.
+        has_alpha = scaled.shape[2] == 4 and bool((scaled[..., 3] < 1).any())
+        scaled = scaled[..., 3] if has_alpha else scaled[..., :3].mean(axis=2)
     return np.ascontiguousarray(scaled, dtype=np.float32)
 
 
