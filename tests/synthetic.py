@@ -32,14 +32,20 @@ BUMP_CENTRE = np.array([0.25, 0.1, 1.05])
 BUMP_RADIUS = 0.22
 
 
-def render_sphere(light: NDArray[np.float64], size: int = 48) -> NDArray[np.float32]:
+def render_sphere(
+    light: NDArray[np.float64], size: int = 48, turn: NDArray[np.float64] | None = None
+) -> NDArray[np.float32]:
     """A white Lambertian unit sphere with a small ball before it that casts a shadow, under a distant light.
 
-    The ball itself is not seen; radiance is max(0, n·l), 0 in its shadow. (size, size, 3) float32.
+    The ball itself is not seen; radiance is max(0, n·l), 0 in its shadow. (size, size, 3) float32. `turn` (3, 3) turns
+    the sphere and its ball in the room, where the light stays; each pixel then shows the same spot of the sphere as
+    before, wherever that has gone.
     """
-    points, inside = sphere_surface(size)
+    turn = np.eye(3) if turn is None else turn
+    spots, inside = sphere_surface(size)
+    points = spots @ turn.T
     shade = np.maximum(points @ light, 0)
-    towards = BUMP_CENTRE - points
+    towards = turn @ BUMP_CENTRE - points
     along = towards @ light
     distance = np.linalg.norm(towards - along[..., None] * light, axis=-1)
     shade[(along > 0) & (distance < BUMP_RADIUS)] = 0
