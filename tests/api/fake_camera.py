@@ -61,7 +61,12 @@ class FakeCamera:
         scene = self.director.scene
         state = CameraState.FROZEN if scene.frozen else self.base.state
         return replace(
-            self.base, state=state, subject=scene.subject_name, mode=scene.look.mode.value, degraded=self.degraded
+            self.base,
+            state=state,
+            subject=scene.subject_name,
+            mode=scene.look.mode.value,
+            degraded=self.degraded,
+            fps=self.base.fps if self.publishing else replace(self.base.fps, published=0.0),
         )
 
     def picture(self, after: int, timeout_s: float) -> tuple[int, DisplayImage] | None:

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 
-from relit_camera.bench.live import NoddingTracker
+from relit_camera.bench.live import NoddingTracker, bench_live
 from relit_camera.bench.machine import machine
 from relit_camera.bench.relighting import bench_relighting
 from relit_camera.bench.sample_subject import LIGHTS, sample_subject
 from relit_camera.bench.timing import median_ms
 from relit_camera.bench.transfer import bench_transfer
+from relit_camera.config.look import Look
+from relit_camera.config.settings import OutputSettings, RelitSettings, SourceSettings, StorageSettings
 from relit_camera.face.schemes import landmark_scheme
 from relit_camera.models.session import SessionOptions
 from relit_camera.space.images import Frame
 from relit_camera.space.rotation import angles_from_rotation
+from relit_camera.stream.director import Director
+from relit_camera.stream.sources.factory import open_source
 
 
 def test_relighting_is_compared_in_one_run() -> None:
@@ -58,3 +66,22 @@ def test_without_a_gpu_nothing_is_said_of_transfers() -> None:
 
 def test_the_machine_is_named() -> None:
     assert machine()["cores"]
+    # With a GPU the module comes from another package.
+    with patch("importlib.metadata.version", side_effect=PackageNotFoundError("onnxruntime")):
+        assert machine()["onnxruntime"]
+
+
+def test_every_live_stage_has_both_figures(tmp_path: Path) -> None:
+    settings = RelitSettings(
+        source=SourceSettings(source="pattern", width=128, height=96),
+        output=OutputSettings(sink="null", width=128, height=96),
+        storage=StorageSettings(data_dir=tmp_path),
+    )
+    director = Director(settings.storage)
+    director.show_subject("bench", sample_subject(48, 48))
+    director.set_look(Look())
+    result = bench_live(settings, director, open_source(settings.source), NoddingTracker(), 0.5)
+    assert {"track", "light", "relight", "move", "compose", "capture_to_publish"} <= result["live"].keys()
+    for stage in result["live"].values():
+        assert 0 < stage["p50_ms"] <= stage["p95_ms"]  # type: ignore[index]
+    assert result["live_run"]["degraded"] == []

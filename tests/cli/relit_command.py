@@ -42,7 +42,7 @@ class Answer:
             AssertionError: otherwise.
         """
         assert self.code == code, self
-        lines = self.err.strip().splitlines()
+        lines = self.err.splitlines()
         assert len(lines) == 1, self.err
         assert lines[0].startswith("relit: "), lines[0]
         assert ";" in lines[0], f"no cure: {lines[0]}"

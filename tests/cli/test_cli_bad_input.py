@@ -7,6 +7,7 @@ import os
 import resource
 import shutil
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,7 +18,17 @@ import pytest
 from relit_camera.face.state import FaceStatus
 from relit_camera.face.track_file import Track, TrackFrame, read_track
 from relit_camera.space.picture_files import write_linear
-from tests.cli.relit_command import COMMAND, Answer, Material, call, environment, files, finish
+from tests.cli.relit_command import (
+    COMMAND,
+    Answer,
+    Material,
+    call,
+    environment,
+    files,
+    finish,
+    start,
+    write_material,
+)
 from tests.synthetic import sphere_samples, write_lights
 
 
@@ -126,6 +137,16 @@ def test_damaged_hdr(material: Material, out: Path, tmp_path: Path) -> None:
 def test_unknown_environment_names_close_ones(material: Material, out: Path) -> None:
     relight(material.subject, out, environment="stuido").complains("stuido", "studio")
     replay(material, out, environment="sunst").complains("sunst", "sunset")
+
+
+@pytest.mark.parametrize(("option", "value"), [("exposure-ev", "99"), ("exposure-ev", "5000"), ("rotate", "999,0,0")])
+def test_light_out_of_range_is_usage(option: str, value: str, material: Material, out: Path) -> None:
+    answers = [replay(material, out, **{option: value})]
+    if option == "exposure-ev":
+        answers.append(relight(material.subject, out, light="0,0", **{option: value}))
+    for answer in answers:
+        assert answer.code == 2
+        assert "Traceback" not in answer.err
 
 
 @pytest.mark.parametrize("text", ["90", "left,up", "1,2,3", "nan,0", ""])
@@ -260,6 +281,33 @@ def test_folder_that_does_not_exist(material: Material, out: Path, lights: Path)
         call("track", material.clip, "--out", out / "new" / "t.json", "--tracker", material.tracker),
     ):
         answer.complains(str(out / "new"), "create the folder first")
+
+
+def test_a_side_result_that_cannot_be_written_leaves_no_video(material: Material, out: Path) -> None:
+    named = ("--subject", material.subject, "--environment", "studio", "--tracker", material.tracker)
+    into = ("replay", material.clip, *named, "--out", out / "x.mp4")
+    call(*into, "--report", out / "new" / "r.json").complains(str(out / "new"), "create the folder first")
+    call(*into, "--contact-sheet", out / "new" / "s.png").complains(str(out / "new"), "create the folder first")
+    assert call(*into, "--contact-sheet", out / "s.gif").code == 2
+
+
+def test_bench_says_what_is_missing_before_it_measures(out: Path) -> None:
+    call("bench", "--environments", out / "none").complains("none")
+    call("bench", "--video", out / "none.mp4").complains("none.mp4")
+
+
+def test_a_command_told_to_end_leaves_nothing(out: Path, tmp_path: Path) -> None:
+    long = write_material(tmp_path, frames=1500)
+    process = start(
+        "replay", long.clip, "--subject", long.subject, "--environment", "studio", "--tracker", long.tracker,
+        "--out", out / "x.mp4", folder=tmp_path,
+    )  # fmt: skip
+    until = time.monotonic() + 60
+    while not files(out) and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.02)
+    process.terminate()
+    assert process.communicate(timeout=30) == ("", "")
+    assert process.returncode == 143
 
 
 def test_folder_that_cannot_be_written(material: Material, out: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +91,20 @@ def test_global_options_come_before_the_command(material: Material, tmp_path: Pa
     config = tmp_path / "config.yaml"
     config.write_text("tracker:\n  dead_band_deg: 0.5\n")
     done(call("--config", config, "relight", material.subject, "--light=0,0", "--out", tmp_path / "x.png"))
+
+
+def test_the_log_follows_the_option_then_the_settings(
+    material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ours = logging.getLogger("relit_camera")
+    monkeypatch.setattr(ours, "level", ours.level)
+    config = tmp_path / "config.yaml"
+    config.write_text("log_level: debug\n")
+    done(call("--config", config, "subject", "info", material.subject))
+    assert ours.level == logging.DEBUG
+    done(call("--config", config, "--log-level", "error", "subject", "info", material.subject))
+    assert ours.level == logging.ERROR
+    assert call("--log-level", "loud", "devices").code == 2
 
 
 def test_usage_errors_exit_with_two(material: Material) -> None:

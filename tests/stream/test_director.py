@@ -143,6 +143,16 @@ def test_what_a_change_leaves_alone_is_kept(director: Director, monkeypatch: pyt
     assert after.look.mode is Mode.RATIO
 
 
+@pytest.mark.parametrize("stem", [LIT_BY_BACKGROUND, "studio", "background!", "s" * 80])
+def test_a_file_takes_no_name_that_means_something_else(stem: str, director: Director, tmp_path: Path) -> None:
+    path = tmp_path / f"{stem}.exr"
+    write_linear(path, np.full((32, 64, 3), 0.5, np.float32))
+    name = director.admit_environment(str(path))
+    assert name not in {LIT_BY_BACKGROUND, *director.environments.names()}
+    environment = director.set_look(Look(lighting=Lighting(environment=name))).environment
+    assert environment is director.guest_environments()[name]
+
+
 def test_subjects_by_path_by_name_and_none(director: Director, tmp_path: Path) -> None:
     path = tmp_path / "me.relit"
     write_subject(path, small_subject())

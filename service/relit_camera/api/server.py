@@ -71,6 +71,7 @@ class ApiServer:
         deadline = time.monotonic() + START_S
         while not self._server.started:
             if not self._thread.is_alive() or time.monotonic() > deadline:
+                self.stop()  # its thread would keep the process from ending
                 raise RelitError(f"the server at {self.address.url} did not start", "see the log")
             time.sleep(0.01)
 

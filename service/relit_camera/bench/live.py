@@ -16,7 +16,7 @@ from relit_camera.space.rotation import rotation_from_angles
 from relit_camera.stream.daemon import Daemon
 from relit_camera.stream.director import Director
 from relit_camera.stream.sinks.null import NullSink
-from relit_camera.stream.sources.factory import open_source
+from relit_camera.stream.sources.base import Source
 
 WARM_UP_S = 2.0
 
@@ -40,14 +40,16 @@ class NoddingTracker:
         """Nothing to forget."""
 
 
-def bench_live(settings: RelitSettings, director: Director, tracker: Tracker, seconds: float) -> dict[str, object]:
-    """Run the daemon on the settings' source into nothing; stage → {p50_ms, p95_ms}, `capture_to_publish` among them.
+def bench_live(
+    settings: RelitSettings, director: Director, source: Source, tracker: Tracker, seconds: float
+) -> dict[str, dict[str, object]]:
+    """Run the daemon on a source into nothing.
 
-    Raises:
-        RelitError: the source or the subject cannot be used.
+    Returns:
+        `live`: stage → {p50_ms, p95_ms}, `capture_to_publish` among them; `live_run`: how it ran.
     """
     size = (settings.output.width, settings.output.height)
-    daemon = Daemon(settings, director, open_source(settings.source), NullSink(size), tracker)
+    daemon = Daemon(settings, director, source, NullSink(size), tracker)
     daemon.start()
     try:
         time.sleep(WARM_UP_S + seconds)
@@ -56,10 +58,13 @@ def bench_live(settings: RelitSettings, director: Director, tracker: Tracker, se
         daemon.stop()
     stages = {**status.stage_ms, "capture_to_publish": status.latency_ms}
     return {
-        **{name: {"p50_ms": round(s.p50, 2), "p95_ms": round(s.p95, 2)} for name, s in stages.items()},
-        "fps": {name: round(value, 1) for name, value in asdict(status.fps).items()},
-        "size": list(size),
-        "tracker": status.tracker.name,
-        "tracker_state": status.tracker.state,
-        "degraded": [asdict(trouble) for trouble in status.degraded],
+        "live": {name: {"p50_ms": round(s.p50, 2), "p95_ms": round(s.p95, 2)} for name, s in stages.items()},
+        "live_run": {
+            "fps": {name: round(value, 1) for name, value in asdict(status.fps).items()},
+            "size": list(size),
+            "mode": status.mode,
+            "tracker": status.tracker.name,
+            "tracker_state": status.tracker.state,
+            "degraded": [asdict(trouble) for trouble in status.degraded],
+        },
     }

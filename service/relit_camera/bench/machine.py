@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import os
 import platform
-from importlib.metadata import version
 from pathlib import Path
 
+import cv2
+import numpy as np
+import onnxruntime
 import psutil
+
+from relit_camera import __version__
 
 
 def machine() -> dict[str, object]:
@@ -19,7 +23,11 @@ def machine() -> dict[str, object]:
         "load_before": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
         "system": platform.platform(),
         "python": platform.python_version(),
-        **{name: version(name) for name in ("numpy", "opencv-contrib-python-headless", "onnxruntime", "relit-camera")},
+        # Of the modules, not of the packages: with a GPU onnxruntime comes from onnxruntime-gpu.
+        "numpy": np.__version__,
+        "opencv": cv2.__version__,
+        "onnxruntime": onnxruntime.__version__,
+        "relit-camera": __version__,
     }
 
 

@@ -37,13 +37,18 @@ def bench(
     from relit_camera.cli.settings import settings_of
     from relit_camera.config.look import Look
     from relit_camera.cores import share_cores
+    from relit_camera.errors import NotFoundError
     from relit_camera.light.maps import resample
     from relit_camera.light.panorama import read_panorama
     from relit_camera.stream.assembly import make_tracker, session_options
     from relit_camera.stream.director import Director
+    from relit_camera.stream.sources.factory import open_source
     from relit_camera.subject.store import SubjectStore
 
     width, height = parse_size(size)
+    look = Look(mode=parse_mode(mode))
+    if environments is not None and not environments.is_dir():
+        raise NotFoundError(f"no folder {environments}", "name a folder with .hdr or .exr files")
     overrides = {
         "source": {"source": video or "pattern", "width": width, "height": height},
         "output": {"sink": "null", "width": width, "height": height},
@@ -54,6 +59,9 @@ def bench(
     before = machine()
     options = session_options(settings.inference)
     director = Director(settings.storage)
+    # What is missing shall be said before minutes of measuring, not after.
+    source = open_source(settings.source)
+    followed = NoddingTracker() if video is None else make_tracker(settings)
     measured = sample_subject() if subject is None else SubjectStore(settings.storage.subjects).resolve(subject)[1]
     maps = {name: director.environments.load(name).light_map for name in director.environments.names()}
     if environments is not None:
@@ -63,9 +71,8 @@ def bench(
     result["transfer"] = bench_transfer(options)
     if seconds:
         director.show_subject("bench", sample_subject(256, 256) if subject is None else measured)
-        director.set_look(Look(mode=parse_mode(mode)))
-        followed = NoddingTracker() if video is None else make_tracker(settings)
-        result["live"] = bench_live(settings, director, followed, seconds)
+        director.set_look(look)
+        result |= bench_live(settings, director, source, followed, seconds)
     result["machine"] = before
     typer.echo(json.dumps(result, indent=2) if as_json else _text(result))
 

@@ -27,19 +27,17 @@ def import_lights(
     ] = None,
 ) -> None:
     """Build a subject from aligned pictures, each under one light whose direction is known."""
-    from rich.console import Console
-    from rich.progress import Progress
-
     from relit_camera.capture.build import build_subject
     from relit_camera.capture.importing import import_samples
     from relit_camera.capture.landmarks_file import read_landmarks
+    from relit_camera.cli.progress import progress_bar
     from relit_camera.reflectance.method import open_method
     from relit_camera.space.colour import parse_gamma
     from relit_camera.subject.file import write_subject
 
     curve = parse_gamma(gamma)
     open_method(method)
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with progress_bar() as progress:
         reading = progress.add_task("Reading pictures", total=None)
         samples = import_samples(
             lights, curve, lambda done, total: progress.update(reading, completed=done, total=total)

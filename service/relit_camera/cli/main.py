@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import signal
 import sys
+from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -27,6 +29,15 @@ GROUPS = {
     "doctor": ("relit_camera.cli.doctor", "Find out what keeps the camera from working, and the cure."),
 }
 """Command → module with a typer `app`, and its help. A module is imported when its command is called."""
+
+
+class LogLevel(StrEnum):
+    """What `--log-level` takes."""
+
+    DEBUG = "debug"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
 
 
 class _LazyGroup(TyperGroup):
@@ -73,17 +84,20 @@ def _print_version(wanted: bool) -> None:
 def options(
     context: typer.Context,
     config: Annotated[Path | None, typer.Option(help="Configuration file (YAML).", metavar="FILE")] = None,
-    log_level: Annotated[str | None, typer.Option(help="debug, info, warning or error.")] = None,
+    log_level: Annotated[LogLevel | None, typer.Option(help="How much our log says, on stderr.")] = None,
     version: Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True)] = False,
 ) -> None:
     """Keep the global options for the commands; they load the settings when they need them."""
-    context.obj = {"config": config, "log_level": log_level}
-    level = (log_level or "warning").upper()
-    logging.basicConfig(level=getattr(logging, level, logging.WARNING), format="%(levelname)s %(name)s: %(message)s")
+    context.obj = {"config": config, "log_level": log_level.value if log_level else None}
+    # Only our own log follows the level: the libraries' chatter stays out of it.
+    logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
+    logging.getLogger("relit_camera").setLevel((log_level or LogLevel.WARNING).upper())
 
 
 def run() -> None:
     """Exit with 0: done; 1: the input is at fault, one line on stderr; 2: usage. Our own faults show a traceback."""
+    # Told to end, a command cleans up as one that fails; `relit run` has its own way.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     try:
         app()
     except RelitError as error:

@@ -13,6 +13,7 @@ from relit_camera.config.look import (
     ColorBackground,
     EnvironmentBackground,
     ImageBackground,
+    Lighting,
     Mode,
     NoBackground,
 )
@@ -50,6 +51,20 @@ def background(text: str) -> Background:
         return ColorBackground(color=text) if text.startswith("#") else ImageBackground(image=text)
     except ValidationError as error:
         raise typer.BadParameter(error.errors()[0]["msg"], param_hint="--background") from error
+
+
+def lighting(environment: str, rotate: str, exposure_ev: float) -> Lighting:
+    """An environment's name, its YAW,PITCH,ROLL in degrees and the exposure as lighting.
+
+    Raises:
+        typer.BadParameter: not three numbers, or one out of its range (exit 2: usage).
+    """
+    yaw, pitch, roll = numbers(rotate, 3, "--rotate")
+    try:
+        return Lighting(environment=environment, yaw_deg=yaw, pitch_deg=pitch, roll_deg=roll, exposure_ev=exposure_ev)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise typer.BadParameter(f"{'.'.join(map(str, first['loc']))}: {first['msg']} (is {first['input']})") from error
 
 
 def mode(text: str) -> Mode:

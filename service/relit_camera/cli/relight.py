@@ -19,7 +19,9 @@ def relight(
     environment: Annotated[str | None, typer.Option(help="A stored environment's name, or a panorama file.")] = None,
     rotate: Annotated[str, typer.Option(help="Head pose YAW,PITCH,ROLL in degrees.")] = "0,0,0",
     linear: Annotated[bool, typer.Option("--linear", help="Write linear light, unscaled and unclipped.")] = False,
-    exposure_ev: Annotated[float, typer.Option(help="Brighter or darker than a white ball at 0.8.")] = 0.0,
+    exposure_ev: Annotated[
+        float, typer.Option(help="Brighter or darker than a white ball at 0.8.", min=-10, max=10)
+    ] = 0.0,
 ) -> None:
     """Relight a subject's still by an environment, or by one distant light of unit irradiance."""
     import numpy as np

@@ -9,6 +9,9 @@ import typer
 
 app = typer.Typer()
 
+SHEET_FRAMES = 12
+"""A contact sheet has about so many frames, and fewer than twice as many."""
+
 
 @app.command()
 def replay(
@@ -23,42 +26,38 @@ def replay(
     background: Annotated[str, typer.Option(help="none, blur, environment, or #RRGGBB.")] = "none",
     rotate: Annotated[str, typer.Option(help="YAW,PITCH,ROLL of the environment, in degrees.")] = "0,0,0",
     exposure_ev: Annotated[float, typer.Option(help="Brighter or darker.")] = 0.0,
-    contact_sheet: Annotated[Path | None, typer.Option(help="PNG of a dozen frames, live above relit.")] = None,
+    contact_sheet: Annotated[Path | None, typer.Option(help="PNG or JPEG of some frames, live above relit.")] = None,
 ) -> None:
     """Relight a recorded video: the subject under the environment, moved as the face in the video moves."""
     import json
     import sys
-
-    from rich.console import Console
-    from rich.progress import Progress
+    from contextlib import ExitStack
 
     from relit_camera.cli.parse import background as parse_background
+    from relit_camera.cli.parse import lighting as parse_lighting
     from relit_camera.cli.parse import mode as parse_mode
-    from relit_camera.cli.parse import numbers
+    from relit_camera.cli.progress import progress_bar
     from relit_camera.cli.settings import settings_of
-    from relit_camera.config.look import Lighting, Look
+    from relit_camera.compose.sheet import contact_sheet as draw_sheet
+    from relit_camera.config.look import Look
     from relit_camera.cores import share_cores
-    from relit_camera.files import write_atomic
-    from relit_camera.space.picture_files import write_display
+    from relit_camera.files import atomic_path
+    from relit_camera.space.images import DisplayImage
+    from relit_camera.space.picture_files import encode_display
     from relit_camera.stream.assembly import make_pipeline, make_tracker
     from relit_camera.stream.director import Director
     from relit_camera.stream.replay import replay as run_replay
     from relit_camera.stream.video import probe
 
+    if contact_sheet and contact_sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        raise typer.BadParameter(f"{contact_sheet} is neither .png nor .jpg", param_hint="--contact-sheet")
     settings = settings_of(context, tracker={"name": tracker})
-    yaw, pitch, roll = numbers(rotate, 3, "--rotate")
     share_cores()
     chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
     info = probe(video)
     director = Director(settings.storage)
     director.set_subject(subject)
-    lighting = Lighting(
-        environment=director.admit_environment(environment),
-        yaw_deg=yaw,
-        pitch_deg=pitch,
-        roll_deg=roll,
-        exposure_ev=exposure_ev,
-    )
+    lighting = parse_lighting(director.admit_environment(environment), rotate, exposure_ev)
     director.set_look(Look(lighting=lighting, background=chosen_background, mode=chosen_mode))
     track = make_tracker(settings)
     pipelines = []
@@ -67,32 +66,38 @@ def replay(
         pipelines.append(make_pipeline(settings, track, size))
         return pipelines[0]
 
-    every = max((info.frames or 96) // 12, 1)
-    kept = []
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    every = max((info.frames or 0) // SHEET_FRAMES, 1)
+    kept: list[tuple[int, DisplayImage, DisplayImage]] = []
+    with ExitStack() as results, progress_bar() as progress:
+        # Opened before the work, so that what cannot be written is said at once and leaves no video behind.
+        report_file = results.enter_context(atomic_path(report)) if report else None
+        sheet_file = results.enter_context(atomic_path(contact_sheet)) if contact_sheet else None
         task = progress.add_task("Relighting", total=info.frames or None)
 
-        def watch(index, before, after):  # type: ignore[no-untyped-def]
+        def watch(index: int, before: DisplayImage, after: DisplayImage) -> None:
+            nonlocal every
             progress.update(task, completed=index + 1)
-            if contact_sheet and index % every == every // 2:
-                kept.append((f"{index}", before, after))
+            if sheet_file and index % every == 0:
+                kept.append((index, before, after))
+                if len(kept) == 2 * SHEET_FRAMES:  # a file that does not tell its length: keep every other one
+                    del kept[1::2]
+                    every *= 2
 
         frames = run_replay(video, out, pipeline_for, lambda time_s: director.scene, watch)
+        if sheet_file:
+            indices, before, after = zip(*kept, strict=True)
+            sheet = draw_sheet([list(before), list(after)], ["live", "relit"], [str(index) for index in indices])
+            sheet_file.write_bytes(encode_display(sheet, sheet_file.suffix))
+        if report_file:
+            document = {
+                "video": video.name,
+                "tracker": track.name,
+                "mode": mode,
+                "degraded": [vars(trouble) for trouble in pipelines[0].troubles],
+                "frames": [frame.as_json() for frame in frames],
+            }
+            report_file.write_text(json.dumps(document, indent=1), encoding="utf-8")
     for trouble in pipelines[0].troubles:
         print(f"relit: {trouble.what}: {trouble.why}; {trouble.cure}", file=sys.stderr)
-    if contact_sheet and kept:
-        from relit_camera.compose.sheet import contact_sheet as draw_sheet
-
-        labels, before, after = zip(*kept, strict=True)
-        write_display(contact_sheet, draw_sheet([list(before), list(after)], ["live", "relit"], list(labels)))
-    if report:
-        document = {
-            "video": video.name,
-            "tracker": track.name,
-            "mode": mode,
-            "degraded": [vars(trouble) for trouble in pipelines[0].troubles],
-            "frames": [frame.as_json() for frame in frames],
-        }
-        write_atomic(report, json.dumps(document, indent=1))
     found = sum(1 for frame in frames if frame.motion and frame.motion.status == "found")
     typer.echo(f"{out}: {len(frames)} frames, face found in {found}")

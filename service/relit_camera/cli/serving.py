@@ -39,6 +39,8 @@ def run_camera(settings: RelitSettings, environment: str | None = None) -> None:
     director.set_look(look)
     director.set_subject(settings.subject)
     stop = threading.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: stop.set())
     with contextlib.ExitStack() as cleanup:
         listener = cleanup.enter_context(listen(settings.server))
         tracker = make_tracker(settings)
@@ -48,8 +50,6 @@ def run_camera(settings: RelitSettings, environment: str | None = None) -> None:
         cleanup.callback(sink.close)
         daemon = Daemon(settings, director, source, sink, tracker)
         cleanup.callback(daemon.stop)
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, lambda *_: stop.set())
         daemon.start()
         server = serve(create_app(daemon, settings), settings.server, listener=listener)
         cleanup.callback(server.stop)

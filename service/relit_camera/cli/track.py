@@ -18,9 +18,7 @@ def track(
     tracker: Annotated[str | None, typer.Option(help="mesh or openseeface.")] = None,
 ) -> None:
     """Follow the face in a video and write, per frame, its pose, landmarks, eyes and mouth."""
-    from rich.console import Console
-    from rich.progress import Progress
-
+    from relit_camera.cli.progress import progress_bar
     from relit_camera.cli.settings import settings_of
     from relit_camera.cores import share_cores
     from relit_camera.errors import VideoError
@@ -30,7 +28,7 @@ def track(
 
     share_cores()
     opened = make_tracker(settings_of(context, tracker={"name": tracker}))
-    with VideoReader(video) as reader, Progress(console=Console(stderr=True), transient=True) as progress:
+    with VideoReader(video) as reader, progress_bar() as progress:
         recorder = TrackRecorder(opened, (reader.info.width, reader.info.height), reader.info.fps)
         task = progress.add_task("Tracking", total=reader.info.frames or None)
         for frame in reader:

@@ -12,7 +12,7 @@ import time
 
 from relit_camera import __version__
 from relit_camera.config.settings import RelitSettings
-from relit_camera.errors import RelitError
+from relit_camera.errors import DeviceError, RelitError
 from relit_camera.face.state import FaceStatus, Tracker
 from relit_camera.models.session import session_report
 from relit_camera.space.images import DisplayImage, Frame
@@ -150,9 +150,12 @@ class Daemon:
             self._failed("source", error)
             self._stopping.wait(RETRY_S)
             frame = None
+        reason = self._source.reason
         if frame is not None:
             self._recovered("source")
-        elif self._source.state is not SourceState.RUNNING and self._state is not CameraState.STARTING:
+        elif self._source.state is not SourceState.RUNNING and (reason or self._state is not CameraState.STARTING):
+            if reason and "source" not in self._troubles:
+                self._failed("source", DeviceError(reason, "it is tried again by itself; see `relit devices`"))
             self._publisher.placeholder = self._waiting_picture
             self._set_state(CameraState.WAITING)
         return frame

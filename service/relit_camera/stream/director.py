@@ -100,7 +100,9 @@ class Director:
         if name_or_path == LIT_BY_BACKGROUND or name_or_path in self.environments.names():
             return name_or_path
         environment = self.environments.resolve(name_or_path)
-        name = re.sub(r"[^A-Za-z0-9_-]+", "-", Path(name_or_path).stem).strip("-_")[:64] or "file"
+        name = re.sub(r"[^A-Za-z0-9_-]+", "-", Path(name_or_path).stem).strip("-_")[:50] or "file"
+        if name == LIT_BY_BACKGROUND or name in self.environments.names():
+            name += "-file"
         with self._change:
             self._guests[name] = environment
         return name

@@ -18,7 +18,7 @@ class Event:
     """One happening.
 
     Attributes:
-        kind: `look`, `subject`, `tracking`, `state`, `freeze`, `neutral-pose`, `degraded`.
+        kind: `state`, `tracking`, `neutral-pose`, `degraded`, `recovered`, or `collection` from the API.
         data: JSON-ready details.
         at: seconds since the epoch.
     """

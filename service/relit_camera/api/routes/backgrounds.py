@@ -40,11 +40,10 @@ def list_backgrounds(api: Context) -> list[BackgroundPicture]:
 @router.post("/backgrounds", status_code=HTTPStatus.CREATED, responses=responses(409, 413, 422, 503, 507))
 def add_background(api: Context, name: Annotated[Name, Form()], file: UploadFile) -> BackgroundPicture:
     """Store a picture (.jpg, .png, .webp …) to be used as background."""
-    director = api.camera.director
-    if name in director.background_names():
-        raise ConflictError(f"a background or environment '{name}' is stored already", "choose another name")
-    data = read_upload(file)
-    with api.slow_work():
+    director, data = api.camera.director, read_upload(file)
+    with api.slow_work():  # the check too: of two at a time with one name, one must hear of the other
+        if name in director.background_names():
+            raise ConflictError(f"a background or environment '{name}' is stored already", "choose another name")
         director.backgrounds.add(name, data)
     api.changed("backgrounds")
     return _item(api, name)

@@ -35,11 +35,10 @@ def list_environments(api: Context) -> list[EnvironmentItem]:
 @router.post("", status_code=HTTPStatus.CREATED, responses=responses(409, 413, 422, 503, 507))
 def add_environment(api: Context, name: Annotated[Name, Form()], file: UploadFile) -> EnvironmentDetails:
     """Store a 360° panorama (.hdr, .exr, .png or .jpg, twice as wide as high), as seen from inside."""
-    director = api.camera.director
-    if name in RESERVED_NAMES or name in {*director.background_names(), *director.guest_environments()}:
-        raise ConflictError(f"an environment or background '{name}' exists already", "choose another name")
-    data = read_upload(file)
-    with api.slow_work():
+    director, data = api.camera.director, read_upload(file)
+    with api.slow_work():  # the check too: of two at a time with one name, one must hear of the other
+        if name in RESERVED_NAMES or name in {*director.background_names(), *director.guest_environments()}:
+            raise ConflictError(f"an environment or background '{name}' exists already", "choose another name")
         director.environments.add(name, data, PurePath(file.filename or "").suffix)
     api.changed("environments")
     return _details(api, name)
