@@ -118,6 +118,15 @@ def test_a_node_given_as_sink_is_examined(tree):
     expect(finding, State.OK, "Spare", "video11", "in use at 1280x720")
 
 
+def test_a_node_that_is_no_virtual_camera_is_a_problem_though_there_is_one(tree):
+    node = str(tree.dev / "video97")
+    finding = check_virtual_camera(OutputSettings(sink=node), tree, everybody_may)
+    expect(finding, State.PROBLEM, "video97 is no virtual camera", "choose one of", "'Relit Camera'")
+    bare = FakeTree(tree.dev.parent / "bare")
+    finding = check_virtual_camera(OutputSettings(sink=str(bare.dev / "video97")), bare, everybody_may)
+    expect(finding, State.PROBLEM, "modprobe")
+
+
 # The webcam.
 
 
@@ -129,6 +138,12 @@ def test_no_webcam_and_an_unknown_one_are_problems(tree, tmp_path):
     bare = FakeTree(tmp_path / "bare")
     expect(check_webcam(SourceSettings(), bare, everybody_may), State.PROBLEM, "no webcam", "--source FILE")
     expect(check_webcam(SourceSettings(source="usb-other"), tree, everybody_may), State.PROBLEM, "usb-other", C920)
+
+
+def test_our_own_camera_is_no_webcam_whatever_it_is_called(tree):
+    node = tree.add_loopback(12, "Studio")
+    finding = check_webcam(SourceSettings(source=node), tree, everybody_may, "Studio")
+    expect(finding, State.PROBLEM, "film itself")
 
 
 def test_who_may_read_the_webcam_is_said(tree):
@@ -210,6 +225,15 @@ def test_a_gpu_build_takes_the_place_of_the_usual_one(monkeypatch):
     real = installation.metadata.version
     monkeypatch.setattr(installation.metadata, "version", version)
     expect(check_packages(), State.OK, "onnxruntime-gpu 1.30.0")
+
+
+def test_two_packages_of_one_module_are_a_warning(monkeypatch):
+    real = installation.metadata.version
+    monkeypatch.setattr(
+        installation.metadata, "version", lambda name: "1.30.0" if name == "onnxruntime-gpu" else real(name)
+    )
+    finding = check_packages()
+    expect(finding, State.WARNING, "onnxruntime and onnxruntime-gpu", "pip uninstall onnxruntime onnxruntime-gpu")
 
 
 def test_an_old_python_is_a_problem(monkeypatch):

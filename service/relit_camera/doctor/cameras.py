@@ -11,6 +11,7 @@ from relit_camera.config.settings import OutputSettings, SourceSettings
 from relit_camera.doctor.findings import Finding, fine, problem, problem_from, warning
 from relit_camera.errors import DeviceError
 from relit_camera.stream.devices import (
+    OWN_LABEL,
     SYSTEM,
     DeviceTree,
     find_virtual_camera,
@@ -27,14 +28,16 @@ Access = Callable[[str, int], bool]
 """`os.access` or a stand-in: (path, mode) → whether this user may."""
 
 
-def check_webcam(settings: SourceSettings, tree: DeviceTree = SYSTEM, access: Access = os.access) -> Finding:
-    """The camera that the settings name: there, and readable."""
+def check_webcam(
+    settings: SourceSettings, tree: DeviceTree = SYSTEM, access: Access = os.access, own_label: str = OWN_LABEL
+) -> Finding:
+    """The camera that the settings name: there, readable, and not our own virtual one, called `own_label`."""
     topic, found = "webcam", list_webcams(tree)
     names = ", ".join(f"{webcam.id} ({webcam.node})" for webcam in found) or "none"
     if settings.source in NO_DEVICE_SOURCES or Path(settings.source).expanduser().is_file():
         return fine(topic, f"not needed: the source is '{settings.source}'; there are: {names}")
     try:
-        webcam = find_webcam(settings.source, tree)
+        webcam = find_webcam(settings.source, tree, own_label)
     except DeviceError as error:
         return problem_from(topic, error)
     if Path(webcam.node).exists() and not access(webcam.node, os.R_OK | os.W_OK):
@@ -52,10 +55,13 @@ def check_virtual_camera(settings: OutputSettings, tree: DeviceTree = SYSTEM, ac
     if not sys.platform.startswith("linux") and tree is SYSTEM:
         return fine(topic, "OBS Studio's is used here; it shows when the camera starts")
     cameras = list_virtual_cameras(tree, settings.label)
+    named = next((camera for camera in cameras if camera.node == settings.sink), None)
+    if named is None and settings.sink != "camera":
+        known = ", ".join(f"{camera.node} ('{camera.label}')" for camera in cameras)
+        cure = f"choose one of {known}" if known else f"run: {load_command(settings.label)}"
+        return problem(topic, f"{settings.sink} is no virtual camera", cure)
     try:
-        camera = next((c for c in cameras if c.node == settings.sink), None) or find_virtual_camera(
-            tree, settings.label
-        )
+        camera = named or find_virtual_camera(tree, settings.label)
     except DeviceError as error:
         return problem_from(topic, error)
     if not access(camera.node, os.R_OK | os.W_OK):

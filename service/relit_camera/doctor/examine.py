@@ -40,7 +40,7 @@ def examine(config: Path | None = None, tree: DeviceTree = SYSTEM, access: Acces
         lambda: check_folder("models folder", models_folder(), f"set {FOLDER_VARIABLE} to a folder of yours"),
         lambda: check_models(settings),
         lambda: check_provider(settings),
-        lambda: check_webcam(settings.source, tree, access),
+        lambda: check_webcam(settings.source, tree, access, settings.output.label),
         lambda: check_virtual_camera(settings.output, tree, access),
         lambda: check_port(settings.server),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import platform
 import shutil
@@ -46,6 +47,11 @@ def check_packages() -> Finding:
         requirement for requirement in wanted if not requirement.marker or requirement.marker.evaluate({"extra": ""})
     ]
     wrong = [text for text in map(_fault, needed) if text]
+    twice = next((names for names in map(_installed_names, REPLACEMENTS) if len(names) > 1), ())
+    if not wrong and twice:
+        # Their files lie in one folder: whichever came last works, and a GPU may be left unused without a word.
+        seen = f"{' and '.join(twice)} are both installed and own the same folder"
+        return warning("packages", seen, f"run: pip uninstall {' '.join(twice)}, then install the one that you want")
     if not wrong:
         return fine("packages", f"{len(needed)} packages, {', '.join(map(_shown, ('onnxruntime', 'numpy')))}")
     return problem("packages", "; ".join(wrong), f"run: pip install --upgrade {PACKAGE}")
@@ -104,12 +110,18 @@ def _fault(requirement: Requirement) -> str:
 
 
 def _installed(name: str) -> tuple[str, str | None]:
+    found = next(iter(_installed_names(name)), None)
+    return (name, None) if found is None else (found, metadata.version(found))
+
+
+def _installed_names(name: str) -> list[str]:
+    """Of a package and those that bring the same module: the installed ones."""
+    found = []
     for candidate in (name, *REPLACEMENTS.get(name, ())):
-        try:
-            return candidate, metadata.version(candidate)
-        except metadata.PackageNotFoundError:
-            continue
-    return name, None
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            metadata.version(candidate)
+            found.append(candidate)
+    return found
 
 
 def _shown(name: str) -> str:
