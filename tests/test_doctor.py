@@ -141,8 +141,10 @@ def test_no_webcam_and_an_unknown_one_are_problems(tree, tmp_path):
 
 
 def test_our_own_camera_is_no_webcam_whatever_it_is_called(tree):
-    node = tree.add_loopback(12, "Studio")
-    finding = check_webcam(SourceSettings(source=node), tree, everybody_may, "Studio")
+    tree.add_loopback(12, "Studio")
+    source = SourceSettings(source="Studio")
+    expect(check_webcam(source, tree, everybody_may), State.OK, "video12")
+    finding = check_webcam(source, tree, everybody_may, "Studio")
     expect(finding, State.PROBLEM, "film itself")
 
 

@@ -98,6 +98,12 @@ def test_missing_video(material: Material, out: Path) -> None:
     replay(material, out, clip=out / "none.mp4").complains("none.mp4")
 
 
+def test_result_that_is_the_clip_itself(material: Material, out: Path) -> None:
+    before = material.clip.read_bytes()
+    assert replay(material, out, out=material.clip).code == 2
+    assert material.clip.read_bytes() == before
+
+
 def test_result_that_is_no_video_name(material: Material, out: Path) -> None:
     replay(material, out, out=out / "result.txt").complains("result.txt", ".mp4")
 

@@ -51,6 +51,8 @@ def replay(
 
     if contact_sheet and contact_sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"{contact_sheet} is neither .png nor .jpg", param_hint="--contact-sheet")
+    if video.resolve() == out.resolve():
+        raise typer.BadParameter(f"{out} is the driving video itself", param_hint="--out")
     settings = settings_of(context, tracker={"name": tracker})
     share_cores()
     chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
