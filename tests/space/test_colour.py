@@ -108,6 +108,11 @@ def test_daylight_is_white_candles_are_red_and_the_sky_is_blue() -> None:
     assert blue > 1.3 * red
 
 
+def test_a_colour_temperature_has_no_steps() -> None:
+    colours = np.array([rgb_from_kelvin(kelvin) for kelvin in range(1700, 12000, 10)])
+    assert np.abs(np.diff(colours, axis=0)).max() < 0.015
+
+
 def test_redness_falls_with_temperature() -> None:
     ratios = [rgb[0] / rgb[2] for rgb in map(rgb_from_kelvin, range(2200, 25000, 200))]
     # The two loci meet at 4000 K with a small step; everywhere else the ratio falls strictly.

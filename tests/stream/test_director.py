@@ -21,6 +21,7 @@ from relit_camera.config.look import (
 )
 from relit_camera.config.settings import StorageSettings
 from relit_camera.errors import InputError, NotFoundError, SubjectError
+from relit_camera.light.maps import irradiance
 from relit_camera.space.picture_files import encode_display, write_linear
 from relit_camera.stream.director import LIT_BY_BACKGROUND, Director
 from relit_camera.subject.file import write_subject
@@ -123,10 +124,15 @@ def test_an_environment_as_background_picture_is_seen_from_inside(director: Dire
     scene = director.set_look(Look(background=ImageBackground(image="window")))
     assert scene.backdrop is not None
     assert scene.backdrop.dtype == np.uint8
+    halves = np.split(scene.backdrop.astype(np.float64), 2, axis=1)
+    brighter_right = float(halves[1].mean() - halves[0].mean())
     lit = Look(lighting=Lighting(environment=LIT_BY_BACKGROUND), background=ImageBackground(image="window"))
     environment = director.set_look(lit).environment
     assert environment is not None
     np.testing.assert_array_equal(environment.light_map, director.environments.load("window").light_map)
+    sides = [irradiance(environment.light_map, [x, 0, 0]).mean() for x in (-1.0, 1.0)]
+    assert np.sign(brighter_right) == np.sign(sides[1] - sides[0])
+    assert abs(brighter_right) > 5
 
 
 def test_what_a_change_leaves_alone_is_kept(director: Director, monkeypatch: pytest.MonkeyPatch) -> None:

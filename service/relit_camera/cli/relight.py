@@ -49,6 +49,8 @@ def relight(
     if light is not None:
         azimuth, elevation = numbers(light, 2, "--light")
         picture = relight_direction(opened, head.inv().apply(direction_from_degrees(azimuth, elevation)))
+        if not picture.any():
+            typer.echo(f"warning: no captured light is near {light}: the picture is black", err=True)
         # One light has no surroundings to be exposed for: unit irradiance shows as itself.
         scale = 1.0
     else:

@@ -20,7 +20,7 @@ from relit_camera.reenact.reenactor import Move, Moved, Stage
 from relit_camera.reenact.room_probe import RoomProbe
 from relit_camera.reenact.source_face import SourceFace
 from relit_camera.reenact.warp import Warp, sampled
-from relit_camera.space.colour import linear_from_uint8
+from relit_camera.space.display import linear_from_display
 from relit_camera.space.images import Frame, LinearImage, Mask
 
 RATIO_RANGE = (0.02, 12.0)
@@ -60,7 +60,7 @@ class RatioReenactor:
         Raises:
             SubjectError: the live face is not the subject's: no light explains it.
         """
-        live = linear_from_uint8(frame.image)
+        live = linear_from_display(frame.image)
         width, height = frame.size
         everywhere = np.ones((height, width), np.float32)
         if motion.pose is None:

@@ -89,25 +89,39 @@ def luminance(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     return result
 
 
+def _planckian_locus(t: float) -> NDArray[np.float64]:
+    """CIE x and y of a black body at 1667 to 25000 K, after Kim et al. 2002."""
+    if t < 4000:
+        x = -0.2661239e9 / t**3 - 0.2343589e6 / t**2 + 0.8776956e3 / t + 0.179910
+    else:
+        x = -3.0258469e9 / t**3 + 2.1070379e6 / t**2 + 0.2226347e3 / t + 0.240390
+    if t < 2222:
+        y = -1.1063814 * x**3 - 1.34811020 * x**2 + 2.18555832 * x - 0.20219683
+    elif t < 4000:
+        y = -0.9549476 * x**3 - 1.37418593 * x**2 + 2.09137015 * x - 0.16748867
+    else:
+        y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
+    return np.array([x, y])
+
+
+def _daylight_locus(t: float) -> NDArray[np.float64]:
+    """CIE x and y of daylight at 4000 to 25000 K."""
+    if t <= 7000:
+        x = -4.6070e9 / t**3 + 2.9678e6 / t**2 + 0.09911e3 / t + 0.244063
+    else:
+        x = -2.0064e9 / t**3 + 1.9018e6 / t**2 + 0.24748e3 / t + 0.237040
+    return np.array([x, -3.0 * x**2 + 2.870 * x - 0.275])
+
+
 def rgb_from_kelvin(kelvin: float) -> NDArray[np.float32]:
     """Linear RGB (3,) of a black body or daylight at `kelvin`, scaled to luminance 1; negative parts are cut.
 
-    Chromaticity: Planckian locus after Kim et al. 2002 (1667 to 4000 K), CIE daylight locus above, 4000 to 25000 K;
-    outside it is clamped.
+    Chromaticity: black body below 4000 K, CIE daylight above 5000 K, between them from one to the other; clamped to
+    1667 to 25000 K.
     """
     t = float(np.clip(kelvin, 1667, 25000))
-    if t < 4000:
-        x = -0.2661239e9 / t**3 - 0.2343589e6 / t**2 + 0.8776956e3 / t + 0.179910
-        if t < 2222:
-            y = -1.1063814 * x**3 - 1.34811020 * x**2 + 2.18555832 * x - 0.20219683
-        else:
-            y = -0.9549476 * x**3 - 1.37418593 * x**2 + 2.09137015 * x - 0.16748867
-    else:
-        if t <= 7000:
-            x = -4.6070e9 / t**3 + 2.9678e6 / t**2 + 0.09911e3 / t + 0.244063
-        else:
-            x = -2.0064e9 / t**3 + 1.9018e6 / t**2 + 0.24748e3 / t + 0.237040
-        y = -3.0 * x**2 + 2.870 * x - 0.275
+    daylight = float(np.clip((t - 4000) / 1000, 0, 1))
+    x, y = (1 - daylight) * _planckian_locus(t) + daylight * _daylight_locus(max(t, 4000))
     xyz = np.array([x / y, 1.0, (1 - x - y) / y])
     rgb_from_xyz = np.array(
         [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]

@@ -156,7 +156,9 @@ class Director:
         if background.image in self.environments.names():
             environment = self.environments.load(background.image)
             # A white wall under irradiance 1 reads 1 and has radiance 1/π: so seen, background and face fit together.
-            shown = environment.panorama.radiance[:, ::-1] * np.float32(np.pi * display_scale(environment.light_map))
+            # Seen from inside, looking where the camera looks: the map's edge in the middle, its right half mirrored.
+            seen = np.roll(environment.panorama.radiance[:, ::-1], environment.panorama.radiance.shape[1] // 2, axis=1)
+            shown = seen * np.float32(np.pi * display_scale(environment.light_map))
             return uint8_from_linear(shown)
         known = ", ".join(self.background_names()) or "none"
         raise NotFoundError(f"no background picture '{background.image}'", f"stored are: {known}")
