@@ -125,3 +125,12 @@ def test_teeth_turn_with_the_head(mouth, face):
     slope, tilt = ((p[half - 1] - p[0]) for p in (band, rolled))
     angle = np.degrees(np.arctan2(slope[1], slope[0]) - np.arctan2(tilt[1], tilt[0]))
     assert angle == pytest.approx(15, abs=2)
+
+
+def test_teeth_part_in_the_middle_and_darken_to_the_sides(mouth, face):
+    x = face.landmarks[list(SCHEME.lips), 0]
+    columns = np.linspace(x.min(), x.max(), 401) * SCALE
+    row = mouth._row(face.pose, TO_OUTPUT, columns)
+    middle = 200 - 10 + int(row[190:211].argmin())
+    assert row[middle - 20] > row[middle] + 0.1 < row[middle + 20]
+    assert row[[middle - 20, middle + 20]].min() > row[[0, -1]].max() + 0.2

@@ -10,6 +10,7 @@ from relit_camera.reenact.ratio import RatioReenactor, extended, shape_differenc
 from relit_camera.reenact.reenactor import open_reenactor
 from relit_camera.reenact.room_probe import RoomLight
 from relit_camera.space.colour import linear_from_uint8
+from relit_camera.space.display import linear_from_display
 from relit_camera.space.quality import psnr
 from tests.reenact.people import NOBODY, close_up, face_of, moved_by, stage_of
 from tests.reenact.rooms import (
@@ -90,7 +91,7 @@ def test_presence_eases_to_the_live_frame():
 def test_without_a_face_the_live_frame_is_shown():
     image = live_picture(WINDOW)
     moved = moved_by(reenactor(), still_under(EVENING), NOBODY, live_frame(image, 0))
-    np.testing.assert_array_equal(moved.picture, linear_from_uint8(image))
+    np.testing.assert_array_equal(moved.picture, linear_from_display(image))  # highlights are not dimmed
     np.testing.assert_array_equal(moved.alpha, 1)
 
 

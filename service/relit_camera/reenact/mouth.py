@@ -18,8 +18,14 @@ from relit_camera.space.images import DisplayImage, LinearImage
 
 CAVITY = np.array([0.035, 0.014, 0.012], dtype=np.float32)
 """The cavity, in the exposure of the still: dark, and red rather than black."""
-TEETH = np.array([0.36, 0.33, 0.28], dtype=np.float32)
+TEETH = np.array([0.52, 0.48, 0.41], dtype=np.float32)
 """Teeth lie in the lips' shade, so they read well below white."""
+TOOTH_EDGES_CM = np.array([0.0, 0.85, 1.5, 2.25, 2.95])
+"""Where the upper teeth meet, from the middle to either side: incisors, canine, premolar."""
+TOOTH_GAP_CM, TOOTH_GAP_SHADE = 0.05, 0.22
+"""Half width of the line between two teeth, and how dark it is."""
+ROW_HALF_CM = 2.6
+"""Half width of the row that is seen from the front: beyond it bends back, out of the light."""
 TEETH_BELOW_LIP_CM = 0.2
 """How far the upper teeth show below the closed upper lip's edge; they stay with the skull when the lip goes up."""
 FULL_AT = 0.05
@@ -73,16 +79,25 @@ class Mouth:
         light = relit[self._lips[:, 1], self._lips[:, 0]].mean(axis=0) / self._white
         inside = np.broadcast_to(CAVITY * light, (*shape, 3)).copy()
         teeth = _polygon(self._teeth(pose, to_output) - low, shape, 1.5 * softness)[..., None]
-        # The row bends back toward the corners, out of the light.
-        across = (np.arange(shape[1]) - (opening[:, 0].mean() - low[0])) / max(float(np.ptp(opening[:, 0])) / 2, 1)
-        teeth *= np.clip(1.05 - 0.8 * across**2, 0, 1).astype(np.float32)[None, :, None]
-        inside += teeth * (TEETH * light - inside)
+        shade = self._row(pose, to_output, np.arange(shape[1]) + low[0] + 0.5)[None, :, None]
+        inside += teeth * (TEETH * shade * light - inside)
         area = np.s_[low[1] : high[1], low[0] : high[0]]
         cover = (hole * alpha[area])[..., None]
         picture[area] += cover * (inside - picture[area] / np.maximum(alpha[area][..., None], 1e-3))
 
     def _gap(self, landmarks: NDArray) -> float:
         return self._face.scheme.mouth_opening(landmarks.astype(np.float32))
+
+    def _row(self, pose: HeadPose, to_output: NDArray[np.float64], columns: NDArray[np.float64]) -> NDArray[np.float32]:
+        """How bright the teeth are at these `columns` (count,) of the output: darker between them and to the sides."""
+        edge = self._face.head_points[self._upper]
+        edge = edge[np.argsort(edge[:, 0])]
+        seen = _transform(to_output, project(edge, pose, self._face.size))[:, 0]
+        across = np.abs(np.interp(columns, np.maximum.accumulate(seen), edge[:, 0] - edge[:, 0].mean()))
+        pixel = float(np.abs(np.gradient(across)).mean()) if len(columns) > 1 else 0.0
+        width = max(TOOTH_GAP_CM, pixel)
+        gap = np.exp(-(((across[:, None] - TOOTH_EDGES_CM) / width) ** 2)).max(axis=1) * (TOOTH_GAP_CM / width)
+        return np.asarray(np.clip(1.05 - (across / ROW_HALF_CM) ** 2, 0, 1) * (1 - TOOTH_GAP_SHADE * gap), np.float32)
 
     def _teeth(self, pose: HeadPose, to_output: NDArray[np.float64]) -> NDArray[np.float64]:
         edge = self._face.head_points[self._upper]
