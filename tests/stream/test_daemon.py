@@ -80,6 +80,19 @@ def test_status_tells_what_runs(tmp_path: Path) -> None:
         assert found.fps.published == pytest.approx(FPS, rel=0.35)
 
 
+class SlowTracker(SteadyTracker):
+    def track(self, frame: Frame) -> FaceState:
+        time.sleep(3 / FPS)
+        return super().track(frame)
+
+
+def test_a_slow_pipeline_is_not_taken_for_a_slow_camera(tmp_path: Path) -> None:
+    with running_camera(tmp_path, tracker=SlowTracker()) as camera:
+        wait_until(lambda: camera.daemon.status().frames.dropped > 20)
+        status = camera.daemon.status()
+        assert status.fps.camera > 1.8 * status.fps.pipeline > 0
+
+
 def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

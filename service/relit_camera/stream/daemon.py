@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from dataclasses import replace
 
 from relit_camera import __version__
 from relit_camera.config.settings import RelitSettings
@@ -64,6 +65,7 @@ class Daemon:
         self._troubles: dict[str, Degradation] = {}
         self._face = FaceStatus.LOST
         self._camera_rate, self._pipeline_rate = RateMeter(), RateMeter()
+        self._index, self._passed_over = -1, 0
         self._state = CameraState.STARTING
         self._started_at = time.monotonic()
         self._stopping = threading.Event()
@@ -93,7 +95,7 @@ class Daemon:
         """What is going on."""
         scene, source, sink = self.director.scene, self._source.describe(), self._sink.describe()
         troubles = [*self._troubles.values(), *self._pipeline.troubles]
-        sessions = session_report()
+        counts, sessions = self._publisher.counts, session_report()
         troubles += [Degradation(f"model {s.name} runs on {s.provider}", s.why, s.cure) for s in sessions if s.why]
         return CameraStatus(
             state=CameraState.FROZEN if scene.frozen else self._state,
@@ -105,7 +107,7 @@ class Daemon:
             fps=Rates(self._camera_rate.rate(), self._pipeline_rate.rate(), self._publisher.fps),
             latency_ms=self._publisher.latency_ms,
             stage_ms=self._pipeline.timer.percentiles(),
-            frames=self._publisher.counts,
+            frames=replace(counts, dropped=counts.dropped + self._passed_over),
             providers={s.name: s.provider for s in sessions},
             degraded=troubles,
             version=__version__,
@@ -128,7 +130,7 @@ class Daemon:
             frame = self._read()
             if frame is None:
                 continue
-            self._camera_rate.tick()
+            self._count(frame)
             scene = self.director.scene
             if scene.frozen:
                 continue
@@ -159,6 +161,13 @@ class Daemon:
             self._publisher.placeholder = self._waiting_picture
             self._set_state(CameraState.WAITING)
         return frame
+
+    def _count(self, frame: Frame) -> None:
+        """Frames that the source gave, those too that were replaced before the worker came: indices have gaps there."""
+        given = frame.index - self._index
+        self._index, self._passed_over = frame.index, self._passed_over + given - 1
+        for _ in range(given):
+            self._camera_rate.tick(frame.captured_at)
 
     def _follow(self, finished: Finished) -> None:
         face = finished.motion.status if finished.motion else FaceStatus.LOST
