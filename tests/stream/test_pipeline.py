@@ -55,8 +55,27 @@ def test_reenact_lets_no_live_pixel_through() -> None:
 
 
 def test_without_a_subject_the_live_picture_passes() -> None:
-    picture = pipeline().process(frame(), scene(subject=False)).image
-    assert difference(picture, grey()) <= 1
+    made = pipeline()
+    assert difference(made.process(frame(), scene(subject=False)).image, grey()) <= 1
+    assert [trouble.why for trouble in made.troubles] == ["no subject is chosen"]
+    made.process(frame(1), scene())
+    assert made.troubles == []
+
+
+def test_ratio_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
+    """The face is tracked in the frame as it comes, the light is exchanged in the frame as it goes out."""
+    size, shown = (160, 90), scene(mode=Mode.RATIO, lighting={"exposure_ev": -2})
+    textured = cv2.resize(np.random.default_rng(0).integers(60, 200, (9, 16, 3), dtype=np.uint8), (320, 240))
+    live = frame(0, textured)
+    scaled, cut = pipeline(NoddingTracker(), size), pipeline(NoddingTracker(), size)
+    one = scaled.process(live, shown).image
+    motion = scaled.process(live, shown).motion
+    assert motion is not None
+    assert motion.pose is not None
+    middle = motion.landmarks.mean(axis=0)
+    assert np.abs(middle - np.array(size) / 2).max() < 0.2 * size[1]
+    two = cut.process(fitted(live, size), shown).image
+    assert difference(one, two) < 2
 
 
 def test_the_light_comes_from_its_side() -> None:
@@ -129,8 +148,9 @@ def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None
 def test_stages_are_timed() -> None:
     made = pipeline()
     made.process(frame(), scene())
-    assert set(made.timer.latest_ms()) == {"track", "light", "relight", "follow", "move", "compose"}
-    assert all(value > 0 for value in made.timer.latest_ms().values())
+    stages = made.timer.lap_ms()
+    assert set(stages) == {"track", "light", "relight", "follow", "move", "compose"}
+    assert all(value > 0 for value in stages.values())
 
 
 def test_a_matte_that_needs_a_missing_model_says_which(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,3 +56,4 @@ def run_camera(settings: RelitSettings, environment: str | None = None) -> None:
         typer.echo(f"Relit Camera runs; the panel is at {server.address.url}")
         while not stop.wait(0.5):
             pass
+        daemon.begin_stop()

@@ -35,7 +35,8 @@ STALE_AFTER_S = 3.0
 """Without a new picture for this long the placeholder is shown."""
 RETRY_S = 1.0
 """Pause after a frame that could not be processed."""
-STOP_S = 1.5
+STOP_S = 2.0
+"""What has not ended by then, a device or a network that hangs, is left behind."""
 
 
 class Daemon:
@@ -69,6 +70,8 @@ class Daemon:
         self._state = CameraState.STARTING
         self._started_at = time.monotonic()
         self._stopping = threading.Event()
+        self._stop_by = 0.0
+        self._ending: list[threading.Thread] = []
         # No daemon thread: one that is inside OpenCV when the interpreter ends would abort the process.
         self._worker = threading.Thread(target=self._run, name="worker")
 
@@ -77,14 +80,24 @@ class Daemon:
         self._publisher.start()
         self._worker.start()
 
-    def stop(self) -> None:
-        """End all threads and free the devices, within 3 s. Harmless when repeated."""
+    def begin_stop(self) -> None:
+        """Tell all threads to end, and return at once. Harmless when repeated."""
+        if self._stopping.is_set():
+            return
         self._stopping.set()
         self._set_state(CameraState.STOPPING)
-        if self._worker.ident is not None:
-            self._worker.join(STOP_S)
-        self._publisher.stop()
-        self._source.close()
+        self._stop_by = time.monotonic() + STOP_S
+        for end in (self._publisher.stop, self._source.close):
+            thread = threading.Thread(target=end, daemon=True)
+            thread.start()
+            self._ending.append(thread)
+
+    def stop(self) -> None:
+        """End all threads and free the devices, within `STOP_S` of `begin_stop`. Harmless when repeated."""
+        self.begin_stop()
+        for thread in (self._worker, *self._ending):
+            if thread.ident is not None:
+                thread.join(max(0.0, self._stop_by - time.monotonic()))
         self._sink.close()
 
     def stopping(self) -> bool:

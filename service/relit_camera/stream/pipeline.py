@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import logging
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from relit_camera.config.look import Mode
 from relit_camera.config.settings import ReenactSettings, TrackerSettings
@@ -32,6 +33,9 @@ from relit_camera.subject.subject import Subject
 
 log = logging.getLogger(__name__)
 
+NO_SUBJECT = Degradation(
+    "the live picture is shown as it is", "no subject is chosen", "choose one in the panel or with --subject"
+)
 REENACTOR_OF_MODE = {Mode.REENACT: "first-order", Mode.RATIO: "ratio"}
 
 
@@ -115,15 +119,18 @@ class Pipeline:
             ModelError: a model that the scene needs is missing.
         """
         subject, mode = scene.subject, self._mode(scene)
-        if mode is Mode.RATIO:
-            frame = fitted(frame, self._size)
         if subject is None:
+            self._troubles["subject"] = NO_SUBJECT
             frame = fitted(frame, self._size)
             return Finished(self._composer.live(linear_from_display(frame.image), frame, scene), None)
+        self._troubles.pop("subject", None)
         cast = self._prepare(subject, mode)
         with self.timer.stage("track"):
             motion = self._follower.follow(self._tracker.track(frame), frame.size, frame.time_s)
-        following = self._beside.submit(self._follow, cast, motion, frame)
+        live = frame
+        if mode is Mode.RATIO:
+            live, motion = fitted(frame, self._size), fitted_motion(motion, frame.size, self._size)
+        following = self._beside.submit(self._follow, cast, motion, live)
         with self.timer.stage("light"):
             room = self._light.update(scene, frame.time_s)
             light = rotate(room, motion.rotation)
@@ -137,7 +144,7 @@ class Pipeline:
         if moved is None:
             return self.process(frame, scene)
         with self.timer.stage("compose"):
-            image = self._compose(moved, mode, frame, scene)
+            image = self._compose(moved, mode, live, scene)
         return Finished(image, motion)
 
     def _mode(self, scene: Scene) -> Mode:
@@ -202,13 +209,24 @@ def blended(subject: Subject, relit: LinearImage, share: float) -> LinearImage:
     return np.asarray(linear_from_uint8(subject.neutral) * (1 - share) + relit * share, dtype=np.float32)
 
 
+def _fit(size: tuple[int, int], to: tuple[int, int]) -> tuple[float, NDArray[np.float64]]:
+    """Scale and shift (2,) that let a picture of `size` (width, height) cover one of size `to`, middle on middle."""
+    scale = max(to[0] / size[0], to[1] / size[1])
+    return scale, (np.array(to) - scale * np.array(size)) / 2
+
+
+def fitted_motion(motion: FaceMotion, size: tuple[int, int], to: tuple[int, int]) -> FaceMotion:
+    """The motion seen in a frame of `size` (width, height), as it is seen in that frame `fitted` to another."""
+    scale, shift = _fit(size, to)
+    pose = motion.pose and replace(motion.pose, focal_px=motion.pose.focal_px * scale)
+    return replace(motion, landmarks=(motion.landmarks * scale + shift).astype(np.float32), pose=pose)
+
+
 def fitted(frame: Frame, size: tuple[int, int]) -> Frame:
     """The frame scaled to cover `size` (width, height) and cut to it about its middle; the frame itself if it fits."""
     if frame.size == size:
         return frame
-    width, height = frame.size
-    scale = max(size[0] / width, size[1] / height)
-    shift = [(size[i] - scale * (width, height)[i]) / 2 for i in range(2)]
+    scale, shift = _fit(frame.size, size)
     # cv2's pixel centres are integers: x' + ½ = s (x + ½) + shift.
     affine = np.array([[scale, 0, shift[0] + (scale - 1) / 2], [0, scale, shift[1] + (scale - 1) / 2]])
     flags = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR

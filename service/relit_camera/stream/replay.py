@@ -27,7 +27,7 @@ class ReplayedFrame:
         index: from 0 in presentation order.
         time_s: presentation time.
         motion: what the face did.
-        stage_ms: milliseconds of each stage.
+        stage_ms: milliseconds of each stage that it went through.
     """
 
     index: int
@@ -77,7 +77,7 @@ def replay(
         pipeline = pipeline_for(size)
         for frame in reader:
             finished = pipeline.process(frame, scene_at(frame.time_s))
-            frames.append(ReplayedFrame(frame.index, frame.time_s, finished.motion, pipeline.timer.latest_ms()))
+            frames.append(ReplayedFrame(frame.index, frame.time_s, finished.motion, pipeline.timer.lap_ms()))
             watch(frame.index, frame.image, finished.image)
             if writer:
                 writer.write(np.ascontiguousarray(finished.image), frame.time_s)

@@ -28,12 +28,6 @@ class DurationWindow:
         with self._lock:
             self._seconds.append(seconds)
 
-    @property
-    def latest_ms(self) -> float:
-        """The last duration in milliseconds, 0 before the first."""
-        with self._lock:
-            return self._seconds[-1] * 1e3 if self._seconds else 0.0
-
     def percentiles(self) -> Percentiles:
         """Median and 95th percentile in milliseconds, 0 before the first duration."""
         with self._lock:
@@ -54,6 +48,7 @@ class StageTimer:
     def __init__(self, length: int = WINDOW) -> None:
         self._length = length
         self._windows: dict[str, DurationWindow] = {}
+        self._lap: dict[str, float] = {}
         self._lock = threading.Lock()
 
     @contextmanager
@@ -67,15 +62,18 @@ class StageTimer:
         """Count a duration that was measured elsewhere."""
         with self._lock:
             window = self._windows.setdefault(name, DurationWindow(self._length))
+            self._lap[name] = seconds * 1e3
         window.add(seconds)
 
     def percentiles(self) -> dict[str, Percentiles]:
         """Median and 95th percentile of every stage in milliseconds, in the order the stages were first timed."""
         return {name: window.percentiles() for name, window in self._copy().items()}
 
-    def latest_ms(self) -> dict[str, float]:
-        """Give the last duration of every stage in milliseconds."""
-        return {name: window.latest_ms for name, window in self._copy().items()}
+    def lap_ms(self) -> dict[str, float]:
+        """Give the milliseconds of the stages that ran since this was last asked."""
+        with self._lock:
+            lap, self._lap = self._lap, {}
+        return lap
 
     def _copy(self) -> dict[str, DurationWindow]:
         with self._lock:
