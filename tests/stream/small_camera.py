@@ -24,7 +24,7 @@ from relit_camera.stream.daemon import Daemon
 from relit_camera.stream.director import Director
 from relit_camera.stream.sinks.null import NullSink
 from relit_camera.stream.sources.base import Source, SourceInfo
-from relit_camera.stream.sources.playback import Timed, playback
+from relit_camera.stream.sources.playback import Playback, Timed
 from relit_camera.subject.subject import Subject
 
 SIZE = (128, 96)
@@ -60,7 +60,7 @@ def memory_source(picture: DisplayImage | None = None, count: int | None = None)
             yield shown, index / FPS
             index += 1
 
-    return playback(SourceInfo("still", "memory", SIZE, FPS), play, loop=False, realtime=True)
+    return Playback(SourceInfo("still", "memory", SIZE, FPS), play())
 
 
 @dataclass

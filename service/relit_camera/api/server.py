@@ -8,7 +8,6 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
 
@@ -140,18 +139,12 @@ def listen(settings: ServerSettings) -> socket.socket:
 _FREE = "--port 0 picks a free one"
 
 
-def serve(
-    app: FastAPI,
-    settings: ServerSettings,
-    on_ready: Callable[[Address], None] | None = None,
-    listener: socket.socket | None = None,
-) -> ApiServer:
+def serve(app: FastAPI, settings: ServerSettings, listener: socket.socket | None = None) -> ApiServer:
     """Run the application of `create_app` in a thread; returns when it answers.
 
     Args:
         app: from `create_app`.
         settings: host and port, used where no listener is given.
-        on_ready: called with the real address, once it answers.
         listener: from `listen`, for a caller who wants to know early that the port is free.
 
     Raises:
@@ -159,6 +152,4 @@ def serve(
     """
     server = ApiServer(app, listener or listen(settings))
     server.start()
-    if on_ready is not None:
-        on_ready(server.address)
     return server

@@ -91,9 +91,8 @@ class SourceInfo:
 class Source(Protocol):
     """Gives frames to one reading thread. Nothing is opened before the first `read`.
 
-    A live source (camera, or a file played in real time) gives the newest frame and drops older ones; a file read as
-    fast as possible waits for its reader and drops none. Indices count from 0 and grow; they have gaps where frames
-    were dropped.
+    The newest frame is given, older ones are dropped. Indices count from 0 and grow; they have gaps where frames were
+    dropped.
     """
 
     def read(self, timeout_s: float) -> Frame | None:

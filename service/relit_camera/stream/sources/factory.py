@@ -15,20 +15,13 @@ from relit_camera.stream.sources.still import still_source
 from relit_camera.stream.sources.webcam import WebcamSource
 
 
-def open_source(
-    settings: SourceSettings,
-    *,
-    loop: bool = True,
-    realtime: bool = True,
-    own_label: str = OWN_LABEL,
-    tree: DeviceTree = SYSTEM,
-) -> Source:
+def open_source(settings: SourceSettings, *, own_label: str = OWN_LABEL, tree: DeviceTree = SYSTEM) -> Source:
     """Make the source that `settings.source` names: `webcam`, a camera's id, `pattern`, a picture or a video file.
+
+    Files, pictures and pattern keep their own time; a video begins anew after its end.
 
     Args:
         settings: source, and the size and rate to ask of a camera or pattern.
-        loop: a file begins anew after its end.
-        realtime: files, pictures and pattern keep their own time; otherwise they are as fast as their reader.
         own_label: name of the virtual camera that is published to: never a source.
         tree: where cameras are looked for.
 
@@ -40,11 +33,11 @@ def open_source(
     text, size = settings.source, (settings.width, settings.height)
     path = Path(text).expanduser()
     if text == "pattern":
-        return pattern_source(size, settings.fps, realtime=realtime)
+        return pattern_source(size, settings.fps)
     if path.is_file():
         if path.suffix.lower() in LDR_SUFFIXES:
-            return still_source(path, settings.fps, loop=loop, realtime=realtime)
-        return file_source(path, loop=loop, realtime=realtime)
+            return still_source(path, settings.fps)
+        return file_source(path)
     try:
         return WebcamSource(text, size, settings.fps, tree=tree, own_label=own_label)
     except DeviceError as error:

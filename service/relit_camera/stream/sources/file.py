@@ -6,22 +6,27 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from relit_camera.stream.sources.base import Source, SourceInfo
-from relit_camera.stream.sources.playback import Timed, playback
+from relit_camera.stream.sources.playback import Playback, Timed
 from relit_camera.stream.video import VideoReader, probe
 
 
-def file_source(path: Path, *, loop: bool, realtime: bool) -> Source:
-    """Play a video file; see `playback` for `loop` and `realtime`.
+def file_source(path: Path) -> Source:
+    """Play a video file in its own time, for ever.
 
     Raises:
         VideoError: as `VideoReader`; what shows only later, `read` raises.
     """
     info = probe(path)
-
-    def play() -> Iterator[Timed]:
-        with VideoReader(path, accurate=not realtime) as video:
-            for frame in video:
-                yield frame.image, frame.time_s
-
     described = SourceInfo("file", str(path), (info.width, info.height), info.fps)
-    return playback(described, play, loop=loop, realtime=realtime)
+    return Playback(described, _rounds(path, info.fps))
+
+
+def _rounds(path: Path, fps: float) -> Iterator[Timed]:
+    """The pictures of one round after another, their times growing throughout."""
+    start = 0.0
+    while True:
+        with VideoReader(path, accurate=False) as video:
+            for frame in video:
+                end = start + frame.time_s
+                yield frame.image, end
+        start = end + 1 / fps

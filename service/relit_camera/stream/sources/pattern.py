@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 
 import numpy as np
 
 from relit_camera.errors import InputError
 from relit_camera.space.images import DisplayImage
 from relit_camera.stream.sources.base import Source, SourceInfo
-from relit_camera.stream.sources.playback import Timed, playback
+from relit_camera.stream.sources.playback import Playback
 
 NUMBER_BITS = 24
 CELLS = 32
@@ -26,8 +25,8 @@ BARS = np.array(
 """The colours of a television test picture at 75 %."""
 
 
-def pattern_source(size: tuple[int, int], fps: float, *, realtime: bool) -> Source:
-    """Draw the test pattern for ever.
+def pattern_source(size: tuple[int, int], fps: float) -> Source:
+    """Draw the test pattern `fps` times a second, for ever.
 
     Raises:
         InputError: narrower than 128 or lower than 96 pixels: the number could not be read back.
@@ -35,12 +34,8 @@ def pattern_source(size: tuple[int, int], fps: float, *, realtime: bool) -> Sour
     if size[0] < 128 or size[1] < 96:
         raise InputError(f"the test pattern cannot be {size[0]}x{size[1]}", "use at least 128x96")
     colours = _colours(size)
-
-    def play() -> Iterator[Timed]:
-        for number in itertools.count():
-            yield _draw(colours, number), number / fps
-
-    return playback(SourceInfo("pattern", "pattern", size, fps), play, loop=False, realtime=realtime)
+    pictures = ((_draw(colours, number), number / fps) for number in itertools.count())
+    return Playback(SourceInfo("pattern", "pattern", size, fps), pictures)
 
 
 def draw_pattern(size: tuple[int, int], number: int) -> DisplayImage:

@@ -57,11 +57,6 @@ class ThreadedSource(ABC):
         """One line saying why no frames come; empty while they do."""
         return self._reason
 
-    @property
-    def dropped(self) -> int:
-        """Frames that were replaced by newer ones before they were read."""
-        return self._reader.dropped
-
     def describe(self) -> SourceInfo:
         """Say what the source is."""
         return self._info
