@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -163,7 +164,8 @@ def test_subjects_by_path_by_name_and_none(director: Director, tmp_path: Path) -
     path = tmp_path / "me.relit"
     write_subject(path, small_subject())
     assert director.set_subject(str(path)).subject_name == "me"
-    director.subjects.add("stored", path)
+    director.subjects.folder.mkdir(parents=True)
+    shutil.copy(path, director.subjects.folder / "stored.relit")
     assert director.set_subject("stored").subject is not None
     kept = director.scene
     path.write_bytes(b"damaged")

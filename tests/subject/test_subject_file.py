@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import mmap
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +106,9 @@ def test_a_full_disk_leaves_nothing(subject: Subject, tmp_path: Path, monkeypatc
 
 def test_the_store_names_what_is_near(path: Path, tmp_path: Path) -> None:
     store = SubjectStore(tmp_path / "store")
-    store.add("anna", path)
+    store.folder.mkdir()
+    shutil.copy(path, store.folder / "anna.relit")
+    (store.folder / ".anna.0x1y.relit").touch()  # a write under way
     assert store.names() == ["anna"]
     assert store.resolve("anna")[0] == "anna"
     assert store.resolve(str(path))[0] == "s"

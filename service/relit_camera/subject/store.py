@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 from difflib import get_close_matches
 from pathlib import Path
 
-from relit_camera.errors import InputError, NotFoundError
-from relit_camera.files import atomic_path
+from relit_camera.errors import NotFoundError
 from relit_camera.subject.file import SUFFIX, read_subject
 from relit_camera.subject.subject import Subject
 
@@ -20,7 +18,8 @@ class SubjectStore:
 
     def names(self) -> list[str]:
         """Stored names in alphabetical order."""
-        return sorted(path.stem for path in self.folder.glob(f"*{SUFFIX}"))
+        # Hidden files are temporary ones of a write under way.
+        return sorted(path.stem for path in self.folder.glob(f"[!.]*{SUFFIX}"))
 
     def path(self, name: str) -> Path:
         """The file of a stored subject.
@@ -56,21 +55,6 @@ class SubjectStore:
         if not path.exists():
             self.path(name_or_path)
         return path.stem, read_subject(path)
-
-    def add(self, name: str, source: Path) -> None:
-        """Copy a subject file into the store under `name`, whole or not at all.
-
-        Raises:
-            SubjectError: `source` is not a usable subject file.
-            InputError: the name would leave the folder.
-            StorageError: the copy cannot be written.
-        """
-        if Path(name).name != name or name.startswith("."):
-            raise InputError(f"'{name}' cannot name a subject", "use letters, digits, dash and underscore")
-        read_subject(source)
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with atomic_path(self.folder / f"{name}{SUFFIX}") as temporary:
-            shutil.copyfile(source, temporary)
 
     def remove(self, name: str) -> None:
         """Delete a stored subject.
