@@ -75,6 +75,20 @@ def test_the_newest_picture_wins_and_the_others_are_counted(make, sink):
     assert publisher.counts.dropped >= 8
 
 
+def test_a_late_picture_is_waited_for_but_a_missing_one_is_not(make, sink):
+    publisher = make(fps=5)
+    publisher.pictures.put(picture(1))
+    wait_until(lambda: 1 in sink.values)
+    due = sink.times[-1] + 0.2
+    time.sleep(max(0.0, due + 0.04 - time.monotonic()))
+    publisher.pictures.put(picture(2))
+    wait_until(lambda: 2 in sink.values)
+    assert sink.times[sink.values.index(2)] - due < 0.1  # not a whole period later
+    wait_until(lambda: sink.values.count(2) == 5)
+    steps = np.diff(sink.times[-3:])
+    np.testing.assert_allclose(steps, 0.2, atol=0.05)
+
+
 def test_the_rate_is_kept_without_drift(make, sink):
     start = time.monotonic()
     publisher = make(fps=100)

@@ -21,6 +21,9 @@ RETRY_S = 1.0
 
 STOP_S = 1.0
 
+GRACE = 0.4
+"""Share of a period for which a tick waits for a late picture: so it is late by that much, not by a whole period."""
+
 
 @dataclass(frozen=True)
 class PublishedPicture:
@@ -40,8 +43,8 @@ class PublishedPicture:
 class Publisher:
     """Writes to the sink at a steady rate: the newest picture, else the last again, else the placeholder.
 
-    It never waits for the pipeline, and a sink that fails is tried again every second. The sink belongs to the caller,
-    who closes it after `stop`.
+    It waits for the pipeline no longer than `GRACE`, and a sink that fails is tried again every second. The sink belongs
+    to the caller, who closes it after `stop`.
 
     Attributes:
         pictures: the slot to put finished pictures in.
@@ -117,9 +120,11 @@ class Publisher:
 
     def _run(self) -> None:
         pacer = Pacer(self._fps, time.monotonic())
+        picture = None
         while not self._stopping.wait(max(0.0, pacer.deadline - time.monotonic())):
+            # Only where pictures do come: after a tick without one it is not late, but missing.
+            picture = self._newest.get(0.0 if picture is None else GRACE * pacer.period)
             now = time.monotonic()
-            picture = self._newest.get(0)
             self._tick(picture, now)
             pacer.advance(time.monotonic(), None if picture is None else now - self._newest.put_at)
 

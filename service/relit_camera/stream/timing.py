@@ -111,12 +111,12 @@ class Pacer:
     """Deadlines at a frame rate, by arithmetic on one monotonic clock, so that they do not drift.
 
     A picture that is ready waits for the next deadline, up to a whole period. When pictures come at about the frame
-    rate, the deadlines are moved by at most 1 % of a period a frame, until pictures are ready a fifth of a period ahead
+    rate, the deadlines are moved by at most 1 % of a period a frame, until pictures are ready a tenth of a period ahead
     of them: latency falls, and the time between frames stays even. Pictures of any other rate come at all phases and
     move the deadlines to and fro, by nothing on average.
     """
 
-    MARGIN = 0.2
+    MARGIN = 0.1
     NUDGE = 0.01
     LATE = 3.0
 
