@@ -43,8 +43,8 @@ class PublishedPicture:
 class Publisher:
     """Writes to the sink at a steady rate: the newest picture, else the last again, else the placeholder.
 
-    It waits for the pipeline no longer than `GRACE`, and a sink that fails is tried again every second. The sink belongs
-    to the caller, who closes it after `stop`.
+    It waits for the pipeline no longer than `GRACE`. A sink that fails is tried again every second; it belongs to the
+    caller, who closes it after `stop`.
 
     Attributes:
         pictures: the slot to put finished pictures in.
