@@ -20,15 +20,15 @@ def atomic_path(target: Path) -> Iterator[Path]:
     On any failure it is deleted and an existing target is left as it was.
 
     Raises:
-        StorageError: the folder does not exist, is not writable, or the disk is full.
+        StorageError: the folder does not exist, is not writable, the name is too long, or the disk is full.
     """
     target = Path(target)
-    if target.is_dir():
-        raise StorageError(f"cannot write {target}: it is a folder", "name a file in it")
     try:
+        if target.is_dir():
+            raise StorageError(f"cannot write {target}: it is a folder", "name a file in it")
         handle, name = tempfile.mkstemp(prefix=f".{target.stem[:40]}.", suffix=target.suffix, dir=target.parent)
     except OSError as error:
-        raise _storage_error(target, error) from error
+        raise storage_error(target, error) from error
     os.close(handle)
     temporary = Path(name)
     try:
@@ -39,7 +39,7 @@ def atomic_path(target: Path) -> Iterator[Path]:
         temporary.replace(target)
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EROFS, errno.EFBIG):
-            raise _storage_error(target, error) from error
+            raise storage_error(target, error) from error
         raise
     finally:
         temporary.unlink(missing_ok=True)
@@ -64,12 +64,14 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _storage_error(folder, error) from error
+        raise storage_error(folder, error) from error
 
 
-def _storage_error(target: Path, error: OSError) -> StorageError:
+def storage_error(target: Path, error: OSError) -> StorageError:
+    """What a person is told when `target` cannot be written: why, and the cure."""
     cures = {
         errno.ENOENT: "create the folder first",
+        errno.ENAMETOOLONG: "choose a shorter name",
         errno.EACCES: "choose a folder you may write to",
         errno.EROFS: "choose a folder you may write to",
         errno.ENOSPC: "free some space on the disk",

@@ -334,6 +334,20 @@ def test_result_that_is_a_folder(material: Material, out: Path, tmp_path: Path) 
     assert files(folder) == set()
 
 
+def test_name_that_is_too_long(material: Material, out: Path) -> None:
+    """No file system takes more than 255 bytes; the letters here have two each."""
+    name = "ä" * 126
+    written = relight(material.subject, out, light="0,0", out=out / f"{name}.png")
+    written.complains("cannot write", "File name too long", "shorter")
+    for answer in (
+        replay(material, out, clip=f"{name}.mp4"),
+        replay(material, out, environment=f"{name}.hdr"),
+        relight(Path(f"{name}.relit"), out, light="0,0"),
+        call("config", "check", f"{name}.yaml"),
+    ):
+        answer.complains(name, "too long", "shorter")
+
+
 @pytest.fixture
 def full_disk(tmp_path: Path) -> Iterator[Path]:
     """A disk of 64 kB, where this user may mount one."""

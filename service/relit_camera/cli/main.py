@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import signal
 import sys
@@ -104,4 +105,9 @@ def run() -> None:
         print(f"relit: {error}", file=sys.stderr)
         sys.exit(1)
     except BrokenPipeError:
+        sys.exit(1)
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:  # that one only a name that a person gave can be
+            raise
+        print(f"relit: cannot use {error.filename}: the name is too long; choose a shorter one", file=sys.stderr)
         sys.exit(1)
