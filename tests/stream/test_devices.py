@@ -1,4 +1,5 @@
 import json
+import re
 
 import pytest
 from typer.testing import CliRunner
@@ -117,7 +118,7 @@ def test_the_negotiated_size_is_read(tree, text, size):
 
 def run(monkeypatch, tree, *arguments):
     monkeypatch.setattr(command, "list_webcams", lambda: list_webcams(tree))
-    monkeypatch.setattr(command, "list_virtual_cameras", lambda: list_virtual_cameras(tree))
+    monkeypatch.setattr(command, "list_virtual_cameras", lambda label: list_virtual_cameras(tree, label))
     result = CliRunner().invoke(command.app, list(arguments))
     assert result.exit_code == 0
     return result.stdout
@@ -129,6 +130,15 @@ def test_the_command_lists_both_kinds(monkeypatch, tree):
     assert C920 in text
     assert "OBS Virtual Camera (another program's, free)" in text
     assert "Relit Camera (ours, 1280x720, in use)" in text
+
+
+def test_the_command_knows_a_renamed_camera_as_ours(monkeypatch, tree):
+    monkeypatch.setenv("RELIT_OUTPUT__LABEL", "Studio")
+    assert re.search('none of ours: run sudo modprobe .* card_label="Studio"', run(monkeypatch, tree))
+    tree.add_loopback(11, "Studio")
+    text = run(monkeypatch, tree)
+    assert "Studio (ours, free)" in text
+    assert "Relit Camera (another program's, free)" in text
 
 
 def test_the_command_speaks_json(monkeypatch, tree):

@@ -14,9 +14,15 @@ app = typer.Typer()
 
 
 @app.command()
-def devices(as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False) -> None:
+def devices(
+    context: typer.Context,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
+) -> None:
     """List the webcams that --source takes, and the virtual cameras."""
-    webcams, virtual = list_webcams(), list_virtual_cameras()
+    from relit_camera.cli.settings import settings_of
+
+    label = settings_of(context).output.label
+    webcams, virtual = list_webcams(), list_virtual_cameras(label=label)
     if as_json:
         found = {
             "webcams": [dataclasses.asdict(webcam) for webcam in webcams],
@@ -24,7 +30,9 @@ def devices(as_json: Annotated[bool, typer.Option("--json", help="Print JSON ins
         }
         typer.echo(json.dumps(found, indent=2))
     else:
-        typer.echo("\n".join(["Webcams", *_webcam_lines(webcams), "", "Virtual cameras", *_virtual_lines(virtual)]))
+        typer.echo(
+            "\n".join(["Webcams", *_webcam_lines(webcams), "", "Virtual cameras", *_virtual_lines(virtual, label)])
+        )
 
 
 def _webcam_lines(webcams: list[Webcam]) -> list[str]:
@@ -34,12 +42,12 @@ def _webcam_lines(webcams: list[Webcam]) -> list[str]:
     return [f"  {webcam.id:<{width}}  {webcam.node}  {webcam.name}" for webcam in webcams]
 
 
-def _virtual_lines(cameras: list[VirtualCamera]) -> list[str]:
+def _virtual_lines(cameras: list[VirtualCamera], label: str) -> list[str]:
     lines = []
     for camera in cameras:
         owner = "ours" if camera.ours else "another program's"
         use = f"{camera.size[0]}x{camera.size[1]}, in use" if camera.size else "free"
         lines.append(f"  {camera.node}  {camera.label} ({owner}, {use})")
     if not any(camera.ours for camera in cameras):
-        lines.append(f"  none of ours: run {load_command()}")
+        lines.append(f"  none of ours: run {load_command(label)}")
     return lines
