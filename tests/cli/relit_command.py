@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from io import StringIO
 from pathlib import Path
 from unittest.mock import patch
@@ -62,14 +63,19 @@ def call(*arguments: object) -> Answer:
     return Answer(code, out.getvalue(), err.getvalue())
 
 
-def start(*arguments: object, folder: Path) -> subprocess.Popen[str]:
-    """Start a command in a process of its own, which keeps its data in `folder`."""
+def start(*arguments: object, folder: Path, full_at: int | None = None) -> subprocess.Popen[str]:
+    """Start a command in a process of its own, which keeps its data in `folder`.
+
+    With `full_at` no file may grow beyond so many bytes: the kernel refuses to write them, as on a full disk.
+    """
+    limit = None if full_at is None else partial(resource.setrlimit, resource.RLIMIT_FSIZE, (full_at, full_at))
     return subprocess.Popen(
         [*COMMAND, *map(str, arguments)],
         env=environment(folder),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=limit,
     )
 
 

@@ -28,8 +28,10 @@ def arguments(material: Material, *more: object) -> list[object]:
 
 
 @contextmanager
-def running(material: Material, folder: Path, *more: object) -> Iterator[tuple[subprocess.Popen[str], httpx.Client]]:
-    process = start(*arguments(material, *more), folder=folder)
+def running(
+    material: Material, folder: Path, *more: object, full_at: int | None = None
+) -> Iterator[tuple[subprocess.Popen[str], httpx.Client]]:
+    process = start(*arguments(material, *more), folder=folder, full_at=full_at)
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
@@ -106,6 +108,27 @@ def test_environment_of_a_file_lights_this_run(material: Material, tmp_path: Pat
     with running(material, tmp_path, "--environment", "sunset", "--mode", "ratio") as (_, http):
         assert http.get("lighting").json()["environment"] == "sunset"
         assert http.get("mode").json() == {"mode": "ratio"}
+
+
+def test_a_disk_that_is_full_loses_the_file_not_the_camera(material: Material, tmp_path: Path) -> None:
+    recording = tmp_path / "recording.mp4"
+    with running(material, tmp_path, "--sink", recording, full_at=20) as (process, http):
+        deadline = time.monotonic() + START_S
+        while not (status := http.get("status").json())["degraded"]:
+            assert time.monotonic() < deadline
+            time.sleep(0.2)
+        assert status["degraded"][0]["what"] == "sink failed"
+        assert "recording.mp4: File too large" in status["degraded"][0]["why"]
+        assert http.get("snapshot.jpg").status_code == 200
+        time.sleep(1.5)  # the publisher has tried again
+        assert http.get("status").json()["state"] == "live"
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 1
+        assert process.stderr is not None
+        said = process.stderr.read().splitlines()
+        assert said[-1].startswith(f"relit: cannot write {recording}: File too large;")
+        assert "Traceback" not in "\n".join(said)
+    assert not [path.name for path in tmp_path.iterdir() if "recording" in path.name]
 
 
 def test_port_in_use(material: Material, tmp_path: Path) -> None:

@@ -1,3 +1,7 @@
+import errno
+from itertools import repeat
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -213,6 +217,27 @@ def test_a_file_keeps_the_times_of_publishing(tmp_path, monkeypatch):
         frames = list(video)
     assert [read_number(frame.image) for frame in frames] == [0, 1, 2, 3]
     assert [frame.time_s for frame in frames] == pytest.approx([0, 0.1, 0.15, 1.0], abs=1e-3)
+
+
+def test_a_file_that_failed_is_lost_and_says_so_to_the_end(tmp_path, monkeypatch):
+    path = tmp_path / "out.mp4"
+    sink = FileSink(path, SIZE, 30)
+    sink.write(draw_pattern(SIZE, 0))
+    with pytest.raises(ImageError):
+        sink.write(draw_pattern((128, 96), 1))  # no failure of the file
+
+    def full(packet):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(sink._video, "_container", SimpleNamespace(mux=full))
+    said = r"out\.mp4: Input/output error"
+    with pytest.raises(StorageError, match=said):  # the encoder keeps some pictures before it gives the first away
+        any(map(sink.write, repeat(draw_pattern(SIZE, 1), 100)))
+    assert list(tmp_path.iterdir()) == []
+    for call in (lambda: sink.write(draw_pattern(SIZE, 100)), sink.close, sink.close):
+        with pytest.raises(StorageError, match=said):
+            call()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_null_sink_counts_and_keeps_the_last():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Self
@@ -13,7 +13,7 @@ import numpy as np
 from av.video.reformatter import ColorRange, VideoReformatter
 
 from relit_camera.errors import ImageError, StorageError, VideoError
-from relit_camera.files import atomic_path
+from relit_camera.files import atomic_path, storage_error
 from relit_camera.space.images import DisplayImage, check_image
 from relit_camera.stream.decoding import ACCURATE, BT709, MAX_SIDE, MIN_SIDE
 
@@ -108,7 +108,10 @@ class VideoWriter:
             return
         self._encode(None)
         self._open = False
-        self._files.close()
+        try:
+            self._files.close()
+        except OSError as error:
+            raise storage_error(self.path, error) from error
 
     def __enter__(self) -> Self:
         return self
@@ -135,6 +138,10 @@ class VideoWriter:
         try:
             for packet in self._stream.encode(picture):
                 self._container.mux(packet)
+        except OSError as error:
+            with suppress(OSError):  # what failed at first is what is told
+                self._give_up(error)
+            raise storage_error(self.path, error) from error
         except BaseException as error:
             self._give_up(error)
             raise

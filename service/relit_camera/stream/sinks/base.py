@@ -24,7 +24,11 @@ class SinkInfo:
 
 
 class Sink(Protocol):
-    """Takes pictures from one thread, all of one size. After a failure it may be written to again: it tries anew."""
+    """Takes pictures from one thread, all of one size.
+
+    After a failure it may be written to again: a camera tries anew. A file that failed is lost, and the sink says so at
+    each call, to the end.
+    """
 
     def write(self, image: DisplayImage) -> None:
         """Show or keep a picture, uint8 sRGB RGB (height, width, 3).
@@ -44,6 +48,6 @@ class Sink(Protocol):
         """Finish. Harmless when repeated.
 
         Raises:
-            StorageError: the end of the file cannot be written.
+            StorageError: the end of the file cannot be written, or the file was lost before.
         """
         ...
