@@ -3,7 +3,7 @@
 A light map is float32 (32, 64, 3), linear RGB radiance in map axes (`space.directions`). A panorama is the same light
 at a file's resolution. Energy Σ E·ω is kept: by resampling exactly, by rotation within 1 % for any lamp.
 
-    panorama.py    files in, checked and turned into map axes (picture_size.py reads their headers)
+    panorama.py    files in, checked and turned into map axes
     maps.py        resample, rotate, irradiance
     sphere.py      interpolation on the map that conserves energy, poles included
     lamps.py       round lamps

@@ -11,17 +11,15 @@ from numpy.typing import NDArray
 
 from relit_camera.errors import ImageError, PanoramaError
 from relit_camera.light.maps import resample_by_area
-from relit_camera.light.picture_size import picture_size
 from relit_camera.space.directions import texel_solid_angles
-from relit_camera.space.picture_files import read_linear
-from relit_camera.space.quiet import quiet_decoders
+from relit_camera.space.picture_files import MAX_PIXELS, read_linear
+from relit_camera.space.picture_size import picture_size
 
 Axes = Literal["picture", "map"]
 """How a panorama file is laid out: `picture` as seen from inside the sphere, so that −X lies to the right of its middle
 (what cameras and renderers write); `map` as a light map is, +X to the right."""
 
 SUFFIXES = frozenset({".hdr", ".exr", ".png", ".jpg", ".jpeg"})
-MAX_PIXELS = 64_000_000
 _LARGEST = 1e9
 """Radiance above this is no light (the sun is 3e4 to 1e5 times the sky) and would overflow sums in float32."""
 _ROUNDING = 1e-6
@@ -85,8 +83,7 @@ def _check_header(path: Path) -> None:
     if path.suffix.lower() not in SUFFIXES:
         raise PanoramaError(f"{path}: '{path.suffix}' is no panorama format known here", "use .hdr, .exr, .png or .jpg")
     try:
-        with quiet_decoders():
-            width, height = picture_size(path)
+        width, height = picture_size(path)
     except ValueError as error:
         raise PanoramaError(f"{path} cannot be read: {error}", "save or download it again") from error
     except OSError as error:

@@ -12,6 +12,7 @@ from relit_camera.errors import ImageError
 from relit_camera.files import atomic_path, write_atomic
 from relit_camera.space.colour import Gamma, decode, uint8_from_linear
 from relit_camera.space.images import DisplayImage, LinearImage, Mask
+from relit_camera.space.picture_size import picture_size
 from relit_camera.space.quiet import quiet_decoders
 
 LDR_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff"})
@@ -30,14 +31,15 @@ def read_linear(path: Path, gamma: Gamma = "srgb") -> LinearImage:
     suffix = path.suffix.lower()
     if not path.is_file():
         raise ImageError(f"no picture at {path}", "check the path")
+    if suffix not in LDR_SUFFIXES | {".exr", ".hdr"}:
+        raise ImageError(f"{path}: '{suffix}' is not a picture format known here", "use .png, .jpg, .exr or .hdr")
+    _check_size(path)
     if suffix == ".exr":
         image = _read_exr(path)
     elif suffix == ".hdr":
         image = _read_coded(path)
-    elif suffix in LDR_SUFFIXES:
-        image = decode(_read_coded(path), gamma)
     else:
-        raise ImageError(f"{path}: '{suffix}' is not a picture format known here", "use .png, .jpg, .exr or .hdr")
+        image = decode(_read_coded(path), gamma)
     if not np.isfinite(image).all():
         raise ImageError(f"{path} holds NaN or infinity", "render or export it again")
     return image
@@ -56,10 +58,11 @@ def read_mask(path: Path) -> Mask:
     """Read a matte as float32 (height, width) in 0..1: the alpha channel where it marks anything, else the grey value.
 
     Raises:
-        ImageError: missing or unreadable.
+        ImageError: missing, unreadable or too large.
     """
     if not path.is_file():
         raise ImageError(f"no matte at {path}", "check the path")
+    _check_size(path)
     coded = _imread(path)
     if coded is None:
         raise ImageError(f"{path} cannot be read as a picture", "save it again as PNG")
@@ -114,6 +117,20 @@ def encode_display(image: DisplayImage, suffix: str = ".jpg", quality: int = 90)
     return bytes(data)
 
 
+def _check_size(path: Path) -> None:
+    """Refuse by its header what is no picture, or would fill the memory."""
+    try:
+        width, height = picture_size(path)
+    except ValueError as error:
+        cure = "it may be truncated; save or download it again"
+        raise ImageError(f"{path} cannot be read as a picture: {error}", cure) from error
+    except OSError as error:
+        raise ImageError(f"cannot read {path}: {error.strerror}", "check your permission to read it") from error
+    if width * height > MAX_PIXELS:
+        what = f"{path} is {width}x{height} pixels, more than {MAX_PIXELS // 10**6} million"
+        raise ImageError(what, "scale it down")
+
+
 def _imread(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> NDArray | None:
     # From memory: cv2.imread knows no paths beyond the locale's encoding.
     data = np.frombuffer(path.read_bytes(), np.uint8)
@@ -129,8 +146,6 @@ def _read_coded(path: Path) -> NDArray[np.float32]:
     coded = _imread(path, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
     if coded is None:
         raise ImageError(f"{path} cannot be read as a picture", "it may be truncated; save or download it again")
-    if coded.shape[0] * coded.shape[1] > MAX_PIXELS:
-        raise ImageError(f"{path} has {coded.shape[0] * coded.shape[1] / 1e6:.0f} million pixels", "scale it down")
     scaled = _unit_range(coded)
     if scaled.ndim == 2:
         return np.repeat(scaled[..., None], 3, axis=2)

@@ -1,0 +1,108 @@
+"""The size of a picture file from its header, so that an absurd one is refused before memory is taken for it."""
+
+from __future__ import annotations
+
+import re
+import struct
+from pathlib import Path
+
+from relit_camera.space.quiet import quiet_decoders
+
+_JPEG_FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+
+
+def picture_size(path: Path) -> tuple[int, int]:
+    """Width and height in pixels that the header of a picture file states, before any EXIF rotation.
+
+    .hdr and .exr files must be what their suffix says, for their values are linear. Any other suffix stands for PNG,
+    JPEG, WebP, BMP and TIFF: which of them, the content says.
+
+    Raises:
+        ValueError: the file is none of these, or its header is damaged.
+        OSError: it cannot be read.
+    """
+    if path.suffix.lower() == ".exr":
+        return _exr_size(path)
+    with path.open("rb") as file:
+        if path.suffix.lower() == ".hdr":
+            return _radiance_size(file.read(1 << 16))
+        data = file.read()  # a JPEG's size may stand behind any amount of metadata
+    try:
+        return _coded_size(data)
+    except struct.error as error:
+        raise ValueError("its header is cut off") from error
+
+
+def _coded_size(data: bytes) -> tuple[int, int]:
+    if data.startswith(b"\x89PNG\r\n\x1a\n") and data[12:16] == b"IHDR":
+        width, height = struct.unpack_from(">II", data, 16)
+        return width, height
+    if data.startswith(b"\xff\xd8"):
+        return _jpeg_size(data)
+    if data.startswith(b"RIFF") and data[8:12] == b"WEBP":
+        return _webp_size(data)
+    if data.startswith((b"II*\0", b"MM\0*")):
+        return _tiff_size(data)
+    if data.startswith(b"BM"):
+        (header_bytes,) = struct.unpack_from("<I", data, 14)
+        width, height = struct.unpack_from("<HH" if header_bytes == 12 else "<ii", data, 18)
+        return width, abs(height)  # negative: rows from the top
+    raise ValueError("none of PNG, JPEG, WebP, BMP and TIFF")
+
+
+def _webp_size(data: bytes) -> tuple[int, int]:
+    # RFC 9649 (container, lossless) and RFC 6386, 9.1 (lossy).
+    if data[12:16] == b"VP8X":
+        low, middle, high = struct.unpack_from("<HHH", data, 24)
+        return 1 + low + ((middle & 0xFF) << 16), 1 + (middle >> 8) + (high << 8)
+    if data[12:16] == b"VP8L":
+        (bits,) = struct.unpack_from("<I", data, 21)
+        return 1 + (bits & 0x3FFF), 1 + (bits >> 14 & 0x3FFF)
+    width, height = struct.unpack_from("<HH", data, 26)
+    return width & 0x3FFF, height & 0x3FFF
+
+
+def _tiff_size(data: bytes) -> tuple[int, int]:
+    # TIFF 6.0, section 2: the entries of the first directory; 256 is the width, 257 the height, as 16 or 32 bits.
+    order = "<" if data.startswith(b"II") else ">"
+    (start,) = struct.unpack_from(f"{order}I", data, 4)
+    (count,) = struct.unpack_from(f"{order}H", data, start)
+    sides = {}
+    for position in range(start + 2, start + 2 + 12 * count, 12):
+        tag, kind = struct.unpack_from(f"{order}HH", data, position)
+        (sides[tag],) = struct.unpack_from(f"{order}{'H' if kind == 3 else 'I'}", data, position + 8)
+    if not {256, 257} <= sides.keys():
+        raise ValueError("a TIFF file without a size")
+    return sides[256], sides[257]
+
+
+def _radiance_size(header: bytes) -> tuple[int, int]:
+    # Radiance's file formats (radsite.lbl.gov/radiance/refer/filefmts.pdf): the resolution follows an empty line.
+    found = re.match(rb"#\?.*?\n\r?\n-Y (\d{1,9}) \+X (\d{1,9})\s", header, re.DOTALL)
+    if not found:
+        raise ValueError("not a Radiance file with rows from the top and columns from the left")
+    return int(found[2]), int(found[1])
+
+
+def _exr_size(path: Path) -> tuple[int, int]:
+    import OpenEXR
+
+    path.open("rb").close()
+    try:
+        with quiet_decoders(), OpenEXR.File(str(path), header_only=True) as file:
+            low, high = file.header()["dataWindow"]
+    except Exception as error:  # OpenEXR raises RuntimeError, ValueError or KeyError
+        raise ValueError("not an OpenEXR file, or its header is damaged") from error
+    return int(high[0]) - int(low[0]) + 1, int(high[1]) - int(low[1]) + 1
+
+
+def _jpeg_size(data: bytes) -> tuple[int, int]:
+    # ITU T.81 annex B: markers with their lengths, until the frame header.
+    position = 2
+    while position + 9 <= len(data) and data[position] == 0xFF:
+        marker, length = data[position + 1], int.from_bytes(data[position + 2 : position + 4], "big")
+        if marker in _JPEG_FRAME_MARKERS:
+            height, width = struct.unpack(">HH", data[position + 5 : position + 9])
+            return width, height
+        position += 1 if marker == 0xFF else 2 + length
+    raise ValueError("a JPEG file without a frame header")
