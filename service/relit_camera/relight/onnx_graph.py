@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relit_camera.light.maps import LightMap
 from relit_camera.models.session import SessionOptions, open_session
 from relit_camera.relight.dense import dense_matrix
-from relit_camera.relight.relighter import weighted_light
+from relit_camera.relight.relighter import masked_basis, weighted_light
 from relit_camera.space.images import LinearImage
 from relit_camera.subject.subject import Subject
 
@@ -67,8 +67,7 @@ class OnnxBasisRelighter(_OnnxRelighter):
     """
 
     def __init__(self, subject: Subject, options: SessionOptions | None = None) -> None:
-        basis = subject.basis.astype(np.float32).reshape(3, subject.metadata.components, -1).transpose(0, 2, 1)
-        factors = {"coefficients": subject.coefficients, "basis": basis}
+        factors = {"coefficients": subject.coefficients, "basis": masked_basis(subject).transpose(0, 2, 1)}
         super().__init__(subject, "relight-basis", factors, options or SessionOptions())
 
 

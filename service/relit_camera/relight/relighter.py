@@ -22,7 +22,10 @@ class Relighter(Protocol):
     """Relights one subject. Holds its data in the form that its arithmetic wants. Thread-safe."""
 
     def relight(self, light_map: LightMap) -> LinearImage:
-        """The subject under a light map (32, 64, 3): float32 linear (height, width, 3), unscaled and unclipped."""
+        """The subject under a light map (32, 64, 3): float32 linear (height, width, 3), unscaled and unclipped.
+
+        Black where the matte is 0.
+        """
         ...
 
 
@@ -30,6 +33,13 @@ def weighted_light(light_map: LightMap) -> NDArray[np.float32]:
     """E[l] · ω_l as float32 (2048, 3): the right-hand side of the relighting product."""
     omega = texel_solid_angles().astype(np.float32)
     return np.ascontiguousarray((light_map * omega[..., None]).reshape(TEXELS, 3))
+
+
+def masked_basis(subject: Subject) -> NDArray[np.float32]:
+    """The subject's basis as a float32 copy (3, components, pixels), black where the matte is 0."""
+    basis = subject.basis.astype(np.float32).reshape(3, subject.metadata.components, -1)
+    basis[..., subject.matte.ravel() == 0] = 0
+    return basis
 
 
 def open_relighter(name: str, subject: Subject) -> Relighter:
