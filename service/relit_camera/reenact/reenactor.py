@@ -53,7 +53,8 @@ class Moved:
 
 
 Move = Callable[[LinearImage], Moved]
-"""Moves a relit picture (subject's size, linear, display exposure). Called at most once."""
+"""Moves a relit picture (subject's size, linear, display exposure). Called at most once, maybe in another thread while
+the next frame is followed: it shares nothing with that which changes."""
 
 
 class Reenactor(Protocol):

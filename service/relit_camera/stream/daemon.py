@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 
 from relit_camera import __version__
@@ -20,7 +21,7 @@ from relit_camera.space.images import DisplayImage, Frame
 from relit_camera.stream.assembly import make_pipeline
 from relit_camera.stream.director import Director
 from relit_camera.stream.events import EventHub
-from relit_camera.stream.pipeline import Finished
+from relit_camera.stream.pipeline import Finish, Finished
 from relit_camera.stream.placeholder import placeholder
 from relit_camera.stream.publisher import PublishedPicture, Publisher
 from relit_camera.stream.sinks.base import Sink
@@ -74,6 +75,9 @@ class Daemon:
         self._ending: list[threading.Thread] = []
         # No daemon thread: one that is inside OpenCV when the interpreter ends would abort the process.
         self._worker = threading.Thread(target=self._run, name="worker")
+        self._finisher = ThreadPoolExecutor(1, "finisher")
+        self._finishing: Future[None] = Future()
+        self._finishing.set_result(None)
 
     def start(self) -> None:
         """Begin to read, relight and publish."""
@@ -148,15 +152,28 @@ class Daemon:
             if scene.frozen:
                 continue
             try:
-                finished = self._pipeline.process(frame, scene)
+                finish = self._pipeline.begin(frame, scene)
             except Exception as error:  # nothing that one frame does may end the camera
-                self._failed("picture", error)
-                self._stopping.wait(RETRY_S)
+                self._spoiled(error)
                 continue
-            self._recovered("picture")
-            self._pipeline_rate.tick()
-            self._publisher.pictures.put(PublishedPicture(finished.image, frame.captured_at, frame.index))
-            self._follow(finished)
+            wait([self._finishing])  # one frame is finished while the next is begun, no more
+            self._finishing = self._finisher.submit(self._finish, frame, finish)
+        self._finisher.shutdown()
+
+    def _finish(self, frame: Frame, finish: Finish) -> None:
+        try:
+            finished = finish()
+        except Exception as error:
+            self._spoiled(error)
+            return
+        self._recovered("picture")
+        self._pipeline_rate.tick()
+        self._publisher.pictures.put(PublishedPicture(finished.image, frame.captured_at, frame.index))
+        self._follow(finished)
+
+    def _spoiled(self, error: Exception) -> None:
+        self._failed("picture", error)
+        self._stopping.wait(RETRY_S)
 
     def _read(self) -> Frame | None:
         try:

@@ -1,8 +1,9 @@
-"""One frame from left to right: track → light → relight, and beside it follow → move → compose."""
+"""One frame from left to right: track → light → relight, and beside it follow; then move → compose."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -52,6 +53,10 @@ class Finished:
     motion: FaceMotion | None
 
 
+Finish = Callable[[], Finished]
+"""Makes the picture of a frame that was begun. Called once, in the order of the frames."""
+
+
 @dataclass(frozen=True)
 class _Cast:
     """What belongs to one subject in one mode."""
@@ -63,10 +68,11 @@ class _Cast:
 
 
 class Pipeline:
-    """Makes relit pictures of live frames. One thread calls; what may change reaches it as a `Scene` a frame.
+    """Makes relit pictures of live frames. What may change reaches it as a `Scene` a frame.
 
-    How the still must move is found out while it is relit: each takes milliseconds on one core, and neither needs the
-    other.
+    A frame is made in two halves, `begin` and the `Finish` that it returns. One thread may begin the next frame while
+    another finishes this one; finishes keep the order of their frames. Within the first half, how the still must move
+    is found out while it is relit. So two cores have a frame each thirtieth of a second that takes one core longer.
 
     Attributes:
         timer: how long each stage took.
@@ -112,17 +118,25 @@ class Pipeline:
         self._follower.reset_neutral()
 
     def process(self, frame: Frame, scene: Scene) -> Finished:
-        """Make the picture of one live frame.
+        """Make the picture of one live frame: begin it, and finish it at once.
 
         Raises:
             SubjectError: no face is found in the subject's still.
             ModelError: a model that the scene needs is missing.
         """
+        return self.begin(frame, scene)()
+
+    def begin(self, frame: Frame, scene: Scene) -> Finish:
+        """Follow the face, relight the still, and give what makes the picture of both.
+
+        Raises:
+            SubjectError: no face is found in the subject's still.
+            ModelError: a model that the scene needs is missing; so does the finish.
+        """
         subject, mode = scene.subject, self._mode(scene)
         if subject is None:
             self._troubles["subject"] = NO_SUBJECT
-            frame = fitted(frame, self._size)
-            return Finished(self._composer.live(linear_from_display(frame.image), frame, scene), None)
+            return lambda: self._unlit(fitted(frame, self._size), scene)
         self._troubles.pop("subject", None)
         cast = self._prepare(subject, mode)
         with self.timer.stage("track"):
@@ -138,14 +152,20 @@ class Pipeline:
             relit = self._relight(cast, light * np.float32(subject.metadata.display_gain))
             if mode is Mode.REENACT and scene.look.lighting.blend < 1:
                 relit = blended(subject, relit, scene.look.lighting.blend)
-        with self.timer.stage("move"):
-            move = following.result()
-            moved = move(relit) if move else None
-        if moved is None:
-            return self.process(frame, scene)
-        with self.timer.stage("compose"):
-            image = self._compose(moved, mode, live, scene)
-        return Finished(image, motion)
+        move = following.result()
+        if move is None:
+            return self.begin(frame, scene)
+
+        def finish() -> Finished:
+            with self.timer.stage("move"):
+                moved = move(relit)
+            with self.timer.stage("compose"):
+                return Finished(self._compose(moved, mode, live, scene), motion)
+
+        return finish
+
+    def _unlit(self, live: Frame, scene: Scene) -> Finished:
+        return Finished(self._composer.live(linear_from_display(live.image), live, scene), None)
 
     def _mode(self, scene: Scene) -> Mode:
         """The mode asked for, or reenact where the live face is known not to be the subject's."""
