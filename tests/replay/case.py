@@ -17,6 +17,9 @@ FILE = "case.yaml"
 Angle = Annotated[float, Field(ge=-180, le=180)]
 Share = Annotated[float, Field(ge=0, le=1)]
 FrameNumber = Annotated[int, Field(ge=0)]
+Pixel = Annotated[int, Field(ge=0)]
+Part = tuple[Pixel, Pixel, Pixel, Pixel]
+"""A rectangle of a frame: left, top, right, bottom in pixels, the last two not within."""
 
 
 class CaseError(Exception):
@@ -59,6 +62,17 @@ class Pictures(Settings):
     """In linear light over the whole frame, the expected frame's 99.5th percentile being 1."""
 
 
+class Colours(Settings):
+    """What mean colour parts of the relit frames have: for cases whose pictures may not be kept here."""
+
+    track: str
+    """A CSV file in the case's folder with the columns frame, part, red, green, blue; `record` writes it."""
+    frames: Annotated[tuple[FrameNumber, ...], Field(min_length=1)]
+    parts: Annotated[dict[str, Part], Field(min_length=1)]
+    tolerance: Annotated[float, Field(gt=0, le=1)] = 0.03
+    """By how much red, green and blue may differ, in linear light, white being 1."""
+
+
 class Expected(Settings):
     """What must come out."""
 
@@ -68,6 +82,7 @@ class Expected(Settings):
     """A word of what must have been reported as working less well than asked; without it nothing may be."""
     pose: Pose | None = None
     pictures: Pictures | None = None
+    colours: Colours | None = None
 
 
 class Case(Settings):

@@ -48,7 +48,8 @@ def keep(case: Case, folder: Path, played: Played, wrong: list[str], root: Path 
 
 
 def _shown(case: Case, count: int) -> list[int]:
-    """The frames that have an expected picture, else some spread over the clip."""
-    if case.expect.pictures is not None:
-        return list(case.expect.pictures.frames)
+    """The frames whose pictures or colours are looked at, else some spread over the clip."""
+    looked_at = case.expect.pictures or case.expect.colours
+    if looked_at is not None:
+        return list(looked_at.frames)
     return list(range(0, count, max(1, count // SHEET_COLUMNS)))[:SHEET_COLUMNS]

@@ -54,6 +54,8 @@ def played(count: int = 4, shade: int = 100) -> Played:
         ("expect: {pictures: {frames: []}}", "expect.pictures.frames"),
         ("expect: {pictures: {frames: [3], min_psnr_db: .nan}}", "expect.pictures.min_psnr_db"),
         ("expect: {found: 1.5}", "expect.found"),
+        ("expect: {colours: {track: c.csv, frames: [1], parts: {}}}", "expect.colours.parts"),
+        ("expect: {colours: {track: c.csv, frames: [1], parts: {nose: [1, 2, 3]}}}", "expect.colours.parts.nose"),
     ],
 )
 def test_wrong_case_names_file_and_field(text: str, said: str, tmp_path: Path) -> None:
@@ -117,6 +119,40 @@ def test_pictures_of_another_size(tmp_path: Path) -> None:
     small = played()
     small = Played(small.frames, small.live, [cv2.resize(p, (32, 24)) for p in small.relit], [])
     assert "frame 1 is 32x24, expected 64x48" in differences(case, tmp_path, small)
+
+
+def coloured(frames: tuple[int, ...] = (1, 3), **parts: list[int]) -> Case:
+    colours = {"track": "colours.csv", "frames": frames, "parts": parts or {"face": [8, 8, 24, 24]}}
+    return case_of(expect={"found": 0, "colours": colours})
+
+
+def test_a_wrong_colour_is_named_with_part_and_frame(tmp_path: Path) -> None:
+    case = coloured()
+    run = played()
+    assert [path.name for path in record(case, tmp_path, run)] == ["colours.csv"]
+    assert differences(case, tmp_path, run) == []
+    tinted = [picture * np.array([1, 1, 0.5]) for picture in run.relit]
+    wrong = differences(case, tmp_path, Played(run.frames, run.live, [p.astype(np.uint8) for p in tinted], []))
+    assert [line.split(" has ")[0] for line in wrong] == ["face in frame 1", "face in frame 3"]
+    assert all("has blue" in line for line in wrong)
+    # The mean of the square and what is beside it, in linear light.
+    row = (tmp_path / "colours.csv").read_text().splitlines()[1].split(",")
+    bright, dark = 0.7913, 0.1274  # 230 and 100 under the sRGB curve
+    assert row[:2] == ["1", "face"]
+    assert float(row[2]) == pytest.approx(0.75 * bright + 0.25 * dark, abs=1e-3)
+
+
+def test_colours_that_cannot_be_compared(tmp_path: Path) -> None:
+    with pytest.raises(CaseError, match=r"No such file.*tests\.replay\.record"):
+        differences(coloured(), tmp_path, played())
+    record(coloured(), tmp_path, played())
+    with pytest.raises(CaseError, match="no chin in frame 1"):
+        differences(coloured(chin=[0, 0, 8, 8]), tmp_path, played())
+    with pytest.raises(CaseError, match=r"colours\.frames has 9, the clip 4 frames"):
+        differences(coloured((9,)), tmp_path, played())
+    for beyond in ([0, 0, 65, 8], [8, 8, 8, 16], [16, 8, 8, 16]):
+        with pytest.raises(CaseError, match=r"parts\.face is not within"):
+            differences(coloured(face=beyond), tmp_path, played())
 
 
 def test_missing_expectations_say_how_to_make_them(tmp_path: Path) -> None:
