@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from relit_camera.errors import SubjectError
 from relit_camera.face.follow import FaceMotion
-from relit_camera.light.maps import rotate
 from relit_camera.reenact.control_points import control_points, head_anchors
 from relit_camera.reenact.cutout import feathered
 from relit_camera.reenact.dense_motion import DenseMotion
@@ -60,14 +59,13 @@ class RatioReenactor:
         Raises:
             SubjectError: the live face is not the subject's: no light explains it.
         """
-        live = linear_from_display(frame.image)
         width, height = frame.size
         everywhere = np.ones((height, width), np.float32)
         if motion.pose is None:
-            return lambda relit: Moved(live, everywhere, (0, 0))
+            return lambda relit: Moved(linear_from_display(frame.image), everywhere, (0, 0))
         room = self._probe.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
         self._check_person(room.residual, motion, frame.time_s)
-        under_room = self._relighter.relight(rotate(room.light_map, motion.rotation)) * room.gain
+        under_room = self._relighter.relight(room.on_head) * room.gain
         small = (0, 0, -(-width // COARSE), -(-height // COARSE))
         positions = self._warp(motion, frame.size).map(small)
 
@@ -77,6 +75,7 @@ class RatioReenactor:
             weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
             everywhere_known = extended(sampled(weighted, positions, cv2.BORDER_REPLICATE))
             large = cv2.resize(everywhere_known, (small[2] * COARSE, small[3] * COARSE), interpolation=cv2.INTER_LINEAR)
+            live = linear_from_display(frame.image)
             relit_live = cv2.multiply(live, np.ascontiguousarray(large[:height, :width]))
             return Moved(np.asarray(relit_live, dtype=np.float32), everywhere, (0, 0))
 

@@ -46,11 +46,13 @@ class RoomLight:
 
     Attributes:
         light_map: (32, 64, 3) float32 room radiance in units of the live picture's linear values.
+        on_head: the same as the head sees it, under its rotation.
         gain: (3,) float32 by which this frame's exposure differs from the fit's.
         residual: median relative deviation of the live face from the relit one, 0..1: how badly the light explains it.
     """
 
     light_map: LightMap
+    on_head: LightMap
     gain: NDArray[np.float32]
     residual: float
 
@@ -82,7 +84,8 @@ class RoomProbe:
             self._fitted_at = time_s
             light = _lobes(Rotation.identity()) @ self._amounts
             self._light_map = light.reshape(MAP_HEIGHT, MAP_WIDTH, 3).astype(np.float32)
-        predicted = self._predict(rotation)
+        on_head = rotate(self._light_map, rotation)
+        predicted = self._predict(on_head)
         gain = np.ones(3, np.float32)
         if usable.sum() >= 20:
             ratio = live[usable] / np.maximum(predicted[usable], 1e-4)
@@ -92,10 +95,10 @@ class RoomProbe:
             self._residual = (
                 now if self._residual is None else self._residual + RESIDUAL_FOLLOW * (now - self._residual)
             )
-        return RoomLight(self._light_map, gain, 0.0 if self._residual is None else self._residual)
+        return RoomLight(self._light_map, on_head, gain, 0.0 if self._residual is None else self._residual)
 
-    def _predict(self, rotation: Rotation) -> NDArray[np.float32]:
-        amounts = self._coefficients @ weighted_light(rotate(self._light_map, rotation))
+    def _predict(self, on_head: LightMap) -> NDArray[np.float32]:
+        amounts = self._coefficients @ weighted_light(on_head)
         return np.stack([self._samples[c] @ amounts[:, c] for c in range(3)], axis=1)
 
     def _fit(self, live: NDArray[np.float32], usable: NDArray[np.bool_], rotation: Rotation) -> None:
