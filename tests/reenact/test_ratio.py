@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from relit_camera.errors import SubjectError
+from relit_camera.light.maps import rotate
 from relit_camera.reenact.ratio import RatioReenactor, extended, shape_difference, similarity, trusted
 from relit_camera.reenact.reenactor import open_reenactor
 from relit_camera.reenact.room_probe import RoomLight
@@ -31,7 +32,8 @@ class KnownRoom:
         self.light = light
 
     def update(self, image, landmarks, rotation, time_s):
-        return RoomLight(self.light * exposure(), np.ones(3, np.float32), 0.0)
+        room = self.light * exposure()
+        return RoomLight(room, rotate(room, rotation), np.ones(3, np.float32), 0.0)
 
 
 def reenactor(light=None):
