@@ -190,3 +190,12 @@ def test_the_rim_is_trusted_less_than_the_middle():
     assert weight[100:, 40:60].min() == pytest.approx(1, abs=1e-3)
     assert weight[100, 20] < 0.1
     assert weight[matte == 0].max() < 0.1
+
+
+def test_nearly_clipped_skin_dims_as_the_light_does():
+    """A camera's brightest codes are not taken for more light than they say: red, the first to clip, would glow."""
+    image = np.full_like(live_picture(WINDOW), 252)
+    moved = moved_by(reenactor(WINDOW), still_under(WINDOW) * 0.5, before_the_camera(), live_frame(image, 0))
+    height, width = image.shape[:2]
+    middle = moved.picture[int(0.4 * height) : int(0.6 * height), int(0.4 * width) : int(0.6 * width)]
+    np.testing.assert_allclose(np.median(middle), 0.5 * linear_from_uint8(np.uint8([252]))[0], rtol=0.1)

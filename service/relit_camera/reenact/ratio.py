@@ -19,6 +19,7 @@ from relit_camera.reenact.reenactor import Move, Moved, Stage
 from relit_camera.reenact.room_probe import RoomProbe
 from relit_camera.reenact.source_face import SourceFace
 from relit_camera.reenact.warp import Warp, sampled
+from relit_camera.space.colour import linear_from_uint8
 from relit_camera.space.display import linear_from_display
 from relit_camera.space.images import Frame, LinearImage, Mask
 
@@ -70,14 +71,18 @@ class RatioReenactor:
         positions = self._warp(motion, frame.size).map(small)
 
         def move(relit: LinearImage) -> Moved:
-            # Where nobody is tracked with confidence the picture eases back to the live one.
-            ratio = 1 + (self._ratio(relit, under_room) - 1) * np.float32(motion.presence)
+            ratio = self._ratio(relit, under_room)
             weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
             everywhere_known = extended(sampled(weighted, positions, cv2.BORDER_REPLICATE))
             large = cv2.resize(everywhere_known, (small[2] * COARSE, small[3] * COARSE), interpolation=cv2.INTER_LINEAR)
-            live = linear_from_display(frame.image)
-            relit_live = cv2.multiply(live, np.ascontiguousarray(large[:height, :width]))
-            return Moved(np.asarray(relit_live, dtype=np.float32), everywhere, (0, 0))
+            # Not `linear_from_display`: what it makes of the brightest codes, where skin is red first, is a guess that
+            # a ratio would show as red blotches.
+            picture = cv2.multiply(linear_from_uint8(frame.image), np.ascontiguousarray(large[:height, :width]))
+            if motion.presence < 1:
+                # Where nobody is tracked with confidence the picture eases back to the live one.
+                presence = float(motion.presence)
+                picture = cv2.addWeighted(picture, presence, linear_from_display(frame.image), 1 - presence, 0)
+            return Moved(np.asarray(picture, dtype=np.float32), everywhere, (0, 0))
 
         return move
 

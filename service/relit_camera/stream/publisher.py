@@ -132,6 +132,7 @@ class Publisher:
         if picture is not None:
             self._last = picture
         image = self._image(now)
+        self._show(image)
         if not self._write(image, now):
             return
         done = time.monotonic()
@@ -141,7 +142,6 @@ class Publisher:
             self._repeated += 1
         else:
             self._latency.add(done - picture.captured_at)
-        self._show(image)
 
     def _image(self, now: float) -> DisplayImage:
         last = self._last
