@@ -27,6 +27,7 @@ GROUPS = {
     "devices": ("relit_camera.cli.devices", "List cameras and virtual cameras."),
     "config": ("relit_camera.cli.config", "Check and show the configuration."),
     "bench": ("relit_camera.cli.bench", "Measure relighting and the live chain on this machine."),
+    "evaluate": ("relit_camera.cli.evaluate", "Measure fields and relit videos against truth; writes reports."),
     "doctor": ("relit_camera.cli.doctor", "Find out what keeps the camera from working, and the cure."),
 }
 """Command → module with a typer `app`, and its help. A module is imported when its command is called."""

@@ -1,0 +1,163 @@
+"""`relit evaluate`: what was built against what is known."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+    from relit_camera.reflectance.samples import Samples
+
+app = typer.Typer(no_args_is_help=True)
+
+LIGHTS_NAME = "lights.lp"
+
+Out = Annotated[Path | None, typer.Option(help="Report to write: one .html file, pictures embedded.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable figures on stdout.")]
+GammaText = Annotated[str, typer.Option("--gamma", help="Curve of the pictures: srgb, linear, or an exponent.")]
+Within = Annotated[
+    float | None, typer.Option(help="Use lights at most so many degrees from the camera's axis.", min=1, max=180)
+]
+Methods = Annotated[list[str] | None, typer.Option("--method", help="Reflectance method; all that are installed.")]
+
+
+@app.callback()
+def group() -> None:
+    """Measure fields and relit videos against truth."""
+
+
+@app.command()
+def field(
+    context: typer.Context,
+    subject_or_lights: Annotated[
+        str, typer.Argument(help="Captured lights (.lp), or a subject's name or .relit file.")
+    ],
+    truth: Annotated[Path, typer.Option(help="Lights (.lp) from directions all round, of the same person.")],
+    out: Out = None,
+    as_json: AsJson = False,
+    gamma: GammaText = "srgb",
+    within_deg: Within = None,
+    every: Annotated[int, typer.Option(help="Use every so many-th of the captured lights.", min=1)] = 1,
+    method: Methods = None,
+    environment: Annotated[
+        list[str] | None, typer.Option(help="Stored name or panorama file; the built-in ones if none is given.")
+    ] = None,
+    pixel: Annotated[
+        list[str] | None, typer.Option(help="NAME=X,Y: whose reflectance map is shown; five if none is given.")
+    ] = None,
+) -> None:
+    """Compare a reflectance field with pictures that were really taken under each light (thesis 7)."""
+    import json
+
+    from relit_camera.capture.landmarks_file import read_landmarks
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.cli.settings import settings_of
+    from relit_camera.errors import LightsError
+    from relit_camera.evaluate.candidates import method_candidates, subject_candidate
+    from relit_camera.evaluate.field import evaluate_field
+    from relit_camera.evaluate.field_page import field_json, field_page, field_text
+    from relit_camera.evaluate.points import face_spots, parse_spot
+    from relit_camera.evaluate.truth import Truth, chosen_lights
+    from relit_camera.files import write_atomic
+    from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
+    from relit_camera.light.store import EnvironmentStore
+    from relit_camera.subject.store import SubjectStore
+
+    _check_out(out)
+    storage = settings_of(context).storage
+    store = EnvironmentStore(storage.environments)
+    environments = {each.name: each.light_map for each in map(store.resolve, environment or BUILTIN_NAMES)}
+    known = Truth(_samples(truth, gamma))
+    matte = known.samples.matte
+    points = read_landmarks(truth.parent / "landmarks.json", required=False)
+    spots = [parse_spot(text, matte) for text in pixel] if pixel else face_spots(points, matte)
+    samples = None
+    if _is_lights(Path(subject_or_lights)):
+        samples = chosen_lights(_samples(Path(subject_or_lights), gamma), within_deg, every)
+        size, directions = samples.matte.shape, samples.directions
+        candidates = [] if size != matte.shape else method_candidates(samples, known.inside, method or ())
+    else:
+        if method or within_deg or every > 1:
+            raise typer.BadParameter("a subject is built already: --method, --within-deg and --every are for lights")
+        name, subject = SubjectStore(storage.subjects).resolve(subject_or_lights)
+        size, directions = subject.matte.shape, subject.light_directions.astype(float)
+        candidates = [] if size != matte.shape else [subject_candidate(name, subject, known.inside)]
+    if not candidates:
+        shapes = f"{size[1]}x{size[0]}, the truth {matte.shape[1]}x{matte.shape[0]}"
+        raise LightsError(f"{subject_or_lights} is {shapes}", "give a truth of the same person at the same size")
+    with progress_bar() as progress:
+        task = progress.add_task("Comparing", total=None)
+        advance = partial(_advance, progress, task)
+        report = evaluate_field(candidates, directions, samples, known, environments, spots, advance)
+    if out:
+        write_atomic(out, field_page(report, f"Reflectance field of {Path(subject_or_lights).resolve().parent.name}"))
+    typer.echo(json.dumps(field_json(report), indent=1) if as_json else field_text(report))
+
+
+def _is_lights(path: Path) -> bool:
+    return path.suffix.lower() == ".lp" or (path / LIGHTS_NAME).is_file()
+
+
+def _samples(path: Path, gamma: str) -> Samples:
+    """The pictures of an .lp file, or of the folder it lies in."""
+    from relit_camera.capture.importing import import_samples
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.space.colour import parse_gamma
+
+    lights = path / LIGHTS_NAME if (path / LIGHTS_NAME).is_file() else path
+    with progress_bar() as progress:
+        task = progress.add_task(f"Reading {lights}", total=None)
+        return import_samples(lights, parse_gamma(gamma), partial(_advance, progress, task))
+
+
+def _advance(progress: Progress, task: TaskID, done: int, total: int) -> None:
+    progress.update(task, completed=done, total=total)
+
+
+def _check_out(out: Path | None) -> None:
+    if out and out.suffix.lower() not in (".html", ".htm"):
+        raise typer.BadParameter(f"{out} is no .html file", param_hint="--out")
+
+
+@app.command()
+def olat(
+    lights: Annotated[list[Path], typer.Argument(help="Captured lights (.lp), one list or several.")],
+    hold_out: Annotated[
+        list[str] | None,
+        typer.Option(help="every=N leaves out every N-th inner light; every=4 and every=2 if not given."),
+    ] = None,
+    out: Out = None,
+    as_json: AsJson = False,
+    gamma: GammaText = "srgb",
+    within_deg: Within = None,
+    method: Methods = None,
+) -> None:
+    """Leave captured lights out and predict their pictures from the others."""
+    import json
+
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.evaluate.holdout import hold_out as leave_out
+    from relit_camera.evaluate.holdout import parse_hold_out
+    from relit_camera.evaluate.holdout_page import holdout_json, holdout_page, holdout_text
+    from relit_camera.evaluate.truth import chosen_lights
+    from relit_camera.files import write_atomic
+
+    _check_out(out)
+    shares = [parse_hold_out(text) for text in hold_out or ("every=4", "every=2")]
+    results = []
+    for path in lights:
+        samples = chosen_lights(_samples(path, gamma), within_deg)
+        name = path.name if (path / LIGHTS_NAME).is_file() else f"{path.resolve().parent.name}/{path.name}"
+        for every in shares:
+            with progress_bar() as progress:
+                task = progress.add_task(f"{name}, every {every}", total=None)
+                advance = partial(_advance, progress, task)
+                results.append(leave_out(name, samples, every, method or (), advance))
+    if out:
+        write_atomic(out, holdout_page(results))
+    typer.echo(json.dumps(holdout_json(results), indent=1) if as_json else holdout_text(results))

@@ -1,0 +1,57 @@
+"""The thesis's extension beyond the sampled region: black samples round it (thesis 5.6, its final approach)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.reflectance.barycentric import spherical_delaunay
+from relit_camera.reflectance.samples import Samples
+
+DISTANCE_DEG = 25.0
+"""How far outside of the region the ring lies; the thesis gives no figure. Beyond it the field is black."""
+
+
+def boundary(directions: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Indices (count,) of the lights on the edge of the sampled region; none where they surround the whole sphere.
+
+    Raises:
+        LightsError: the directions (lights, 3) span no region.
+    """
+    triangles = spherical_delaunay(directions)
+    sides = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    # A side of the edge belongs to one triangle only.
+    different, count = np.unique(sides, axis=0, return_counts=True)
+    return np.unique(different[count == 1])
+
+
+def ring_directions(directions: NDArray[np.float64], distance_deg: float = DISTANCE_DEG) -> NDArray[np.float64]:
+    """Where the ring's samples lie: unit vectors (count, 3), one beyond each of `boundary`'s lights (lights, 3).
+
+    Each lies on the great circle from the region's middle through its light, `distance_deg` farther out.
+
+    Raises:
+        LightsError: the directions span no region.
+    """
+    edge = directions[boundary(directions)]
+    middle = directions.sum(axis=0)
+    middle /= max(float(np.linalg.norm(middle)), 1e-12)
+    along = edge @ middle
+    outward = edge * along[:, None] - middle
+    length = np.linalg.norm(outward, axis=1)
+    # None past the pole opposite to the middle, where all ways meet.
+    distance = np.minimum(np.radians(distance_deg), 0.9 * (np.pi - np.arccos(np.clip(along, -1, 1))))
+    ring = edge * np.cos(distance)[:, None] + outward * (np.sin(distance) / np.maximum(length, 1e-12))[:, None]
+    # A light in the middle itself has no way out.
+    return np.asarray(ring[length > 1e-6])
+
+
+def with_black_ring(samples: Samples, distance_deg: float = DISTANCE_DEG) -> Samples:
+    """The samples with the black ring: there the field fades instead of ending.
+
+    Raises:
+        LightsError: the directions span no region.
+    """
+    ring = ring_directions(samples.directions, distance_deg)
+    black = np.zeros((len(ring), *samples.pictures.shape[1:]), np.float32)
+    return Samples(np.concatenate([samples.pictures, black]), np.concatenate([samples.directions, ring]), samples.matte)
