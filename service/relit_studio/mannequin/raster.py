@@ -47,7 +47,7 @@ def nearness_buffer(points: NDArray[np.float32], triangles: Triangles, width: in
         height: of the picture in pixels.
     """
     buffer = np.full(width * height, -np.inf, np.float32)
-    for pixels, nearness, _, _ in _fragments(points, triangles, width, height):
+    for pixels, nearness, _, _ in fragments(points, triangles, width, height):
         np.maximum.at(buffer, pixels, nearness)
     return buffer.reshape(height, width)
 
@@ -57,7 +57,7 @@ def rasterise(points: NDArray[np.float32], triangles: Triangles, width: int, hei
     buffer = np.full(width * height, -np.inf, np.float32)
     seen = np.zeros(width * height, np.int64)
     weights = np.zeros((width * height, 2), np.float32)
-    for pixels, nearness, index, weight in _fragments(points, triangles, width, height):
+    for pixels, nearness, index, weight in fragments(points, triangles, width, height):
         np.maximum.at(buffer, pixels, nearness)
         nearest = nearness == buffer[pixels]
         seen[pixels[nearest]] = index[nearest]
@@ -67,7 +67,7 @@ def rasterise(points: NDArray[np.float32], triangles: Triangles, width: int, hei
     return Hits(covered, triangles[seen[covered]], np.stack([first, second, 1 - first - second], axis=1))
 
 
-def _fragments(
+def fragments(
     points: NDArray[np.float32], triangles: Triangles, width: int, height: int
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int64], NDArray[np.float32]]]:
     """Pixel, nearness, triangle and first two weights of the pixel centres that lie in front-facing triangles."""

@@ -16,7 +16,7 @@ Values = NDArray[np.float32]
 FRESNEL = 0.35
 """How much of Schlick's rise towards grazing light remains: cloth, skin and hair are rough."""
 
-_LIFT = 1.6
+LIFT = 1.6
 """Texels by which points are lifted off their surface before the test: the four texels about a point lie up to √2 of
 them aside, where a slanted surface is nearer to the light."""
 
@@ -56,33 +56,51 @@ class ShadowMap:
 
     def lit(self, positions: Values, normals: Values) -> Values:
         """Share 0..1 (count,) of the light that reaches points with unit normals (count, 3)."""
-        lifted = self._axes @ (positions + normals * np.float32(_LIFT * self._texel)).T
+        lifted = self._axes @ (positions + normals * np.float32(LIFT * self._texel)).T
         x, y, depth = (lifted - self._origin) * self._scale
-        x, y = x - np.float32(0.5), y - np.float32(0.5)
-        left, top = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
-        right_share, down_share = x - left, y - top
-        limit = np.int32(self._depth.shape[0] - 2)
-        at = np.clip(top, 0, limit) * (limit + 2) + np.clip(left, 0, limit)
-        flat = self._depth.ravel()
-        free = [(flat[at + step] <= depth).astype(np.float32) for step in (0, 1, limit + 2, limit + 3)]
-        upper = free[0] + (free[1] - free[0]) * right_share
-        lower = free[2] + (free[3] - free[2]) * right_share
-        return np.asarray(upper + (lower - upper) * down_share)
+        return lit_share(self._depth, x, y, depth)
+
+
+def lit_share(buffer: Values, x: Values, y: Values, nearness: Values) -> Values:
+    """Share 0..1 (count,) of the four texels about each point that hold nothing nearer, weighed by how near they are.
+
+    Args:
+        buffer: what the light sees, as `nearness_buffer` gives it, square.
+        x: of the points (count,) in texels, centres at integers + ½.
+        y: likewise, down.
+        nearness: of the points (count,), in the buffer's measure.
+    """
+    x, y = x - np.float32(0.5), y - np.float32(0.5)
+    left, top = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
+    right_share, down_share = x - left, y - top
+    limit = np.int32(buffer.shape[0] - 2)
+    at = np.clip(top, 0, limit) * (limit + 2) + np.clip(left, 0, limit)
+    flat = buffer.ravel()
+    free = [(flat[at + step] <= nearness).astype(np.float32) for step in (0, 1, limit + 2, limit + 3)]
+    upper = free[0] + (free[1] - free[0]) * right_share
+    lower = free[2] + (free[3] - free[2]) * right_share
+    return np.asarray(upper + (lower - upper) * down_share)
 
 
 def reflected(surface: Surface, direction: ArrayLike) -> tuple[Values, Values]:
-    """What a distant light of unit irradiance gives without shadows: Lambert's cosine (count,), and gloss (count,).
+    """What a light of unit irradiance gives without shadows: Lambert's cosine (count,), and gloss (count,).
+
+    `direction` is toward it: one (3,) of a distant light, or one a point (count, 3).
 
     A white Lambert surface that faces the light reads 1, so the gloss is the normalised Blinn-Phong reflectance
     (n + 8) / 8 · (n·h)^n times the cosine, with Schlick's rise at grazing angles.
     """
     toward = np.asarray(direction, np.float32)
-    cosine = np.maximum(surface.normals @ toward, 0)
+    cosine = np.maximum(_dot(surface.normals, toward), 0)
     half = surface.views + toward
     half /= np.maximum(np.sqrt(np.einsum("ij,ij->i", half, half)), 1e-6)[:, None]
     aligned = np.maximum(np.einsum("ij,ij->i", surface.normals, half), 1e-6)
-    grazing = 1 - np.minimum(half @ toward, 1)
+    grazing = 1 - np.minimum(_dot(half, toward), 1)
     grazing2 = grazing * grazing
     shine = surface.shine + (FRESNEL * (1 - surface.shine)) * grazing2 * grazing2 * grazing
     lobe = cv2.exp(surface.exponent * np.log(aligned)).ravel()
     return cosine, shine * ((surface.exponent + 8) / 8) * lobe * cosine
+
+
+def _dot(vectors: Values, direction: Values) -> Values:
+    return np.asarray(vectors @ direction if direction.ndim == 1 else np.einsum("ij,ij->i", vectors, direction))

@@ -1,0 +1,1 @@
+"""The phone capture video whose truth is known (thesis 4.3)."""

@@ -1,0 +1,79 @@
+"""Frames that are done already, so that an interrupted capture goes on where it stopped."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from relit_camera.files import make_folder, write_atomic
+from relit_camera.space.images import DisplayImage
+from relit_camera.space.picture_files import read_display, write_display
+from relit_studio.capture.phone import Gains
+
+
+@dataclass(frozen=True, eq=False)
+class Done:
+    """A finished frame.
+
+    Attributes:
+        truth: of the frame.
+        next_gains: what the phone has set for the next one.
+    """
+
+    truth: dict[str, Any]
+    next_gains: Gains
+
+
+class FrameStore:
+    """A folder of finished frames of one capture; those of another are thrown away on opening."""
+
+    def __init__(self, folder: Path, settings: Mapping[str, Any]) -> None:
+        """Open `folder`, making it; `settings` say which capture this is.
+
+        Raises:
+            StorageError: it cannot be written.
+        """
+        self._folder = folder
+        label, text = folder / "capture.json", json.dumps(settings, sort_keys=True)
+        if not label.is_file() or label.read_text() != text:
+            shutil.rmtree(folder, ignore_errors=True)
+            make_folder(folder)
+            write_atomic(label, text)
+
+    def load(self, index: int) -> Done | None:
+        """Frame `index`, if it is done."""
+        note = self._note(index)
+        if not (note.is_file() and self._picture(index).is_file()):
+            return None
+        kept = json.loads(note.read_text())
+        gains = kept["next_gains"]
+        for name in ("balance", "balance_speed"):
+            gains[name] = tuple(gains[name])
+        return Done(kept["truth"], Gains(**gains))
+
+    def save(self, index: int, image: DisplayImage, done: Done) -> None:
+        """Keep frame `index`.
+
+        Raises:
+            StorageError: it cannot be written.
+        """
+        write_display(self._picture(index), image)
+        write_atomic(self._note(index), json.dumps({"truth": done.truth, "next_gains": asdict(done.next_gains)}))
+
+    def picture(self, index: int) -> DisplayImage:
+        """The picture of a finished frame."""
+        return read_display(self._picture(index))
+
+    def remove(self) -> None:
+        """Throw the frames away."""
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _note(self, index: int) -> Path:
+        return self._folder / f"{index:06d}.json"
+
+    def _picture(self, index: int) -> Path:
+        return self._folder / f"{index:06d}.png"

@@ -1,0 +1,102 @@
+"""Recording a scene with a phone: video, truth, and a sheet to look at."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from relit_camera.compose.sheet import contact_sheet
+from relit_camera.files import make_folder, write_atomic
+from relit_camera.space.images import DisplayImage
+from relit_camera.space.picture_files import write_display
+from relit_camera.stream.video_writer import VideoWriter
+from relit_studio.capture.frame_store import Done, FrameStore
+from relit_studio.capture.lossless import LosslessWriter
+from relit_studio.capture.phone import Gains, Phone, Stages
+from relit_studio.capture.scene import Scene
+from relit_studio.capture.truth import capture_truth, frame_truth
+
+Progress = Callable[[int, int], None]
+"""Told how many frames are done, and of how many."""
+
+_CRF = 20
+_STILL_FRAMES, _BALL_FRAMES = 12, 6
+_BALL_MARGIN = 1.5
+
+
+def no_progress(done: int, total: int) -> None:
+    """Tell nobody."""
+
+
+def record(
+    scene: Scene, stages: Stages, folder: Path, room: str, seed: int, progress: Progress = no_progress
+) -> tuple[Path, Path]:
+    """Write `capture.mp4` (`capture.mkv`, lossless, without H.264), `truth.json` and `sheet.png` into `folder`.
+
+    Finished frames are kept in `folder/.frames` until all are done: the same call goes on where it was interrupted.
+
+    Args:
+        scene: what happens.
+        stages: of the phone's processing.
+        folder: made if missing; what it holds under these names is replaced.
+        room: its name, for the truth.
+        seed: of the noise; also named in the truth.
+        progress: told of every frame.
+
+    Returns:
+        The video and the truth file.
+
+    Raises:
+        StorageError: the folder cannot be written.
+    """
+    make_folder(folder)
+    video = folder / ("capture.mp4" if stages.h264 else "capture.mkv")
+    face = scene.person.face_points()
+    whole = capture_truth(scene, stages, video.name, room, seed, face)
+    total = scene.timing.frames
+    store = FrameStore(folder / ".frames", whole | {"frames": total, "motion": scene.motion})
+    gains, truths = Gains(), []
+    phone: Phone | None = None
+    for index in range(total):
+        done = store.load(index)
+        if done is None:
+            phone = phone or Phone(stages, seed, scene.ordinary_mean())
+            moment = scene.moment(index)
+            light = scene.light(moment)
+            done = Done(frame_truth(scene, moment, gains, face), phone.settle(gains, light))
+            store.save(index, phone.develop(light, gains, index), done)
+        truths.append(done.truth)
+        gains = done.next_gains
+        progress(index + 1, total)
+    _encode(store, total, video, stages, scene)
+    write_display(folder / "sheet.png", _sheet(store, total, scene))
+    write_atomic(folder / "truth.json", json.dumps(whole | {"frames": truths}))
+    store.remove()
+    return video, folder / "truth.json"
+
+
+def _encode(store: FrameStore, total: int, video: Path, stages: Stages, scene: Scene) -> None:
+    size, fps = (scene.camera.width, scene.camera.height), scene.timing.fps
+    with VideoWriter(video, size, fps, crf=_CRF) if stages.h264 else LosslessWriter(video, size, fps) as writer:
+        for index in range(total):
+            writer.write(store.picture(index))
+
+
+def _sheet(store: FrameStore, total: int, scene: Scene) -> DisplayImage:
+    """Frames spread over the video, successive ones from its middle, and the ball in some frames."""
+    spread = np.linspace(0, total - 1, _STILL_FRAMES).round().astype(int)
+    middle = max(0, min(total // 2, total - _BALL_FRAMES)) + np.arange(_BALL_FRAMES)
+    outline = scene.ball.outline(scene.camera)
+    reach = outline.radius * _BALL_MARGIN
+    rows, columns = (
+        slice(max(0, int(at - reach)), min(size, int(at + reach) + 1))
+        for at, size in ((outline.y, scene.camera.height), (outline.x, scene.camera.width))
+    )
+    pictures = [[store.picture(int(index)) for index in chosen] for chosen in np.split(spread, 2)]
+    successive = [store.picture(min(int(index), total - 1)) for index in middle]
+    balls = [store.picture(int(index))[rows, columns] for index in spread[:: _STILL_FRAMES // _BALL_FRAMES]]
+    labels = ("spread over the video", "", "successive", "the ball")
+    return contact_sheet([*pictures, successive, balls], labels)

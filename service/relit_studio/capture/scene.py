@@ -1,0 +1,161 @@
+"""A capture as it happens: the scene's light, frame by frame, and the truth about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.light.environment import Environment
+from relit_camera.light.exposure import WHITE_BALL_READING, display_scale
+from relit_camera.light.maps import LightMap
+from relit_camera.space.images import LinearImage
+from relit_studio.capture.flash import FlashSchedule, RollingShutter
+from relit_studio.capture.head_motion import HeadMotion, Motion
+from relit_studio.capture.mirror_ball import MirrorBall
+from relit_studio.capture.mirror_image import Room, room_in_ball, torch_in_ball
+from relit_studio.capture.person import Person
+from relit_studio.capture.pinhole import Pinhole
+from relit_studio.capture.torch import HandPath, Torch
+
+_BALL_AT = (0.7, 0.46)
+"""Its place: shares of what half the picture spans, to the right and up, at the head's distance."""
+_BALL_BEFORE_CM = 3.0
+"""How far it stands before the head's origin."""
+_BALL_SIZE = 0.16
+"""Its radius as a share of what half the shorter side spans."""
+_POLISHED = np.array([0.86, 0.85, 0.83], np.float32)
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When pictures are taken and when the torch shines.
+
+    Attributes:
+        seconds: length of the video.
+        fps: frames a second.
+        flash_hz: the torch's frequency by its own clock, which is off by `clock_error`: the phase drifts.
+        duty: share of each period that it is on.
+        exposure_s: of each row.
+        readout_s: from the first row's exposure to the last one's.
+    """
+
+    seconds: float = 30.0
+    fps: float = 30.0
+    flash_hz: float = 5.0
+    clock_error: float = 0.013
+    duty: float = 0.5
+    exposure_s: float = 1 / 60
+    readout_s: float = 0.018
+
+    @property
+    def frames(self) -> int:
+        """How many frames there are."""
+        return max(1, round(self.seconds * self.fps))
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What is so while a frame is taken.
+
+    Attributes:
+        index: of the frame.
+        time_s: its presentation time, the start of its first row's exposure.
+        motion: of the head.
+        torch: whether it shines or not.
+        lit: share (height,) of each row's exposure for which it does.
+        knots: the same, exactly; see `RollingShutter.lit_knots`.
+    """
+
+    index: int
+    time_s: float
+    motion: Motion
+    torch: Torch
+    lit: NDArray[np.float64]
+    knots: list[tuple[float, float]]
+
+
+class Scene:
+    """A person, a mirror ball and a room, and a torch that somebody moves about them."""
+
+    def __init__(self, person: Person, room: Room, timing: Timing, seed: int, motion: float = 1.0) -> None:
+        """Set the scene.
+
+        Args:
+            person: before their own camera.
+            room: its light, scaled to what is wanted beside the torch.
+            timing: of frames and flashes.
+            seed: of the hand, the head and the torch's phase.
+            motion: scales the head's movements.
+        """
+        self.person, self.room, self.timing, self.motion = person, room, timing, motion
+        self.camera = person.camera
+        self.ball = place_ball(person)
+        self.schedule = FlashSchedule(
+            frequency_hz=timing.flash_hz * (1 + timing.clock_error),
+            duty=timing.duty,
+            phase_s=float(np.random.default_rng([seed, 4]).uniform(0, 1 / timing.flash_hz)),
+        )
+        self.shutter = RollingShutter(timing.fps, timing.exposure_s, timing.readout_s, self.camera.height)
+        self._hand = HandPath(person.origin, timing.seconds, seed)
+        self._head = HeadMotion(seed, motion)
+        self._behind = _backdrop(self.camera, room)
+        self._in_ball, self._coverage = room_in_ball(self.ball, self.camera, room)
+
+    def moment(self, index: int) -> Moment:
+        """What is so at frame `index`."""
+        time_s = index / self.timing.fps
+        lit = self.shutter.lit_share(self.schedule, index)
+        knots = self.shutter.lit_knots(self.schedule, index)
+        return Moment(index, time_s, self._head.at(time_s), self._hand.at(time_s), lit, knots)
+
+    def light(self, moment: Moment) -> LinearImage:
+        """What reaches the camera (height, width, 3), linear; every row has its own share of the torch's light."""
+        without, torch = self.parts(moment)
+        return without + torch * moment.lit[:, None, None].astype(np.float32)
+
+    def parts(self, moment: Moment) -> tuple[LinearImage, LinearImage]:
+        """The scene without the torch, and what the torch would add if it were on throughout; twice (height, width, 3).
+
+        The second is black where the torch is off during the whole frame.
+        """
+        shining = moment.torch if moment.lit.any() else None
+        layers = self.person.layers(moment.motion, shining)
+        beside_ball = 1 - self._coverage[..., None]
+        without = self._behind * (1 - layers.matte[..., None]) + layers.ambient
+        torch = layers.flash * beside_ball
+        if shining is not None:
+            torch += torch_in_ball(self.ball, self.camera, shining)
+        return without * beside_ball + self._in_ball, torch
+
+    def ordinary_mean(self) -> NDArray[np.float32]:
+        """Linear RGB (3,): geometric mean of the picture's means without and with the torch, half way through."""
+        middle = self.moment(self.timing.frames // 2)
+        without, torch = self.parts(
+            Moment(middle.index, middle.time_s, middle.motion, middle.torch, np.ones_like(middle.lit), middle.knots)
+        )
+        dark, bright = (np.maximum(image.mean(axis=(0, 1)), 1e-6) for image in (without, without + torch))
+        return np.asarray(np.sqrt(dark * bright), np.float32)
+
+
+def place_ball(person: Person) -> MirrorBall:
+    """A ball beside the person's head, in the picture's upper right, where it shadows nothing."""
+    camera, origin = person.camera, person.origin
+    half = -origin[2] * np.array([camera.width, camera.height]) / 2 / camera.focal_px
+    centre = np.array([_BALL_AT[0] * half[0], _BALL_AT[1] * half[1], origin[2] + _BALL_BEFORE_CM])
+    return MirrorBall(centre, float(_BALL_SIZE * half.min()), _POLISHED)
+
+
+def dimmed(environment: Environment, ambient: float) -> tuple[Room, LightMap]:
+    """The room, and its light map, at a level at which a white ball reads `ambient` where it faces the camera.
+
+    The torch gives 1 at its reference distance.
+    """
+    scale = np.float32(display_scale(environment.light_map) * ambient / WHITE_BALL_READING)
+    return Room(environment.panorama.radiance * scale), environment.light_map * scale
+
+
+def _backdrop(camera: Pinhole, room: Room) -> LinearImage:
+    """The room behind the person, so far away that the torch does not reach it."""
+    return room.seen_along(camera.rays(*camera.pixel_grid()))

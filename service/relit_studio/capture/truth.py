@@ -1,0 +1,104 @@
+"""The truth of a capture as JSON: what a perfect `relit capture` would find, and what it should not need to know."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_studio.capture.flash import flash_state
+from relit_studio.capture.mirror_image import highlight_px
+from relit_studio.capture.person import to_rest
+from relit_studio.capture.phone import EXPOSURE, Gains, Stages
+from relit_studio.capture.scene import Moment, Scene
+from relit_studio.capture.torch import BEAM_EXPONENT, RADIUS_CM, REFERENCE_CM
+
+VERSION = 1
+
+
+def capture_truth(scene: Scene, stages: Stages, video: str, room: str, seed: int, face: NDArray) -> dict[str, Any]:
+    """What holds for the whole video. `face` are the face's surface points (count, 3), camera axes."""
+    camera, ball, outline = scene.camera, scene.ball, scene.ball.outline(scene.camera)
+    return {
+        "version": VERSION,
+        "video": video,
+        "person": scene.person.name,
+        "room": room,
+        "seed": seed,
+        "width_px": camera.width,
+        "height_px": camera.height,
+        "focal_px": camera.focal_px,
+        "head_origin_cm": _numbers(scene.person.origin),
+        "face_centroid_cm": _numbers(face.mean(axis=0)),
+        "ball": {
+            "x_px": outline.x,
+            "y_px": outline.y,
+            "radius_px": outline.radius,
+            "semi_radial_px": outline.semi_radial,
+            "semi_tangential_px": outline.semi_tangential,
+            "centre_cm": _numbers(ball.centre),
+            "radius_cm": ball.radius_cm,
+            "reflectance": _numbers(ball.reflectance),
+        },
+        "torch": {
+            "frequency_hz": scene.schedule.frequency_hz,
+            "duty": scene.schedule.duty,
+            "phase_s": scene.schedule.phase_s,
+            "radius_cm": RADIUS_CM,
+            "unit_irradiance_at_cm": REFERENCE_CM,
+            "beam_exponent": BEAM_EXPONENT,
+        },
+        "shutter": {
+            "fps": scene.timing.fps,
+            "exposure_s": scene.timing.exposure_s,
+            "readout_s": scene.timing.readout_s,
+        },
+        "sensor_value_of_white": EXPOSURE,
+        "stages": asdict(stages),
+    }
+
+
+def frame_truth(scene: Scene, moment: Moment, gains: Gains, face: NDArray) -> dict[str, Any]:
+    """What holds for one frame. `face` as in `capture_truth`."""
+    torch, motion = moment.torch, moment.motion
+    centroid = face.mean(axis=0)
+    to_face, to_ball = torch.position - centroid, torch.position - scene.ball.centre
+    picture = to_rest(scene.person, face, motion)
+    x, y = highlight_px(scene.ball, scene.camera, torch)
+    origin = scene.person.origin + motion.apply(np.zeros(3))
+    return {
+        "index": moment.index,
+        "time_s": moment.time_s,
+        "light": {
+            "position_cm": _numbers(torch.position),
+            "aim": _numbers(torch.aim),
+            "off_aim_deg": float(np.degrees(np.arccos(np.clip(torch.off_axis_cosine(centroid), 0, 1)))),
+            "distance_cm": float(np.linalg.norm(to_face)),
+            "irradiance": float(torch.irradiance(centroid)),
+            "direction": _numbers(to_face / np.linalg.norm(to_face)),
+            "at_ball": _numbers(to_ball / np.linalg.norm(to_ball)),
+        },
+        "flash": {
+            "state": flash_state(moment.lit),
+            "lit_share": float(moment.lit.mean()),
+            "lit_rows_px_share": [[round(row, 4), round(share, 6)] for row, share in moment.knots],
+        },
+        "head": {
+            "pose_deg": motion.angles._asdict(),
+            "origin_cm": _numbers(origin),
+            "to_rest": {
+                "rotation_deg": picture.rotation_deg,
+                "translation_px": list(picture.translation_px),
+                "residual_px": picture.residual_px,
+            },
+        },
+        "highlight_px": [x, y],
+        "exposure_gain": gains.exposure,
+        "white_balance_gain": list(gains.white_balance),
+    }
+
+
+def _numbers(vector: NDArray) -> list[float]:
+    return [round(float(value), 6) for value in vector]
