@@ -161,3 +161,40 @@ def olat(
     if out:
         write_atomic(out, holdout_page(results))
     typer.echo(json.dumps(holdout_json(results), indent=1) if as_json else holdout_text(results))
+
+
+@app.command()
+def video(
+    relit: Annotated[Path, typer.Argument(help="Video made by `relit replay`.")],
+    truth: Annotated[Path, typer.Option(help="Ground-truth relit video: the same frames under the same light.")],
+    matte: Annotated[
+        Path | None, typer.Option(help="Video whose bright pixels are the person; else the whole frame counts.")
+    ] = None,
+    pose: Annotated[
+        Path | None, typer.Option(help="Measured motion: a replay's report, or a track of RELIT with landmarks.")
+    ] = None,
+    true_pose: Annotated[Path | None, typer.Option(help="True motion: truth.json or a true track.")] = None,
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compare a relit video with the ground-truth relit video: light, steadiness, pose."""
+    import json
+
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.evaluate.motion import read_motion
+    from relit_camera.evaluate.video import compare_videos
+    from relit_camera.evaluate.video_page import VideoReport, video_json, video_page, video_text
+    from relit_camera.files import write_atomic
+
+    _check_out(out)
+    if (pose is None) != (true_pose is None):
+        raise typer.BadParameter("give both --pose and --true-pose, or neither")
+    motions = [read_motion(path) for path in (pose, true_pose) if path]
+    with progress_bar() as progress:
+        task = progress.add_task("Comparing", total=None)
+        light = compare_videos(relit, truth, matte, lambda done: progress.update(task, completed=done))
+    report = VideoReport(light, *motions)
+    result = json.dumps(video_json(report), indent=1) if as_json else video_text(report)
+    if out:
+        write_atomic(out, video_page(report, f"Relit video {relit.name}"))
+    typer.echo(result)

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from relit_camera.errors import ConfigError, LightsError
 from relit_camera.evaluate.candidates import RING, method_candidates
-from relit_camera.evaluate.measure import Colours
+from relit_camera.evaluate.measure import Colours, finite_psnr
 from relit_camera.evaluate.truth import only, pixels_of
 from relit_camera.reflectance.black_ring import boundary
 from relit_camera.reflectance.method import method_names
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.colour import uint8_from_linear
-from relit_camera.space.quality import psnr, ssim
+from relit_camera.space.quality import ssim
 
 
 @dataclass(frozen=True)
@@ -157,9 +157,9 @@ def _scores(
         similar.append(ssim(shown[0], shown[1], samples.matte))
     return Scores(
         method=method,
-        peak_255_db=float(np.mean([psnr(p, t, peak=1.0) for p, t, _ in pairs])),
-        raw_peak_255_db=float(np.mean([psnr(p, r, peak=1.0) for p, _, r in pairs])),
-        psnr_db=float(np.mean([psnr(p, t) for p, t, _ in pairs])),
+        peak_255_db=float(np.mean([finite_psnr(p, t, peak=1.0) for p, t, _ in pairs])),
+        raw_peak_255_db=float(np.mean([finite_psnr(p, r, peak=1.0) for p, _, r in pairs])),
+        psnr_db=float(np.mean([finite_psnr(p, t) for p, t, _ in pairs])),
         ssim=float(np.mean(similar)),
     )
 

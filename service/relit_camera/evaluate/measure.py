@@ -11,10 +11,14 @@ from numpy.typing import NDArray
 from relit_camera.evaluate.truth import Truth
 from relit_camera.light.maps import LightMap
 from relit_camera.space.colour import uint8_from_linear
-from relit_camera.space.images import DisplayImage
+from relit_camera.space.images import DisplayImage, Mask
 from relit_camera.space.quality import psnr, ssim
 
 Colours = NDArray[np.float32]
+
+
+MAX_DB = 100.0
+"""PSNR of equal pictures, and of what differs by less: so that means stay finite."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,11 @@ class Relit:
     truth: DisplayImage
     psnr_db: float
     ssim: float
+
+
+def finite_psnr(picture: Colours, truth: Colours, matte: Mask | None = None, peak: float | None = None) -> float:
+    """PSNR in dB as `space.quality` defines it, `MAX_DB` at most; see there."""
+    return min(psnr(picture, truth, matte, peak), MAX_DB)
 
 
 def squared_distances(colours: Colours, truth: Colours) -> NDArray[np.float64]:
@@ -59,7 +68,7 @@ def error_of_pixels(
 
 def light_psnr(colours: Colours, truth: Colours, lights: NDArray[np.intp]) -> NDArray[np.float64]:
     """PSNR in dB (some,) of the pictures (lights, pixels, 3) under the lights of these indices (some,)."""
-    return np.array([psnr(colours[light][:, None], truth[light][:, None]) for light in lights])
+    return np.array([finite_psnr(colours[light][:, None], truth[light][:, None]) for light in lights])
 
 
 def relit_pictures(colours: Colours, truth: Truth, environments: Mapping[str, LightMap]) -> dict[str, Relit]:
@@ -78,5 +87,5 @@ def compare(truth: Truth, seen: Colours, expected: Colours) -> Relit:
     # Shown and judged alike: the brightest half percent of the truth is white.
     peak = float(np.percentile(expected, 99.5)) or 1.0
     shown = [uint8_from_linear(truth.picture(colours / np.float32(peak))) for colours in (seen, expected)]
-    quality = psnr(seen[:, None], expected[:, None])
+    quality = finite_psnr(seen[:, None], expected[:, None])
     return Relit(shown[0], shown[1], quality, ssim(shown[0], shown[1], truth.samples.matte))

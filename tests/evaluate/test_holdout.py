@@ -1,0 +1,85 @@
+"""Leaving lights out."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from relit_camera.errors import ConfigError, LightsError
+from relit_camera.evaluate.holdout import common_gains, hold_out, interior_lights, parse_hold_out
+from relit_camera.evaluate.holdout_page import holdout_json, holdout_page, holdout_text
+from relit_camera.reflectance.black_ring import boundary
+from relit_camera.reflectance.samples import Samples
+from tests.evaluate.ball import cap, lambert
+
+
+def test_only_surrounded_lights_are_left_out() -> None:
+    samples = lambert(cap(120, 50))
+    assert set(interior_lights(samples.directions)) | set(boundary(samples.directions)) == set(
+        range(len(samples.directions))
+    )
+    result = hold_out("ball", samples, 4, ["barycentric"])
+    rim = range(len(samples.directions) - 16, len(samples.directions))
+    assert not set(result.left_out) & set(rim)
+    assert len(result.left_out) == -(-(len(samples.directions) - 16) // 4)
+
+
+def test_more_left_out_is_harder_and_the_nearest_light_is_worst() -> None:
+    samples = lambert(cap(120, 60))
+    few, many = hold_out("ball", samples, 4), hold_out("ball", samples, 2)
+    scores = {score.method: score for score in few.scores}
+    assert few.scores[-1].method == "nearest"
+    assert scores["barycentric"].peak_255_db > scores["nearest"].peak_255_db + 3
+    harder = {score.method: score for score in many.scores}
+    assert harder["barycentric"].peak_255_db < scores["barycentric"].peak_255_db
+    assert harder["barycentric"].ssim < scores["barycentric"].ssim
+
+
+def test_the_figure_is_the_error_at_peak_one() -> None:
+    samples = lambert(cap(120, 50))
+    result = hold_out("ball", samples, 4, ["nearest"])
+    inside = samples.matte > 0.5
+    kept = np.setdiff1d(np.arange(len(samples.directions)), result.left_out)
+    errors = []
+    for light in result.left_out:
+        nearest = kept[(samples.directions[kept] @ samples.directions[light]).argmax()]
+        errors.append(np.mean((samples.pictures[nearest][inside] - samples.pictures[light][inside]) ** 2))
+    assert result.scores[0].raw_peak_255_db == pytest.approx(np.mean(-10 * np.log10(errors)), abs=1e-3)
+
+
+def test_flashes_of_varying_strength_are_evened_out_by_one_gain_for_all() -> None:
+    samples = lambert(cap(120, 50))
+    gains = np.random.default_rng(3).uniform(0.8, 1.25, len(samples.directions)).astype(np.float32)
+    truth = samples.pictures.reshape(len(gains), -1, 3)
+    np.testing.assert_allclose(common_gains(truth / gains[:, None, None], [truth, truth]), gains, rtol=1e-5)
+    left_out = hold_out("ball", samples, 4, ["barycentric"]).left_out
+    uneven = samples.pictures.copy()
+    uneven[left_out] *= gains[left_out][:, None, None, None]
+    result = hold_out("ball", Samples(uneven, samples.directions, samples.matte), 4, ["barycentric"])
+    assert result.scores[0].peak_255_db > result.scores[0].raw_peak_255_db + 5
+
+
+def test_no_surrounded_light_is_an_error() -> None:
+    rim = cap(120, 50)[-16:]
+    with pytest.raises(LightsError):
+        hold_out("rim", lambert(rim), 4)
+
+
+@pytest.mark.parametrize("wrong", ["4", "every", "every=1", "every=x", "each=4", "every=-2"])
+def test_a_wrong_hold_out_is_one_clear_error(wrong: str) -> None:
+    assert parse_hold_out("every=4") == 4
+    with pytest.raises(ConfigError, match="every=N"):
+        parse_hold_out(wrong)
+
+
+def test_reports_hold_every_list_and_method() -> None:
+    results = [hold_out(name, lambert(cap(60, 50)), 2) for name in ("a.lp", "b.lp")]
+    page, text, figures = holdout_page(results), holdout_text(results), json.loads(json.dumps(holdout_json(results)))
+    for name in ("a.lp", "b.lp", "planar", "nearest", "barycentric"):
+        assert name in page
+        assert name in text
+    mean = figures["mean_peak_255_db"]["planar"]["every_2"]
+    of_lists = [figures["lists"][n]["every_2"]["methods"]["planar"]["peak_255_db"] for n in ("a.lp", "b.lp")]
+    assert mean == pytest.approx(np.mean(of_lists))

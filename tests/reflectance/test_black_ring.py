@@ -1,0 +1,46 @@
+"""The black ring round the sampled region."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relit_camera.reflectance.barycentric import SphericalBarycentric
+from relit_camera.reflectance.black_ring import boundary, ring_directions, with_black_ring
+from relit_camera.space.directions import direction_from_degrees
+from tests.evaluate.ball import cap, lambert
+from tests.synthetic import fibonacci_directions
+
+
+def test_the_boundary_of_a_cap_is_its_rim() -> None:
+    captured = cap(120, 50)
+    assert set(boundary(captured)) == set(range(len(captured) - 16, len(captured)))
+
+
+def test_lights_all_round_have_no_boundary_and_get_no_ring() -> None:
+    captured = fibonacci_directions(100)
+    assert not len(boundary(captured))
+    assert not len(ring_directions(captured))
+
+
+def test_each_black_sample_lies_farther_out_on_its_lights_way() -> None:
+    captured = cap(120, 50)
+    ring = ring_directions(captured, 20)
+    rim = captured[boundary(captured)]
+    np.testing.assert_allclose(np.linalg.norm(ring, axis=1), 1)
+    np.testing.assert_allclose(np.degrees(np.arccos((ring * rim).sum(axis=1))), 20, atol=1e-6)
+    # The cap's middle is the camera's axis, but for the spiral's unevenness.
+    np.testing.assert_allclose(np.degrees(np.arccos(ring[:, 2])), 70, atol=1.5)
+
+
+def test_the_field_fades_over_the_ring_and_stays_the_same_inside() -> None:
+    samples = lambert(cap(120, 50))
+    wider = with_black_ring(samples, 20)
+    method = SphericalBarycentric()
+    query = direction_from_degrees([0, 30, 60, 75], [10, 0, 0, 0])
+    before = np.tensordot(method.weights(samples.directions, query).T, samples.pictures, 1)
+    after = np.tensordot(method.weights(wider.directions, query).T, wider.pictures, 1)
+    np.testing.assert_allclose(after[:2], before[:2], atol=1e-6)
+    assert before[2].max() == 0
+    half_way = samples.pictures[boundary(samples.directions)].max()
+    assert 0.3 * half_way < after[2].max() < 0.7 * half_way
+    assert after[3].max() == 0
