@@ -1,0 +1,1 @@
+"""Meshes and pictures made by others: fetched on demand, verified, never committed."""

@@ -1,0 +1,1 @@
+"""The commands of `python -m relit_studio`, one a file."""

@@ -1,0 +1,66 @@
+"""Options that several commands take, and how they show progress."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from relit_camera.cli.progress import progress_bar
+from relit_camera.light.store import EnvironmentStore
+from relit_studio.cycles.job import Quality
+from relit_studio.cycles.runner import Progress as Told
+from relit_studio.drive.room import Room
+from relit_studio.people.person import Person, make_person
+from relit_studio.people.traits import find_traits
+from relit_studio.people.wardrobe import wardrobe
+
+PersonName = Annotated[str, typer.Option("--person", help="adam, bea, cem, or a number for a random person.")]
+Out = Annotated[Path, typer.Option("--out", help="Folder to write to.", metavar="DIR")]
+Threads = Annotated[int, typer.Option("--threads", min=1, max=256, help="Of Cycles.")]
+Truth = Annotated[
+    bool, typer.Option("--truth/--denoise", help="No denoiser and no clamp, for measuring; or denoised, for show.")
+]
+Samples = Annotated[int | None, typer.Option("--samples", min=1, max=65536, help="A pixel.")]
+Size = Annotated[int, typer.Option("--size", min=32, max=4096, help="Of the pictures, pixels.")]
+Environment = Annotated[str, typer.Option("--environment", help="A stored name or a panorama file.")]
+Turn = Annotated[float, typer.Option("--turn", help="Of the environment, degrees; > 0 moves its front to the right.")]
+
+SHOW_SAMPLES, TRUTH_SAMPLES = 32, 512
+
+
+def quality_of(truth: bool, samples: int | None, threads: int, show_samples: int = SHOW_SAMPLES) -> Quality:
+    """The quality that the options ask for."""
+    if truth:
+        return Quality.truth(samples or TRUTH_SAMPLES, threads)
+    return Quality(samples or show_samples, threads=threads)
+
+
+def load_person(name: str) -> Person:
+    """The person of the cast or of a number.
+
+    Raises:
+        NotFoundError: no such person, or the raw files have not been fetched.
+    """
+    return make_person(find_traits(name), wardrobe())
+
+
+def load_room(environment: str, turn_deg: float) -> Room:
+    """The environment of a name or a file, turned.
+
+    Raises:
+        NotFoundError: there is none.
+        PanoramaError: the file cannot be used.
+    """
+    return Room(EnvironmentStore().resolve(environment), turn_deg)
+
+
+@contextmanager
+def shown_progress(what: str) -> Iterator[Told]:
+    """A progress bar on stderr."""
+    with progress_bar() as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -1,0 +1,89 @@
+"""Cycles' own Python environment: `bpy` wants numpy 1 and exactly one version of Python, we want neither."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+from filelock import FileLock
+
+from relit_camera.errors import DeviceError, StorageError
+from relit_camera.files import make_folder
+from relit_studio.assets.store import cache_folder
+
+BPY = "4.5.15"
+PYTHON = "3.11"
+"""What that bpy is built for."""
+REQUIREMENTS = (f"bpy=={BPY}", "numpy<2")
+LIBRARIES = "libx11-6 libxrender1 libxfixes3 libxi6 libxkbcommon0 libxext6 libsm6 libice6 libgl1"
+"""Debian packages that bpy links to."""
+_SETUP = "run `python -m relit_studio setup`"
+
+
+def environment_folder() -> Path:
+    """Where the environment is, made or not."""
+    return cache_folder() / f"bpy-{BPY}"
+
+
+def environment_python() -> Path:
+    """The environment's interpreter.
+
+    Raises:
+        DeviceError: it has not been made.
+    """
+    python = environment_folder() / "bin" / "python"
+    if not (environment_folder() / "ready").is_file():
+        raise DeviceError(f"Cycles is not set up: no environment at {environment_folder()}", _SETUP)
+    return python
+
+
+def create_environment() -> Path:
+    """Make the environment, or leave it as it is if it works; returns its folder.
+
+    Raises:
+        DeviceError: there is no Python 3.11, or bpy cannot be installed or imported.
+        StorageError: the folder cannot be written.
+    """
+    folder = environment_folder()
+    make_folder(folder.parent)
+    with FileLock(folder.with_suffix(".lock")):
+        if not (folder / "ready").is_file():
+            _create(folder)
+    return folder
+
+
+def _create(folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    try:
+        if f"{sys.version_info.major}.{sys.version_info.minor}" == PYTHON:
+            venv.create(folder, with_pip=True)
+        else:
+            _run([_python311(), "-m", "venv", str(folder)], "make an environment")
+    except OSError as error:
+        raise StorageError(
+            f"cannot write {folder}: {error.strerror}", "free some space, or set XDG_CACHE_HOME"
+        ) from error
+    python = str(folder / "bin" / "python")
+    _run([python, "-m", "pip", "install", "--quiet", *REQUIREMENTS], "install bpy")
+    _run([python, "-c", "import bpy"], f"import bpy; on Debian, `apt-get install {LIBRARIES}` may be what is missing")
+    (folder / "ready").touch()
+
+
+def _python311() -> str:
+    found = shutil.which(f"python{PYTHON}")
+    if found is None:
+        raise DeviceError(f"bpy {BPY} wants Python {PYTHON}, and there is none", f"install python{PYTHON}")
+    return found
+
+
+def _run(command: list[str], purpose: str) -> None:
+    # Not ours: packages of the calling environment would be found in the new one.
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        raise DeviceError(f"cannot {purpose}: {last}", "cure that, then set up again")

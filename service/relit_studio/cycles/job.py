@@ -1,0 +1,200 @@
+"""What the worker is asked to render, as files: a JSON job, and arrays as .npz beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.files import atomic_path, make_folder, write_atomic
+from relit_studio.camera import Camera
+
+JOB_FILE = "job.json"
+
+Material = Mapping[str, Any]
+"""A `kind` that the worker knows (`worker/materials.py`) and its arguments; picture files as absolute paths."""
+
+Shape = Mapping[str, NDArray]
+"""What moves, by "object.vertices", "object.points" or, for a rigid motion in our axes, "object.matrix"."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A surface.
+
+    Attributes:
+        name: unique in the scene.
+        vertices: (count, 3) in our axes, centimetres.
+        faces: (faces, 4) int, counter-clockwise from outside, -1 in the last column of a triangle.
+        slots: (faces,) int, which of `materials` each face has.
+        materials: names in the scene.
+        uv: (count, 2) texture coordinates, v up, or None.
+        attributes: (count,) each, by the name under which materials know it.
+        subdivision: how often Cycles subdivides it.
+    """
+
+    name: str
+    vertices: NDArray
+    faces: NDArray
+    slots: NDArray
+    materials: tuple[str, ...]
+    uv: NDArray | None = None
+    attributes: Mapping[str, NDArray] = field(default_factory=dict)
+    subdivision: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Strands:
+    """Hairs: `points` (strands, points, 3) in our axes, and their `radius` (strands, points), both centimetres."""
+
+    name: str
+    points: NDArray
+    radius: NDArray
+    material: str
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything before the camera."""
+
+    objects: tuple[Mesh | Strands, ...]
+    materials: Mapping[str, Material]
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How well Cycles renders.
+
+    Attributes:
+        samples: a pixel.
+        denoise: with OpenImageDenoise. It moves means by less than 0.0003 and softens hair.
+        clamp_indirect: brightest indirect sample, against fireflies; 0 clamps nothing.
+        seed: of the noise; the same in all pictures, so that a video does not flicker.
+        threads: of the renderer.
+    """
+
+    samples: int = 32
+    denoise: bool = True
+    clamp_indirect: float = 6.0
+    seed: int = 0
+    threads: int = 2
+
+    @staticmethod
+    def truth(samples: int, threads: int) -> Quality:
+        """Unbiased: no denoiser and no clamp."""
+        return Quality(samples, denoise=False, clamp_indirect=0.0, threads=threads)
+
+
+@dataclass(frozen=True)
+class DistantLight:
+    """A lamp far away: a white wall that faces it reads `irradiance`. `size_deg` is its full angle."""
+
+    direction: tuple[float, float, float]
+    irradiance: float = 1.0
+    size_deg: float = 2.0
+    kind: Literal["distant"] = "distant"
+
+
+@dataclass(frozen=True)
+class PanoramaLight:
+    """Light all round from a panorama file in picture axes, its radiance times `strength`."""
+
+    picture: str
+    strength: float = 1.0
+    kind: Literal["panorama"] = "panorama"
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """One picture to render.
+
+    Attributes:
+        path: an .exr file: linear RGBA, half floats, premultiplied over black.
+        light: what lights it.
+        shape: what has moved since the scene was built, or None for nothing.
+        all_passes: write depth, normals and albedo too, as a file of many layers.
+    """
+
+    path: Path
+    light: DistantLight | PanoramaLight
+    shape: Shape | None = None
+    all_passes: bool = False
+
+
+def write_job(folder: Path, scene: Scene, camera: Camera, quality: Quality, pictures: list[Picture]) -> Path:
+    """Write a job into `folder` and return its file.
+
+    Raises:
+        StorageError: the folder cannot be written.
+    """
+    make_folder(folder)
+    _save(folder / "scene.npz", _scene_arrays(scene))
+    listed = []
+    for index, picture in enumerate(pictures):
+        shape = None
+        if picture.shape is not None:
+            shape = f"shape{index:04d}.npz"
+            _save(folder / shape, picture.shape)
+        listed.append(
+            {
+                "path": str(picture.path.resolve()),
+                "light": asdict(picture.light),
+                "shape": shape,
+                "all_passes": picture.all_passes,
+            }
+        )
+    job = {
+        "scene": {
+            "arrays": "scene.npz",
+            "materials": scene.materials,
+            "objects": [_description(each) for each in scene.objects],
+        },
+        "camera": {
+            "focal_px": camera.focal_px,
+            "width": camera.size,
+            "height": camera.size,
+            "position_cm": camera.position_cm.tolist(),
+        },
+        "quality": asdict(quality),
+        "pictures": listed,
+    }
+    write_atomic(folder / JOB_FILE, json.dumps(job))
+    return folder / JOB_FILE
+
+
+def _scene_arrays(scene: Scene) -> dict[str, NDArray]:
+    arrays: dict[str, NDArray] = {}
+    for each in scene.objects:
+        if isinstance(each, Strands):
+            fields: dict[str, NDArray] = {"points": each.points, "radius": each.radius}
+        else:
+            fields = {"vertices": each.vertices, "faces": each.faces, "slots": each.slots, **each.attributes}
+            if each.uv is not None:
+                fields["uv"] = each.uv
+        arrays |= {f"{each.name}.{name}": values for name, values in fields.items()}
+    return arrays
+
+
+def _description(each: Mesh | Strands) -> dict[str, Any]:
+    if isinstance(each, Strands):
+        return {"kind": "strands", "name": each.name, "materials": [each.material]}
+    return {
+        "kind": "mesh",
+        "name": each.name,
+        "materials": list(each.materials),
+        "attributes": list(each.attributes),
+        "subdivision": each.subdivision,
+    }
+
+
+def _save(path: Path, arrays: Mapping[str, NDArray]) -> None:
+    compact = {
+        key: values.astype(np.float32) if values.dtype == np.float64 else values for key, values in arrays.items()
+    }
+    with atomic_path(path) as temporary:
+        np.savez(temporary, allow_pickle=False, **compact)

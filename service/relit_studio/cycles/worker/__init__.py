@@ -1,0 +1,1 @@
+"""What runs inside Cycles' environment: bpy and numpy, nothing else of ours."""

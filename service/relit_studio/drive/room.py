@@ -1,0 +1,69 @@
+"""The room of a driving video: its panorama as light for Cycles, and as what is seen behind the person."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from relit_camera.compose.composite import over, straight
+from relit_camera.compose.view import EnvironmentView
+from relit_camera.light.environment import Environment
+from relit_camera.light.exposure import display_scale
+from relit_camera.light.maps import rotate
+from relit_camera.space.display import display_from_linear
+from relit_camera.space.images import DisplayImage, LinearImage, Mask
+from relit_camera.space.picture_files import write_linear
+from relit_camera.space.rotation import rotation_from_angles
+from relit_studio.camera import Camera
+from relit_studio.cycles.job import PanoramaLight
+
+_BLUR = 0.05
+"""Of what is seen behind the person: a webcam's lens has its focus on them."""
+
+
+ROOM_FILE = "room.exr"
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """An environment about the person, turned by `yaw_deg` (positive moves a frontal light to the picture's right)."""
+
+    environment: Environment
+    yaw_deg: float = 0.0
+
+    @property
+    def scale(self) -> float:
+        """The exposure: a white ball that faces the camera reads 0.8."""
+        return display_scale(self.light_map)
+
+    @property
+    def light_map(self) -> LinearImage:
+        """The light about the person, (32, 64, 3)."""
+        return rotate(self.environment.light_map, rotation_from_angles(self.yaw_deg).inv())
+
+    def light(self, folder: Path) -> PanoramaLight:
+        """The light for Cycles; the panorama, turned, is written into `folder`.
+
+        Raises:
+            StorageError: the folder cannot be written.
+        """
+        radiance = self.environment.panorama.radiance
+        columns = round(self.yaw_deg / 360 * radiance.shape[1])
+        turned = np.roll(radiance, columns, axis=1)
+        # Cycles takes pictures as seen from inside the sphere.
+        path = folder / ROOM_FILE
+        write_linear(path, np.ascontiguousarray(turned[:, ::-1]))
+        return PanoramaLight(str(path))
+
+    def backdrop(self, camera: Camera) -> DisplayImage:
+        """What is seen behind the person, as exposed, uint8 sRGB (size, size, 3)."""
+        height_deg = float(np.degrees(2 * np.arctan(camera.size / 2 / camera.focal_px)))
+        view = EnvironmentView(self.environment.panorama, (camera.size, camera.size), height_deg, _BLUR)
+        return view.picture(rotation_from_angles(self.yaw_deg), self.scale)
+
+    def shown(self, picture: LinearImage, alpha: Mask, backdrop: DisplayImage) -> DisplayImage:
+        """A rendered picture (h, w, 3), premultiplied, over the backdrop, as the webcam gives it."""
+        colours = straight(picture, alpha) * np.float32(self.scale)
+        return over(display_from_linear(colours), np.clip(alpha, 0, 1), backdrop)

@@ -1,0 +1,1 @@
+"""A person under one light after another, over the whole sphere."""

@@ -1,0 +1,117 @@
+"""One-light pictures of a person by Cycles, as `relit capture import` reads them, and their truth."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.files import atomic_path, write_atomic
+from relit_camera.space.colour import uint8_from_linear
+from relit_camera.space.picture_files import write_display
+from relit_studio.assets.manifest import manifest
+from relit_studio.begun import keep_settings
+from relit_studio.camera import Camera
+from relit_studio.cycles.exr import Passes, read_passes
+from relit_studio.cycles.figure import Figure
+from relit_studio.cycles.job import DistantLight, Picture, Quality, Scene
+from relit_studio.cycles.runner import Progress, render
+from relit_studio.mannequin.lights import light_directions
+from relit_studio.people.landmarks import canonical_origin, landmarks
+from relit_studio.people.person import Person
+from relit_studio.people.posture import Posture
+
+_PASSES = "passes.exr"
+_PASSES_SAMPLES = 96
+_SOFT_FRONTAL = DistantLight((0.0, 0.35, 0.9367), size_deg=90.0)
+
+
+@dataclass(frozen=True)
+class FieldSettings:
+    """What a field is rendered with.
+
+    Attributes:
+        lights: how many, spread evenly over the whole sphere.
+        size: of the pictures, pixels.
+        light_size_deg: full angle of the lamp.
+        quality: of the one-light pictures.
+    """
+
+    lights: int = 253
+    size: int = 256
+    light_size_deg: float = 2.0
+    quality: Quality = field(default_factory=Quality)
+
+
+def render_field(
+    person: Person, folder: Path, settings: FieldSettings, progress: Progress = lambda done, total: None
+) -> dict[str, float]:
+    """Render the neutral person under each light; lights that are there already are left. Returns seconds by picture.
+
+    `000.exr` … are linear, over black, under lamps of unit irradiance: a white wall that faces the lamp reads 1. Beside
+    them `lights.lp`, `matte.png`, `neutral.png` (under a soft frontal lamp), `landmarks.json`, `truth.npz` (normals,
+    linear albedo, depth in centimetres toward the camera from the canonical face's origin; float32) and `field.json`
+    (settings, camera, credits).
+
+    Raises:
+        InputError: the folder holds a field of other settings.
+        DeviceError: Cycles is not set up, or fails.
+        StorageError: the folder cannot be written.
+    """
+    camera = Camera(settings.size)
+    keep_settings(folder, "field.json", _description(person, settings, camera))
+    scene = Figure(person).scene()
+    directions = light_directions(settings.lights)
+    digits = len(str(settings.lights - 1))
+    names = [f"{index:0{digits}d}.exr" for index in range(settings.lights)]
+    _write_lights(folder, names, directions)
+    _write_truth(person, scene, camera, folder, settings.quality)
+    pictures = [
+        Picture(folder / name, DistantLight((x, y, z), size_deg=settings.light_size_deg))
+        for name, (x, y, z) in zip(names, directions.tolist(), strict=True)
+    ]
+    return render(scene, camera, settings.quality, pictures, progress)
+
+
+def _description(person: Person, settings: FieldSettings, camera: Camera) -> dict[str, object]:
+    # Threads change no picture.
+    quality = {key: value for key, value in asdict(settings.quality).items() if key != "threads"}
+    return {
+        "person": asdict(person.traits),
+        "settings": {**asdict(settings), "quality": quality},
+        "camera": {**asdict(camera), "focal_px": camera.focal_px},
+        "credits": list(manifest().credits.values()),
+    }
+
+
+def _write_lights(folder: Path, names: list[str], directions: NDArray) -> None:
+    lines = [f"{name} {x:.7f} {y:.7f} {z:.7f}" for name, (x, y, z) in zip(names, directions, strict=True)]
+    write_atomic(folder / "lights.lp", "\n".join([str(len(names)), *lines, ""]))
+
+
+def _write_truth(person: Person, scene: Scene, camera: Camera, folder: Path, quality: Quality) -> None:
+    passes_quality = Quality.truth(_PASSES_SAMPLES, quality.threads)
+    render(scene, camera, passes_quality, [Picture(folder / _PASSES, _SOFT_FRONTAL, all_passes=True)])
+    passes = read_passes(folder / _PASSES)
+    matte = np.round(np.clip(passes.alpha, 0, 1) * 255).astype(np.uint8)
+    write_display(folder / "matte.png", np.repeat(matte[..., None], 3, axis=2))
+    write_display(folder / "neutral.png", uint8_from_linear(passes.picture))
+    pixels = {
+        scheme: camera.project(points).astype(np.float64).round(3).tolist()
+        for scheme, points in landmarks(person, Posture()).items()
+    }
+    write_atomic(folder / "landmarks.json", json.dumps(pixels))
+    with atomic_path(folder / "truth.npz") as temporary:
+        np.savez_compressed(
+            temporary, normals=passes.normals, albedo=passes.albedo, depth=_depth(person, passes, camera)
+        )
+
+
+def _depth(person: Person, passes: Passes, camera: Camera) -> NDArray[np.float32]:
+    """Centimetres toward the camera from the canonical face's origin (h, w); zero where there is nothing."""
+    origin, _ = canonical_origin(person.model)
+    toward = camera.distance_cm - origin[2] - passes.depth_cm
+    return np.where(np.isfinite(toward), toward, 0).astype(np.float32)

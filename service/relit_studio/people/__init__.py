@@ -1,0 +1,1 @@
+"""People as numbers: shape, skin, hair, eyes and clothes, in numpy alone."""

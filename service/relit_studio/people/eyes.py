@@ -1,0 +1,133 @@
+"""Eyeballs: where they look, and the picture that is laid over them along that axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from relit_camera.space.colour import uint8_from_linear
+from relit_camera.space.images import DisplayImage
+from relit_camera.space.rotation import rotation_from_angles
+from relit_studio.people.expressions import Expression
+from relit_studio.people.face_model import CORNEA_MATERIALS, FaceModel, Part
+from relit_studio.people.geometry import Floats, smoothstep, unit
+from relit_studio.people.traits import Traits
+
+_WAYS = ("Out", "In", "Down", "Up")
+
+LIMBUS_CM = 0.62
+"""Radius of the coloured part; ICT-FaceKit's eyeballs are 1.5 cm in radius."""
+_PUPIL_CM = 0.21
+VIEW_CM = 3.2
+"""What the picture spans."""
+_SIDE = 1024
+_SCLERA = (0.60, 0.525, 0.48)
+GAZE_DEG = 30.0
+"""What an `eyeLook` weight of 1 turns an eye by: the model's shapes move the lids alone."""
+_EYES = ((Part.EYE_LEFT, CORNEA_MATERIALS[0], "L", 1), (Part.EYE_RIGHT, CORNEA_MATERIALS[1], "R", -1))
+"""Part, outer shell, suffix of its expressions, and on which side of the nose it lies."""
+
+
+@dataclass(frozen=True, eq=False)
+class EyeMap:
+    """How the eye's picture lies on the mesh: texture coordinates (vertices, 2), distance from the axis (vertices,)."""
+
+    uv: Floats
+    eccentricity: Floats
+
+
+def eye_map(model: FaceModel, neutral: Floats) -> EyeMap:
+    """Lay the picture over both eyeballs of a neutral head, as seen along each gaze axis."""
+    uv, eccentricity = np.zeros((len(neutral), 2)), np.zeros(len(neutral))
+    for part, material, _, _ in _EYES:
+        eyeball = _vertices(model.faces[model.face_part == part])
+        middle, axis = gaze(neutral[_vertices(model.faces[model.face_material == material])])
+        right = unit(np.cross([0, 1, 0], axis))
+        offset = neutral[eyeball] - middle
+        across, up, ahead = offset @ right, offset @ np.cross(axis, right), offset @ axis
+        eccentricity[eyeball] = np.where(ahead > 0, np.hypot(across, up), (VIEW_CM / 2))
+        uv[eyeball] = np.stack([across, up], axis=1) / VIEW_CM + 0.5
+    return EyeMap(uv, eccentricity)
+
+
+def gaze(shell: Floats) -> tuple[Floats, Floats]:
+    """Middle (3,) and unit axis (3,) of an eyeball's outer shell (n, 3): a sphere, and where the cornea stands out."""
+    back = shell[shell[:, 2] < np.percentile(shell[:, 2], 60)]
+    system = np.column_stack([2 * back, np.ones(len(back))])
+    middle = np.linalg.lstsq(system, (back**2).sum(axis=1), rcond=None)[0][:3]
+    farthest = np.argsort(-np.linalg.norm(shell - middle, axis=1))[:10]
+    return middle, unit(shell[farthest].mean(axis=0) - middle)
+
+
+def turn_eyes(model: FaceModel, vertices: Floats, expression: Expression) -> Floats:
+    """Vertices (count, 3) of an upright head with the eyeballs turned as the expression's `eyeLook` weights say."""
+    moved = vertices.copy()
+    for part, material, suffix, side in _EYES:
+        outward, inward, down, up = (expression.get(f"eyeLook{way}_{suffix}", 0.0) for way in _WAYS)
+        if not (outward or inward or down or up):
+            continue
+        middle, _ = gaze(vertices[_vertices(model.faces[model.face_material == material])])
+        eyeball = _vertices(model.faces[model.face_part == part])
+        turn = rotation_from_angles(side * GAZE_DEG * (outward - inward), GAZE_DEG * (down - up))
+        moved[eyeball] = turn.apply(vertices[eyeball] - middle) + middle
+    return moved
+
+
+def lid_shade(model: FaceModel) -> Floats:
+    """0..1 (vertices,) on the shells before the eyes: how deep in the lids' shade."""
+    shade = np.zeros(len(model.vertices))
+    chosen = np.isin(model.face_part, (Part.OCCLUSION_LEFT, Part.OCCLUSION_RIGHT))
+    height = model.uv[model.face_uv[chosen].ravel(), 1]
+    shade[model.faces[chosen].ravel()] = np.maximum(smoothstep(height, 0.35, 1.0), 0.6 * smoothstep(height, 0.3, 0.0))
+    return shade
+
+
+def eye_picture(traits: Traits) -> DisplayImage:
+    """Sclera with veins, limbal ring, iris fibres and pupil, (1024, 1024, 3) sRGB, 3.2 cm wide."""
+    rng = np.random.default_rng(traits.seed + 7)
+    place = ((np.arange(_SIDE) + 0.5) / _SIDE * 2 - 1) * (VIEW_CM / 2)
+    x, y = np.meshgrid(place, -place)
+    radius, angle = np.hypot(x, y), np.arctan2(y, x)
+    iris = _iris(traits, radius, angle, rng)
+    veins = _veins(rng)[..., None]
+    sclera = np.array(_SCLERA) * (1 - veins * [0.15, 0.6, 0.6])
+    sclera = sclera * (1 - 0.25 * smoothstep(radius, 0.8, 1.5)[..., None] * [0.4, 0.9, 1.0])
+    share = smoothstep(radius, LIMBUS_CM - 0.06, LIMBUS_CM + 0.07)[..., None]
+    return uint8_from_linear((iris.clip(0, 1) * (1 - share) + sclera * share).astype(np.float32))
+
+
+def _iris(traits: Traits, radius: Floats, angle: Floats, rng: np.random.Generator) -> Floats:
+    around = np.linspace(-np.pi, np.pi, 4096)
+    waves = [np.sin(f * around + rng.uniform(0, 6.28)) * rng.uniform(0.5, 1) for f in (9, 17, 31, 57, 93, 140)]
+    noise = cv2.GaussianBlur(rng.normal(size=radius.shape), (0, 0), 5) * 9
+    fibres = (np.interp(angle + 0.03 * noise, around, np.sum(waves, axis=0)) / 3)[..., None]
+    colour = np.array(traits.iris) * (1 + 0.38 * fibres + 0.075 * noise[..., None])
+    outward = np.clip((radius - _PUPIL_CM) / (LIMBUS_CM - _PUPIL_CM), 0, 1)
+    warm = max(traits.iris) * np.array([1.25, 0.75, 0.3])
+    ring = 0.55 * np.exp(-(((outward - 0.16) / 0.13) ** 2))[..., None]
+    colour = colour * (1 - ring) + warm * ring * (1 + 0.3 * fibres)
+    limbal = 1 - 0.75 * smoothstep(outward, 0.72, 1.0)
+    pupil = smoothstep(radius, _PUPIL_CM - 0.012, _PUPIL_CM + 0.02)
+    return np.asarray(colour * (limbal * pupil)[..., None])
+
+
+def _veins(rng: np.random.Generator) -> Floats:
+    canvas = np.zeros((_SIDE, _SIDE), np.float32)
+    for _ in range(70):
+        angle, radius, drift = rng.uniform(-np.pi, np.pi), 1.5, rng.normal() * 0.2
+        points: list[Floats] = []
+        while radius > rng.uniform(0.75, 1.1) and len(points) < 60:
+            offset = radius * np.array([np.cos(angle), -np.sin(angle)])
+            points.append((offset + (VIEW_CM / 2)) / VIEW_CM * _SIDE)
+            radius -= 0.03
+            drift = drift * 0.9 + rng.normal() * 0.05
+            angle += drift * 0.12
+        strength, width = float(rng.uniform(0.15, 0.5)), int(rng.integers(1, 3))
+        cv2.polylines(canvas, [np.array(points, np.int32)], False, strength, width, cv2.LINE_AA)
+    return np.asarray(cv2.GaussianBlur(canvas, (0, 0), 1.3), np.float64)
+
+
+def _vertices(faces: np.ndarray) -> np.ndarray:
+    return np.unique(faces[faces >= 0])

@@ -1,0 +1,49 @@
+"""How a person holds their head and face."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from relit_camera.space.rotation import Angles, rotation_from_angles
+from relit_studio.people.expressions import NEUTRAL, Expression
+from relit_studio.people.geometry import Floats, smoothstep
+
+PIVOT = np.array([0.0, -4.0, -1.0])
+"""Where the head turns on the neck, in head axes, centimetres."""
+
+
+@dataclass(frozen=True)
+class Posture:
+    """How the head stands relative to the room, and the face's expression."""
+
+    angles: Angles = field(default_factory=lambda: Angles(0.0, 0.0, 0.0))
+    expression: Expression = field(default_factory=lambda: NEUTRAL)
+
+    @property
+    def rotation(self) -> Rotation:
+        """Room from head."""
+        return rotation_from_angles(*self.angles)
+
+
+def follows_head(points: Floats) -> Floats:
+    """How much (n,) of the head's turn a point at rest follows: all of it on the head, less and less down the neck."""
+    return smoothstep(points[:, 1] + 0.25 * points[:, 2], -12.5, -6.5)
+
+
+def turned(points: Floats, rotation: Rotation, share: Floats | None = None) -> Floats:
+    """Points (n, 3) turned about the neck; `share` (n,) of the turn where they do not follow wholly."""
+    offset = points - PIVOT
+    if share is None:
+        return np.asarray(rotation.apply(offset) + PIVOT)
+    return np.asarray(Rotation.from_rotvec(share[:, None] * rotation.as_rotvec()).apply(offset) + PIVOT)
+
+
+def rigid_motion(rotation: Rotation) -> Floats:
+    """The head's turn as a matrix (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation.as_matrix()
+    matrix[:3, 3] = PIVOT - rotation.apply(PIVOT)
+    return matrix

@@ -1,0 +1,91 @@
+"""Where hair grows, and the surface that it must not enter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from relit_studio.people.face_model import FaceModel, Part
+from relit_studio.people.geometry import (
+    Floats,
+    Indices,
+    SurfacePoints,
+    areas,
+    find_nearest,
+    scatter,
+    smoothstep,
+    unit,
+    vertex_normals,
+)
+
+_HAIRLINE = np.array(
+    [
+        [0, 18, 32, 45, 56, 64, 71, 76, 84, 98, 106, 116, 140, 180],
+        [10.4, 10.7, 10.3, 8.4, 6.2, 3.4, 2.4, 3.9, 4.4, 3.9, 1.2, -1.5, -4.2, -4.6],
+    ]
+)
+"""Height of the hairline on the mean head over the azimuth from the front, degrees and centimetres."""
+
+
+def scalp(model: FaceModel) -> Floats:
+    """0..1 (vertices,) where hair grows."""
+    mean = model.vertices
+    azimuth = np.degrees(np.arctan2(np.abs(mean[:, 0]), mean[:, 2]))
+    above = mean[:, 1] - np.interp(azimuth, *_HAIRLINE)
+    return smoothstep(above, -0.25, 0.75) * (model.vertex_part <= Part.HEAD) * (mean[:, 1] > -6)
+
+
+def ears(model: FaceModel) -> Floats:
+    """0..1 (vertices,) what belongs to the ears."""
+    x, y, z = np.abs(model.vertices[:, 0]), model.vertices[:, 1], model.vertices[:, 2]
+    height = smoothstep(y, -3.2, -1.8) * smoothstep(y, 4.3, 3.2)
+    return smoothstep(x, 7.2, 7.9) * height * smoothstep(z, -2.4, -1) * smoothstep(z, 3.4, 2.2)
+
+
+@dataclass(frozen=True, eq=False)
+class Roots:
+    """Where hairs stand.
+
+    Attributes:
+        place, normal: (n, 3).
+        density: (n,) 0 at the hairline to 1 inside.
+    """
+
+    place: Floats
+    normal: Floats
+    density: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """Points of a surface and their outward normals, (n, 3) each, to be kept out of."""
+
+    points: Floats
+    normals: Floats
+    tree: cKDTree
+
+    def nearest(self, places: Floats) -> tuple[Floats, Floats]:
+        """Nearest point and its normal, (n, 3) each."""
+        _, index = find_nearest(self.tree, places)
+        return self.points[index], self.normals[index]
+
+
+def place_roots(model: FaceModel, head: Floats, count: int, rng: np.random.Generator) -> Roots:
+    """`count` roots on the scalp of a head (vertices, 3)."""
+    triangles = model.triangles(Part.FACE, Part.HEAD)
+    mask = scalp(model)
+    density = areas(head, triangles) * mask[triangles].mean(axis=1) ** 1.5
+    surface: SurfacePoints = scatter(triangles, density, count, rng)
+    normals = vertex_normals(head, triangles)
+    return Roots(surface.of(head), unit(surface.of(normals)), surface.of(mask))
+
+
+def head_and_body(model: FaceModel, head: Floats, body: Floats) -> Obstacle:
+    """The head's skin, and the clothes' points (n, 3) as a hill."""
+    triangles: Indices = model.triangles(Part.FACE, Part.HEAD)
+    skin = np.unique(triangles)
+    slope = unit(body * [0.3, 0, 0.3] + [0, 8, 1])
+    points = np.concatenate([head[skin], body])
+    return Obstacle(points, np.concatenate([vertex_normals(head, triangles)[skin], slope]), cKDTree(points))
