@@ -77,7 +77,8 @@ def test_status_tells_what_runs(tmp_path: Path) -> None:
         found = camera.daemon.status()
         assert 0 < found.latency_ms.p50 <= found.latency_ms.p95
         assert found.frames.published >= found.frames.repeated >= 0
-        assert found.fps.published == pytest.approx(FPS, rel=0.35)
+        # On a busy machine the first second may stutter.
+        wait_until(lambda: camera.daemon.status().fps.published == pytest.approx(FPS, rel=0.35))
 
 
 class SlowTracker(SteadyTracker):
