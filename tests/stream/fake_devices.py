@@ -80,13 +80,3 @@ class FakeCapture:
     def release(self):
         self.threads.add(threading.get_ident())
         self.released = True
-
-
-def wait_until(condition, timeout_s=10.0):
-    """Wait until `condition()` is true; whether it became so in time."""
-    deadline = time.monotonic() + timeout_s
-    while time.monotonic() < deadline:
-        if condition():
-            return True
-        time.sleep(0.005)
-    return bool(condition())

@@ -9,7 +9,7 @@ from relit_camera.stream import publisher as module
 from relit_camera.stream.placeholder import BACKDROP, placeholder
 from relit_camera.stream.publisher import PublishedPicture, Publisher
 from relit_camera.stream.sinks.null import NullSink
-from tests.stream.fake_devices import wait_until
+from tests.stream.small_camera import wait_until
 
 SIZE = (64, 48)
 PLACEHOLDER = np.full((48, 64, 3), 7, np.uint8)
@@ -58,20 +58,20 @@ def make(sink):
 
 def test_there_is_always_a_picture(make, sink):
     publisher = make()
-    assert wait_until(lambda: len(sink.values) >= 5)
+    wait_until(lambda: len(sink.values) >= 5)
     assert set(sink.values) == {7}
     publisher.pictures.put(picture(50))
-    assert wait_until(lambda: sink.values.count(50) >= 5)  # repeated while nothing newer comes
+    wait_until(lambda: sink.values.count(50) >= 5)  # repeated while nothing newer comes
     assert publisher.counts.repeated >= 8
     assert publisher.counts.published == pytest.approx(len(sink.values), abs=1)
 
 
 def test_the_newest_picture_wins_and_the_others_are_counted(make, sink):
     publisher = make(fps=20)
-    assert wait_until(lambda: sink.values)
+    wait_until(lambda: sink.values)
     for value in range(100, 110):
         publisher.pictures.put(picture(value))
-    assert wait_until(lambda: 109 in sink.values)
+    wait_until(lambda: 109 in sink.values)
     assert publisher.counts.dropped >= 8
 
 
@@ -121,7 +121,7 @@ def test_latency_is_from_capture_to_the_end_of_writing(make, sink):
 def test_a_repeated_picture_has_no_latency(make, sink):
     publisher = make()
     publisher.pictures.put(picture(1))
-    assert wait_until(lambda: sink.values.count(1) > 20)
+    wait_until(lambda: sink.values.count(1) > 20)
     assert publisher.latency_ms.p95 < 100  # not the age of the repeated picture
 
 
@@ -130,11 +130,11 @@ def test_a_failing_sink_is_told_once_and_tried_again(make, sink, monkeypatch):
     told = []
     sink.error = DeviceError("the virtual camera is gone")
     publisher = make(on_sink_error=told.append)
-    assert wait_until(lambda: sink.attempts >= 3)
+    wait_until(lambda: sink.attempts >= 3)
     assert told == [sink.error]
     assert publisher.counts.published == 0
     sink.error = None
-    assert wait_until(lambda: len(sink.values) >= 3)
+    wait_until(lambda: len(sink.values) >= 3)
     assert told[1:] == [None]
 
 
@@ -142,9 +142,9 @@ def test_a_fault_of_the_sink_does_not_end_the_thread(make, sink, monkeypatch):
     monkeypatch.setattr(module, "RETRY_S", 0.05)
     sink.error = ZeroDivisionError("a fault")
     make()
-    assert wait_until(lambda: sink.attempts >= 2)
+    wait_until(lambda: sink.attempts >= 2)
     sink.error = None
-    assert wait_until(lambda: sink.values)
+    wait_until(lambda: sink.values)
 
 
 def test_failed_writes_are_not_hammered(make, sink):
@@ -157,12 +157,12 @@ def test_failed_writes_are_not_hammered(make, sink):
 def test_the_placeholder_comes_back_when_pictures_are_stale(make, sink):
     publisher = make(stale_after_s=0.2)
     publisher.pictures.put(picture(90))
-    assert wait_until(lambda: 90 in sink.values)
-    assert wait_until(lambda: sink.values[-1] == 7)
+    wait_until(lambda: 90 in sink.values)
+    wait_until(lambda: sink.values[-1] == 7)
     publisher.placeholder = np.full((48, 64, 3), 8, np.uint8)
-    assert wait_until(lambda: sink.values[-1] == 8)
+    wait_until(lambda: sink.values[-1] == 8)
     publisher.pictures.put(picture(91))
-    assert wait_until(lambda: 91 in sink.values)
+    wait_until(lambda: 91 in sink.values)
 
 
 def test_previews_get_each_shown_picture_once(make, sink):
@@ -182,7 +182,7 @@ def test_previews_get_each_shown_picture_once(make, sink):
 def test_stopping_is_quick(sink):
     publisher = Publisher(sink, 0.5, PLACEHOLDER)  # it would sleep two seconds
     publisher.start()
-    assert wait_until(lambda: sink.values)
+    wait_until(lambda: sink.values)
     start = time.monotonic()
     assert publisher.stop()
     assert time.monotonic() - start < 0.9
@@ -203,12 +203,12 @@ def test_a_stuck_sink_does_not_hold_up_stopping():
     assert not publisher.stop()
     assert time.monotonic() - start < 2
     free.set()
-    assert wait_until(publisher.stop)
+    wait_until(publisher.stop)
 
 
 def test_the_publisher_never_waits_for_a_slow_pipeline(make, sink):
     make(fps=50)
-    assert wait_until(lambda: len(sink.times) >= 25)
+    wait_until(lambda: len(sink.times) >= 25)
     gaps = np.diff(sink.times)
     assert np.median(gaps) == pytest.approx(0.02, abs=0.005)
 

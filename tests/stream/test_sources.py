@@ -16,7 +16,8 @@ from relit_camera.stream.sources.playback import Playback
 from relit_camera.stream.sources.webcam import WebcamSource
 from relit_camera.stream.video import VideoReader
 from relit_camera.stream.video_writer import VideoWriter
-from tests.stream.fake_devices import FakeCapture, FakeTree, wait_until
+from tests.stream.fake_devices import FakeCapture, FakeTree
+from tests.stream.small_camera import wait_until
 
 S = SourceState
 INFO = SourceInfo("test", "test", (64, 48), 50.0)
@@ -41,7 +42,7 @@ def source_threads():
 @pytest.fixture(autouse=True)
 def no_threads_left():
     yield
-    assert wait_until(lambda: not source_threads(), 3.0)
+    wait_until(lambda: not source_threads(), 3.0)
 
 
 def test_every_state_can_be_left_for_the_end_and_reached_from_idle():
@@ -103,7 +104,7 @@ def test_playback_keeps_the_pictures_own_time():
 def test_playback_drops_what_nobody_came_for():
     source = Playback(INFO, pictures())
     source.read(5)
-    assert wait_until(lambda: source._slot.count >= 10)
+    wait_until(lambda: source._slot.count >= 10)
     assert source.read(5).index >= 9
     source.close()
 
@@ -295,10 +296,10 @@ def test_a_silent_webcam_is_stalled_then_reopened(tree):
     source, opener = webcam(tree, silent)
     assert source.read(5) is not None
     silent.mode = "silent"
-    assert wait_until(lambda: source.state is not S.RUNNING)
+    wait_until(lambda: source.state is not S.RUNNING)
     assert source.state in (S.STALLED, S.RECONNECTING, S.OPENING)
     assert "gives no pictures" in source.reason
-    assert wait_until(lambda: source.read(0.1) is not None and len(opener.calls) == 2)
+    wait_until(lambda: source.read(0.1) is not None and len(opener.calls) == 2)
     assert silent.released
     assert source.state is S.RUNNING
     source.close()
@@ -309,14 +310,14 @@ def test_a_stuck_webcam_is_stalled_and_does_not_hold_up_closing(tree):
     source, _ = webcam(tree, capture)
     assert source.read(5) is not None
     capture.mode = "stuck"
-    assert wait_until(lambda: source.state is S.STALLED)
+    wait_until(lambda: source.state is S.STALLED)
     assert source.reason == "HD Webcam gives no pictures"
     start = time.monotonic()
     source.close()
     assert time.monotonic() - start < 2.9
     assert source.state is S.ENDED
     capture.unstick.set()
-    assert wait_until(lambda: capture.released)
+    wait_until(lambda: capture.released)
     assert source.state is S.ENDED
 
 
@@ -326,16 +327,16 @@ def test_an_unplugged_webcam_comes_back_under_another_node(tree):
     last = source.read(5)
     tree.remove(0)
     capture.mode = "silent"
-    assert wait_until(lambda: source.reason == "HD Webcam is unplugged")
+    wait_until(lambda: source.reason == "HD Webcam is unplugged")
     assert source.state in (S.RECONNECTING, S.OPENING)
     assert source.read(0.05) is None
     tree.add_webcam(3, "HD Webcam", usb="1-4:1.0", by_id="usb-hd-video-index0")
-    assert wait_until(lambda: len(opener.calls) == 2)
+    wait_until(lambda: len(opener.calls) == 2)
     assert opener.calls[1][0] == str(tree.dev / "video3")
     frame = source.read(5)
     assert frame.index > last.index
     assert frame.time_s > last.time_s
-    assert wait_until(lambda: source.state is S.RUNNING)
+    wait_until(lambda: source.state is S.RUNNING)
     assert source.reason == ""
     source.close()
 
