@@ -31,7 +31,7 @@ from relit_studio.capture.torch import Torch
 
 CAMERA_NAME, TRUTH_NAME = "field.json", "truth.npz"
 
-_NOSE_CM = 7.5
+_NOSE_CM = np.array([0.0, -0.6, 7.5])
 """From the head's origin to the tip of the nose."""
 _NEAR_COSINE = 0.5
 """Triangles of lights whose corners are all farther off the torch's direction are not looked at."""
@@ -175,7 +175,7 @@ def _head_origin(points: NDArray[np.float64]) -> NDArray[np.float64]:
     low, high = points[:, 1].min(), points[:, 1].max()
     upper = points[points[:, 1] > low + 0.4 * (high - low)]
     nose = upper[upper[:, 2] >= np.percentile(upper[:, 2], 99.8)].mean(axis=0)
-    return np.asarray(nose - [0.0, 0.0, _NOSE_CM])
+    return np.asarray(nose - _NOSE_CM)
 
 
 def _read_camera(path: Path, shape: tuple[int, ...]) -> tuple[Pinhole, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from relit_camera.light.maps import LightMap
 from relit_camera.space.images import LinearImage
@@ -18,9 +18,8 @@ from relit_studio.mannequin.lights import lights_from_map
 from relit_studio.mannequin.raster import Hits, rasterise
 from relit_studio.mannequin.shading import ShadowMap, Surface, Values, reflected
 
-DISTANCE_CM = 62.0
-"""From the camera to the head's origin."""
-_BELOW_AXIS_CM = 2.0
+_SEAT_CM = (0.0, -2.0, -62.0)
+"""The head's origin at rest."""
 _HEIGHT_CM = 56.0
 """What the picture's height spans at the head's origin: the bust, cut below the shoulders, fills it to the bottom."""
 
@@ -34,7 +33,7 @@ _SHADOW_PER_ROW = 1.6
 
 def phone_camera(width: int, height: int) -> Pinhole:
     """The phone's camera for the mannequin: a head and shoulders at arm's length."""
-    return Pinhole(width, height, height * DISTANCE_CM / _HEIGHT_CM)
+    return Pinhole(width, height, height * -_SEAT_CM[2] / _HEIGHT_CM)
 
 
 class MannequinPerson:
@@ -42,9 +41,9 @@ class MannequinPerson:
 
     name = "mannequin"
 
-    def __init__(self, camera: Pinhole, room: LightMap) -> None:
-        """Seat it before `camera`, in a room of this light."""
-        self.camera = camera
+    def __init__(self, camera: Pinhole, room: LightMap, origin: ArrayLike = _SEAT_CM) -> None:
+        """Seat it before `camera` in a room of this light, its head's origin at `origin` (3,), camera axes."""
+        self.camera, self._origin = camera, np.asarray(origin, np.float64)
         self._fine = camera.scaled(_SUPERSAMPLING)
         self._room = lights_from_map(room, _AMBIENT_LIGHTS)
         self._figure = mannequin()
@@ -59,7 +58,7 @@ class MannequinPerson:
     @property
     def origin(self) -> NDArray[np.float64]:
         """See `Person.origin`."""
-        return np.array([0.0, -_BELOW_AXIS_CM, -DISTANCE_CM])
+        return self._origin
 
     def layers(self, motion: Motion, torch: Torch | None) -> Layers:
         """See `Person.layers`."""

@@ -69,10 +69,12 @@ def room_in_ball(ball: MirrorBall, camera: Pinhole, room: Room) -> tuple[LinearI
         left + (np.arange((right - left) * fine) + 0.5) / fine, top + (np.arange((bottom - top) * fine) + 0.5) / fine
     )
     hit, _, mirrored = ball.reflect(camera.rays(x, y).reshape(-1, 3))
-    seen = np.zeros((hit.size, 4), np.float32)
-    seen[hit, :3] = room.coarse().seen_along(mirrored[:, None])[:, 0] * ball.reflectance
-    seen[hit, 3] = 1
-    averaged = cv2.resize(seen.reshape(*x.shape, 4), (right - left, bottom - top), interpolation=cv2.INTER_AREA)
+    directions = np.full((hit.size, 3), [0.0, 0.0, 1.0])
+    directions[hit] = mirrored
+    seen = room.coarse().seen_along(directions.reshape(*x.shape, 3)) * ball.reflectance
+    coverage_fine = hit.reshape(x.shape).astype(np.float32)
+    fine_image = np.concatenate([seen * coverage_fine[..., None], coverage_fine[..., None]], axis=2)
+    averaged = cv2.resize(fine_image, (right - left, bottom - top), interpolation=cv2.INTER_AREA)
     image[top:bottom, left:right] = averaged[..., :3]
     coverage[top:bottom, left:right] = averaged[..., 3]
     return image, coverage

@@ -22,8 +22,8 @@ _SHOT, _READ = 1.5e-4, 1.2e-3
 _PULL, _MOMENTUM = 0.10, 0.72
 """Share of the error that is put right each frame, and of the last change that goes on: it rings."""
 _EXPOSURE_LIMIT_EV = 0.6
-_BALANCE_PULL, _BALANCE_LIMIT = 0.05, 0.25
-_BALANCE_STRENGTH = 0.6
+_BALANCE_PULL, _BALANCE_LIMIT = 0.1, 0.25
+_BALANCE_STRENGTH = 1.0
 """How far grey-world correction goes; limits are of the logarithm of the gains."""
 
 
