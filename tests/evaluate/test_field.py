@@ -106,8 +106,8 @@ class Outline(HTMLParser):
         values = {name: value or "" for name, value in attrs}
         self.fetched += [v for n, v in values.items() if n in ("src", "href", "srcset") and not v.startswith("data:")]
         self.fetched += [tag] if tag in ("script", "link", "iframe", "object") else []
-        self.figures += tag in ("figure", "table")
-        self.captions += tag in ("figcaption", "caption")
+        self.figures += tag == "figure"
+        self.captions += tag == "figcaption"
         if tag not in ("img", "meta", "br", "path"):
             self.open.append(tag)
 

@@ -54,6 +54,8 @@ def field(
     """Compare a reflectance field with pictures that were really taken under each light (thesis 7)."""
     import json
 
+    from relit_camera.capture.build import neutral_picture
+    from relit_camera.capture.landmarks import find_landmarks
     from relit_camera.capture.landmarks_file import read_landmarks
     from relit_camera.cli.progress import progress_bar
     from relit_camera.cli.settings import settings_of
@@ -74,8 +76,12 @@ def field(
     environments = {each.name: each.light_map for each in map(store.resolve, environment or BUILTIN_NAMES)}
     known = Truth(_samples(truth, gamma))
     matte = known.samples.matte
-    points = read_landmarks(truth.parent / "landmarks.json", required=False)
-    spots = [parse_spot(text, matte) for text in pixel] if pixel else face_spots(points, matte)
+    if pixel:
+        spots = [parse_spot(text, matte) for text in pixel]
+    else:
+        frontal = known.samples.pictures[known.directions[:, 2].argmax()]
+        points = read_landmarks(truth.parent / "landmarks.json", required=False)
+        spots = face_spots(points or find_landmarks(neutral_picture(frontal, matte)), matte)
     samples = None
     if _is_lights(Path(subject_or_lights)):
         samples = chosen_lights(_samples(Path(subject_or_lights), gamma), within_deg, every)

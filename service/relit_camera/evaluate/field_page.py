@@ -135,9 +135,10 @@ def _heat_maps(report: FieldReport) -> Iterator[str]:
         contact_sheet(rows, ["all directions", "in region"], names, 210),
         "Error of each pixel's reflectance map: black is none, pale yellow the most. Above, over light from all "
         "directions: what was never sampled dominates, and it shows at the sides of the face, which side light and "
-        "back light reach. With the black ring the error there is a little lower. Below, over light inside the sampled "
-        "region only: what is left is the interpolation's own error, at shadow edges beside the nose, under the chin "
-        f"and in the hair. Each row has its own scale: pale yellow is {tops[0]:.2g} above and {tops[1]:.2g} below.",
+        "back light reach. With the black ring the error there is lower. Below, over light inside the sampled "
+        "region only: what is left is the interpolation's own error, along the edges of shadows, which interpolation "
+        "cannot move: beside the nose, in the eye sockets, under the chin. Each row has its own scale: pale yellow is "
+        f"{tops[0]:.2g} above and {tops[1]:.2g} below.",
     )
 
 

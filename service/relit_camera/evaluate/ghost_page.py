@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.evaluate.candidates import RINGED
 from relit_camera.evaluate.charts import line_chart
 from relit_camera.evaluate.field import FieldReport
-from relit_camera.evaluate.ghosts import MID_TONES, SCALE_EDGES
+from relit_camera.evaluate.ghosts import MID_TONES, SCALE_EDGES, ghosts
 from relit_camera.evaluate.page import chart, heading, paragraph, picture
 from relit_camera.evaluate.pictures import labelled_grid, with_line
 from relit_camera.evaluate.truth import unseen
@@ -97,10 +98,10 @@ def _histogram(report: FieldReport) -> str:
 
 
 def _row(report: FieldReport) -> int:
-    """The picture's row with the most decided spots that the thesis's interpolation shows as mid-tones."""
+    """The picture's row that crosses most ghosts, of dark and of lit spots."""
     assert report.ghost is not None
-    reference = next((each for each in report.judged if each.name == "barycentric"), report.judged[0])
-    wrong = report.ghost.mid_tones(luminance(reference.ghost))
-    wrong &= ~report.ghost.mid_tones(luminance(report.truth.colours[report.ghost.light]))
-    rows = report.truth.inside[wrong] // report.truth.samples.matte.shape[1]
-    return int(np.bincount(rows).argmax())
+    reference = next((each for each in report.judged if each.name == RINGED), report.judged[0])
+    height, width = report.truth.samples.matte.shape
+    parts = ghosts(report.ghost, reference.ghost, report.truth.colours[report.ghost.light])
+    dark, lit = (np.bincount(report.truth.inside[part] // width, minlength=height) for part in parts)
+    return int((np.minimum(dark, lit) * height + dark + lit).argmax())

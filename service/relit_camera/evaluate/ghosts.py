@@ -89,9 +89,18 @@ def mid_tone_share(spots: list[Between], colours: NDArray[np.float32]) -> float:
     return mid / max(total, 1)
 
 
+def ghosts(
+    between: Between, colours: NDArray[np.float32], truth: NDArray[np.float32]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Pixels inside (pixels,) that colours (pixels, 3) show as mid-tones: those truly dark, and those truly lit."""
+    seen, known = between.mid_tones(luminance(colours)), between.scale(luminance(truth))
+    dark, lit = np.zeros(len(seen), bool), np.zeros(len(seen), bool)
+    dark[between.decided] = known <= MID_TONES[0]
+    lit[between.decided] = known >= MID_TONES[1]
+    return seen & dark, seen & lit
+
+
 def clearest(spots: list[Between], colours: NDArray[np.float32], truth: NDArray[np.float32]) -> Between | None:
-    """Where ghosts are seen best: most spots that are mid-tones in `colours` and are not in `truth`; None for none."""
-    counts = [
-        int((s.mid_tones(luminance(colours[s.light])) & ~s.mid_tones(luminance(truth[s.light]))).sum()) for s in spots
-    ]
+    """Where colours (truth lights, pixels, 3) show most ghosts, of dark and of lit spots; None if they show none."""
+    counts = [min(int(part.sum()) for part in ghosts(s, colours[s.light], truth[s.light])) for s in spots]
     return spots[int(np.argmax(counts))] if counts and max(counts) > 0 else None

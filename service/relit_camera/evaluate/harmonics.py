@@ -51,9 +51,15 @@ def project(light_map: LightMap, degree: int) -> Floats:
 
 
 def reconstruct(coefficients: Floats) -> LightMap:
-    """The light map of coefficients ((degree + 1)², 3), negative light cut off: no lamp can give it."""
+    """The light map of coefficients ((degree + 1)², 3), as lamps could give it.
+
+    Negative light is cut off, and each channel scaled so that its energy Σ E·ω stays that of the coefficients: the
+    more a series rings, the more brightness the cut alone would add.
+    """
     degree = int(np.sqrt(len(coefficients))) - 1
     radiance = np.maximum(_texel_basis(degree) @ coefficients, 0)
+    energy, wanted = texel_solid_angles().ravel() @ radiance, np.sqrt(4 * np.pi) * np.maximum(coefficients[0], 0)
+    radiance *= np.divide(wanted, energy, out=np.zeros(3), where=energy > 0)
     return radiance.reshape(*texel_directions().shape).astype(np.float32)
 
 

@@ -14,8 +14,8 @@ _STYLE = """
 body{font:16px/1.5 system-ui,sans-serif;color:#1a1a1a;background:#fff;max-width:1080px;margin:2em auto;padding:0 1em}
 h1{font-size:1.6em}h2{font-size:1.25em;margin-top:2em;border-top:1px solid #ddd;padding-top:1em}
 figure{margin:1.2em 0}figure img{max-width:100%;display:block}
-figcaption,caption{color:#444;font-size:.92em;text-align:left;max-width:62em;padding:.4em 0}
-table{border-collapse:collapse;margin:1em 0;font-size:.92em}caption{caption-side:bottom}
+figcaption{color:#444;font-size:.92em;max-width:62em;padding:.4em 0}
+table{border-collapse:collapse;font-size:.92em}
 td,th{padding:.3em .7em;border-bottom:1px solid #e3e3e3;text-align:right}
 td:first-child,th:first-child{text-align:left}
 svg{font:12px system-ui,sans-serif;max-width:100%}.legend span{margin-right:1.2em}
@@ -48,9 +48,8 @@ def table(head: Sequence[str], rows: Sequence[Sequence[object]], caption: str, d
 
     top = "".join(f"<th>{escape(name)}</th>" for name in head)
     body = "".join("<tr>" + "".join(f"<td>{cell(value)}</td>" for value in row) + "</tr>" for row in rows)
-    return (
-        f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{top}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div>"
+    return _figure(
+        f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>', caption
     )
 
 
