@@ -148,11 +148,10 @@ class Daemon:
             if frame is None:
                 continue
             self._count(frame)
-            scene = self.director.scene
-            if scene.frozen:
+            if self.director.scene.frozen:
                 continue
             try:
-                finish = self._pipeline.begin(frame, scene)
+                finish = self._pipeline.begin(frame, lambda: self.director.scene)
             except Exception as error:  # nothing that one frame does may end the camera
                 self._spoiled(error)
                 continue

@@ -124,24 +124,31 @@ class Pipeline:
             SubjectError: no face is found in the subject's still.
             ModelError: a model that the scene needs is missing.
         """
-        return self.begin(frame, scene)()
+        return self.begin(frame, lambda: scene)()
 
-    def begin(self, frame: Frame, scene: Scene) -> Finish:
+    def begin(self, frame: Frame, scene_now: Callable[[], Scene]) -> Finish:
         """Follow the face, relight the still, and give what makes the picture of both.
+
+        The scene is asked for as late as can be, after the face is tracked: so a change shows that much earlier.
 
         Raises:
             SubjectError: no face is found in the subject's still.
             ModelError: a model that the scene needs is missing; so does the finish.
         """
+        motion = self._track(frame) if scene_now().subject else None
+        return self._light_and_follow(frame, motion, scene_now())
+
+    def _track(self, frame: Frame) -> FaceMotion:
+        with self.timer.stage("track"):
+            return self._follower.follow(self._tracker.track(frame), frame.size, frame.time_s)
+
+    def _light_and_follow(self, frame: Frame, motion: FaceMotion | None, scene: Scene) -> Finish:
         subject, mode = scene.subject, self._mode(scene)
-        if subject is None:
+        if subject is None or motion is None:
             self._troubles["subject"] = NO_SUBJECT
             return lambda: self._unlit(fitted(frame, self._size), scene)
         self._troubles.pop("subject", None)
-        cast = self._prepare(subject, mode)
-        with self.timer.stage("track"):
-            motion = self._follower.follow(self._tracker.track(frame), frame.size, frame.time_s)
-        live = frame
+        cast, live, tracked = self._prepare(subject, mode), frame, motion
         if mode is Mode.RATIO:
             live, motion = fitted(frame, self._size), fitted_motion(motion, frame.size, self._size)
         following = self._beside.submit(self._follow, cast, motion, live)
@@ -154,7 +161,7 @@ class Pipeline:
                 relit = blended(subject, relit, scene.look.lighting.blend)
         move = following.result()
         if move is None:
-            return self.begin(frame, scene)
+            return self._light_and_follow(frame, tracked, scene)
 
         def finish() -> Finished:
             with self.timer.stage("move"):
