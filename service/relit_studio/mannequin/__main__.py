@@ -4,6 +4,10 @@ DIR/olat/        one-light pictures, lights.lp, matte.png, landmarks.json, truth
 DIR/clip.mp4     the mannequin in a soft room, 320x320, 24 frames a second
 DIR/track.json   the clip's true track, for the tracker `recorded`
 DIR/truth.json   the room's light map, and every frame's pose and expression
+
+With --field-rows also DIR/field/, the whole reflectance field: a picture for each texel of a light map of that size.
+With --relit NAME also DIR/relit-NAME.mp4, the clip's performance in truth under that built-in environment, and its
+DIR/matte.mp4.
 """
 
 from __future__ import annotations
@@ -23,18 +27,28 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from relit_camera.compose.sheet import contact_sheet
 from relit_camera.errors import RelitError, StorageError
 from relit_camera.files import make_folder, write_atomic
+from relit_camera.light.builtin.catalogue import BUILTIN_NAMES, builtin_environment
 from relit_camera.space.images import DisplayImage
 from relit_camera.space.picture_files import read_display, write_display
 from relit_camera.stream.video import VideoReader
 from relit_studio.mannequin.clip import CLIP_SIZE, write_clip
+from relit_studio.mannequin.field import write_field
 from relit_studio.mannequin.lights import room
 from relit_studio.mannequin.olat import write_olat
 from relit_studio.mannequin.performance import FPS, FRAMES, frame_times, posture_at
+from relit_studio.mannequin.relit import write_relit
 
-_OUTPUTS = ("olat", "clip.mp4", "track.json", "truth.json", "sheet.png")
 
-
-def generate(out: Path, size: int, lights: int, frames: int = FRAMES, *, quiet: bool = False) -> None:
+def generate(
+    out: Path,
+    size: int,
+    lights: int,
+    frames: int = FRAMES,
+    *,
+    field_rows: int = 0,
+    relit: Sequence[str] = (),
+    quiet: bool = False,
+) -> None:
     """Write everything into folder `out`; what it held under the same names is replaced at the end.
 
     Args:
@@ -42,6 +56,8 @@ def generate(out: Path, size: int, lights: int, frames: int = FRAMES, *, quiet: 
         size: of the one-light pictures, pixels.
         lights: how many of them.
         frames: of the clip, from its beginning.
+        field_rows: of the light map whose every texel lights a picture of the field; 0 makes no field.
+        relit: built-in environments under which the performance is rendered as well.
         quiet: show no progress.
 
     Raises:
@@ -66,9 +82,24 @@ def generate(out: Path, size: int, lights: int, frames: int = FRAMES, *, quiet: 
                 frames,
                 lambda done, _: shown.update(clip_task, completed=done),
             )
+            if field_rows:
+                field_task = shown.add_task("field", total=2 * field_rows**2)
+                make_folder(temporary / "field")
+                write_field(
+                    temporary / "field", size, field_rows, lambda done, _: shown.update(field_task, completed=done)
+                )
+            for name in relit:
+                relit_task = shown.add_task(f"relit: {name}", total=frames)
+                write_relit(
+                    temporary / f"relit-{name}.mp4",
+                    temporary / "matte.mp4",
+                    builtin_environment(name).light_map,
+                    frames,
+                    lambda done, _, task=relit_task: shown.update(task, completed=done),  # type: ignore[misc]
+                )
         write_atomic(temporary / "truth.json", json.dumps(_truth(frames)))
         write_display(temporary / "sheet.png", _sheet(temporary))
-        for name in _OUTPUTS:
+        for name in sorted(path.name for path in temporary.iterdir()):
             target = out / name
             if target.is_dir():
                 shutil.rmtree(target)
@@ -121,10 +152,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--size", type=_within(32, 1024), default=192, help="of the one-light pictures, pixels")
     parser.add_argument("--lights", type=_within(4, 999), default=96, help="how many, over the whole sphere")
     parser.add_argument("--frames", type=_within(1, FRAMES), default=FRAMES, help="of the clip, from its beginning")
+    parser.add_argument(
+        "--field-rows", type=_within(2, 32), default=0, metavar="N", help="also the field, for N x 2N directions"
+    )
+    parser.add_argument(
+        "--relit", action="append", choices=BUILTIN_NAMES, default=[], help="also the true clip under this environment"
+    )
     parser.add_argument("--quiet", action="store_true", help="show no progress")
     options = parser.parse_args(arguments)
     try:
-        generate(options.out, options.size, options.lights, options.frames, quiet=options.quiet)
+        generate(
+            options.out, options.size, options.lights, options.frames,
+            field_rows=options.field_rows, relit=options.relit, quiet=options.quiet,
+        )  # fmt: skip
     except RelitError as error:
         print(f"mannequin: {error}", file=sys.stderr)
         return 1

@@ -25,7 +25,7 @@ from relit_studio.mannequin.performance import FPS, FRAMES, frame_times, posture
 from relit_studio.mannequin.renderer import View
 
 CLIP_SIZE = 320
-_LIGHTS = 32
+CLIP_LIGHTS = 32
 """Distant lights that stand for a light map."""
 
 
@@ -83,7 +83,7 @@ def render_clip(
         ImageError: not a light map.
     """
     camera = camera or Camera(CLIP_SIZE)
-    lights = lights_from_map(light_map, _LIGHTS)
+    lights = lights_from_map(light_map, CLIP_LIGHTS)
     behind = backdrop(light_map, camera)
     for time_s in frame_times() if times is None else times:
         view = View(posture_at(float(time_s)), camera)

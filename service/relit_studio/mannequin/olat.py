@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -48,14 +48,20 @@ def write_olat(folder: Path, size: int = 192, lights: int = 96, progress: Progre
     for index, (name, direction) in enumerate(zip(names, directions, strict=True)):
         write_display(folder / name, uint8_from_linear(view.under_light(direction)))
         progress(index + 1, lights)
-    lines = [f"{name} {x:.7f} {y:.7f} {z:.7f}" for name, (x, y, z) in zip(names, directions, strict=True)]
-    write_atomic(folder / "lights.lp", "\n".join([str(lights), *lines, ""]))
-    write_display(folder / "matte.png", _grey(view.matte()))
+    write_atomic(folder / "lights.lp", lights_text(names, directions))
+    write_display(folder / "matte.png", grey(view.matte()))
     points = landmarks_px(camera, posture).astype(np.float64).round(3).tolist()
     write_atomic(folder / "landmarks.json", json.dumps({"mesh478": points}))
     with atomic_path(folder / "truth.npz") as temporary:
         np.savez_compressed(temporary, normals=view.normals(), albedo=view.albedo(), depth=view.depth())
 
 
-def _grey(matte: Mask) -> NDArray[np.uint8]:
+def lights_text(names: Sequence[str], directions: NDArray[np.float64]) -> str:
+    """An .lp file: the count, then each picture's name and unit vector (count, 3)."""
+    lines = [f"{name} {x:.7f} {y:.7f} {z:.7f}" for name, (x, y, z) in zip(names, directions, strict=True)]
+    return "\n".join([str(len(lines)), *lines, ""])
+
+
+def grey(matte: Mask) -> NDArray[np.uint8]:
+    """A matte (height, width) as a picture."""
     return np.repeat(np.round(matte * 255).astype(np.uint8)[..., None], 3, axis=2)
