@@ -67,7 +67,7 @@ def test_olat_prints_each_list(folder: Path, tmp_path: Path) -> None:
     )
     assert answer.code == 0, answer.err
     assert "captured/lights.lp, every 3" in answer.out
-    assert "truth, every 3" in answer.out
+    assert "truth/lights.lp, every 3" in answer.out
     assert "nearest" in out.read_text()
 
 

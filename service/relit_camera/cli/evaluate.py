@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +14,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from relit_camera.reflectance.samples import Samples
+    from relit_camera.space.images import Mask
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -59,75 +62,89 @@ def field(
     from relit_camera.capture.landmarks_file import read_landmarks
     from relit_camera.cli.progress import progress_bar
     from relit_camera.cli.settings import settings_of
-    from relit_camera.errors import LightsError
     from relit_camera.evaluate.candidates import method_candidates, subject_candidate
     from relit_camera.evaluate.field import evaluate_field
     from relit_camera.evaluate.field_page import field_json, field_page, field_text
     from relit_camera.evaluate.points import face_spots, parse_spot
     from relit_camera.evaluate.truth import Truth, chosen_lights
-    from relit_camera.files import write_atomic
     from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
     from relit_camera.light.store import EnvironmentStore
     from relit_camera.subject.store import SubjectStore
 
-    _check_out(out)
-    storage = settings_of(context).storage
-    store = EnvironmentStore(storage.environments)
-    environments = {each.name: each.light_map for each in map(store.resolve, environment or BUILTIN_NAMES)}
-    known = Truth(_samples(truth, gamma))
-    matte = known.samples.matte
-    if pixel:
-        spots = [parse_spot(text, matte) for text in pixel]
-    else:
-        frontal = known.samples.pictures[known.directions[:, 2].argmax()]
-        points = read_landmarks(truth.parent / "landmarks.json", required=False)
-        spots = face_spots(points or find_landmarks(neutral_picture(frontal, matte)), matte)
-    samples = None
-    if _is_lights(Path(subject_or_lights)):
-        samples = chosen_lights(_samples(Path(subject_or_lights), gamma), within_deg, every)
-        size, directions = samples.matte.shape, samples.directions
-        candidates = [] if size != matte.shape else method_candidates(samples, known.inside, method or ())
-    else:
-        if method or within_deg or every > 1:
-            raise typer.BadParameter("a subject is built already: --method, --within-deg and --every are for lights")
-        name, subject = SubjectStore(storage.subjects).resolve(subject_or_lights)
-        size, directions = subject.matte.shape, subject.light_directions.astype(float)
-        candidates = [] if size != matte.shape else [subject_candidate(name, subject, known.inside)]
-    if not candidates:
-        shapes = f"{size[1]}x{size[0]}, the truth {matte.shape[1]}x{matte.shape[0]}"
-        raise LightsError(f"{subject_or_lights} is {shapes}", "give a truth of the same person at the same size")
-    with progress_bar() as progress:
-        task = progress.add_task("Comparing", total=None)
-        advance = partial(_advance, progress, task)
-        report = evaluate_field(candidates, directions, samples, known, environments, spots, advance)
-    if out:
-        write_atomic(out, field_page(report, f"Reflectance field of {Path(subject_or_lights).resolve().parent.name}"))
+    with _report_file(out) as report_file:
+        storage = settings_of(context).storage
+        store = EnvironmentStore(storage.environments)
+        environments = {each.name: each.light_map for each in map(store.resolve, environment or BUILTIN_NAMES)}
+        true_lights = _lights_file(truth)
+        known = Truth(_samples(true_lights, gamma))
+        matte = known.samples.matte
+        if pixel:
+            spots = [parse_spot(text, matte) for text in pixel]
+        else:
+            frontal = known.samples.pictures[known.directions[:, 2].argmax()]
+            points = read_landmarks(true_lights.parent / "landmarks.json", required=False)
+            spots = face_spots(points or find_landmarks(neutral_picture(frontal, matte)), matte)
+        lights = _lights_file(Path(subject_or_lights))
+        samples: Samples | None = None
+        if lights.suffix.lower() == ".lp":
+            samples = chosen_lights(_samples(lights, gamma), within_deg, every)
+            _check_size(lights, samples.matte, matte)
+            directions, candidates = samples.directions, method_candidates(samples, known.inside, method or ())
+        else:
+            if method or within_deg or every > 1:
+                raise typer.BadParameter(
+                    "--method, --within-deg and --every are for lights: a subject is built already"
+                )
+            name, subject = SubjectStore(storage.subjects).resolve(subject_or_lights)
+            _check_size(lights, subject.matte, matte)
+            directions = subject.light_directions.astype(float)
+            candidates = [subject_candidate(name, subject, known.inside)]
+        with progress_bar() as progress:
+            task = progress.add_task("Comparing", total=None)
+            advance = partial(_advance, progress, task)
+            report = evaluate_field(candidates, directions, samples, known, environments, spots, advance)
+        if report_file:
+            title = f"Reflectance field of {lights.resolve().parent.name if samples else lights.stem}"
+            report_file.write_text(field_page(report, title), encoding="utf-8")
     typer.echo(json.dumps(field_json(report), indent=1) if as_json else field_text(report))
 
 
-def _is_lights(path: Path) -> bool:
-    return path.suffix.lower() == ".lp" or (path / LIGHTS_NAME).is_file()
+def _lights_file(path: Path) -> Path:
+    """The .lp file that is meant by itself or by the folder it lies in."""
+    return path / LIGHTS_NAME if (path / LIGHTS_NAME).is_file() else path
+
+
+def _check_size(name: Path, matte: Mask, truth: Mask) -> None:
+    from relit_camera.errors import LightsError
+
+    if matte.shape != truth.shape:
+        sizes = f"{matte.shape[1]}x{matte.shape[0]}, the truth {truth.shape[1]}x{truth.shape[0]}"
+        raise LightsError(f"{name} is {sizes}", "give a truth of the same person at the same size")
 
 
 def _samples(path: Path, gamma: str) -> Samples:
-    """The pictures of an .lp file, or of the folder it lies in."""
     from relit_camera.capture.importing import import_samples
     from relit_camera.cli.progress import progress_bar
     from relit_camera.space.colour import parse_gamma
 
-    lights = path / LIGHTS_NAME if (path / LIGHTS_NAME).is_file() else path
     with progress_bar() as progress:
-        task = progress.add_task(f"Reading {lights}", total=None)
-        return import_samples(lights, parse_gamma(gamma), partial(_advance, progress, task))
+        task = progress.add_task(f"Reading {path}", total=None)
+        return import_samples(path, parse_gamma(gamma), partial(_advance, progress, task))
 
 
 def _advance(progress: Progress, task: TaskID, done: int, total: int) -> None:
     progress.update(task, completed=done, total=total)
 
 
-def _check_out(out: Path | None) -> None:
+@contextmanager
+def _report_file(out: Path | None) -> Iterator[Path | None]:
+    """Where to write the report: opened before the work, so that what cannot be written is said at once."""
+    from relit_camera.files import atomic_path
+
     if out and out.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"{out} is no .html file", param_hint="--out")
+    with atomic_path(out) if out else nullcontext() as temporary:
+        yield temporary
 
 
 @app.command()
@@ -151,21 +168,20 @@ def olat(
     from relit_camera.evaluate.holdout import parse_hold_out
     from relit_camera.evaluate.holdout_page import holdout_json, holdout_page, holdout_text
     from relit_camera.evaluate.truth import chosen_lights
-    from relit_camera.files import write_atomic
 
-    _check_out(out)
     shares = [parse_hold_out(text) for text in hold_out or ("every=4", "every=2")]
     results = []
-    for path in lights:
-        samples = chosen_lights(_samples(path, gamma), within_deg)
-        name = path.name if (path / LIGHTS_NAME).is_file() else f"{path.resolve().parent.name}/{path.name}"
-        for every in shares:
-            with progress_bar() as progress:
-                task = progress.add_task(f"{name}, every {every}", total=None)
-                advance = partial(_advance, progress, task)
-                results.append(leave_out(name, samples, every, method or (), advance))
-    if out:
-        write_atomic(out, holdout_page(results))
+    with _report_file(out) as report_file:
+        for path in map(_lights_file, lights):
+            samples = chosen_lights(_samples(path, gamma), within_deg)
+            name = f"{path.resolve().parent.name}/{path.name}"
+            for every in shares:
+                with progress_bar() as progress:
+                    task = progress.add_task(f"{name}, every {every}", total=None)
+                    advance = partial(_advance, progress, task)
+                    results.append(leave_out(name, samples, every, method or (), advance))
+        if report_file:
+            report_file.write_text(holdout_page(results), encoding="utf-8")
     typer.echo(json.dumps(holdout_json(results), indent=1) if as_json else holdout_text(results))
 
 
@@ -190,17 +206,15 @@ def video(
     from relit_camera.evaluate.motion import read_motion
     from relit_camera.evaluate.video import compare_videos
     from relit_camera.evaluate.video_page import VideoReport, video_json, video_page, video_text
-    from relit_camera.files import write_atomic
 
-    _check_out(out)
     if (pose is None) != (true_pose is None):
         raise typer.BadParameter("give both --pose and --true-pose, or neither")
     motions = [read_motion(path) for path in (pose, true_pose) if path]
-    with progress_bar() as progress:
+    with _report_file(out) as report_file, progress_bar() as progress:
         task = progress.add_task("Comparing", total=None)
         light = compare_videos(relit, truth, matte, lambda done: progress.update(task, completed=done))
-    report = VideoReport(light, *motions)
-    result = json.dumps(video_json(report), indent=1) if as_json else video_text(report)
-    if out:
-        write_atomic(out, video_page(report, f"Relit video {relit.name}"))
+        report = VideoReport(light, *motions)
+        result = json.dumps(video_json(report), indent=1) if as_json else video_text(report)
+        if report_file:
+            report_file.write_text(video_page(report, f"Relit video {relit.name}"), encoding="utf-8")
     typer.echo(result)
