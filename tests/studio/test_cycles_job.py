@@ -40,7 +40,7 @@ def scene() -> Scene:
         uv=np.zeros((3, 2)),
         attributes={"oil": np.ones(3)},
     )
-    strands = Strands("hair", np.zeros((4, 3, 3)), np.ones((4, 3)), "hair")
+    strands = Strands("hair", np.zeros((4, 3, 3)), np.ones((4, 3)), np.zeros(4), "hair")
     return Scene((triangle, strands), {"skin": {"kind": "plain", "colour": [1, 1, 1]}, "hair": {"kind": "hair"}})
 
 
@@ -66,7 +66,7 @@ def test_a_job_says_everything(tmp_path: Path) -> None:
     assert job["pictures"][0]["light"]["direction"] == [1, 0, 0]
     arrays = np.load(path.parent / job["scene"]["arrays"])
     assert set(arrays) == {
-        "head.vertices", "head.faces", "head.slots", "head.uv", "head.oil", "hair.points", "hair.radius",
+        "head.vertices", "head.faces", "head.slots", "head.uv", "head.oil", "hair.points", "hair.radius", "hair.shade",
     }  # fmt: skip
     np.testing.assert_array_equal(np.load(path.parent / job["pictures"][0]["shape"])["head.vertices"], np.ones((3, 3)))
 

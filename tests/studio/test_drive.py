@@ -43,7 +43,7 @@ def person(shared: Path) -> Person:
     traits = CAST["adam"]
     bare = Shirt(NOTHING, NOTHING, NOTHING, NOTHING, np.zeros(len(model.vertices), bool))
     wardrobe = Wardrobe(model, np.zeros((len(model.vertices), 2)), NOTHING, NOTHING, Path())
-    hair = Hairs(np.zeros((0, 2, 3)), np.zeros((0, 2)))
+    hair = Hairs(np.zeros((0, 2, 3)), np.zeros((0, 2)), np.zeros(0))
     return Person(traits, wardrobe, model.neutral(traits.identity()), hair, bare)
 
 

@@ -74,9 +74,9 @@ class Figure:
             ),
         )
         strands = (
-            Strands("hair", self.person.hair.points, self.person.hair.radius, "hair"),
-            Strands("brows", brows.points, brows.radius, "brow"),
-            Strands("lashes", lashes.points, lashes.radius, "lash"),
+            Strands("hair", *self.person.hair, "hair"),
+            Strands("brows", *brows, "brow"),
+            Strands("lashes", *lashes, "lash"),
         )
         return Scene((*meshes, *clothes, *strands), self._materials())
 
@@ -135,7 +135,7 @@ class Figure:
             "iris": {"kind": "iris", "picture": eye},
             "cornea": {"kind": "cornea", "picture": eye, "limbus_cm": LIMBUS_CM},
             "wet": {"kind": "wet"},
-            "lid_shade": {"kind": "lid_shade", "colour": [0.36, 0.25, 0.22]},
+            "lid_shade": {"kind": "lid_shade", "colour": [0.5, 0.39, 0.36]},
             "gums": {"kind": "plain", "colour": [0.42, 0.12, 0.11], "roughness": 0.25, "scattering": 0.5},
             "teeth": {"kind": "plain", "colour": [0.66, 0.565, 0.42], "roughness": 0.2, "scattering": 0.4},
             "cloth": {"kind": "cloth", "colour": list(traits.shirt)},

@@ -50,11 +50,20 @@ class Mesh:
 
 @dataclass(frozen=True, eq=False)
 class Strands:
-    """Hairs: `points` (strands, points, 3) in our axes, and their `radius` (strands, points), both centimetres."""
+    """Hairs.
+
+    Attributes:
+        name: unique in the scene.
+        points: (strands, points, 3) in our axes, centimetres.
+        radius: (strands, points) centimetres.
+        shade: (strands,) added, scaled, to the material's melanin; about -1 to 1.
+        material: name in the scene.
+    """
 
     name: str
     points: NDArray
     radius: NDArray
+    shade: NDArray
     material: str
 
 
@@ -171,7 +180,7 @@ def _scene_arrays(scene: Scene) -> dict[str, NDArray]:
     arrays: dict[str, NDArray] = {}
     for each in scene.objects:
         if isinstance(each, Strands):
-            fields: dict[str, NDArray] = {"points": each.points, "radius": each.radius}
+            fields: dict[str, NDArray] = {"points": each.points, "radius": each.radius, "shade": each.shade}
         else:
             fields = {"vertices": each.vertices, "faces": each.faces, "slots": each.slots, **each.attributes}
             if each.uv is not None:

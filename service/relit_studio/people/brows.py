@@ -92,4 +92,4 @@ def _hairs(
     offset = direction[:, None] * t + (0.5 * bend - 0.22 * normal)[:, None] * t**2
     points = start[:, None] + offset * length[:, None, None]
     thick = 0.0058 * traits.thickness * (0.55 + 0.45 * faint) * rng.uniform(0.75, 1.1, count)
-    return Hairs(points, thick[:, None] * np.linspace(1, 0.3, _POINTS))
+    return Hairs(points, thick[:, None] * np.linspace(1, 0.3, _POINTS), 0.5 * rng.normal(size=count))

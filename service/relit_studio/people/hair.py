@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from relit_studio.people.face_model import FaceModel
-from relit_studio.people.geometry import Floats, find_nearest, smoothstep, unit
+from relit_studio.people.geometry import Floats, Indices, find_nearest, smoothstep, unit
 from relit_studio.people.hair_styles import Combing, long, short
 from relit_studio.people.hairs import Hairs
 from relit_studio.people.scalp import Obstacle, Roots, head_and_body, place_roots
@@ -14,9 +14,11 @@ from relit_studio.people.traits import Traits
 
 _COUNTS = {"short": 46_000, "long": 60_000, "buzz": 110_000}
 _RADIUS_CM = 0.0065
-_LOCKS = ((420, 0.62, 1.1), (38, 0.8, 1.5))
-"""Two scales: hairs a lock, how far they are drawn together at the tip, and how late that begins."""
-_STRAYS = 0.025
+_LOCKS = ((380, 0.7, 1.0, 0.28), (34, 0.88, 1.3, 0.10))
+"""Two scales: hairs a lock, how far they are drawn together at the tip, how late that begins, and by how many
+centimetres a whole lock's tip lies higher or lower than its neighbours'."""
+_HEAD_MIDDLE = np.array([0.0, 3.0, 0.0])
+_STRAYS = 0.03
 """Share of hairs that leave their lock."""
 
 
@@ -28,12 +30,15 @@ def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits) -> H
         return _cropped(roots, rng)
     combing = short(roots, rng) if traits.hair == "short" else long(roots, rng)
     points = _combed(roots, combing, head_and_body(model, head, body), rng)
-    for hairs, strength, onset in _LOCKS:
-        points = _gathered(points, hairs, strength, onset, rng)
+    shade = 0.35 * rng.normal(size=len(points))
+    for hairs, strength, onset, lift_cm in _LOCKS:
+        lock = _locks(points[:, 0], hairs, rng)
+        points = _gathered(points, lock, strength, onset, lift_cm, rng)
+        shade += 0.45 * rng.normal(size=len(points))[lock]
     points = _frayed(points, combing, rng)
     t = np.linspace(0, 1, combing.points)
     thick = _RADIUS_CM * rng.uniform(0.8, 1.15, (len(points), 1)) * np.interp(t, [0, 0.7, 1], [1, 1, 0.3])
-    return Hairs(points, thick)
+    return Hairs(points, thick, shade)
 
 
 def _cropped(roots: Roots, rng: np.random.Generator) -> Hairs:
@@ -45,7 +50,7 @@ def _cropped(roots: Roots, rng: np.random.Generator) -> Hairs:
     t = np.linspace(0, 1, steps)[None, :, None]
     curl = 0.03 * t * np.sin(5 * t + 6 * rng.random((count, 1, 3)))
     points = roots.place[:, None] + direction[:, None] * length[:, None, None] * t + curl
-    return Hairs(points, np.full((count, steps), 0.0052) * np.linspace(1, 0.6, steps))
+    return Hairs(points, np.full((count, steps), 0.0052) * np.linspace(1, 0.6, steps), 0.5 * rng.normal(size=count))
 
 
 def _combed(roots: Roots, combing: Combing, obstacle: Obstacle, rng: np.random.Generator) -> Floats:
@@ -87,19 +92,28 @@ def _out_of_face(place: Floats) -> Floats:
     return np.stack([x, y, z], axis=1)
 
 
-def _gathered(points: Floats, hairs: int, strength: float, onset: float, rng: np.random.Generator) -> Floats:
-    """Hairs drawn to the nearest of some guides, more so toward their tips: locks of about `hairs` hairs."""
+def _locks(roots: Floats, hairs: int, rng: np.random.Generator) -> Indices:
+    """The hair (n,) that guides each hair; about `hairs` have the same."""
+    guides = rng.choice(len(roots), max(1, len(roots) // hairs), replace=False)
+    # Straight borders between locks would show.
+    ragged = roots + 0.25 * np.sqrt(hairs / 400) * rng.normal(size=roots.shape)
+    _, nearest = find_nearest(cKDTree(roots[guides]), ragged)
+    return np.asarray(guides[nearest])
+
+
+def _gathered(
+    points: Floats, guide: Indices, strength: float, onset: float, lift_cm: float, rng: np.random.Generator
+) -> Floats:
+    """Hairs drawn to their guides, more so toward their tips; each lock lies a little higher or lower."""
     roots = points[:, 0]
-    guides = rng.choice(len(points), max(1, len(points) // hairs), replace=False)
-    # Locks are longer along the head than across: their borders are ragged.
-    jitter = roots + 0.25 * rng.normal(size=roots.shape) * np.sqrt(hairs / 400)
-    _, nearest = find_nearest(cKDTree(roots[guides]), jitter)
-    guide = guides[nearest]
     t = np.linspace(0, 1, points.shape[1])
     apart = (roots - roots[guide])[:, None] * (1 - 0.75 * t)[None, :, None]
-    looseness = np.clip(rng.uniform(0.3, 1.15, (len(points), 1, 1)), 0, 1)
+    looseness = np.clip(rng.uniform(0.35, 1.15, (len(points), 1, 1)), 0, 1)
     weight = strength * looseness * (t**onset)[None, :, None]
-    return np.asarray(points + weight * (points[guide] + apart - points))
+    height = lift_cm * np.clip(rng.normal(size=len(points)), -0.6, 2)[guide]
+    outward = unit(roots[guide] - _HEAD_MIDDLE) * height[:, None]
+    goal = points[guide] + apart + outward[:, None] * t[None, :, None]
+    return np.asarray(points + weight * (goal - points))
 
 
 def _frayed(points: Floats, combing: Combing, rng: np.random.Generator) -> Floats:
@@ -110,7 +124,7 @@ def _frayed(points: Floats, combing: Combing, rng: np.random.Generator) -> Float
     waved = points + combing.waviness_cm * amount * t * np.sin(6.28 * combing.waves * t + phase)
     stray = rng.random(count) < _STRAYS
     far = stray & (rng.random(count) < 0.35)
-    outward = unit(waved[:, -1] - [0, 3, 0])[:, None]
+    outward = unit(waved[:, -1] - _HEAD_MIDDLE)[:, None]
     reach = np.minimum(combing.length_cm, 8)[:, None, None] / 5
     drift = 0.45 * rng.normal(size=(count, 1, 3)) + far[:, None, None] * (
         0.5 * outward + 0.3 * rng.normal(size=(count, 1, 3))

@@ -11,12 +11,16 @@ from relit_studio.people.geometry import Floats
 
 
 class Hairs(NamedTuple):
-    """`points` (hairs, points, 3) from root to tip and `radius` (hairs, points), centimetres."""
+    """`points` (hairs, points, 3) from root to tip and `radius` (hairs, points), centimetres.
+
+    `shade` (hairs,) is how much darker or lighter than the rest a hair is, about -1 to 1.
+    """
 
     points: Floats
     radius: Floats
+    shade: Floats
 
 
 def joined(several: Sequence[Hairs]) -> Hairs:
     """All hairs of several, which have equally many points each."""
-    return Hairs(np.concatenate([each.points for each in several]), np.concatenate([each.radius for each in several]))
+    return Hairs(*(np.concatenate(parts) for parts in zip(*several, strict=True)))

@@ -33,7 +33,7 @@ def grow_lashes(model: FaceModel, vertices: Floats, seed: int, amount: float = 1
             points[:, :, 1] += (0.30 if upper else -0.10) * length[:, None] * along**1.6
             points[:, :, 2] -= (0.12 if upper else 0.0) * length[:, None] * along**2
             thick = np.full((count, _ROWS), 0.0085 if upper else 0.0055) * np.linspace(1, 0.25, _ROWS)
-            grown.append(Hairs(points, thick))
+            grown.append(Hairs(points, thick, np.zeros(count)))
     return joined(grown)
 
 

@@ -91,4 +91,4 @@ def make_person(traits: Traits, wardrobe: Wardrobe) -> Person:
 
 def _turned_hairs(hairs: Hairs, posture: Posture) -> Hairs:
     flat = hairs.points.reshape(-1, 3)
-    return Hairs(turned(flat, posture.rotation).reshape(hairs.points.shape), hairs.radius)
+    return Hairs(turned(flat, posture.rotation).reshape(hairs.points.shape), hairs.radius, hairs.shade)

@@ -8,6 +8,8 @@ from typing import Any
 from relit_studio.cycles.worker.nodes import Nodes, Socket
 
 Colour = list[float]
+_SHADE = 0.07
+"""What a strand's shade of 1 adds to its melanin."""
 
 
 def build_material(name: str, description: Mapping[str, Any]) -> Any:
@@ -89,7 +91,7 @@ def _cornea(nodes: Nodes, picture: str, limbus_cm: float) -> Any:
     ).outputs[0]
     radius = nodes.attribute("eccentricity")
     ramp = nodes.add("MapRange", {"Value": radius, "From Min": limbus_cm - 0.06, "From Max": limbus_cm + 0.05})
-    return nodes.finish(nodes.mix_shader(ramp.outputs[0], _film(nodes, 1.5, 0.03), sclera))
+    return nodes.finish(nodes.mix_shader(ramp.outputs[0], _film(nodes, 1.62, 0.03), sclera))
 
 
 def _wet(nodes: Nodes) -> Any:
@@ -136,16 +138,16 @@ def _cloth(nodes: Nodes, colour: Colour) -> Any:
 def _hair(nodes: Nodes, melanin: float, redness: float, roughness: float = 0.26) -> Any:
     shader = nodes.add("BsdfHairPrincipled", model="CHIANG", parametrization="MELANIN")
     values = {
-        "Melanin": melanin,
+        "Melanin": nodes.scaled_sum(melanin, (nodes.attribute("shade"), _SHADE)),
         "Melanin Redness": redness,
         "Roughness": roughness,
         "Radial Roughness": 0.45,
         "Coat": 0.1,
-        "Random Color": 0.45,
+        "Random Color": 0.25,
         "Random Roughness": 0.2,
     }
     for name, value in values.items():
-        shader.inputs[name].default_value = value
+        nodes.connect(value, shader.inputs[name])
     return nodes.finish(shader.outputs[0])
 
 

@@ -51,6 +51,8 @@ def add_strands(description: Mapping[str, Any], arrays: Arrays, materials: Mappi
     curves.attributes["position"].data.foreach_set("vector", to_blender(points).ravel())
     widths = curves.attributes.get("radius") or curves.attributes.new("radius", "FLOAT", "POINT")
     widths.data.foreach_set("value", radius.astype(np.float32).ravel())
+    shades = curves.attributes.new("shade", "FLOAT", "CURVE")
+    shades.data.foreach_set("value", arrays[f"{name}.shade"].astype(np.float32))
     _add_materials(curves, description["materials"], materials)
     _link(name, curves)
 
