@@ -66,12 +66,12 @@ class RatioReenactor:
             return lambda relit: Moved(linear_from_display(frame.image), everywhere, (0, 0))
         room = self._probe.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
         self._check_person(room.residual, motion, frame.time_s)
-        under_room = self._relighter.relight(room.on_head) * room.gain
         small = (0, 0, -(-width // COARSE), -(-height // COARSE))
         positions = self._warp(motion, frame.size).map(small)
 
         def move(relit: LinearImage) -> Moved:
-            ratio = self._ratio(relit, under_room)
+            # Here, not in `follow`, though it needs no relit picture: so both halves of a frame take as long.
+            ratio = self._ratio(relit, self._relighter.relight(room.on_head) * room.gain)
             weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
             everywhere_known = extended(sampled(weighted, positions, cv2.BORDER_REPLICATE))
             large = cv2.resize(everywhere_known, (small[2] * COARSE, small[3] * COARSE), interpolation=cv2.INTER_LINEAR)
