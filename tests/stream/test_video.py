@@ -1,3 +1,4 @@
+import gc
 import struct
 import subprocess
 import sys
@@ -213,6 +214,18 @@ def test_a_reader_reads_once_and_holds_nothing(tmp_path):
     with VideoReader(path) as video:
         next(iter(video))
     path.unlink()
+
+
+def test_pictures_read_are_freed_at_once(tmp_path):
+    path = write(tmp_path / "clip.mp4", noise(30))
+    gc.collect()
+    gc.disable()
+    try:
+        with VideoReader(path) as reader:
+            held = [sum(isinstance(thing, av.VideoFrame) for thing in gc.get_objects()) for _ in reader]
+    finally:
+        gc.enable()
+    assert max(held) < 15  # of 30: the decoder keeps a few
 
 
 def test_a_missing_file_is_named(tmp_path):

@@ -70,14 +70,19 @@ class UprightRgb:
     def __init__(self, accurate: bool) -> None:
         self._reformatter = VideoReformatter()
         self._interpolation = ACCURATE if accurate else None
+        self._display_matrix: Any = None
+        self._first = True
 
     def __call__(self, picture: Any) -> DisplayImage:
         """Return the picture's pixels in an array of its own, not writable."""
+        if self._first:
+            # Asked once: PyAV's answer and the picture hold one another until Python's garbage collector comes by.
+            self._first, self._display_matrix = False, picture.side_data.get("DISPLAYMATRIX")
         rgb = self._reformatter.reformat(
             picture, format="rgb24", dst_colorspace=None, interpolation=self._interpolation, **_encoding(picture)
         )
         pixels = np.asarray(rgb.to_ndarray(), dtype=np.uint8)
-        image = np.ascontiguousarray(_turn_upright(pixels, picture.side_data.get("DISPLAYMATRIX")))
+        image = np.ascontiguousarray(_turn_upright(pixels, self._display_matrix))
         image.setflags(write=False)
         return image
 
