@@ -89,6 +89,21 @@ def test_a_late_picture_is_waited_for_but_a_missing_one_is_not(make, sink):
     np.testing.assert_allclose(steps, 0.2, atol=0.05)
 
 
+def test_a_picture_that_waited_long_gives_way_to_its_successor(make, sink):
+    publisher = make(fps=5)
+    publisher.pictures.put(picture(1))
+    wait_until(lambda: 1 in sink.values)
+    due = sink.times[-1] + 0.2
+    time.sleep(0.03)
+    publisher.pictures.put(picture(2))
+    time.sleep(max(0.0, due + 0.03 - time.monotonic()))
+    publisher.pictures.put(picture(3))
+    wait_until(lambda: 3 in sink.values)
+    assert 2 not in sink.values
+    assert sink.times[sink.values.index(3)] - due < 0.1
+    assert publisher.counts.dropped == 1
+
+
 def test_the_rate_is_kept_without_drift(make, sink):
     start = time.monotonic()
     publisher = make(fps=100)

@@ -85,7 +85,7 @@ class Publisher:
         self._last: PublishedPicture | None = None
         self._failing = False
         self._retry_at = self._held_at = 0.0
-        self._published = self._repeated = 0
+        self._published = self._repeated = self._overtaken = 0
         self._rate = RateMeter()
         self._latency = DurationWindow()
         self._stopping = threading.Event()
@@ -106,7 +106,7 @@ class Publisher:
     @property
     def counts(self) -> FrameCounts:
         """Pictures written, those of them that were written before, and those passed over for newer ones."""
-        return FrameCounts(self._published, self._newest.dropped, self._repeated)
+        return FrameCounts(self._published, self._newest.dropped + self._overtaken, self._repeated)
 
     @property
     def fps(self) -> float:
@@ -122,11 +122,25 @@ class Publisher:
         pacer = Pacer(self._fps, time.monotonic())
         picture = None
         while not self._stopping.wait(max(0.0, pacer.deadline - time.monotonic())):
-            # Only where pictures do come: after a tick without one it is not late, but missing.
-            picture = self._newest.get(0.0 if picture is None else GRACE * pacer.period)
+            picture = self._take(pacer.period, picture is not None)
             now = time.monotonic()
             self._tick(picture, now)
             pacer.advance(time.monotonic(), None if picture is None else now - self._newest.put_at)
+
+    def _take(self, period: float, in_step: bool) -> PublishedPicture | None:
+        """Get the newest picture, waiting for one that is due by now.
+
+        Args:
+            period: of the ticks, in seconds.
+            in_step: whether the last tick had a new picture. If not, the next one is not late but missing.
+        """
+        picture = self._newest.get(0.0)
+        # One that has waited for almost a whole period has a successor about to come.
+        due = picture is None or time.monotonic() - self._newest.put_at > (1 - GRACE) * period
+        newer = self._newest.get(GRACE * period) if in_step and due else None
+        if picture is not None and newer is not None:
+            self._overtaken += 1
+        return newer or picture
 
     def _tick(self, picture: PublishedPicture | None, now: float) -> None:
         if picture is not None:
