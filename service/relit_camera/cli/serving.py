@@ -11,7 +11,7 @@ import typer
 from relit_camera.api.app import create_app
 from relit_camera.api.server import listen, serve
 from relit_camera.config.settings import RelitSettings
-from relit_camera.cores import share_cores
+from relit_camera.cores import leave_to_stay, share_cores
 from relit_camera.stream.assembly import make_tracker
 from relit_camera.stream.daemon import Daemon
 from relit_camera.stream.director import Director
@@ -53,6 +53,7 @@ def run_camera(settings: RelitSettings, environment: str | None = None) -> None:
         daemon.start()
         server = serve(create_app(daemon, settings), settings.server, listener=listener)
         cleanup.callback(server.stop)
+        leave_to_stay()
         typer.echo(f"Relit Camera runs; the panel is at {server.address.url}")
         while not stop.wait(0.5):
             pass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,4 +30,5 @@ def _rounds(path: Path, fps: float) -> Iterator[Timed]:
             for frame in video:
                 end = start + frame.time_s
                 yield frame.image, end
+        gc.collect()  # the reader's first picture is in a reference cycle of PyAV's, and a short clip ends often
         start = end + 1 / fps
