@@ -218,3 +218,23 @@ def video(
         if report_file:
             report_file.write_text(video_page(report, f"Relit video {relit.name}"), encoding="utf-8")
     typer.echo(result)
+
+
+@app.command()
+def capture(
+    report: Annotated[Path, typer.Argument(help="Report of a capture (JSON): frames, ball, directions, transforms.")],
+    truth: Annotated[Path, typer.Option(help="truth.json of the rendered capture video.")],
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compare what a capture found in a rendered video with the truth: frames, ball, light, head motion."""
+    import json
+
+    from relit_camera.evaluate.capture import compare_capture
+    from relit_camera.evaluate.capture_page import capture_json, capture_page, capture_text
+
+    with _report_file(out) as report_file:
+        errors = compare_capture(report, truth)
+        if report_file:
+            report_file.write_text(capture_page(errors, f"Capture {report.stem}"), encoding="utf-8")
+    typer.echo(json.dumps(capture_json(errors), indent=1) if as_json else capture_text(errors))

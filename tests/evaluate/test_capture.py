@@ -1,0 +1,129 @@
+"""What a capture found against the truth, with errors put in by hand."""
+
+from __future__ import annotations
+
+import json
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from relit_camera.errors import InputError
+from relit_camera.evaluate.capture import compare_capture
+from relit_camera.evaluate.capture_page import capture_json, capture_page, capture_text
+from relit_camera.space.directions import direction_from_degrees
+from tests.evaluate.test_field import Outline
+
+STATES = ("dark", "partial", "bright", "bright", "partial", "dark") * 5
+
+
+def documents() -> tuple[dict[str, Any], dict[str, Any]]:
+    """A truth of 30 frames, and the report of a capture that finds all of it."""
+    noise = np.random.default_rng(8)
+    true_frames, frames = [], []
+    for index, state in enumerate(STATES):
+        head, ball = (direction_from_degrees(noise.uniform(-60, 60), noise.uniform(-40, 40)).tolist() for _ in range(2))
+        turn, shift = float(noise.normal()), noise.normal(size=2).tolist()
+        true_frames.append(
+            {
+                "index": index,
+                "light": {"direction": head, "at_ball": ball, "distance_cm": 100.0},
+                "flash": {"state": state, "lit_share": 0.5},
+                "head": {"to_rest": {"rotation_deg": turn, "translation_px": shift, "residual_px": 0.0}},
+            }
+        )
+        found = {"direction": head, "at_ball": ball} if state == "bright" else {}
+        frames.append({"index": index, "kind": state, "rotation_deg": turn, "translation_px": shift, **found})
+    truth = {"ball": {"x_px": 100.0, "y_px": 50.0, "radius_px": 20.0}, "focal_px": 800.0, "frames": true_frames}
+    return truth, {"ball": {"x": 100.0, "y": 50.0, "radius": 20.0}, "focal_px": 800.0, "frames": frames}
+
+
+@pytest.fixture
+def truth() -> dict[str, Any]:
+    return documents()[0]
+
+
+@pytest.fixture
+def report() -> dict[str, Any]:
+    return documents()[1]
+
+
+@pytest.fixture
+def compare(tmp_path: Path, truth: dict[str, Any]):  # type: ignore[no-untyped-def]
+    def run(report: object):  # type: ignore[no-untyped-def]
+        (tmp_path / "truth.json").write_text(json.dumps(truth))
+        (tmp_path / "report.json").write_text(report if isinstance(report, str) else json.dumps(report))
+        return compare_capture(tmp_path / "report.json", tmp_path / "truth.json")
+
+    return run
+
+
+def test_a_perfect_capture_has_no_errors(compare, report) -> None:  # type: ignore[no-untyped-def]
+    errors = compare(report)
+    assert (errors.frames, errors.true_bright, errors.used, errors.wrongly_bright) == (30, 10, 10, 0)
+    assert errors.direction_deg.max() < 1e-6
+    assert errors.at_ball_deg.max() < 1e-6
+    assert abs(errors.rotation_deg).max() < 1e-9
+    assert abs(errors.translation_px).max() < 1e-9
+    assert errors.ball_px == (0, 0, 0)
+    assert errors.focal_ratio == 1
+
+
+def test_errors_put_in_are_found(compare, report) -> None:  # type: ignore[no-untyped-def]
+    for frame in report["frames"]:
+        frame["rotation_deg"] += 5 + 0.1 * (-1) ** frame["index"]
+        frame["translation_px"][0] += 0.4 * (-1) ** frame["index"]
+        if frame["kind"] == "bright":
+            known = np.array(frame["direction"])
+            across = np.cross(known, [0, 1, 0])
+            turned = Rotation.from_rotvec(np.radians(2.5) * across / np.linalg.norm(across)).apply(known)
+            frame["direction"] = turned.tolist()
+    report["ball"] = {"x": 101.0, "y": 50.0, "radius": 19.5}
+    report["focal_px"] = 840.0
+    errors = compare(report)
+    np.testing.assert_allclose(errors.direction_deg, 2.5, atol=1e-6)
+    assert errors.at_ball_deg.max() < 1e-6
+    np.testing.assert_allclose(abs(errors.rotation_deg), 0.1, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(errors.translation_px, axis=1), 0.4, atol=1e-9)
+    assert errors.ball_px == (1, 0, -0.5)
+    assert errors.focal_ratio == pytest.approx(1.05)
+
+
+def test_frames_taken_for_others_are_counted(compare, report) -> None:  # type: ignore[no-untyped-def]
+    report["frames"][2]["kind"] = "rejected"
+    report["frames"][4]["kind"] = "bright"
+    errors = compare(report)
+    assert (errors.used, errors.wrongly_bright, errors.used_share) == (9, 1, 0.9)
+    assert len(errors.direction_deg) == 9
+
+
+def test_what_a_report_does_not_tell_is_null(compare, report) -> None:  # type: ignore[no-untyped-def]
+    bare = {"frames": [{"index": frame["index"], "kind": frame["kind"]} for frame in report["frames"]]}
+    errors = compare(bare)
+    figures = json.loads(json.dumps(capture_json(errors), allow_nan=False))
+    assert figures["direction_deg"] is figures["rotation_deg"] is figures["ball_px"] is figures["focal_ratio"] is None
+    assert figures["used_share"] == 1
+    assert "not told" in capture_text(errors)
+
+
+def test_the_report_is_whole_in_itself(compare, report) -> None:  # type: ignore[no-untyped-def]
+    errors = compare(report)
+    outline = Outline()
+    outline.feed(capture_page(errors, "Capture"))
+    assert outline.fetched == outline.open == []
+    assert outline.figures == outline.captions == 2
+    assert "10 of 10" in capture_text(errors)
+
+
+def test_wrong_files_are_one_clear_error(compare, report, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    wrong: dict[str, object] = {"no JSON": "{", "frames": {}, r"frames\.0\.kind": deepcopy(report), "frame 99": report}
+    wrong[r"frames\.0\.kind"]["frames"][0]["kind"] = "lit"  # type: ignore[index]
+    report["frames"][3]["index"] = 99
+    for place, document in wrong.items():
+        with pytest.raises(InputError, match=place):
+            compare(document)
+    with pytest.raises(InputError, match="cannot read"):
+        compare_capture(tmp_path / "none.json", tmp_path / "truth.json")
