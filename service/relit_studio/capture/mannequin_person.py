@@ -24,7 +24,7 @@ _HEIGHT_CM = 56.0
 """What the picture's height spans at the head's origin: the bust, cut below the shoulders, fills it to the bottom."""
 
 _SUPERSAMPLING = 2
-_AMBIENT_LIGHTS = 24
+_AMBIENT_LIGHTS = 16
 """Distant lights that stand for the room."""
 _AMBIENT_SHADOW = 112
 _SHADOW_PER_ROW = 1.6
@@ -103,14 +103,14 @@ class MannequinPerson:
         figure = self._figure
         used = np.unique(hits.corners)
         seen = Surface(vertices[used], normals[used], _unit(-vertices[used]), figure.shine[used], figure.exponent[used])
-        received = np.zeros((len(vertices), 6), np.float32)
-        for direction, irradiance, lit in zip(
-            self._room.directions, self._room.irradiance.astype(np.float32), self._room_lit, strict=True
-        ):
-            cosine, gloss = reflected(seen, direction)
-            received[used, :3] += (cosine * lit[used])[:, None] * irradiance
-            received[used, 3:] += (gloss * lit[used])[:, None] * irradiance
-        at_samples = hits.interpolate(received)
+        shades = np.empty((2, len(self._room_lit), len(used)), np.float32)
+        for index, (direction, lit) in enumerate(zip(self._room.directions, self._room_lit, strict=True)):
+            shades[:, index] = reflected(seen, direction)
+            shades[:, index] *= lit[used]
+        diffuse, gloss = shades.transpose(0, 2, 1) @ self._room.irradiance.astype(np.float32)
+        everywhere = np.zeros((len(vertices), 6), np.float32)
+        everywhere[used] = np.concatenate([diffuse, gloss], axis=1)
+        at_samples = hits.interpolate(everywhere)
         return np.asarray(albedo * at_samples[:, :3] + at_samples[:, 3:])
 
     def _picture(self, hits: Hits, values: Values) -> LinearImage:
