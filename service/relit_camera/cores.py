@@ -41,7 +41,7 @@ def keep_picture_memory() -> None:
 def leave_to_stay() -> None:
     """Tell Python's garbage collector that all there is now stays: modules, networks, the subject.
 
-    A collection then looks at what came since, and holds the camera up for a millisecond, not for a twentieth of a second.
+    A collection then looks at what came since: it holds the camera up for a millisecond, not for fifty.
     """
     gc.collect()
     gc.freeze()

@@ -91,7 +91,10 @@ def _cornea(nodes: Nodes, picture: str, limbus_cm: float) -> Any:
     ).outputs[0]
     radius = nodes.attribute("eccentricity")
     ramp = nodes.add("MapRange", {"Value": radius, "From Min": limbus_cm - 0.06, "From Max": limbus_cm + 0.05})
-    return nodes.finish(nodes.mix_shader(ramp.outputs[0], _film(nodes, 1.62, 0.03), sclera))
+    # The real cornea bends light onto the iris; here the shell's rim would shade it: it lets all light in.
+    opaque = nodes.math("SUBTRACT", 1.0, nodes.add("LightPath").outputs["Is Shadow Ray"])
+    share = nodes.math("MULTIPLY", ramp.outputs[0], opaque)
+    return nodes.finish(nodes.mix_shader(share, _film(nodes, 1.62, 0.06), sclera))
 
 
 def _wet(nodes: Nodes) -> Any:
