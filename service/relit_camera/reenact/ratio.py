@@ -20,7 +20,7 @@ from relit_camera.reenact.room_probe import RoomProbe
 from relit_camera.reenact.source_face import SourceFace
 from relit_camera.reenact.warp import Warp, sampled
 from relit_camera.space.colour import linear_from_uint8
-from relit_camera.space.display import linear_from_display
+from relit_camera.space.display import display_from_linear, linear_from_display
 from relit_camera.space.images import Frame, LinearImage, Mask
 
 RATIO_RANGE = (0.02, 12.0)
@@ -79,9 +79,11 @@ class RatioReenactor:
             # a ratio would show as red blotches.
             picture = cv2.multiply(linear_from_uint8(frame.image), np.ascontiguousarray(large[:height, :width]))
             if motion.presence < 1:
-                # Where nobody is tracked with confidence the picture eases back to the live one.
+                # Where nobody is tracked with confidence the picture eases back to the live one, as both are shown:
+                # in linear light that guess would be in the mixture.
                 presence = float(motion.presence)
-                picture = cv2.addWeighted(picture, presence, linear_from_display(frame.image), 1 - presence, 0)
+                shown = display_from_linear(picture)
+                picture = linear_from_display(cv2.addWeighted(shown, presence, frame.image, 1 - presence, 0))
             return Moved(np.asarray(picture, dtype=np.float32), everywhere, (0, 0))
 
         return move
