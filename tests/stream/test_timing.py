@@ -69,6 +69,16 @@ def test_rate_is_events_a_second():
     assert meter.rate(199 / 30) == pytest.approx(30)
 
 
+def test_events_told_late_and_together_count_for_the_time_in_which_they_came():
+    meter = RateMeter(3.0)
+    meter.tick(0.0)
+    meter.tick(4.0, 120)  # the reader was held up for four seconds
+    for number in range(1, 31):
+        now = 4 + number / 30
+        meter.tick(now)
+        assert meter.rate(now) == pytest.approx(30)
+
+
 def test_rate_falls_when_nothing_comes():
     meter = RateMeter(3.0)
     for number in range(31):

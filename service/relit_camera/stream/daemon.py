@@ -195,8 +195,7 @@ class Daemon:
         """Frames that the source gave, those too that were replaced before the worker came: indices have gaps there."""
         given = frame.index - self._index
         self._index, self._passed_over = frame.index, self._passed_over + given - 1
-        for _ in range(given):
-            self._camera_rate.tick(frame.captured_at)
+        self._camera_rate.tick(frame.captured_at, given)
 
     def _follow(self, finished: Finished) -> None:
         face = finished.motion.status if finished.motion else FaceStatus.LOST

@@ -39,7 +39,7 @@ class DurationWindow:
 
 
 class StageTimer:
-    """Durations of named stages. One thread usually times, others read.
+    """Durations of named stages. Thread-safe.
 
     with timer.stage("track"):
         state = tracker.track(frame)
@@ -85,26 +85,29 @@ class RateMeter:
 
     def __init__(self, window_s: float = 3.0) -> None:
         self._window_s = window_s
-        self._times: deque[float] = deque(maxlen=4096)
+        self._total = 0
+        self._ticks: deque[tuple[float, int]] = deque(maxlen=4096)
         self._lock = threading.Lock()
 
-    def tick(self, now: float | None = None) -> None:
-        """Count one event at monotonic time `now`."""
+    def tick(self, now: float | None = None, events: int = 1) -> None:
+        """Count `events` since the last tick, the newest of them at monotonic time `now`."""
         with self._lock:
-            self._times.append(time.monotonic() if now is None else now)
+            self._total += events
+            self._ticks.append((time.monotonic() if now is None else now, self._total))
 
     def rate(self, now: float | None = None) -> float:
-        """Events a second at monotonic time `now`, 0 for fewer than two events in the window."""
+        """Events a second at monotonic time `now`, 0 for fewer than two ticks in the window."""
         now = time.monotonic() if now is None else now
         with self._lock:
-            while self._times and self._times[0] < now - self._window_s:
-                self._times.popleft()
-            if len(self._times) < 2:
+            while self._ticks and self._ticks[0][0] < now - self._window_s:
+                self._ticks.popleft()
+            if len(self._ticks) < 2:
                 return 0.0
-            # Up to `now` once the next event is overdue, so that the rate falls at once when events stop.
-            span = self._times[-1] - self._times[0]
-            overdue = max(0.0, now - self._times[-1] - span / (len(self._times) - 1))
-            return (len(self._times) - 1) / max(span + overdue, 1e-6)
+            (first, before), (last, total) = self._ticks[0], self._ticks[-1]
+            # Up to `now` once the next tick is overdue, so that the rate falls at once when events stop.
+            span = last - first
+            overdue = max(0.0, now - last - span / (len(self._ticks) - 1))
+            return (total - before) / max(span + overdue, 1e-6)
 
 
 class Pacer:
