@@ -12,7 +12,7 @@ import pytest
 from relit_camera.errors import DeviceError, InputError
 from relit_studio.begun import keep_settings
 from relit_studio.camera import Camera
-from relit_studio.cycles.environment import environment_python
+from relit_studio.cycles.environment import create_environment, environment_python
 from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene, Strands, write_job
 from relit_studio.cycles.runner import render
 
@@ -100,6 +100,16 @@ def test_without_cycles_the_cure_is_told(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     with pytest.raises(DeviceError, match="relit_studio setup"):
         environment_python()
+
+
+def test_an_environment_that_cannot_be_made_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    python = tmp_path / "python"
+    python.write_text("#!/bin/sh\necho ensurepip is not available\nexit 1\n")
+    python.chmod(0o755)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr("relit_studio.cycles.environment._python311", lambda: str(python))
+    with pytest.raises(DeviceError, match="cannot make an environment: ensurepip is not available"):
+        create_environment()
 
 
 def test_a_folder_keeps_to_its_settings(tmp_path: Path) -> None:

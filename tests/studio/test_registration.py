@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from relit_camera.errors import InputError
-from relit_studio.people.face_model import IDENTITIES, Part
+from relit_studio.people.face_model import IDENTITIES, Part, read_face_model
 from relit_studio.people.geometry import Floats, Indices, Similarity, areas, scatter, vertex_normals
 from relit_studio.people.mesh478 import nearest_on_surface
 from relit_studio.people.registration import LANDMARKS, fit
@@ -56,6 +58,13 @@ def test_identities_add_up() -> None:
 def test_unknown_expressions_are_named() -> None:
     with pytest.raises(InputError, match="no expression 'wink'"):
         tiny_model().displacement({"wink": 1.0})
+
+
+@pytest.mark.parametrize("data", [b"", b"no archive", b"PK\x03\x04 cut off"])
+def test_a_damaged_model_is_said(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "model.npz").write_bytes(data)
+    with pytest.raises(InputError, match="no packed face model"):
+        read_face_model(tmp_path / "model.npz")
 
 
 def test_a_person_is_the_same_each_time_and_unlike_the_next() -> None:

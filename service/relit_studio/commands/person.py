@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from relit_camera.space.picture_files import write_display
+from relit_camera.files import atomic_path
+from relit_camera.space.picture_files import encode_display
 from relit_camera.space.rotation import Angles
 from relit_studio.camera import Camera
 from relit_studio.commands.options import (
@@ -45,9 +46,12 @@ def person(
     threads: Threads = 2,
 ) -> None:
     """Render one picture of a person."""
+    if out.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        raise typer.BadParameter(f"{out} is neither .png nor .jpg", param_hint="--out")
     posture = Posture(Angles(yaw, pitch, roll), find_expression(expression))
     camera = Camera(size, view_cm=view_cm, middle_cm=middle_cm)
     room, quality = load_room(environment, turn), quality_of(truth, samples, threads, 48)
-    with shown_progress(who) as progress:
+    # Opened before the work, so that what cannot be written is said at once.
+    with atomic_path(out) as file, shown_progress(who) as progress:
         (picture,) = render_stills(load_person(who), [posture], room, camera, quality, progress)
-    write_display(out, picture)
+        file.write_bytes(encode_display(picture, file.suffix))

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
+from relit_camera.cli.parse import numbers
 from relit_camera.compose.sheet import contact_sheet
-from relit_camera.files import make_folder
 from relit_camera.space.picture_files import read_display, write_display
 from relit_camera.space.rotation import Angles
 from relit_studio.begun import keep_settings
@@ -44,12 +44,11 @@ def sheet(
     """Render people into DIR, one picture each, and lay them out in DIR/sheet.png; finished pictures are left."""
     camera, room = Camera(size), load_room(environment, turn)
     quality = quality_of(False, samples, threads)
+    looks = [(name, yaw) for name in expressions.split(",") for yaw in numbers(yaws, yaws.count(",") + 1, "--yaws")]
+    postures = [Posture(Angles(yaw, 0.0, 0.0), find_expression(name)) for name, yaw in looks]
     keep_settings(
         out, "sheet.json", {"environment": environment, "turn": turn, "size": size, "samples": quality.samples}
     )
-    looks = [(name, float(yaw)) for name in expressions.split(",") for yaw in yaws.split(",")]
-    postures = [Posture(Angles(yaw, 0.0, 0.0), find_expression(name)) for name, yaw in looks]
-    make_folder(out)
     cells = []
     with shown_progress("people") as progress:
         names = people.split(",")

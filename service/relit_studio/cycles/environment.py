@@ -6,12 +6,11 @@ import os
 import shutil
 import subprocess
 import sys
-import venv
 from pathlib import Path
 
 from filelock import FileLock
 
-from relit_camera.errors import DeviceError, StorageError
+from relit_camera.errors import DeviceError
 from relit_camera.files import make_folder
 from relit_studio.assets.store import cache_folder
 
@@ -45,8 +44,9 @@ def create_environment() -> Path:
     """Make the environment, or leave it as it is if it works; returns its folder.
 
     Raises:
-        DeviceError: there is no Python 3.11, or bpy cannot be installed or imported.
-        StorageError: the folder cannot be written.
+        DeviceError: there is no Python 3.11, or no environment can be made with it, or bpy cannot be installed or
+            imported.
+        StorageError: the cache cannot be written.
     """
     folder = environment_folder()
     make_folder(folder.parent)
@@ -58,15 +58,7 @@ def create_environment() -> Path:
 
 def _create(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
-    try:
-        if f"{sys.version_info.major}.{sys.version_info.minor}" == PYTHON:
-            venv.create(folder, with_pip=True)
-        else:
-            _run([_python311(), "-m", "venv", str(folder)], "make an environment")
-    except OSError as error:
-        raise StorageError(
-            f"cannot write {folder}: {error.strerror}", "free some space, or set XDG_CACHE_HOME"
-        ) from error
+    _run([_python311(), "-m", "venv", str(folder)], "make an environment")
     python = str(folder / "bin" / "python")
     _run([python, "-m", "pip", "install", "--quiet", *REQUIREMENTS], "install bpy")
     _run([python, "-c", "import bpy"], f"import bpy; on Debian, `apt-get install {LIBRARIES}` may be what is missing")
@@ -74,6 +66,8 @@ def _create(folder: Path) -> None:
 
 
 def _python311() -> str:
+    if f"{sys.version_info.major}.{sys.version_info.minor}" == PYTHON:
+        return sys.executable
     found = shutil.which(f"python{PYTHON}")
     if found is None:
         raise DeviceError(f"bpy {BPY} wants Python {PYTHON}, and there is none", f"install python{PYTHON}")
@@ -85,5 +79,6 @@ def _run(command: list[str], purpose: str) -> None:
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     if done.returncode:
-        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        # Without Debian's python3-venv, `venv` says so on stdout.
+        last = ((done.stderr.strip() or done.stdout.strip()).splitlines() or ["no message"])[-1]
         raise DeviceError(f"cannot {purpose}: {last}", "cure that, then set up again")

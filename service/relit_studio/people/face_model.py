@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +98,7 @@ def read_face_model(path: Path) -> FaceModel:
         InputError: it is not that file.
     """
     try:
-        with np.load(path) as data:
+        with path.open("rb") as file, np.load(file) as data:
             return FaceModel(
                 vertices=data["vertices"].astype(np.float64),
                 faces=data["faces"],
@@ -111,5 +112,5 @@ def read_face_model(path: Path) -> FaceModel:
                 names=tuple(str(name) for name in data["expression_names"]),
                 landmarks68=data["landmarks68"],
             )
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise InputError(f"{path} is no packed face model: {error}", "fetch it again") from error
