@@ -89,5 +89,13 @@ def test_other_files_are_one_clear_error(text: str, tmp_path: Path) -> None:
     path.write_text(text)
     with pytest.raises(TrackError, match=r"motion\.json"):
         read_motion(path)
+
+
+def test_what_is_wrong_is_said_with_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "motion.json"
+    for text, place in (('{"frames": [{"pose": {"yaw": "x"}}]}', r"frames\.0\.pose\.yaw"), ("[]", "top level")):
+        path.write_text(text)
+        with pytest.raises(TrackError, match=place):
+            read_motion(path)
     with pytest.raises(TrackError, match="cannot read"):
         read_motion(tmp_path / "missing.json")

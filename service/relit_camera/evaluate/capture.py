@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from relit_camera.errors import InputError
+from relit_camera.evaluate.json_file import Record, read_json
 
 Vector = tuple[float, float, float]
 Kind = Literal["bright", "dark", "partial", "rejected"]
-Form = TypeVar("Form", bound=BaseModel)
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(allow_inf_nan=False)
-
-
-class _Ball(_Record):
+class _Ball(Record):
     x: float
     y: float
     radius: Annotated[float, Field(gt=0)]
 
 
-class _ReportFrame(_Record):
+class _ReportFrame(Record):
     index: int
     kind: Kind
     direction: Vector | None = None
@@ -37,44 +32,44 @@ class _ReportFrame(_Record):
     translation_px: tuple[float, float] | None = None
 
 
-class _Report(_Record):
+class _Report(Record):
     ball: _Ball | None = None
     focal_px: float | None = None
     frames: Annotated[list[_ReportFrame], Field(min_length=1)]
 
 
-class _TrueBall(_Record):
+class _TrueBall(Record):
     x_px: float
     y_px: float
     radius_px: float
 
 
-class _Light(_Record):
+class _Light(Record):
     direction: Vector
     at_ball: Vector
 
 
-class _Flash(_Record):
+class _Flash(Record):
     state: Literal["bright", "dark", "partial"]
 
 
-class _ToRest(_Record):
+class _ToRest(Record):
     rotation_deg: float
     translation_px: tuple[float, float]
 
 
-class _Head(_Record):
+class _Head(Record):
     to_rest: _ToRest
 
 
-class _TrueFrame(_Record):
+class _TrueFrame(Record):
     index: int
     light: _Light
     flash: _Flash
     head: _Head
 
 
-class _Truth(_Record):
+class _Truth(Record):
     ball: _TrueBall
     focal_px: float
     frames: Annotated[list[_TrueFrame], Field(min_length=1)]
@@ -122,8 +117,8 @@ def compare_capture(report: Path, truth: Path) -> CaptureErrors:
     Raises:
         InputError: one is missing or in another form, or the report tells of frames that the video has not.
     """
-    found = _read(report, _Report, "a report of `relit capture`")
-    known = _read(truth, _Truth, "the truth.json of a rendered capture")
+    found = read_json(report, _Report, "give a report of `relit capture`")
+    known = read_json(truth, _Truth, "give the truth.json of a rendered capture")
     by_index = {frame.index: frame for frame in known.frames}
     strangers = [frame.index for frame in found.frames if frame.index not in by_index]
     if strangers:
@@ -151,19 +146,6 @@ def compare_capture(report: Path, truth: Path) -> CaptureErrors:
         else None,
         focal_ratio=found.focal_px / known.focal_px if found.focal_px else None,
     )
-
-
-def _read(path: Path, form: type[Form], what: str) -> Form:
-    try:
-        return form.model_validate(json.loads(path.read_bytes()))
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}", "check the path") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"]))
-        raise InputError(f"{path}: {place}: {first['msg']}", f"give {what}") from error
-    except ValueError as error:
-        raise InputError(f"{path} is no JSON: {error}", f"give {what}") from error
 
 
 def _angle(found: Vector | None, known: Vector) -> float:

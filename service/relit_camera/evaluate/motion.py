@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from relit_camera.errors import TrackError
+from relit_camera.evaluate.json_file import Record, read_json
 
 
-class _Angles(BaseModel):
-    model_config = ConfigDict(allow_inf_nan=False)
-
+class _Angles(Record):
     yaw: float
     pitch: float
     roll: float = 0.0
 
 
-class _Frame(BaseModel):
-    model_config = ConfigDict(allow_inf_nan=False)
-
+class _Frame(Record):
     pose: _Angles | None = None
     pose_deg: _Angles | None = None
-    landmarks: list[tuple[float, float]] = []
+    landmarks: tuple[tuple[float, float], ...] = ()
 
 
-class _File(BaseModel):
+class _File(Record):
     frames: list[_Frame] = Field(min_length=1)
 
 
@@ -72,13 +68,8 @@ def read_motion(path: Path) -> Motion:
     Raises:
         TrackError: missing, no JSON, without frames, or with a varying number of landmarks.
     """
-    try:
-        document = _File.model_validate(json.loads(path.read_bytes()))
-    except OSError as error:
-        raise TrackError(f"cannot read {path}: {error.strerror or error}", "check the path") from error
-    except (ValueError, ValidationError) as error:
-        cure = "give a track, a replay's report, or a truth.json, whose frames have a pose"
-        raise TrackError(f"{path} tells of no motion: {str(error).splitlines()[0]}", cure) from error
+    cure = "give a track, a replay's report, or a truth.json, whose frames have a pose"
+    document = read_json(path, _File, cure, TrackError)
     poses = [frame.pose or frame.pose_deg for frame in document.frames]
     angles = [(pose.yaw, pose.pitch, pose.roll) if pose else (np.nan,) * 3 for pose in poses]
     counts = {len(frame.landmarks) for frame in document.frames if frame.landmarks}
@@ -123,7 +114,7 @@ def second_difference_rms(values: NDArray[np.float64]) -> float:
 
     Steady motion has none; what is left is acceleration, and jitter, which has most of it.
     """
-    second = values[2:] - 2 * values[1:-1] + values[:-2]
+    second = np.diff(values, 2, axis=0)
     known = second[np.isfinite(second)]
     return float(np.sqrt((known**2).mean())) if known.size else float("nan")
 
