@@ -96,6 +96,8 @@ def test_videos_that_do_not_fit_are_one_clear_error(truth: Path, tmp_path: Path)
     for pair in ((shorter, truth), (truth, shorter)):
         with pytest.raises(VideoError, match="differ in length after 5 frames"):
             compare_videos(*pair)
+    with pytest.raises(VideoError, match=r"short\.mp4 differ in length after 5 frames"):
+        compare_videos(truth, truth, shorter)
     with VideoWriter(tmp_path / "small.mp4", (32, 32), 24) as video:
         video.write(np.zeros((32, 32, 3), np.uint8), 0.0)
     with pytest.raises(VideoError, match="32x32"):
@@ -124,3 +126,14 @@ def test_equal_frames_are_no_infinity_in_json(truth: Path) -> None:
     figures = video_json(VideoReport(compare_videos(truth, truth)))
     json.dumps(figures, allow_nan=False)
     assert figures["pose"] is None
+
+
+@pytest.mark.parametrize(("frames", "level", "flicker"), [(8, 0.0, 0.0), (2, 0.3, None)])
+def test_a_black_and_a_very_short_video_have_figures(
+    frames: int, level: float, flicker: float | None, tmp_path: Path
+) -> None:
+    relit = write(tmp_path / "relit.mp4", [lit(0.5, level)] * frames)
+    report = VideoReport(compare_videos(relit, write(tmp_path / "truth.mp4", [lit(0.5)] * frames)))
+    figures = json.loads(json.dumps(video_json(report), allow_nan=False))
+    assert figures["jitter"]["brightness_share"] == flicker
+    assert video_page(report, "Clip").startswith("<!doctype html>")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 
 import cv2
@@ -48,13 +49,13 @@ class LightConsistency:
 
     @property
     def flicker(self) -> float:
-        """RMS second difference of the brightness, as a share of its mean."""
-        return second_difference_rms(self.brightness) / float(self.brightness.mean())
+        """RMS second difference of the brightness, as a share of its mean; NaN for under three frames."""
+        return _flicker(self.brightness)
 
     @property
     def true_flicker(self) -> float:
         """The same of the truth: what the motion itself brings."""
-        return second_difference_rms(self.true_brightness) / float(self.true_brightness.mean())
+        return _flicker(self.true_brightness)
 
 
 def compare_videos(
@@ -73,29 +74,27 @@ def compare_videos(
     """
     rows: list[tuple[float, ...]] = []
     shown: list[tuple[int, DisplayImage, DisplayImage]] = []
+    paths = [relit, truth, matte] if matte else [relit, truth]
     with ExitStack() as files:
-        readers = [files.enter_context(VideoReader(path)) for path in (relit, truth, matte) if path]
+        readers = [files.enter_context(VideoReader(path)) for path in paths]
         every = max((readers[0].info.frames or 0) // KEPT_FRAMES, 1)
         names = ", ".join(f"{r.info.width}x{r.info.height}" for r in readers)
         if len({(reader.info.width, reader.info.height) for reader in readers}) > 1:
             raise VideoError(f"the videos to compare are {names}", "make them of one size")
-        try:
-            for index, frames in enumerate(zip(*readers, strict=True)):
-                images = [frame.image for frame in frames]
-                inside = images[2][..., 1] > 127 if matte else np.ones(images[0].shape[:2], bool)
-                if not inside.any():
-                    raise VideoError(f"{matte} is empty in frame {index}", "white must mark the person")
-                rows.append(_figures(linear_from_display(images[0]), linear_from_display(images[1]), inside))
-                if index % every == every // 2:
-                    shown.append((index, images[0], images[1]))
-                progress(index + 1)
-        except ValueError as error:
-            if "zip()" not in str(error):
-                raise
-            raise VideoError(
-                f"{relit.name} and {truth.name} differ in length after {len(rows)} frames",
-                "compare a whole replay with the truth of the same clip",
-            ) from error
+        for index, frames in enumerate(zip_longest(*readers)):
+            images = [frame.image for frame in frames if frame is not None]
+            if len(images) < len(readers):
+                raise VideoError(
+                    f"{', '.join(path.name for path in paths)} differ in length after {index} frames",
+                    "compare a whole replay with the truth of the same clip",
+                )
+            inside = images[2][..., 1] > 127 if matte else np.ones(images[0].shape[:2], bool)
+            if not inside.any():
+                raise VideoError(f"{matte} is empty in frame {index}", "white must mark the person")
+            rows.append(_figures(linear_from_display(images[0]), linear_from_display(images[1]), inside))
+            if index % every == every // 2:
+                shown.append((index, images[0], images[1]))
+            progress(index + 1)
     plain, aligned, shading, gain, brightness, true_brightness = np.array(rows).T
     return LightConsistency(plain, aligned, shading, gain, brightness, true_brightness, tuple(shown))
 
@@ -114,6 +113,10 @@ def _figures(relit: LinearImage, truth: LinearImage, inside: NDArray[np.bool_]) 
         float(luminance(seen).mean()),
         float(luminance(known).mean()),
     )
+
+
+def _flicker(brightness: NDArray[np.float64]) -> float:
+    return second_difference_rms(brightness) / max(float(brightness.mean()), 1e-12)
 
 
 def _gain(seen: NDArray[np.float32], known: NDArray[np.float32]) -> float:

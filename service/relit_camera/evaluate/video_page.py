@@ -42,7 +42,7 @@ class VideoReport:
 
 
 def video_json(report: VideoReport) -> dict[str, object]:
-    """The figures; `null` for what was not given."""
+    """The figures; `null` for what was not given, and for what the frames are too few to tell."""
     light, pose = report.light, report.pose
     return {
         "frames": len(light.psnr_db),
@@ -54,10 +54,10 @@ def video_json(report: VideoReport) -> dict[str, object]:
             "gain_ev_std": float(light.gain_ev.std()),
         },
         "jitter": {
-            "brightness_share": light.flicker,
-            "true_brightness_share": light.true_flicker,
-            "landmarks_px": _landmark_jitter(report.measured),
-            "true_landmarks_px": _landmark_jitter(report.truth),
+            "brightness_share": _known(light.flicker),
+            "true_brightness_share": _known(light.true_flicker),
+            "landmarks_px": _known(_landmark_jitter(report.measured)),
+            "true_landmarks_px": _known(_landmark_jitter(report.truth)),
         },
         "pose": None
         if pose is None
@@ -65,7 +65,7 @@ def video_json(report: VideoReport) -> dict[str, object]:
             "frames": pose.frames,
             "angle_rms_deg": pose.angle_rms_deg,
             **{f"{name}_rms_deg": pose.rms_deg[i] for i, name in enumerate(ANGLES)},
-            **{f"{name}_gain": None if np.isnan(pose.gain[i]) else pose.gain[i] for i, name in enumerate(ANGLES)},
+            **{f"{name}_gain": _known(pose.gain[i]) for i, name in enumerate(ANGLES)},
             **{f"{name}_offset_deg": pose.offset_deg[i] for i, name in enumerate(ANGLES)},
         },
     }
@@ -166,7 +166,12 @@ def _pose(report: VideoReport) -> Iterator[str]:
 
 
 def _landmark_jitter(motion: Motion | None) -> float | None:
+    """Of both coordinates together, pixels; None where there are no landmarks."""
     if motion is None or not motion.landmarks.shape[1]:
         return None
-    # Of both coordinates together.
     return second_difference_rms(motion.landmarks) * float(np.sqrt(2))
+
+
+def _known(value: float | None) -> float | None:
+    """For JSON, which has no NaN."""
+    return None if value is None or np.isnan(value) else value
