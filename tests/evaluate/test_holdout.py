@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from relit_camera.errors import ConfigError, LightsError
+from relit_camera.evaluate.candidates import RING
 from relit_camera.evaluate.holdout import common_gains, hold_out, interior_lights, parse_hold_out
 from relit_camera.evaluate.holdout_page import holdout_json, holdout_page, holdout_text
 from relit_camera.reflectance.black_ring import boundary
+from relit_camera.reflectance.method import method_names
 from relit_camera.reflectance.samples import Samples
 from tests.evaluate.ball import cap, lambert
 
@@ -59,6 +61,12 @@ def test_flashes_of_varying_strength_are_evened_out_by_one_gain_for_all() -> Non
     uneven[left_out] *= gains[left_out][:, None, None, None]
     result = hold_out("ball", Samples(uneven, samples.directions, samples.matte), 4, ["barycentric"])
     assert result.scores[0].peak_255_db > result.scores[0].raw_peak_255_db + 5
+
+
+def test_the_ring_is_compared_where_it_is_asked_for_and_only_there() -> None:
+    samples = lambert(cap(60, 50))
+    assert [score.method for score in hold_out("ball", samples, 4, [RING]).scores] == [RING]
+    assert {score.method for score in hold_out("ball", samples, 4).scores} == set(method_names())
 
 
 def test_no_surrounded_light_is_an_error() -> None:

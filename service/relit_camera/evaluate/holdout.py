@@ -9,14 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.errors import ConfigError, LightsError
-from relit_camera.evaluate.candidates import RING, method_candidates
-from relit_camera.evaluate.measure import Colours, finite_psnr
-from relit_camera.evaluate.truth import only, pixels_of
+from relit_camera.evaluate.candidates import method_candidates
+from relit_camera.evaluate.measure import Colours, compare, finite_psnr
+from relit_camera.evaluate.truth import Truth, only
 from relit_camera.reflectance.black_ring import boundary
 from relit_camera.reflectance.method import method_names
 from relit_camera.reflectance.samples import Samples
-from relit_camera.space.colour import uint8_from_linear
-from relit_camera.space.quality import ssim
 
 
 @dataclass(frozen=True)
@@ -108,18 +106,19 @@ def hold_out(
     left_out = interior_lights(samples.directions)[::every]
     if not len(left_out):
         raise LightsError(f"no light of {name} is surrounded by others", "more lights are needed")
-    inside = np.flatnonzero(samples.matte > 0.5)
+    known = Truth(samples)
     kept = only(samples, np.setdiff1d(np.arange(len(samples.directions)), left_out))
-    truth = pixels_of(samples, inside)[left_out]
-    # Between captured lights the black ring changes nothing.
-    names = [each for each in methods or method_names() if each != RING]
+    truth = known.colours[left_out]
+    # Without the black ring, unless it is asked for: between captured lights it changes nothing.
+    names = methods or method_names()
     predicted = {}
-    for done, candidate in enumerate(method_candidates(kept, inside, names)):
+    for done, candidate in enumerate(method_candidates(kept, known.inside, names)):
         predicted[candidate.name] = candidate.pictures_at(samples.directions[left_out])
         progress(done + 1, len(names))
     gains = common_gains(truth, list(predicted.values()))
-    scores = [_scores(samples, inside, method, colours, truth, gains) for method, colours in predicted.items()]
-    errors = [((colours - truth * gains[:, None, None]) ** 2).mean(axis=(1, 2)) for colours in predicted.values()]
+    fitted = truth * gains[:, None, None]
+    scores = [_scores(known, method, colours, truth, fitted) for method, colours in predicted.items()]
+    errors = [((colours - fitted) ** 2).mean(axis=(1, 2)) for colours in predicted.values()]
     hardest = int(np.mean(errors, axis=0).argmax())
     return HoldOut(
         name=name,
@@ -128,8 +127,8 @@ def hold_out(
         left_out=left_out,
         scores=sorted(scores, key=lambda each: -each.peak_255_db),
         hardest=hardest,
-        truth=_picture(samples, inside, truth[hardest] * gains[hardest]),
-        predicted={method: _picture(samples, inside, colours[hardest]) for method, colours in predicted.items()},
+        truth=known.picture(fitted[hardest]),
+        predicted={method: known.picture(colours[hardest]) for method, colours in predicted.items()},
     )
 
 
@@ -140,32 +139,18 @@ def common_gains(truth: Colours, predicted: Sequence[Colours]) -> NDArray[np.flo
     return np.asarray(np.einsum("lpc,lpc->l", truth, mean) / np.maximum(energy, 1e-12), np.float32)
 
 
-def _scores(
-    samples: Samples,
-    inside: NDArray[np.intp],
-    method: str,
-    predicted: Colours,
-    truth: Colours,
-    gains: NDArray[np.float32],
-) -> Scores:
-    fitted = truth * gains[:, None, None]
-    pairs = [(p[:, None], t[:, None], r[:, None]) for p, t, r in zip(predicted, fitted, truth, strict=True)]
-    similar = []
-    for colours, expected in zip(predicted, fitted, strict=True):
-        peak = float(np.percentile(expected, 99.5)) or 1.0
-        shown = [uint8_from_linear(_picture(samples, inside, each / np.float32(peak))) for each in (colours, expected)]
-        similar.append(ssim(shown[0], shown[1], samples.matte))
+def _scores(known: Truth, method: str, predicted: Colours, truth: Colours, fitted: Colours) -> Scores:
+    """Of colours (some, pixels, 3) against the true ones, as they are and with their gains."""
+
+    def peak_255_db(expected: Colours) -> float:
+        pairs = zip(predicted, expected, strict=True)
+        return float(np.mean([finite_psnr(p[:, None], e[:, None], peak=1.0) for p, e in pairs]))
+
+    relit = [compare(known, seen, expected) for seen, expected in zip(predicted, fitted, strict=True)]
     return Scores(
         method=method,
-        peak_255_db=float(np.mean([finite_psnr(p, t, peak=1.0) for p, t, _ in pairs])),
-        raw_peak_255_db=float(np.mean([finite_psnr(p, r, peak=1.0) for p, _, r in pairs])),
-        psnr_db=float(np.mean([finite_psnr(p, t) for p, t, _ in pairs])),
-        ssim=float(np.mean(similar)),
+        peak_255_db=peak_255_db(fitted),
+        raw_peak_255_db=peak_255_db(truth),
+        psnr_db=float(np.mean([each.psnr_db for each in relit])),
+        ssim=float(np.mean([each.ssim for each in relit])),
     )
-
-
-def _picture(samples: Samples, inside: NDArray[np.intp], colours: Colours) -> Colours:
-    height, width = samples.matte.shape
-    picture = np.zeros((height * width, 3), np.float32)
-    picture[inside] = colours
-    return picture.reshape(height, width, 3)

@@ -24,9 +24,8 @@ def holdout_json(results: Sequence[HoldOut]) -> dict[str, object]:
 
 
 def holdout_text(results: Sequence[HoldOut]) -> str:
-    """A table: a row a method, a column a list and share left out."""
-    methods = list(dict.fromkeys(score.method for each in results for score in each.scores))
-    width = max(map(len, methods))
+    """A table for each list and share left out: a row a method."""
+    width = max(len(score.method) for each in results for score in each.scores)
     lines = ["PSNR in linear light, peak 255, dB: gain fitted (raw)"]
     for each in results:
         lines.append(f"{each.name}, every {each.every}: {len(each.left_out)} of {each.lights} lights left out")
