@@ -166,27 +166,33 @@ class BrokenSource:
 
     def __init__(self) -> None:
         self._inner = memory_source()
-        self.broken = False
+        self.error: Exception | None = None
 
     def read(self, timeout_s: float) -> Frame | None:
-        if self.broken:
-            raise VideoError("clip.mp4 is damaged", "copy it again")
+        if self.error is not None:
+            raise self.error
         return self._inner.read(timeout_s)
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._inner, name)
 
 
-def test_a_source_that_fails_is_told_with_its_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("error", "cure"),
+    [(VideoError("clip.mp4 is damaged", "copy it again"), "copy it again"), (KeyError("x"), "a fault of ours")],
+)
+def test_a_source_that_fails_is_told_with_its_cure(
+    error: Exception, cure: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(daemon_module, "RETRY_S", 0.1)
     source = BrokenSource()
     with running_camera(tmp_path, source=source) as camera:  # type: ignore[arg-type]
         camera.sink.wait_for(3)
-        source.broken = True
-        wait_until(lambda: "copy it again" in camera.troubles())
+        source.error = error
+        wait_until(lambda: cure in camera.troubles())
         count = camera.sink.count
         wait_until(lambda: camera.sink.count > count + 3)
-        source.broken = False
+        source.error = None
         wait_until(lambda: camera.troubles() == "")
 
 
@@ -202,11 +208,14 @@ class SilentSource(BrokenSource):
 
 
 def test_a_camera_that_never_came_is_told_and_waited_for(tmp_path: Path) -> None:
-    with running_camera(tmp_path, source=SilentSource()) as camera:  # type: ignore[arg-type]
+    source = SilentSource()
+    with running_camera(tmp_path, source=source) as camera:  # type: ignore[arg-type]
         wait_until(lambda: "another program may be using it" in camera.troubles())
         wait_until(lambda: camera.status()["state"] == "waiting")
         assert "relit devices" in camera.troubles()
         wait_until(lambda: difference(camera.sink.new[-1], placeholder(SIZE, "waiting for the camera")) == 0)
+        source.reason = "HD Webcam is unplugged"
+        wait_until(lambda: "is unplugged" in camera.troubles())
 
 
 def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
@@ -262,5 +271,6 @@ def test_stop_ends_every_thread(tmp_path: Path) -> None:
         camera.daemon.stop()
         assert time.monotonic() - start < 3
         assert camera.daemon.stopping()
+        assert camera.daemon.status().state == "stopping"
         camera.daemon.stop()
     wait_until(lambda: not {t for t in set(threading.enumerate()) - before if t.name in {"worker", "publisher", "api"}})

@@ -177,19 +177,24 @@ class Daemon:
     def _read(self) -> Frame | None:
         try:
             frame = self._source.read(READ_TIMEOUT_S)
-        except RelitError as error:
+        except Exception as error:  # nothing that a source does may end the camera
             self._failed("source", error)
+            self._show_waiting()
             self._stopping.wait(RETRY_S)
-            frame = None
-        reason = self._source.reason
+            return None
         if frame is not None:
             self._recovered("source")
-        elif self._source.state is not SourceState.RUNNING and (reason or self._state is not CameraState.STARTING):
-            if reason and "source" not in self._troubles:
+        elif self._source.state is not SourceState.RUNNING:
+            reason = self._source.reason
+            if reason:
                 self._failed("source", DeviceError(reason, "it is tried again by itself; see `relit devices`"))
-            self._publisher.placeholder = self._waiting_picture
-            self._set_state(CameraState.WAITING)
+            if reason or self._state is not CameraState.STARTING:
+                self._show_waiting()
         return frame
+
+    def _show_waiting(self) -> None:
+        self._publisher.placeholder = self._waiting_picture
+        self._set_state(CameraState.WAITING)
 
     def _count(self, frame: Frame) -> None:
         """Frames that the source gave, those too that were replaced before the worker came: indices have gaps there."""
@@ -206,7 +211,8 @@ class Daemon:
         self._set_state(CameraState.LIVE if seen else CameraState.SEARCHING)
 
     def _set_state(self, state: CameraState) -> None:
-        if state is not self._state:
+        # A frame that is finished while the camera stops does not make it live again.
+        if state is not self._state and self._state is not CameraState.STOPPING:
             self._state = state
             self.events.publish("state", state=str(state))
 

@@ -48,7 +48,7 @@ class Publisher:
 
     Attributes:
         pictures: the slot to put finished pictures in.
-        shown: what was written last, for previews: repeated pictures are not put again.
+        shown: what went to the sink last, whether it took it or not, for previews: repeated pictures are not put again.
         placeholder: uint8 sRGB RGB (height, width, 3), of the sink's size; may be replaced at any time.
         hold: while this is true the last picture stays, however old it is.
     """
