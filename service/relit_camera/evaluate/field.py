@@ -150,7 +150,7 @@ def evaluate_field(
             "every truth light inside the sampled region was captured: nothing is left to compare with",
             "hold some back with --every or --within-deg, or give a denser truth",
         )
-    places = _places(truth, spots)
+    places = places_of(spots, truth)
     spots_lit_or_dark = spots_between(captured_samples, truth, judged_lights) if captured_samples else []
     example: Between | None = None
     judged = []
@@ -203,7 +203,7 @@ def through_harmonics(truth: Truth, light_map: LightMap) -> dict[int, Relit]:
     }
 
 
-def _places(truth: Truth, spots: Sequence[Spot]) -> NDArray[np.intp]:
-    """Where the spots stand among the pixels inside."""
+def places_of(spots: Sequence[Spot], truth: Truth) -> NDArray[np.intp]:
+    """Place (spots,) of each spot among the truth's pixels inside."""
     width = truth.samples.matte.shape[1]
     return np.searchsorted(truth.inside, [spot.y * width + spot.x for spot in spots])

@@ -10,7 +10,7 @@ import numpy as np
 from relit_camera.compose.sheet import contact_sheet
 from relit_camera.evaluate.candidates import RING
 from relit_camera.evaluate.charts import line_chart
-from relit_camera.evaluate.field import PROFILE_BINS, FieldReport
+from relit_camera.evaluate.field import PROFILE_BINS, FieldReport, places_of
 from relit_camera.evaluate.ghost_page import ghost_blocks
 from relit_camera.evaluate.harmonics import coefficient_count, project, reconstruct
 from relit_camera.evaluate.page import chart, heading, page, paragraph, picture, table
@@ -169,12 +169,10 @@ def _maps(report: FieldReport) -> Iterator[str]:
     yield heading("Reflectance maps")
     truth = report.truth
     frontal = truth.picture(truth.colours[int(truth.directions[:, 2].argmax())])
-    yield picture(marked_picture(frontal, list(report.spots)), "The spots whose reflectance maps follow.")
-    width = truth.samples.matte.shape[1]
+    yield picture(marked_picture(frontal, report.spots), "The spots whose reflectance maps follow.")
     rows: list[list[DisplayImage]] = []
-    for index, spot in enumerate(report.spots):
-        at = int(np.searchsorted(truth.inside, spot.y * width + spot.x))
-        known = map_of_lights(truth, truth.colours[:, at])
+    for index, place in enumerate(places_of(report.spots, truth)):
+        known = map_of_lights(truth, truth.colours[:, place])
         peak = float(np.nanpercentile(known, 99.5))
         shown = [reflectance_picture(each.maps[index].reshape(known.shape), peak) for each in report.judged]
         rows.append([*shown, reflectance_picture(known, peak)])
@@ -191,13 +189,12 @@ def _maps(report: FieldReport) -> Iterator[str]:
 def _relit(report: FieldReport) -> Iterator[str]:
     yield heading("Under whole surroundings")
     names = list(report.environments)
-    rows = [[light_picture(report.environments[name]) for name in names]]
-    rows += [[each.relit[name].picture for name in names] for each in report.judged]
+    rows = [[each.relit[name].picture for name in names] for each in report.judged]
     rows.append([report.judged[0].relit[name].truth for name in names])
-    labels = ["light", *(each.name for each in report.judged), "truth"]
-    # Every cell takes the shape of the first: the person's.
+    # The light last: every cell takes the shape of the first, which is to be the person's.
+    rows.append([light_picture(report.environments[name]) for name in names])
     yield picture(
-        contact_sheet([*rows[1:], rows[0]], [*labels[1:], labels[0]], names, 160),
+        contact_sheet(rows, [*(each.name for each in report.judged), "truth", "light"], names, 160),
         "The person under each environment by each method, in truth below, and the light itself in the last row. What "
         "differs most is light from the side and from behind: predictions are darker at the sides of the head and the "
         "hair, and miss the bright rim. Each column is scaled so that the brightest part of its truth is white. "

@@ -23,6 +23,8 @@ from relit_camera.space.directions import (
 from relit_camera.space.images import DisplayImage, LinearImage
 
 MAP_ZOOM = 10
+_GAP = 4
+"""Pixels between the rows of a grid."""
 _OUTSIDE, _REGION, _EDGE = (46, 46, 52), (86, 92, 104), (140, 150, 166)
 _LIGHT, _RING = (90, 230, 120), (255, 210, 70)
 _FONT, _TEXT_SCALE = cv2.FONT_HERSHEY_SIMPLEX, 0.45
@@ -60,8 +62,7 @@ def directions_picture(captured: NDArray[np.float64], ring: NDArray[np.float64])
     height, width = MAP_HEIGHT * MAP_ZOOM, MAP_WIDTH * MAP_ZOOM
     inside = sampled_region(captured, texel_directions(height // 2, width // 2).reshape(-1, 3))
     mask = np.repeat(np.repeat(inside.reshape(height // 2, width // 2), 2, axis=0), 2, axis=1)
-    image = np.empty((height, width, 3), np.uint8)
-    image[:] = _OUTSIDE
+    image = np.full((height, width, 3), _OUTSIDE, np.uint8)
     image[mask] = _REGION
     for triangle in spherical_delaunay(captured):
         for a, b in ((0, 1), (1, 2), (2, 0)):
@@ -72,7 +73,7 @@ def directions_picture(captured: NDArray[np.float64], ring: NDArray[np.float64])
     return image
 
 
-def marked_picture(picture: LinearImage, spots: list[Spot]) -> DisplayImage:
+def marked_picture(picture: LinearImage, spots: Sequence[Spot]) -> DisplayImage:
     """The person, brightest parts as white, with each spot ringed in its colour; at least 480 pixels high."""
     zoom = max(1, -(-480 // picture.shape[0]))
     peak = float(np.percentile(picture, 99)) or 1.0
@@ -100,14 +101,13 @@ def labelled_grid(
         for start in range(0, len(pictures), columns)
     ]
     width = max(sheet.shape[1] for sheet in sheets)
-    paper = sheets[0][0, 0]
-    filled = []
-    for sheet in sheets:
-        row = np.empty((sheet.shape[0] + 4, width, 3), np.uint8)
-        row[:] = paper
-        row[: sheet.shape[0], : sheet.shape[1]] = sheet
-        filled.append(row)
-    return np.concatenate(filled)
+    paper = sheets[0][0, 0].tolist()
+    return np.concatenate(
+        [
+            cv2.copyMakeBorder(sheet, 0, _GAP, 0, width - sheet.shape[1], cv2.BORDER_CONSTANT, value=paper)
+            for sheet in sheets
+        ]
+    )
 
 
 def with_line(image: DisplayImage, row: int) -> DisplayImage:
