@@ -177,3 +177,6 @@ def test_fitted_covers_and_centres() -> None:
     small = fitted(frame(0, wide), (100, 50)).image
     expected = cv2.resize(wide[:, 100:300], (100, 50), interpolation=cv2.INTER_AREA)
     assert difference(small, expected) < 2
+    stripes = np.zeros((90, 180, 3), np.uint8)
+    stripes[:, ::3] = 255
+    assert (fitted(frame(0, stripes), (60, 30)).image == 85).all()  # what is finer than its pixels is averaged

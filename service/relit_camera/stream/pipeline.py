@@ -7,10 +7,10 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.compose.background import cropped_to_fill
 from relit_camera.config.look import Mode
 from relit_camera.config.settings import ReenactSettings, TrackerSettings
 from relit_camera.errors import SubjectError
@@ -251,11 +251,4 @@ def fitted_motion(motion: FaceMotion, size: tuple[int, int], to: tuple[int, int]
 
 def fitted(frame: Frame, size: tuple[int, int]) -> Frame:
     """The frame scaled to cover `size` (width, height) and cut to it about its middle; the frame itself if it fits."""
-    if frame.size == size:
-        return frame
-    scale, shift = _fit(frame.size, size)
-    # cv2's pixel centres are integers: x' + ½ = s (x + ½) + shift.
-    affine = np.array([[scale, 0, shift[0] + (scale - 1) / 2], [0, scale, shift[1] + (scale - 1) / 2]])
-    flags = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-    image = cv2.warpAffine(frame.image, affine, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
-    return Frame(np.asarray(image, dtype=np.uint8), frame.index, frame.captured_at, frame.time_s)
+    return frame if frame.size == size else replace(frame, image=cropped_to_fill(frame.image, size))
