@@ -94,8 +94,7 @@ class Mouth:
         edge = edge[np.argsort(edge[:, 0])]
         seen = _transform(to_output, project(edge, pose, self._face.size))[:, 0]
         across = np.abs(np.interp(columns, np.maximum.accumulate(seen), edge[:, 0] - edge[:, 0].mean()))
-        pixel = float(np.abs(np.gradient(across)).mean()) if len(columns) > 1 else 0.0
-        width = max(TOOTH_GAP_CM, pixel)
+        width = max(TOOTH_GAP_CM, float(np.abs(np.gradient(across)).mean()))  # a line no narrower than a pixel
         gap = np.exp(-(((across[:, None] - TOOTH_EDGES_CM) / width) ** 2)).max(axis=1) * (TOOTH_GAP_CM / width)
         return np.asarray(np.clip(1.05 - (across / ROW_HALF_CM) ** 2, 0, 1) * (1 - TOOTH_GAP_SHADE * gap), np.float32)
 
