@@ -12,6 +12,7 @@ from relit_camera.reflectance.method import method_names
 from relit_camera.stream.video_writer import VideoWriter
 from tests.cli.relit_command import Answer, call, files
 from tests.evaluate.ball import cap, grid, lambert
+from tests.evaluate.capture_documents import documents
 from tests.synthetic import write_lights
 
 PARTY = ("--environment", "party")
@@ -81,6 +82,18 @@ def test_video_compares_two_videos(tmp_path: Path) -> None:
     assert json.loads(answer.out)["light"]["gain_ev"] == pytest.approx(np.log2((120 / 100) ** 2.2), abs=0.1)
 
 
+def test_capture_compares_a_report_with_the_truth(tmp_path: Path) -> None:
+    truth, report = documents()
+    (tmp_path / "truth.json").write_text(json.dumps(truth))
+    (tmp_path / "report.json").write_text(json.dumps(report | {"focal_px": 2 * report["focal_px"]}))
+    command = ("evaluate", "capture", tmp_path / "report.json", "--truth", tmp_path / "truth.json")
+    answer = call(*command, "--json", "--out", tmp_path / "page.html")
+    assert answer.code == 0, answer.err
+    assert json.loads(answer.out)["focal_ratio"] == 2
+    assert (tmp_path / "page.html").read_text().startswith("<!doctype html>")
+    assert "focal length: 2.000" in call(*command).out
+
+
 def test_what_is_wrong_is_said_in_one_line_and_leaves_nothing(folder: Path, tmp_path: Path) -> None:
     captured, truth, out = folder / "captured", folder / "truth", tmp_path / "report.html"
     write_lights(tmp_path / "small", lambert(cap(60, 50), 12))
@@ -101,6 +114,9 @@ def test_what_is_wrong_is_said_in_one_line_and_leaves_nothing(folder: Path, tmp_
     field(captured, "--out", tmp_path / "no" / "report.html").complains("report.html")
     call("evaluate", "olat", captured, "--hold-out", "4", "--out", out).complains("every=N")
     call("evaluate", "video", tmp_path / "none.mp4", "--truth", out).complains("none.mp4")
+    call("evaluate", "capture", tmp_path / "none.json", "--truth", tmp_path / "none.json", "--out", out).complains(
+        "none.json"
+    )
     assert field(captured, "--out", tmp_path / "report.pdf").code == 2
     assert call("evaluate", "video", out, "--truth", out, "--pose", out).code == 2
     assert files(tmp_path) == before

@@ -3,57 +3,36 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from relit_camera.errors import InputError
-from relit_camera.evaluate.capture import compare_capture
+from relit_camera.evaluate.capture import CaptureErrors, compare_capture
 from relit_camera.evaluate.capture_page import capture_json, capture_page, capture_text
-from relit_camera.space.directions import direction_from_degrees
-from tests.evaluate.test_field import Outline
+from tests.evaluate.capture_documents import Document, documents
+from tests.evaluate.outline import Outline
 
-STATES = ("dark", "partial", "bright", "bright", "partial", "dark") * 5
-
-
-def documents() -> tuple[dict[str, Any], dict[str, Any]]:
-    """A truth of 30 frames, and the report of a capture that finds all of it."""
-    noise = np.random.default_rng(8)
-    true_frames, frames = [], []
-    for index, state in enumerate(STATES):
-        head, ball = (direction_from_degrees(noise.uniform(-60, 60), noise.uniform(-40, 40)).tolist() for _ in range(2))
-        turn, shift = float(noise.normal()), noise.normal(size=2).tolist()
-        true_frames.append(
-            {
-                "index": index,
-                "light": {"direction": head, "at_ball": ball, "distance_cm": 100.0},
-                "flash": {"state": state, "lit_share": 0.5},
-                "head": {"to_rest": {"rotation_deg": turn, "translation_px": shift, "residual_px": 0.0}},
-            }
-        )
-        found = {"direction": head, "at_ball": ball} if state == "bright" else {}
-        frames.append({"index": index, "kind": state, "rotation_deg": turn, "translation_px": shift, **found})
-    truth = {"ball": {"x_px": 100.0, "y_px": 50.0, "radius_px": 20.0}, "focal_px": 800.0, "frames": true_frames}
-    return truth, {"ball": {"x": 100.0, "y": 50.0, "radius": 20.0}, "focal_px": 800.0, "frames": frames}
+Compare = Callable[[object], CaptureErrors]
 
 
 @pytest.fixture
-def truth() -> dict[str, Any]:
+def truth() -> Document:
     return documents()[0]
 
 
 @pytest.fixture
-def report() -> dict[str, Any]:
+def report() -> Document:
     return documents()[1]
 
 
 @pytest.fixture
-def compare(tmp_path: Path, truth: dict[str, Any]):  # type: ignore[no-untyped-def]
-    def run(report: object):  # type: ignore[no-untyped-def]
+def compare(tmp_path: Path, truth: Document) -> Compare:
+    def run(report: object) -> CaptureErrors:
         (tmp_path / "truth.json").write_text(json.dumps(truth))
         (tmp_path / "report.json").write_text(report if isinstance(report, str) else json.dumps(report))
         return compare_capture(tmp_path / "report.json", tmp_path / "truth.json")
@@ -61,7 +40,7 @@ def compare(tmp_path: Path, truth: dict[str, Any]):  # type: ignore[no-untyped-d
     return run
 
 
-def test_a_perfect_capture_has_no_errors(compare, report) -> None:  # type: ignore[no-untyped-def]
+def test_a_perfect_capture_has_no_errors(compare: Compare, report: Document) -> None:
     errors = compare(report)
     assert (errors.frames, errors.true_bright, errors.used, errors.wrongly_bright) == (30, 10, 10, 0)
     assert errors.direction_deg.max() < 1e-6
@@ -72,7 +51,7 @@ def test_a_perfect_capture_has_no_errors(compare, report) -> None:  # type: igno
     assert errors.focal_ratio == 1
 
 
-def test_errors_put_in_are_found(compare, report) -> None:  # type: ignore[no-untyped-def]
+def test_errors_put_in_are_found(compare: Compare, report: Document) -> None:
     for frame in report["frames"]:
         frame["rotation_deg"] += 5 + 0.1 * (-1) ** frame["index"]
         frame["translation_px"][0] += 0.4 * (-1) ** frame["index"]
@@ -92,7 +71,7 @@ def test_errors_put_in_are_found(compare, report) -> None:  # type: ignore[no-un
     assert errors.focal_ratio == pytest.approx(1.05)
 
 
-def test_frames_taken_for_others_are_counted(compare, report) -> None:  # type: ignore[no-untyped-def]
+def test_frames_taken_for_others_are_counted(compare: Compare, report: Document) -> None:
     report["frames"][2]["kind"] = "rejected"
     report["frames"][4]["kind"] = "bright"
     errors = compare(report)
@@ -100,7 +79,7 @@ def test_frames_taken_for_others_are_counted(compare, report) -> None:  # type: 
     assert len(errors.direction_deg) == 9
 
 
-def test_what_a_report_does_not_tell_is_null(compare, report) -> None:  # type: ignore[no-untyped-def]
+def test_what_a_report_does_not_tell_is_null(compare: Compare, report: Document) -> None:
     bare = {"frames": [{"index": frame["index"], "kind": frame["kind"]} for frame in report["frames"]]}
     errors = compare(bare)
     figures = json.loads(json.dumps(capture_json(errors), allow_nan=False))
@@ -109,7 +88,7 @@ def test_what_a_report_does_not_tell_is_null(compare, report) -> None:  # type: 
     assert "not told" in capture_text(errors)
 
 
-def test_the_report_is_whole_in_itself(compare, report) -> None:  # type: ignore[no-untyped-def]
+def test_the_report_is_whole_in_itself(compare: Compare, report: Document) -> None:
     errors = compare(report)
     outline = Outline()
     outline.feed(capture_page(errors, "Capture"))
@@ -118,10 +97,11 @@ def test_the_report_is_whole_in_itself(compare, report) -> None:  # type: ignore
     assert "10 of 10" in capture_text(errors)
 
 
-def test_wrong_files_are_one_clear_error(compare, report, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    wrong: dict[str, object] = {"no JSON": "{", "frames": {}, r"frames\.0\.kind": deepcopy(report), "frame 99": report}
-    wrong[r"frames\.0\.kind"]["frames"][0]["kind"] = "lit"  # type: ignore[index]
-    report["frames"][3]["index"] = 99
+def test_wrong_files_are_one_clear_error(compare: Compare, report: Document, tmp_path: Path) -> None:
+    unknown, strange = deepcopy(report), deepcopy(report)
+    unknown["frames"][0]["kind"] = "lit"
+    strange["frames"][3]["index"] = 99
+    wrong = {"no JSON": "{", "frames": {}, r"frames\.0\.kind": unknown, "frame 99": strange}
     for place, document in wrong.items():
         with pytest.raises(InputError, match=place):
             compare(document)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from relit_camera.evaluate.points import Spot, face_spots, parse_spot
 from relit_camera.evaluate.truth import Truth
 from relit_camera.light.builtin.catalogue import builtin_environment
 from tests.evaluate.ball import cap, grid, shadowed
+from tests.evaluate.outline import Outline
 
 SPOTS = [Spot("beside the shadow", 20, 20), Spot("middle", 24, 24)]
 
@@ -91,29 +91,6 @@ def test_nothing_left_to_compare_is_an_error() -> None:
     candidates = method_candidates(samples, truth.inside)
     with pytest.raises(LightsError, match="nothing is left to compare"):
         evaluate_field(candidates, samples.directions, samples, truth, {}, [])
-
-
-class Outline(HTMLParser):
-    """Whatever of a page a browser would fetch, and its figures' captions."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.fetched: list[str] = []
-        self.open: list[str] = []
-        self.figures = self.captions = 0
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        values = {name: value or "" for name, value in attrs}
-        self.fetched += [v for n, v in values.items() if n in ("src", "href", "srcset") and not v.startswith("data:")]
-        self.fetched += [tag] if tag in ("script", "link", "iframe", "object") else []
-        self.figures += tag == "figure"
-        self.captions += tag == "figcaption"
-        if tag not in ("img", "meta", "br", "path"):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        if tag != "path":
-            assert self.open.pop() == tag
 
 
 def test_the_page_is_whole_in_itself_and_every_figure_has_a_caption(report: FieldReport) -> None:

@@ -45,7 +45,7 @@ def test_an_error_near_the_pole_weighs_less(truth: Truth) -> None:
         distances = squared_distances(wrong.reshape(2048, -1, 3), truth.colours)
         return float(error_of_pixels(distances, truth.weights).mean())
 
-    # ∫ cos φ over one row of 32, over all: rows sum to 1 / sin(π / 64) · sin … by the midpoint rule's closed form.
+    # One row's cos φ over that of all 32, whose sum is 1 / sin(π / 64).
     for row in (0, 8, 15):
         cosine = np.cos(np.pi * (0.5 - (row + 0.5) / 32))
         assert error_of_row(row) == pytest.approx(3 * cosine * np.sin(np.pi / 64), rel=1e-4)
