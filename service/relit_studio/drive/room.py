@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,6 @@ _BLUR = 0.05
 """Of what is seen behind the person: a webcam's lens has its focus on them."""
 
 
-ROOM_FILE = "room.exr"
-
-
 @dataclass(frozen=True, eq=False)
 class Room:
     """An environment about the person, turned by `yaw_deg` (positive moves a frontal light to the picture's right)."""
@@ -33,12 +31,12 @@ class Room:
     environment: Environment
     yaw_deg: float = 0.0
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """The exposure: a white ball that faces the camera reads 0.8."""
         return display_scale(self.light_map)
 
-    @property
+    @cached_property
     def light_map(self) -> LinearImage:
         """The light about the person, (32, 64, 3)."""
         return rotate(self.environment.light_map, rotation_from_angles(self.yaw_deg).inv())
@@ -53,7 +51,7 @@ class Room:
         columns = round(self.yaw_deg / 360 * radiance.shape[1])
         turned = np.roll(radiance, columns, axis=1)
         # Cycles takes pictures as seen from inside the sphere.
-        path = folder / ROOM_FILE
+        path = folder / "room.exr"
         write_linear(path, np.ascontiguousarray(turned[:, ::-1]))
         return PanoramaLight(str(path))
 
