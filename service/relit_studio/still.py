@@ -11,10 +11,11 @@ from relit_studio.camera import Camera
 from relit_studio.cycles.exr import read_rgba
 from relit_studio.cycles.figure import Figure
 from relit_studio.cycles.job import Picture, Quality
-from relit_studio.cycles.runner import Progress, render
+from relit_studio.cycles.runner import render
 from relit_studio.drive.room import Room
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
+from relit_studio.progress import Progress, no_progress
 
 
 def render_stills(
@@ -23,7 +24,7 @@ def render_stills(
     room: Room,
     camera: Camera,
     quality: Quality,
-    progress: Progress = lambda done, total: None,
+    progress: Progress = no_progress,
 ) -> list[DisplayImage]:
     """The person in each posture before the room, as a webcam shows it, uint8 sRGB.
 

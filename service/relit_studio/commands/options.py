@@ -12,11 +12,11 @@ import typer
 from relit_camera.cli.progress import progress_bar
 from relit_camera.light.store import EnvironmentStore
 from relit_studio.cycles.job import Quality
-from relit_studio.cycles.runner import Progress as Told
 from relit_studio.drive.room import Room
 from relit_studio.people.person import Person, make_person
 from relit_studio.people.traits import find_traits
 from relit_studio.people.wardrobe import wardrobe
+from relit_studio.progress import Progress
 
 PersonName = Annotated[str, typer.Option("--person", help="adam, bea, cem, or a number for a random person.")]
 Out = Annotated[Path, typer.Option("--out", help="Folder to write to.", metavar="DIR")]
@@ -59,7 +59,7 @@ def load_room(environment: str, turn_deg: float) -> Room:
 
 
 @contextmanager
-def shown_progress(what: str) -> Iterator[Told]:
+def shown_progress(what: str) -> Iterator[Progress]:
     """A progress bar on stderr."""
     with progress_bar() as bar:
         task = bar.add_task(what, total=None)

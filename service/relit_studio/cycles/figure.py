@@ -14,7 +14,7 @@ from relit_studio.assets.store import cache_folder
 from relit_studio.cycles.job import Material, Mesh, Scene, Shape, Strands
 from relit_studio.people.eyes import LIMBUS_CM, eye_map, eye_picture, lid_shade
 from relit_studio.people.face_model import CORNEA_MATERIALS, Part
-from relit_studio.people.geometry import Floats, Indices
+from relit_studio.people.geometry import Floats, vertices_of
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 from relit_studio.people.scalp import scalp
@@ -40,7 +40,7 @@ class Figure:
         self._model = person.model
         self._chosen = {name: np.isin(self._model.face_part, parts) for name, parts in _PARTS.items()}
         self._chosen["head"] &= ~person.shirt.covered[self._model.faces].all(axis=1)
-        self._used = {name: _used(self._model.faces[chosen]) for name, chosen in self._chosen.items()}
+        self._used = {name: vertices_of(self._model.faces[chosen]) for name, chosen in self._chosen.items()}
 
     def scene(self) -> Scene:
         """The person upright and neutral; writes their pictures into the cache.
@@ -157,7 +157,3 @@ class Figure:
         write_display(folder / "skin.png", skin_picture(self.person.wardrobe.albedo(traits.beard), traits))
         write_display(folder / "eye.png", eye_picture(traits))
         return folder
-
-
-def _used(faces: NDArray) -> Indices:
-    return np.unique(faces[faces >= 0]).astype(np.intp)

@@ -6,7 +6,7 @@ import json
 import os
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,9 +16,8 @@ from relit_camera.files import make_folder
 from relit_studio.camera import Camera
 from relit_studio.cycles.environment import environment_python
 from relit_studio.cycles.job import Picture, Quality, Scene, write_job
+from relit_studio.progress import Progress, no_progress
 
-Progress = Callable[[int, int], None]
-"""Told how many pictures are done, and of how many."""
 _WAIT_S = 10.0
 
 
@@ -27,7 +26,7 @@ def render(
     camera: Camera,
     quality: Quality,
     pictures: Sequence[Picture],
-    progress: Progress = lambda done, total: None,
+    progress: Progress = no_progress,
     command: Sequence[str] | None = None,
 ) -> dict[str, float]:
     """Render those pictures that are not there yet; returns seconds by name of what was rendered now.

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.space.rotation import Angles
+from relit_studio.mannequin.performance import eased_value
 from relit_studio.people.expressions import NEUTRAL, Expression
 from relit_studio.people.eyes import GAZE_DEG
+from relit_studio.people.geometry import smoothstep
 from relit_studio.people.posture import Posture
 
 FPS = 24
@@ -86,16 +88,16 @@ def posture_at(time_s: float) -> Posture:
     expression = dict(NEUTRAL)
     for viseme, share in _mouth(time_s):
         _add(expression, viseme, share)
-    smile = _value(_SMILE, time_s)
+    smile = eased_value(time_s, _SMILE)
     _add(expression, {"mouthSmile": 0.45, "cheekSquint": 0.45, "eyeSquint": 0.2, "mouthUpperUp": 0.1}, smile)
-    brows = _value(_BROWS, time_s)
+    brows = eased_value(time_s, _BROWS)
     _add(expression, {"browInnerUp": 0.5, "browOuterUp": 0.35}, brows)
-    _add(expression, {"browDown": 0.5}, _value(_FROWN, time_s))
-    _look(expression, _value(_LOOK_RIGHT_DEG, time_s), _value(_LOOK_DOWN_DEG, time_s))
+    _add(expression, {"browDown": 0.5}, eased_value(time_s, _FROWN))
+    _look(expression, eased_value(time_s, _LOOK_RIGHT_DEG), eased_value(time_s, _LOOK_DOWN_DEG))
     _blink(expression, max(_lid(time_s, middle) for middle in _BLINKS_S))
     # Nobody holds still between two movements.
     sway = [np.sin(2 * np.pi * f * time_s + p) for f, p in ((0.9, 0.3), (0.7, 2.0), (1.1, 4.4))]
-    yaw, pitch, roll = (_value(keys, time_s) for keys in (_YAW, _PITCH, _ROLL))
+    yaw, pitch, roll = (eased_value(time_s, keys) for keys in (_YAW, _PITCH, _ROLL))
     ends = float(np.clip(min(time_s, FRAMES / FPS - time_s) / 0.4, 0, 1))
     angles = Angles(yaw + 0.5 * ends * sway[0], pitch + 0.5 * ends * sway[1], roll + 0.4 * ends * sway[2])
     return Posture(angles, {name: round(weight, 4) for name, weight in expression.items()})
@@ -110,7 +112,7 @@ def _mouth(time_s: float) -> tuple[tuple[dict[str, float], float], tuple[dict[st
     """The two mouth shapes between which the mouth is, and their shares."""
     times = np.array([time for time, _ in _SYLLABLES])
     after = int(np.clip(np.searchsorted(times, time_s, side="right"), 1, len(times) - 1))
-    share = _eased((time_s - times[after - 1]) / (times[after] - times[after - 1]))
+    share = float(smoothstep(time_s, times[after - 1], times[after]))
     before, following = (_VISEMES[_SYLLABLES[index][1]] for index in (after - 1, after))
     return (before, 1 - share), (following, share)
 
@@ -143,16 +145,4 @@ def _blink(expression: dict[str, float], shut: float) -> None:
 def _lid(time_s: float, middle_s: float) -> float:
     """A lid that falls in 80 ms, rests shut for a moment, and opens more slowly."""
     offset = time_s - middle_s
-    return _eased(1.3 + offset / 0.085) if offset < 0 else _eased(1.3 - offset / 0.14)
-
-
-def _value(keys: Keys, time_s: float) -> float:
-    times, values = np.array(keys).T
-    after = int(np.clip(np.searchsorted(times, time_s, side="right"), 1, len(keys) - 1))
-    share = _eased((time_s - times[after - 1]) / (times[after] - times[after - 1]))
-    return float(values[after - 1] + (values[after] - values[after - 1]) * share)
-
-
-def _eased(share: float) -> float:
-    t = float(np.clip(share, 0, 1))
-    return t * t * (3 - 2 * t)
+    return float(smoothstep(1.3 + offset / 0.085 if offset < 0 else 1.3 - offset / 0.14, 0, 1))

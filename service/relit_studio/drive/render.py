@@ -16,11 +16,13 @@ from relit_studio.camera import Camera
 from relit_studio.cycles.exr import read_rgba
 from relit_studio.cycles.figure import Figure
 from relit_studio.cycles.job import Picture, Quality
-from relit_studio.cycles.runner import Progress, render
+from relit_studio.cycles.runner import render
 from relit_studio.drive.performance import FPS, FRAMES, frame_times, posture_at
 from relit_studio.drive.room import Room
-from relit_studio.drive.truth import TruthTracker, true_state
+from relit_studio.drive.truth import TruthTracker
+from relit_studio.people.landmarks import landmarks
 from relit_studio.people.person import Person
+from relit_studio.progress import Progress, no_progress
 
 _CHUNK = 12
 """Frames whose shapes are written before they are rendered."""
@@ -49,7 +51,7 @@ class DriveSettings:
 
 
 def render_drive(
-    person: Person, room: Room, folder: Path, settings: DriveSettings, progress: Progress = lambda done, total: None
+    person: Person, room: Room, folder: Path, settings: DriveSettings, progress: Progress = no_progress
 ) -> dict[str, float]:
     """Render the performance into `folder`; frames that are there already are left. Returns seconds by frame.
 
@@ -117,14 +119,13 @@ def _truth(
     frames = []
     for time_s in times:
         posture = posture_at(time_s)
-        state = true_state(person, camera, posture, "openseeface66")
-        assert state.pose is not None
+        points = camera.project(landmarks(person, posture)["openseeface66"])
         frames.append(
             {
                 "time_s": time_s,
                 "pose_deg": posture.angles._asdict(),
                 "expression": dict(posture.expression),
-                "landmarks66_px": state.landmarks.astype(float).round(3).tolist(),
+                "landmarks66_px": points.astype(float).round(3).tolist(),
             }
         )
     return {

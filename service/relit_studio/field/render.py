@@ -18,11 +18,13 @@ from relit_studio.camera import Camera
 from relit_studio.cycles.exr import Passes, read_passes
 from relit_studio.cycles.figure import Figure
 from relit_studio.cycles.job import DistantLight, Picture, Quality, Scene
-from relit_studio.cycles.runner import Progress, render
+from relit_studio.cycles.runner import render
 from relit_studio.mannequin.lights import light_directions
+from relit_studio.mannequin.olat import grey, lights_text
 from relit_studio.people.landmarks import canonical_origin, landmarks
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
+from relit_studio.progress import Progress, no_progress
 
 _PASSES = "passes.exr"
 _PASSES_SAMPLES = 96
@@ -47,7 +49,7 @@ class FieldSettings:
 
 
 def render_field(
-    person: Person, folder: Path, settings: FieldSettings, progress: Progress = lambda done, total: None
+    person: Person, folder: Path, settings: FieldSettings, progress: Progress = no_progress
 ) -> dict[str, float]:
     """Render the neutral person under each light; lights that are there already are left. Returns seconds by picture.
 
@@ -67,7 +69,7 @@ def render_field(
     directions = light_directions(settings.lights)
     digits = len(str(settings.lights - 1))
     names = [f"{index:0{digits}d}.exr" for index in range(settings.lights)]
-    _write_lights(folder, names, directions)
+    write_atomic(folder / "lights.lp", lights_text(names, directions))
     _write_truth(person, scene, camera, folder, settings.quality)
     pictures = [
         Picture(folder / name, DistantLight((x, y, z), size_deg=settings.light_size_deg))
@@ -87,17 +89,11 @@ def _description(person: Person, settings: FieldSettings, camera: Camera) -> dic
     }
 
 
-def _write_lights(folder: Path, names: list[str], directions: NDArray) -> None:
-    lines = [f"{name} {x:.7f} {y:.7f} {z:.7f}" for name, (x, y, z) in zip(names, directions, strict=True)]
-    write_atomic(folder / "lights.lp", "\n".join([str(len(names)), *lines, ""]))
-
-
 def _write_truth(person: Person, scene: Scene, camera: Camera, folder: Path, quality: Quality) -> None:
     passes_quality = Quality.truth(_PASSES_SAMPLES, quality.threads)
     render(scene, camera, passes_quality, [Picture(folder / _PASSES, _SOFT_FRONTAL, all_passes=True)])
     passes = read_passes(folder / _PASSES)
-    matte = np.round(np.clip(passes.alpha, 0, 1) * 255).astype(np.uint8)
-    write_display(folder / "matte.png", np.repeat(matte[..., None], 3, axis=2))
+    write_display(folder / "matte.png", grey(np.clip(passes.alpha, 0, 1)))
     write_display(folder / "neutral.png", uint8_from_linear(passes.picture))
     pixels = {
         scheme: camera.project(points).astype(np.float64).round(3).tolist()

@@ -7,7 +7,6 @@ surfaces (`solver_transport`), bounce by bounce, interpolated to the samples. No
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -29,10 +28,9 @@ from relit_studio.mannequin.figure import Posture, mannequin
 from relit_studio.mannequin.olat import grey, lights_text
 from relit_studio.mannequin.raster import Hits, rasterise
 from relit_studio.mannequin.shading import ShadowMap
+from relit_studio.progress import Progress, no_progress
 
 Values = NDArray[np.float32]
-Progress = Callable[[int, int], None]
-"""Told how many pictures are done, and of how many."""
 
 DISTANCE_CM, HEIGHT_CM, BELOW_AXIS_CM = 62.0, 38.0, 1.0
 """The camera before the mannequin: distance of the head's origin, what the picture's height spans there, and how far
@@ -89,7 +87,7 @@ def solve(
     camera: Pinhole,
     directions: NDArray[np.float64],
     settings: SolverSettings,
-    progress: Progress = lambda done, total: None,
+    progress: Progress = no_progress,
 ) -> SolvedField:
     """The field of `surfaces` before `camera` under distant lights from `directions` (lights, 3), unit vectors."""
     fine = camera.scaled(settings.supersampling)
@@ -135,9 +133,7 @@ def solve(
     )
 
 
-def write_solver_field(
-    folder: Path, settings: SolverSettings | None = None, progress: Progress = lambda done, total: None
-) -> None:
+def write_solver_field(folder: Path, settings: SolverSettings | None = None, progress: Progress = no_progress) -> None:
     """Solve the neutral mannequin's field and write it, as `relit capture import` reads it.
 
     `000.exr` … are linear, over black, not clipped; lights stand at the texels of the map, row by row from the top.

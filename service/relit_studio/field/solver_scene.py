@@ -1,9 +1,8 @@
-"""What the transport solver works on: surfaces with their reflectance, and a camera."""
+"""What the transport solver works on: surfaces with their reflectance."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,17 +11,6 @@ from relit_studio.mannequin.figure import Posture, mannequin
 from relit_studio.mannequin.mesh import Triangles
 
 Values = NDArray[np.float32]
-
-
-class Projection(Protocol):
-    """A pinhole camera at the origin that looks along −Z (see `capture.pinhole`)."""
-
-    width: int
-    height: int
-
-    def project(self, points: NDArray) -> NDArray:
-        """Pixels (count, 2), centres at integers + ½, and 1 / depth as third column, of points (count, 3)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from scipy import sparse
 from relit_studio.mannequin.lights import light_directions
 from relit_studio.mannequin.mesh import Triangles
 from relit_studio.mannequin.raster import fragments
+from relit_studio.mannequin.shading import axes_along
 
 Values = NDArray[np.float32]
 
@@ -51,10 +52,7 @@ def transport(vertices: Values, triangles: Triangles, directions: int, size: int
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     reach = float(np.linalg.norm(vertices - middle, axis=1).max()) * 1.001
     for direction in light_directions(2 * directions)[:directions]:
-        aside = np.cross([0.0, 1.0, 0.0] if abs(direction[1]) < 0.9 else [1.0, 0.0, 0.0], direction)
-        aside /= np.linalg.norm(aside)
-        axes = np.stack([aside, -np.cross(direction, aside), direction]).astype(np.float32)
-        seen = (vertices - middle) @ axes.T
+        seen = (vertices - middle) @ axes_along(direction).T
         seen[:, :2] = (seen[:, :2] + reach) * (size / (2 * reach))
         vertex, upward, pixel = _layers(seen, both_sides, len(triangles), size)
         # Sorted from below within each pixel: light goes from a layer that faces up to the next if that faces down.

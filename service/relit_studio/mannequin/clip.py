@@ -20,9 +20,10 @@ from relit_camera.stream.video_writer import VideoWriter
 from relit_studio.mannequin.camera import DISTANCE_CM, VIEW_CM, Camera
 from relit_studio.mannequin.figure import Posture
 from relit_studio.mannequin.lights import lights_from_map
-from relit_studio.mannequin.olat import Progress, landmarks_px, no_progress
+from relit_studio.mannequin.olat import landmarks_px
 from relit_studio.mannequin.performance import FPS, FRAMES, frame_times, posture_at
 from relit_studio.mannequin.renderer import View
+from relit_studio.progress import Progress, no_progress
 
 CLIP_SIZE = 320
 CLIP_LIGHTS = 32

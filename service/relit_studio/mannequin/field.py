@@ -10,8 +10,9 @@ from relit_camera.space.directions import texel_directions
 from relit_camera.space.picture_files import write_display, write_linear
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Posture
-from relit_studio.mannequin.olat import Progress, grey, landmarks_px, lights_text, no_progress
+from relit_studio.mannequin.olat import grey, landmarks_px, lights_text
 from relit_studio.mannequin.renderer import View
+from relit_studio.progress import Progress, no_progress
 
 
 def write_field(folder: Path, size: int, rows: int, progress: Progress = no_progress) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +17,7 @@ from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Posture, mannequin
 from relit_studio.mannequin.lights import light_directions
 from relit_studio.mannequin.renderer import View
-
-Progress = Callable[[int, int], None]
-"""Told how many pictures are done, and of how many."""
-
-
-def no_progress(done: int, total: int) -> None:
-    """Tell nobody."""
+from relit_studio.progress import Progress, no_progress
 
 
 def landmarks_px(camera: Camera, posture: Posture) -> NDArray[np.float32]:

@@ -13,9 +13,10 @@ from relit_camera.stream.video_writer import VideoWriter
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.clip import CLIP_LIGHTS, CLIP_SIZE
 from relit_studio.mannequin.lights import lights_from_map
-from relit_studio.mannequin.olat import Progress, grey, no_progress
+from relit_studio.mannequin.olat import grey
 from relit_studio.mannequin.performance import FPS, FRAMES, frame_times, posture_at
 from relit_studio.mannequin.renderer import View
+from relit_studio.progress import Progress, no_progress
 
 
 def write_relit(

@@ -42,10 +42,7 @@ class ShadowMap:
 
     def __init__(self, vertices: Values, triangles: Triangles, direction: ArrayLike, size: int) -> None:
         """See `vertices` (count, 3) from `direction` (3,), a unit vector toward the light, at size x size texels."""
-        toward = np.asarray(direction, np.float64)
-        aside = np.cross([0.0, 1.0, 0.0] if abs(toward[1]) < 0.9 else [1.0, 0.0, 0.0], toward)
-        aside /= np.linalg.norm(aside)
-        self._axes = np.stack([aside, -np.cross(toward, aside), toward]).astype(np.float32)
+        self._axes = axes_along(direction)
         # One row a coordinate: numpy reduces along contiguous memory many times faster.
         seen = self._axes @ vertices.T
         low, high = seen[:2].min(axis=1), seen[:2].max(axis=1)
@@ -59,6 +56,14 @@ class ShadowMap:
         lifted = self._axes @ (positions + normals * np.float32(LIFT * self._texel)).T
         x, y, depth = (lifted - self._origin) * self._scale
         return lit_share(self._depth, x, y, depth)
+
+
+def axes_along(direction: ArrayLike) -> Values:
+    """Right, down and toward the light, rows of (3, 3), of a picture taken from `direction` (3,), a unit vector."""
+    toward = np.asarray(direction, np.float64)
+    aside = np.cross([0.0, 1.0, 0.0] if abs(toward[1]) < 0.9 else [1.0, 0.0, 0.0], toward)
+    aside /= np.linalg.norm(aside)
+    return np.stack([aside, -np.cross(toward, aside), toward]).astype(np.float32)
 
 
 def lit_share(buffer: Values, x: Values, y: Values, nearness: Values) -> Values:

@@ -12,7 +12,7 @@ from relit_camera.space.images import DisplayImage
 from relit_camera.space.rotation import rotation_from_angles
 from relit_studio.people.expressions import Expression
 from relit_studio.people.face_model import CORNEA_MATERIALS, FaceModel, Part
-from relit_studio.people.geometry import Floats, smoothstep, unit
+from relit_studio.people.geometry import Floats, smoothstep, unit, vertices_of
 from relit_studio.people.traits import Traits
 
 _WAYS = ("Out", "In", "Down", "Up")
@@ -42,8 +42,8 @@ def eye_map(model: FaceModel, neutral: Floats) -> EyeMap:
     """Lay the picture over both eyeballs of a neutral head, as seen along each gaze axis."""
     uv, eccentricity = np.zeros((len(neutral), 2)), np.zeros(len(neutral))
     for part, material, _, _ in _EYES:
-        eyeball = _vertices(model.faces[model.face_part == part])
-        middle, axis = gaze(neutral[_vertices(model.faces[model.face_material == material])])
+        eyeball = vertices_of(model.faces[model.face_part == part])
+        middle, axis = gaze(neutral[vertices_of(model.faces[model.face_material == material])])
         right = unit(np.cross([0, 1, 0], axis))
         offset = neutral[eyeball] - middle
         across, up, ahead = offset @ right, offset @ np.cross(axis, right), offset @ axis
@@ -68,8 +68,8 @@ def turn_eyes(model: FaceModel, vertices: Floats, expression: Expression) -> Flo
         outward, inward, down, up = (expression.get(f"eyeLook{way}_{suffix}", 0.0) for way in _WAYS)
         if not (outward or inward or down or up):
             continue
-        middle, _ = gaze(vertices[_vertices(model.faces[model.face_material == material])])
-        eyeball = _vertices(model.faces[model.face_part == part])
+        middle, _ = gaze(vertices[vertices_of(model.faces[model.face_material == material])])
+        eyeball = vertices_of(model.faces[model.face_part == part])
         turn = rotation_from_angles(side * GAZE_DEG * (outward - inward), GAZE_DEG * (down - up))
         moved[eyeball] = turn.apply(vertices[eyeball] - middle) + middle
     return moved
@@ -127,7 +127,3 @@ def _veins(rng: np.random.Generator) -> Floats:
         strength, width = float(rng.uniform(0.15, 0.5)), int(rng.integers(1, 3))
         cv2.polylines(canvas, [np.array(points, np.int32)], False, strength, width, cv2.LINE_AA)
     return np.asarray(cv2.GaussianBlur(canvas, (0, 0), 1.3), np.float64)
-
-
-def _vertices(faces: np.ndarray) -> np.ndarray:
-    return np.unique(faces[faces >= 0])

@@ -37,9 +37,8 @@ class Part(IntEnum):
     LASHES_RIGHT = 16
 
 
-IRIS_MATERIALS = (5, 7)
-"""Values of `face_material` of the eyeballs' inner shells, left and right; their outer shells are 4 and 6."""
 CORNEA_MATERIALS = (4, 6)
+"""Values of `face_material` of the eyeballs' outer shells, left and right; their inner shells are 5 and 7."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,10 +30,14 @@ def triangles_of(faces: NDArray) -> Indices:
     return np.concatenate([faces[:, :3], quads[:, [0, 2, 3]]]).astype(np.intp)
 
 
+def vertices_of(faces: NDArray) -> Indices:
+    """The vertices (n,) that faces (m, 4) use, in order; -1 is none."""
+    return np.unique(faces[faces >= 0]).astype(np.intp)
+
+
 def vertex_normals(vertices: Floats, triangles: Indices) -> Floats:
     """Unit normals (vertices, 3), weighted by area; zero where no triangle is."""
-    corners = vertices[triangles]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = _crosses(vertices, triangles)
     summed = np.zeros_like(vertices)
     for corner in range(3):
         np.add.at(summed, triangles[:, corner], flat)
@@ -42,9 +46,13 @@ def vertex_normals(vertices: Floats, triangles: Indices) -> Floats:
 
 def areas(vertices: Floats, triangles: Indices) -> Floats:
     """Area (n,) of each triangle."""
+    return np.asarray(np.linalg.norm(_crosses(vertices, triangles), axis=1) / 2)
+
+
+def _crosses(vertices: Floats, triangles: Indices) -> Floats:
+    """A normal (n, 3) of each triangle, as long as twice its area."""
     corners = vertices[triangles]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(np.linalg.norm(flat, axis=1) / 2)
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 class SurfacePoints(NamedTuple):

@@ -34,8 +34,11 @@ _LIPS = ((448, 478), (480, 458), (513, 462), (548, 458), (578, 478), (550, 500),
 _SHAVED_SCALP = (
     (0, 0), (1023, 0), (1023, 620), (760, 620), (690, 250), (640, 130), (400, 130), (340, 250), (260, 620), (0, 620),
 )  # fmt: skip
+_EYES_AND_NOSE = ((395, 280), (630, 280), (640, 330), (560, 345), (565, 430), (465, 430), (465, 345), (385, 330))
 _FOREHEAD = (slice(100, 230), slice(400, 630))
 """Where pores are taken from to cover what is removed."""
+_MOLE_DEPTH = 0.045
+"""How much darker than its surroundings a mole is, in sRGB code values of 0..1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +119,6 @@ def _without_moles(photo: Picture) -> Picture:
     mask = cv2.dilate(moles[labels].astype(np.uint8), np.ones((7, 7)))
     filled = cv2.inpaint(_coded(photo), mask, 5, cv2.INPAINT_TELEA).astype(np.float32) / 255
     return np.where(mask[..., None] > 0, filled, photo).astype(np.float32)
-
-
-_MOLE_DEPTH = 0.045
-"""How much darker than its surroundings a mole is, in sRGB code values of 0..1."""
-_EYES_AND_NOSE = ((395, 280), (630, 280), (640, 330), (560, 345), (565, 430), (465, 430), (465, 345), (385, 330))
 
 
 def _membrane(photo: Picture, mask: Picture, steps: int = 1200) -> Picture:
