@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from relit_camera.space.directions import (
     direction_from_degrees,
     direction_from_spherical,
+    fibonacci_directions,
     map_position_from_direction,
     spherical_from_direction,
     texel_directions,
@@ -65,6 +66,16 @@ def test_solid_angle_of_a_polar_cap() -> None:
 def test_solid_angles_integrate_a_cosine_to_pi() -> None:
     cosine = np.maximum(0, texel_directions(256, 512)[..., 2])
     assert (cosine * texel_solid_angles(256, 512)).sum() == pytest.approx(np.pi, rel=1e-4)
+
+
+def test_fibonacci_directions_are_even_and_go_down() -> None:
+    directions = fibonacci_directions(500)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-12)
+    assert (np.diff(directions[:, 1]) < 0).all()
+    np.testing.assert_allclose(directions.mean(axis=0), 0, atol=2e-3)
+    np.testing.assert_allclose(directions.T @ directions / 500, np.eye(3) / 3, atol=2e-3)
+    nearest = np.sort(directions @ directions.T, axis=1)[:, -2]
+    assert np.degrees(np.arccos(nearest)).min() > 0.8 * np.degrees(np.sqrt(4 * np.pi / 500))
 
 
 def test_first_texel_is_up_and_behind_on_the_left() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from relit_camera.capture.build import build_subject
@@ -11,6 +10,7 @@ from relit_camera.face.pose import guess_focal, project
 from relit_camera.face.schemes import landmark_scheme
 from relit_camera.face.state import HeadPose
 from relit_camera.reflectance.samples import Samples
+from relit_camera.space.directions import fibonacci_directions
 from relit_camera.space.images import Points
 from relit_camera.subject.subject import Subject
 
@@ -30,7 +30,7 @@ def sample_subject(width: int = 150, height: int = 200) -> Subject:
     normal = np.dstack([-slope_x, slope_y, np.ones_like(depth)])
     normal /= np.linalg.norm(normal, axis=2, keepdims=True)
     albedo = np.array([0.62, 0.42, 0.33]) * (0.8 + 0.4 * rng.random((height, width, 1)))
-    directions = _spread(LIGHTS)
+    directions = fibonacci_directions(LIGHTS)
     pictures = np.empty((LIGHTS, height, width, 3), dtype=np.float32)
     for index, light in enumerate(directions):
         half = (light + [0, 0, 1]) / max(float(np.linalg.norm(light + [0, 0, 1])), 1e-6)
@@ -47,9 +47,3 @@ def _mean_face(width: int, height: int) -> Points:
     """A mean face that looks into the camera from the picture's middle, so that the live chain can move it."""
     pose = HeadPose(Rotation.identity(), np.array([0.0, 0.0, -32.0]), guess_focal((width, height)))
     return project(landmark_scheme(SCHEME).canonical.copy(), pose, (width, height))
-
-
-def _spread(count: int) -> NDArray[np.float64]:
-    y = 1 - (2 * np.arange(count) + 1) / count
-    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
-    return np.stack([np.sqrt(1 - y * y) * np.sin(angle), y, np.sqrt(1 - y * y) * np.cos(angle)], axis=1)

@@ -20,7 +20,13 @@ from relit_camera.light.maps import LightMap, rotate
 from relit_camera.reenact.source_face import SourceFace
 from relit_camera.relight.relighter import weighted_light
 from relit_camera.space.colour import linear_from_uint8
-from relit_camera.space.directions import MAP_HEIGHT, MAP_WIDTH, texel_directions, texel_solid_angles
+from relit_camera.space.directions import (
+    MAP_HEIGHT,
+    MAP_WIDTH,
+    fibonacci_directions,
+    texel_directions,
+    texel_solid_angles,
+)
 from relit_camera.space.images import DisplayImage, Points
 from relit_camera.subject.subject import Subject
 
@@ -130,15 +136,9 @@ def _regularised_nnls(
     return np.asarray(solution)
 
 
-def _fibonacci(count: int) -> NDArray[np.float64]:
-    y = 1 - (2 * np.arange(count) + 1) / count
-    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
-    return np.stack([np.sqrt(1 - y * y) * np.sin(angle), y, np.sqrt(1 - y * y) * np.cos(angle)], axis=1)
-
-
 def _lobes(rotation: Rotation) -> NDArray[np.float64]:
     """Soft lights fixed in the room, as a head under `rotation` sees them: (2048, LOBES)."""
-    seen = rotation.inv().apply(_fibonacci(LOBES))
+    seen = rotation.inv().apply(fibonacci_directions(LOBES))
     return np.exp(LOBE_SHARPNESS * (texel_directions().reshape(-1, 3) @ seen.T - 1))
 
 

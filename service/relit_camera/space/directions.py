@@ -39,6 +39,14 @@ def direction_from_degrees(azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> 
     return direction_from_spherical(np.radians(azimuth_deg), np.radians(elevation_deg))
 
 
+def fibonacci_directions(count: int) -> Floats:
+    """Unit vectors (count, 3) spread evenly over the sphere, from the top down (golden spiral; Vogel 1979)."""
+    y = 1 - (2 * np.arange(count) + 1) / count
+    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    radius = np.sqrt(1 - y * y)
+    return np.stack([radius * np.sin(angle), y, radius * np.cos(angle)], axis=1)
+
+
 @lru_cache(maxsize=8)
 def texel_directions(height: int = MAP_HEIGHT, width: int = MAP_WIDTH) -> Floats:
     """Unit vectors (height, width, 3) toward the texel centres. Read-only."""
