@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from relit_camera.errors import StorageError
+from relit_camera.capture.importing import import_samples
+from relit_camera.errors import InputError, StorageError
 from relit_studio.__main__ import app
+from relit_studio.field.solver import SolverSettings
 
 
 def refused(*arguments: str) -> str:
@@ -16,6 +19,26 @@ def refused(*arguments: str) -> str:
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 2
     return result.output
+
+
+def test_the_solver_fills_a_folder_that_imports_and_keeps_to_its_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = partial(SolverSettings, width=32, height=24, map_rows=2, bundles=8, rays=32, supersampling=1, shadow=96)
+    monkeypatch.setattr("relit_studio.field.solver.SolverSettings", small)
+    result = CliRunner().invoke(app, ["field", "--renderer", "solver", "--out", str(tmp_path / "field")])
+    assert result.exit_code == 0
+    assert "mannequin.relit" in result.output
+    assert import_samples(tmp_path / "field" / "lights.lp").pictures.shape == (8, 24, 32, 3)
+    monkeypatch.undo()
+    result = CliRunner().invoke(app, ["field", "--renderer", "solver", "--out", str(tmp_path / "field")])
+    assert isinstance(result.exception, InputError)
+
+
+def test_the_solver_takes_none_of_the_options_of_cycles(tmp_path: Path) -> None:
+    said = refused("field", "--renderer", "solver", "--out", str(tmp_path / "x"), "--person", "bea", "--lights", "253")
+    assert "--person, --lights" in said
+    assert not (tmp_path / "x").exists()
 
 
 def test_angles_that_are_no_numbers_are_a_usage_error(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -18,10 +19,26 @@ from relit_studio.commands.options import (
     shown_progress,
 )
 from relit_studio.field.render import FieldSettings, render_field
+from relit_studio.field.solver import write_solver_field
+
+
+class Renderer(StrEnum):
+    """What renders a field."""
+
+    CYCLES = "cycles"
+    SOLVER = "solver"
 
 
 def field(
+    context: typer.Context,
     out: Out,
+    renderer: Annotated[
+        Renderer,
+        typer.Option(
+            help="cycles: a person, as the other options say. solver: our own, without Cycles and without other "
+            "options: the mannequin, 64x48 pixels under 16x8 lights."
+        ),
+    ] = Renderer.CYCLES,
     who: PersonName = "adam",
     lights: Annotated[int, typer.Option(min=4, max=9999, help="Spread evenly over the whole sphere.")] = 253,
     size: Size = 256,
@@ -30,14 +47,28 @@ def field(
     truth: Truth = False,
     threads: Threads = 2,
 ) -> None:
-    """Render a person under one light after another, with the truth; run it again to go on after a stop."""
-    settings = FieldSettings(lights, size, light_size_deg, quality_of(truth, samples, threads))
-    with shown_progress("lights") as progress:
-        seconds = render_field(load_person(who), out, settings, progress)
-    _tell(seconds, f"relit capture import {out / 'lights.lp'} --out {who}.relit")
+    """Render a person under one light after another, with the truth; with Cycles run it again to go on after a stop."""
+    if renderer is Renderer.SOLVER:
+        _refuse_other_options(context)
+        with shown_progress("lights") as progress:
+            write_solver_field(out, progress=progress)
+        who = "mannequin"
+    else:
+        settings = FieldSettings(lights, size, light_size_deg, quality_of(truth, samples, threads))
+        with shown_progress("lights") as progress:
+            seconds = render_field(load_person(who), out, settings, progress)
+        if seconds:
+            typer.echo(f"{len(seconds)} pictures, {sum(seconds.values()) / len(seconds):.1f} s each")
+    typer.echo(f"relit capture import {out / 'lights.lp'} --out {who}.relit")
 
 
-def _tell(seconds: dict[str, float], following: str) -> None:
-    if seconds:
-        typer.echo(f"{len(seconds)} pictures, {sum(seconds.values()) / len(seconds):.1f} s each")
-    typer.echo(following)
+def _refuse_other_options(context: typer.Context) -> None:
+    given = [
+        parameter.opts[0]
+        for parameter in context.command.params
+        if parameter.name not in ("out", "renderer", None)
+        and (source := context.get_parameter_source(parameter.name)) is not None
+        and source.name == "COMMANDLINE"
+    ]
+    if given:
+        raise typer.BadParameter(f"solver takes no {', '.join(given)}", param_hint="--renderer")

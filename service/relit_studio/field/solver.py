@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from relit_camera.files import atomic_path, make_folder, write_atomic
+from relit_camera.files import atomic_path, write_atomic
 from relit_camera.space.directions import texel_directions
 from relit_camera.space.images import LinearImage, Mask
 from relit_camera.space.picture_files import write_display, write_linear
+from relit_studio.begun import keep_settings
 from relit_studio.capture.pinhole import Pinhole
 from relit_studio.field.solver_gloss import glossy, schlick
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
@@ -146,11 +147,14 @@ def write_solver_field(folder: Path, settings: SolverSettings | None = None, pro
         progress: told of every picture.
 
     Raises:
+        InputError: the folder holds a field of other settings.
         StorageError: a file cannot be written.
     """
     settings = settings or SolverSettings()
-    make_folder(folder)
     camera = Pinhole(settings.width, settings.height, settings.height * DISTANCE_CM / HEIGHT_CM)
+    seen_by = {"focal_px": camera.focal_px, "depth_zero_cm": DISTANCE_CM}
+    described = {"person": "mannequin", "settings": asdict(settings), "camera": seen_by}
+    keep_settings(folder, "field.json", described)
     place = np.array([0.0, -BELOW_AXIS_CM, -DISTANCE_CM])
     directions = texel_directions(settings.map_rows, 2 * settings.map_rows).reshape(-1, 3)
     solved = solve(mannequin_surfaces(place), camera, directions, settings, progress)
@@ -164,9 +168,6 @@ def write_solver_field(folder: Path, settings: SolverSettings | None = None, pro
     depth = np.where(solved.matte > 0, solved.depth + DISTANCE_CM, 0).astype(np.float32)
     with atomic_path(folder / "truth.npz") as temporary:
         np.savez_compressed(temporary, normals=solved.normals, albedo=solved.albedo, depth=depth)
-    seen_by = {"focal_px": camera.focal_px, "depth_zero_cm": DISTANCE_CM}
-    described = {"person": "mannequin", "settings": asdict(settings), "camera": seen_by}
-    write_atomic(folder / "field.json", json.dumps(described, indent=1))
     write_atomic(folder / "lights.lp", lights_text(names, directions))
 
 
