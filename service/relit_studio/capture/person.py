@@ -7,7 +7,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from relit_camera.space.images import LinearImage, Mask
 from relit_studio.capture.head_motion import Motion
@@ -71,21 +70,19 @@ class PictureMotion:
 def to_rest(person: Person, face: NDArray[np.float64], motion: Motion) -> PictureMotion:
     """The best rigid transform (least squares; Kabsch 1976) of the face's surface points (count, 3) at rest."""
     moved = motion.apply(face - person.origin) + person.origin
-    middle = np.array([person.camera.width / 2, person.camera.height / 2])
-    # With y up a turn counter-clockwise in the picture is one in the plane.
-    rest, now = ((person.camera.project(points)[:, :2] - middle) * [1, -1] for points in (face, moved))
-    flat = [np.pad(points - points.mean(axis=0), ((0, 0), (0, 1))) for points in (rest, now)]
-    turn = np.arctan2(*(np.sum(a) for a in (np.cross(flat[1], flat[0])[:, 2], flat[1] * flat[0])))
-    matrix = Rotation.from_euler("Z", turn).as_matrix()[:2, :2]
-    shift = rest.mean(axis=0) - matrix @ now.mean(axis=0)
-    residual = now @ matrix.T + shift - rest
+    # In the complex plane of the picture, y up, a turn counter-clockwise is a product.
+    rest, now = (_complex_plane(person.camera, points) for points in (face, moved))
+    turn = np.angle(np.vdot(now - now.mean(), rest - rest.mean()))
+    shift = rest.mean() - np.exp(1j * turn) * now.mean()
+    residual = np.exp(1j * turn) * now + shift - rest
     return PictureMotion(
         rotation_deg=float(np.degrees(turn)),
-        translation_px=(float(shift[0]), float(-shift[1])),
-        residual_px=float(np.sqrt(np.square(residual).sum(axis=1).mean())),
+        translation_px=(float(shift.real), float(-shift.imag)),
+        residual_px=float(np.sqrt(np.mean(np.abs(residual) ** 2))),
     )
 
 
-def face_centroid(person: Person) -> NDArray[np.float64]:
-    """Centroid (3,) of the visible face surface at rest, camera axes, centimetres."""
-    return np.asarray(person.face_points().mean(axis=0))
+def _complex_plane(camera: Pinhole, points: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Where points (count, 3) are seen, from the picture's centre to the right, i upward: (count,) pixels."""
+    x, y, _ = camera.project(points).T
+    return np.asarray((x - camera.width / 2) + 1j * (camera.height / 2 - y))

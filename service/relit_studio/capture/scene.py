@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,9 +132,7 @@ class Scene:
     def ordinary_mean(self) -> NDArray[np.float32]:
         """Linear RGB (3,): geometric mean of the picture's means without and with the torch, half way through."""
         middle = self.moment(self.timing.frames // 2)
-        without, torch = self.parts(
-            Moment(middle.index, middle.time_s, middle.motion, middle.torch, np.ones_like(middle.lit), middle.knots)
-        )
+        without, torch = self.parts(replace(middle, lit=np.ones_like(middle.lit)))
         dark, bright = (np.maximum(image.mean(axis=(0, 1)), 1e-6) for image in (without, without + torch))
         return np.asarray(np.sqrt(dark * bright), np.float32)
 
