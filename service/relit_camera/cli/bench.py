@@ -36,7 +36,7 @@ def bench(
     from relit_camera.cli.parse import size as parse_size
     from relit_camera.cli.settings import settings_of
     from relit_camera.config.look import Look
-    from relit_camera.cores import share_cores
+    from relit_camera.cores import leave_to_stay, share_cores
     from relit_camera.errors import NotFoundError
     from relit_camera.light.maps import resample
     from relit_camera.light.panorama import read_panorama
@@ -72,6 +72,7 @@ def bench(
     if seconds:
         director.show_subject("bench", sample_subject(256, 256) if subject is None else measured)
         director.set_look(look)
+        leave_to_stay()  # as `relit run` does
         result |= bench_live(settings, director, source, followed, seconds)
     result["machine"] = before
     typer.echo(json.dumps(result, indent=2) if as_json else _text(result))
