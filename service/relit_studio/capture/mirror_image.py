@@ -103,8 +103,13 @@ def torch_in_ball(ball: MirrorBall, camera: Pinhole, torch: Torch) -> LinearImag
 
 def highlight_px(ball: MirrorBall, camera: Pinhole, torch: Torch) -> tuple[float, float]:
     """Where the ball mirrors the middle of the torch, in pixels."""
-    x, y, _ = camera.project(ball.reflection_point(torch.position)[None])[0]
+    x, y = _mirrored(ball, camera, torch.position)
     return float(x), float(y)
+
+
+def _mirrored(ball: MirrorBall, camera: Pinhole, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Pixels (2,) at which the ball mirrors a point (3,)."""
+    return np.asarray(camera.project(ball.reflection_point(point)[None])[0, :2])
 
 
 def _box(ball: MirrorBall, camera: Pinhole) -> tuple[int, int, int, int]:
@@ -122,11 +127,9 @@ def _disc_window(
     aside = np.cross(torch.aim, [0.0, 1.0, 0.0] if abs(torch.aim[1]) < 0.9 else [1.0, 0.0, 0.0])
     aside /= np.linalg.norm(aside)
     across = np.cross(aside, torch.aim)
-    middle = camera.project(ball.reflection_point(torch.position)[None])[0, :2]
+    middle = _mirrored(ball, camera, torch.position)
     rim = [torch.position + RADIUS_CM * (c * aside + s * across) for c, s in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-    reach = 1.6 * max(
-        float(np.linalg.norm(camera.project(ball.reflection_point(point)[None])[0, :2] - middle)) for point in rim
-    )
+    reach = 1.6 * max(float(np.linalg.norm(_mirrored(ball, camera, point) - middle)) for point in rim)
     step = 2 * reach / _DISC_SAMPLES
     steps = -reach + step * (np.arange(_DISC_SAMPLES) + 0.5)
     x, y = np.meshgrid(middle[0] + steps, middle[1] + steps)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from relit_camera.space.colour import luminance, uint8_from_linear
 from relit_camera.space.images import DisplayImage, LinearImage
@@ -21,10 +21,8 @@ _SHOT, _READ = 1.5e-4, 1.2e-3
 """Noise variance per sensor value, and the sensor's own standard deviation, in linear values."""
 _PULL, _MOMENTUM = 0.10, 0.72
 """Share of the error that is put right each frame, and of the last change that goes on: it rings."""
-_EXPOSURE_LIMIT_EV = 0.6
-_BALANCE_PULL, _BALANCE_LIMIT = 0.1, 0.25
-_BALANCE_STRENGTH = 1.0
-"""How far grey-world correction goes; limits are of the logarithm of the gains."""
+_EXPOSURE_LIMIT_EV, _BALANCE_LIMIT = 0.6, 0.25
+"""Of the exposure in stops, and of the logarithm of the gains of red and blue."""
 
 
 @dataclass(frozen=True)
@@ -96,20 +94,21 @@ class Phone:
         """The gains of the next frame, after one of this scene light was taken with `gains`."""
         mean = np.maximum(light.mean(axis=(0, 1)), 1e-6)
         if self._stages.auto_exposure:
-            error = float(np.log2(luminance(self._mean) / luminance(mean))) - gains.exposure_ev
-            speed = _MOMENTUM * gains.exposure_speed + _PULL * error
-            moved = float(np.clip(gains.exposure_ev + speed, -_EXPOSURE_LIMIT_EV, _EXPOSURE_LIMIT_EV))
-            gains = replace(gains, exposure_ev=moved, exposure_speed=moved - gains.exposure_ev)
+            wanted = np.log2(luminance(self._mean) / luminance(mean))
+            moved = _pulled(gains.exposure_ev, gains.exposure_speed, wanted, _EXPOSURE_LIMIT_EV)
+            gains = replace(gains, exposure_ev=float(moved), exposure_speed=float(moved - gains.exposure_ev))
         if self._stages.white_balance:
+            # Toward grey: red and blue as much as green.
             seen = np.log(mean / self._mean)
-            wanted = _BALANCE_STRENGTH * np.array([seen[1] - seen[0], seen[1] - seen[2]])
-            speed_of = np.array(gains.balance_speed)
-            balance = np.array(gains.balance)
-            moved_to = np.clip(
-                balance + _MOMENTUM * speed_of + _BALANCE_PULL * (wanted - balance), -_BALANCE_LIMIT, _BALANCE_LIMIT
-            )
-            gains = replace(gains, balance=_pair(moved_to), balance_speed=_pair(moved_to - balance))
+            moved = _pulled(gains.balance, gains.balance_speed, seen[1] - seen[[0, 2]], _BALANCE_LIMIT)
+            gains = replace(gains, balance=_pair(moved), balance_speed=_pair(moved - gains.balance))
         return gains
+
+
+def _pulled(setting: ArrayLike, speed: ArrayLike, wanted: ArrayLike, limit: float) -> NDArray[np.float64]:
+    """The next settings (...), drawn toward what is wanted (...); they overshoot."""
+    setting, speed, wanted = (np.asarray(values, np.float64) for values in (setting, speed, wanted))
+    return np.clip(setting + _MOMENTUM * speed + _PULL * (wanted - setting), -limit, limit)
 
 
 def _pair(values: NDArray) -> tuple[float, float]:
