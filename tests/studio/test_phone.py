@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relit_camera.errors import StorageError
 from relit_camera.space.colour import linear_from_uint8
 from relit_camera.stream.video import VideoReader
 from relit_studio.capture.lossless import LosslessWriter
@@ -98,4 +99,18 @@ def test_a_failed_lossless_video_leaves_nothing(tmp_path: Path) -> None:
 
     with pytest.raises(KeyError):
         fail()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_lossless_video_whose_end_cannot_be_written_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fill_disk(writer: LosslessWriter, frame: object) -> None:
+        raise StorageError("the disk is full")
+
+    writer = LosslessWriter(tmp_path / "a.mkv", (66, 50), 30)
+    writer.write(np.zeros((50, 66, 3), np.uint8))
+    monkeypatch.setattr(LosslessWriter, "_mux", fill_disk)
+    with pytest.raises(StorageError), writer:
+        pass
     assert list(tmp_path.iterdir()) == []

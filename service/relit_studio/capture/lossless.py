@@ -48,8 +48,8 @@ class LosslessWriter:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         if error is None:
-            self._mux(None)
-            self._files.close()
+            with self._files:
+                self._mux(None)
         else:
             self._files.__exit__(kind, error, None)
 
