@@ -218,6 +218,17 @@ def test_frames_of_other_settings_are_not_taken_up(brief: Scene, tmp_path: Path)
     np.testing.assert_allclose(frames[0], np.clip(plain_light, 0, 255), atol=0.51)
 
 
+def test_frames_of_another_ambient_light_are_not_taken_up(brief: Scene, tmp_path: Path) -> None:
+    room, light_map = dimmed(EnvironmentStore().load("overcast"), 0.3)
+    lighter = Scene(MannequinPerson(brief.camera, light_map), room, brief.timing, seed=2)
+    with pytest.raises(KeyboardInterrupt):
+        record(brief, PLAIN, tmp_path, "overcast", 2, _interrupt)
+    record(lighter, PLAIN, tmp_path, "overcast", 2)
+    frames, _ = read(tmp_path)
+    plain_light = lighter.light(lighter.moment(0)) * EXPOSURE * 255
+    np.testing.assert_allclose(frames[0], np.clip(plain_light, 0, 255), atol=0.51)
+
+
 def _interrupt(done: int, total: int) -> None:
     raise KeyboardInterrupt
 
@@ -259,6 +270,8 @@ def test_person_of_a_field_looks_like_the_one_rendered_anew(field: Path) -> None
         ("field.json", '{"camera": {"focal_px": -1, "depth_zero_cm": 50}}', "focal_px -1"),
         ("truth.npz", None, "cannot read"),
         ("truth.npz", "no array", "depth"),
+        ("truth.npz", "", "depth"),
+        ("truth.npz", "PK\x03\x04 cut off", "depth"),
     ],
 )
 def test_field_without_camera_or_depth_is_refused(

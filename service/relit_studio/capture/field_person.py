@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from zipfile import BadZipFile
 
 import cv2
 import numpy as np
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from relit_camera.capture.importing import import_samples
-from relit_camera.errors import InputError, LightsError
+from relit_camera.errors import LightsError
 from relit_camera.light.maps import LightMap, rotate
 from relit_camera.reflectance.barycentric import SphericalBarycentric, spherical_barycentric, spherical_delaunay
 from relit_camera.space.colour import Gamma
@@ -197,12 +198,12 @@ def _read_camera(path: Path, shape: tuple[int, ...]) -> tuple[Pinhole, float]:
 def _read_depth(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
     cure = "a capture needs the field's depth; make the field again with `python -m relit_studio field`"
     try:
-        with np.load(path) as kept:
+        with path.open("rb") as file, np.load(file) as kept:
             depth = np.asarray(kept["depth"], np.float64)
     except OSError as error:
         raise LightsError(f"cannot read {path}: {error.strerror or error}", cure) from error
-    except (ValueError, KeyError) as error:
+    except (ValueError, KeyError, EOFError, BadZipFile) as error:
         raise LightsError(f"{path} holds no depth: {error}", cure) from error
     if depth.shape != shape or not np.isfinite(depth).all():
-        raise InputError(f"the depth in {path} has shape {depth.shape}, the pictures {shape}, or is not finite", cure)
+        raise LightsError(f"the depth in {path} has shape {depth.shape}, the pictures {shape}, or is not finite", cure)
     return depth

@@ -60,7 +60,9 @@ def record(
     face = face[:: max(1, len(face) // _FACE_POINTS)]
     whole = capture_truth(scene, stages, video.name, room, seed, face)
     total = scene.timing.frames
-    store = FrameStore(folder / ".frames", whole | {"frames": total, "motion": scene.motion})
+    # With what the truth does not name and the frames depend on.
+    settings = {"frames": total, "motion": scene.motion, "room_light": float(scene.room.radiance.mean())}
+    store = FrameStore(folder / ".frames", whole | settings)
     gains, truths = Gains(), []
     phone: Phone | None = None
     for index in range(total):
