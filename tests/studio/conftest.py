@@ -2,9 +2,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from relit_studio.mannequin.__main__ import main
+from relit_studio.people.face_model import read_face_model
+from relit_studio.people.hairs import Hairs
+from relit_studio.people.person import Person
+from relit_studio.people.shirt import Shirt
+from relit_studio.people.traits import CAST
+from relit_studio.people.wardrobe import Wardrobe
+
+NOTHING = np.zeros((0, 3))
 
 
 @pytest.fixture(scope="session")
@@ -13,3 +22,14 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("mannequin") / "new" / "folder"
     assert main(["--out", str(out), "--size", "96", "--lights", "12", "--frames", "3", "--quiet"]) == 0
     return out
+
+
+@pytest.fixture(scope="session")
+def person(shared: Path) -> Person:
+    """Adam's face alone."""
+    model = read_face_model(shared / "faces" / "ict_facekit_light.npz")
+    traits = CAST["adam"]
+    bare = Shirt(NOTHING, NOTHING, NOTHING, NOTHING, np.zeros(len(model.vertices), bool))
+    wardrobe = Wardrobe(model, np.zeros((len(model.vertices), 2)), NOTHING, NOTHING, Path())
+    hair = Hairs(np.zeros((0, 2, 3)), np.zeros((0, 2)), np.zeros(0))
+    return Person(traits, wardrobe, model.neutral(traits.identity()), hair, bare)

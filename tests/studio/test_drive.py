@@ -22,29 +22,13 @@ from relit_studio.drive.room import Room
 from relit_studio.drive.truth import TruthTracker, blendshapes, head_pose, true_state
 from relit_studio.people.expressions import NEUTRAL
 from relit_studio.people.eyes import gaze
-from relit_studio.people.face_model import CORNEA_MATERIALS, read_face_model
-from relit_studio.people.hairs import Hairs
+from relit_studio.people.face_model import CORNEA_MATERIALS
 from relit_studio.people.landmarks import landmarks
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture, follows_head, rigid_motion, turned
-from relit_studio.people.shirt import Shirt
-from relit_studio.people.traits import CAST
-from relit_studio.people.wardrobe import Wardrobe
 
 CAMERA = Camera(512)
 TURNED = Posture(Angles(22.0, -6.0, 5.0))
-NOTHING = np.zeros((0, 3))
-
-
-@pytest.fixture(scope="module")
-def person(shared: Path) -> Person:
-    """Adam's face alone."""
-    model = read_face_model(shared / "faces" / "ict_facekit_light.npz")
-    traits = CAST["adam"]
-    bare = Shirt(NOTHING, NOTHING, NOTHING, NOTHING, np.zeros(len(model.vertices), bool))
-    wardrobe = Wardrobe(model, np.zeros((len(model.vertices), 2)), NOTHING, NOTHING, Path())
-    hair = Hairs(np.zeros((0, 2, 3)), np.zeros((0, 2)), np.zeros(0))
-    return Person(traits, wardrobe, model.neutral(traits.identity()), hair, bare)
 
 
 def test_the_performance_is_eased_and_stays_within_what_is_asked() -> None:

@@ -64,7 +64,7 @@ def render_field(
         StorageError: the folder cannot be written.
     """
     camera = Camera(settings.size)
-    keep_settings(folder, "field.json", _description(person, settings, camera))
+    keep_settings(folder, "field.json", field_description(person, settings, camera))
     scene = Figure(person).scene()
     directions = light_directions(settings.lights)
     digits = len(str(settings.lights - 1))
@@ -78,13 +78,18 @@ def render_field(
     return render(scene, camera, settings.quality, pictures, progress)
 
 
-def _description(person: Person, settings: FieldSettings, camera: Camera) -> dict[str, object]:
+def field_description(person: Person, settings: FieldSettings, camera: Camera) -> dict[str, object]:
+    """What `field.json` holds: what the pictures depend on, credits, and the camera as a capture reads it."""
     # Threads change no picture.
     quality = {key: value for key, value in asdict(settings.quality).items() if key != "threads"}
     return {
         "person": asdict(person.traits),
         "settings": {**asdict(settings), "quality": quality},
-        "camera": {**asdict(camera), "focal_px": camera.focal_px},
+        "camera": {
+            **asdict(camera),
+            "focal_px": camera.focal_px,
+            "depth_zero_cm": _depth_zero_cm(person, camera),
+        },
         "credits": list(manifest().credits.values()),
     }
 
@@ -108,6 +113,11 @@ def _write_truth(person: Person, scene: Scene, camera: Camera, folder: Path, qua
 
 def _depth(person: Person, passes: Passes, camera: Camera) -> NDArray[np.float32]:
     """Centimetres toward the camera from the canonical face's origin (h, w); zero where there is nothing."""
-    origin, _ = canonical_origin(person.model)
-    toward = camera.distance_cm - origin[2] - passes.depth_cm
+    toward = _depth_zero_cm(person, camera) - passes.depth_cm
     return np.where(np.isfinite(toward), toward, 0).astype(np.float32)
+
+
+def _depth_zero_cm(person: Person, camera: Camera) -> float:
+    """How far before the camera the canonical face's origin lies, where depth is 0."""
+    origin, _ = canonical_origin(person.model)
+    return float(camera.distance_cm - origin[2])
