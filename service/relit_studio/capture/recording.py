@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,19 +17,13 @@ from relit_studio.capture.lossless import LosslessWriter
 from relit_studio.capture.phone import Gains, Phone, Stages
 from relit_studio.capture.scene import Scene
 from relit_studio.capture.truth import capture_truth, frame_truth
-
-Progress = Callable[[int, int], None]
-"""Told how many frames are done, and of how many."""
+from relit_studio.progress import Progress, no_progress
 
 _CRF = 20
 _STILL_FRAMES, _BALL_FRAMES = 12, 6
 _BALL_MARGIN = 1.5
 _FACE_POINTS = 5000
 """Of the face's surface, enough for centroids and fits."""
-
-
-def no_progress(done: int, total: int) -> None:
-    """Tell nobody."""
 
 
 def record(

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from relit_studio.commands.options import shown_progress
+
 
 def capture(
     out: Annotated[Path, typer.Option(help="Folder for capture.mp4, truth.json and sheet.png; made if missing.")],
@@ -31,7 +33,6 @@ def capture(
 ) -> None:
     """Film a person under a blinking hand-held torch, a mirror ball beside them. Run it again to go on."""
     from relit_camera.cli.parse import size as parse_size
-    from relit_camera.cli.progress import progress_bar
     from relit_camera.light.store import EnvironmentStore
     from relit_studio.capture.field_person import FieldPerson
     from relit_studio.capture.mannequin_person import MannequinPerson, phone_camera
@@ -53,9 +54,6 @@ def capture(
         else FieldPerson(Path(person), height, light_map)
     )
     scene = Scene(somebody, light, Timing(seconds=seconds, flash_hz=flash_hz), seed, motion)
-    with progress_bar() as progress:
-        task = progress.add_task("Frames", total=scene.timing.frames)
-        video, truth = record(
-            scene, stages, out, environment.name, seed, lambda done, _: progress.update(task, completed=done)
-        )
+    with shown_progress("Frames") as progress:
+        video, truth = record(scene, stages, out, environment.name, seed, progress)
     typer.echo(f"{video}: {scene.timing.frames} frames of {scene.camera.width}x{scene.camera.height}; truth in {truth}")
