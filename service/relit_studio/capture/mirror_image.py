@@ -17,6 +17,7 @@ from relit_camera.space.images import LinearImage, Mask
 from relit_studio.capture.mirror_ball import MirrorBall
 from relit_studio.capture.pinhole import Pinhole
 from relit_studio.capture.torch import RADIUS_CM, Torch
+from relit_studio.mannequin.shading import axes_along
 
 _SUPERSAMPLING = 4
 _DISC_SAMPLES = 64
@@ -124,11 +125,9 @@ def _disc_window(
     ball: MirrorBall, camera: Pinhole, torch: Torch
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Sample positions (n, n), (n, n) about the disc's image, and the area of each in pixels."""
-    aside = np.cross(torch.aim, [0.0, 1.0, 0.0] if abs(torch.aim[1]) < 0.9 else [1.0, 0.0, 0.0])
-    aside /= np.linalg.norm(aside)
-    across = np.cross(aside, torch.aim)
+    right, down, _ = axes_along(torch.aim)
     middle = _mirrored(ball, camera, torch.position)
-    rim = [torch.position + RADIUS_CM * (c * aside + s * across) for c, s in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+    rim = [torch.position + RADIUS_CM * (c * right + s * down) for c, s in ((1, 0), (-1, 0), (0, 1), (0, -1))]
     reach = 1.6 * max(float(np.linalg.norm(_mirrored(ball, camera, point) - middle)) for point in rim)
     step = 2 * reach / _DISC_SAMPLES
     steps = -reach + step * (np.arange(_DISC_SAMPLES) + 0.5)

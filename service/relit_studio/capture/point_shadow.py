@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from relit_studio.mannequin.mesh import Triangles
 from relit_studio.mannequin.raster import nearness_buffer
-from relit_studio.mannequin.shading import LIFT, lit_share
+from relit_studio.mannequin.shading import LIFT, axes_along, lit_share
 
 Values = NDArray[np.float32]
 
@@ -19,10 +19,8 @@ class PointShadow:
         """See `vertices` (count, 3) from a light at (3,), outside of them all, at size x size texels."""
         self._light = np.asarray(light, np.float32)
         toward = np.asarray(light, np.float64) - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-        toward /= np.linalg.norm(toward)
-        aside = np.cross([0.0, 1.0, 0.0] if abs(toward[1]) < 0.9 else [1.0, 0.0, 0.0], toward)
-        aside /= np.linalg.norm(aside)
-        self._axes = np.stack([aside, -np.cross(toward, aside), -toward]).astype(np.float32)
+        right, down, back = axes_along(toward / np.linalg.norm(toward))
+        self._axes = np.stack([right, down, -back])
         x, y, distance = self._seen(vertices)
         low, high = (np.array([f(x), f(y)]) for f in (np.min, np.max))
         self._texel = float((high - low).max()) / (size - 2)
