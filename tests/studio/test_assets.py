@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 import pytest
 
-from relit_camera.errors import NotFoundError
-from relit_studio.assets.manifest import manifest
+from relit_camera.errors import NotFoundError, StorageError
+from relit_studio.assets.manifest import Manifest, manifest
 from relit_studio.assets.store import asset, assets_folder, fetch_assets
 
 
@@ -38,6 +39,17 @@ def test_another_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(NotFoundError, match="is another file"):
         fetch_assets(tmp_path)
     assert not (assets_folder() / "ict_facekit_light.npz").exists()
+
+
+def test_a_disk_that_is_full_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, "full")
+
+    scan = [file for file in manifest().files if file.urls]
+    monkeypatch.setattr("relit_studio.assets.store.manifest", lambda: Manifest(credits={}, files=tuple(scan)))
+    monkeypatch.setattr("pooch.retrieve", full)
+    with pytest.raises(StorageError, match=r"cannot write .*LeePerrySmith\.glb"):
+        fetch_assets()
 
 
 def test_what_no_address_offers_is_said() -> None:

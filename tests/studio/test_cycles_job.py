@@ -91,6 +91,15 @@ def test_only_what_is_missing_is_rendered(tmp_path: Path, worker: list[str]) -> 
     assert render(scene(), Camera(64), Quality(), wanted, command=["/no/such/program"]) == {}
 
 
+def test_a_worker_that_does_not_end_is_ended(
+    tmp_path: Path, worker: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Path(worker[1]).open("a") as program:
+        program.write("import os, time\nos.close(1)\ntime.sleep(60)\n")
+    monkeypatch.setattr("relit_studio.cycles.runner._WAIT_S", 1.0)
+    assert list(render(scene(), Camera(64), Quality(), pictures(tmp_path / "out", 1), command=worker)) == ["0.exr"]
+
+
 def test_a_worker_that_cannot_start_is_said(tmp_path: Path) -> None:
     with pytest.raises(DeviceError, match="cannot start /no/such/program"):
         render(scene(), Camera(64), Quality(), pictures(tmp_path, 1), command=["/no/such/program"])

@@ -23,19 +23,7 @@ from relit_studio.mannequin.renderer import View
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("truth")
-    arguments = [
-        "--size",
-        "32",
-        "--lights",
-        "4",
-        "--frames",
-        "2",
-        "--field-rows",
-        "3",
-        "--relit",
-        "overcast",
-        "--quiet",
-    ]
+    arguments = ["--size", "32", "--lights", "4", "--frames", "2", "--field-rows", "3", "--relit", "overcast"]
     assert main(["--out", str(out), "--quiet", *arguments]) == 0
     return out
 

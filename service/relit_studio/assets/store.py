@@ -9,7 +9,7 @@ from pathlib import Path
 import platformdirs
 
 from relit_camera.errors import NotFoundError
-from relit_camera.files import atomic_path, make_folder
+from relit_camera.files import atomic_path, make_folder, storage_error
 from relit_camera.models.fetch import sha256_of
 from relit_studio.assets.manifest import AssetFile, manifest
 
@@ -80,6 +80,8 @@ def _download(file: AssetFile, target: Path) -> Path:
             pooch.retrieve(url, f"sha256:{file.sha256}", target.name, target.parent, downloader=downloader)
         except (requests.RequestException, ValueError):  # pooch's answer to another sha256 is a ValueError
             continue
+        except OSError as error:
+            raise storage_error(target, error) from error
         return target
     reason = "cannot be downloaded" if file.urls else "is offered by no address as one file"
     raise NotFoundError(f"{file.name} {reason}", f"it comes from {file.source}; use `fetch --from FOLDER`")

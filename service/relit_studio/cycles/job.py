@@ -98,6 +98,10 @@ class Quality:
         """Unbiased: no denoiser and no clamp."""
         return Quality(samples, denoise=False, clamp_indirect=0.0, threads=threads)
 
+    def settings(self) -> dict[str, object]:
+        """What the pictures depend on: threads change none."""
+        return {key: value for key, value in asdict(self).items() if key != "threads"}
+
 
 @dataclass(frozen=True)
 class DistantLight:

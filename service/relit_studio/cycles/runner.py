@@ -71,7 +71,11 @@ def _reports(command: Sequence[str], errors: Path) -> Iterator[dict[str, str]]:
             # Blender talks on stdout, too.
             if line.startswith('{"picture"'):
                 yield json.loads(line)
-        if process.wait(_WAIT_S):
+        try:
+            failed = process.wait(_WAIT_S)
+        except subprocess.TimeoutExpired:
+            return  # It has nothing more to tell; whether a picture is missing, `render` sees.
+        if failed:
             stderr.seek(0)
             last = (stderr.read().strip().splitlines() or ["no message"])[-1]
             raise DeviceError(f"Cycles failed with exit code {process.returncode}: {last}", "see what it says")

@@ -143,12 +143,10 @@ def _truth(
 
 
 def _description(person: Person, room: Room, settings: DriveSettings, camera: Camera) -> dict[str, object]:
-    # Threads change no picture.
-    quality = {key: value for key, value in asdict(settings.quality).items() if key != "threads"}
     return {
         "person": asdict(person.traits),
         "environment": room.environment.name,
         "environment_yaw_deg": room.yaw_deg,
-        "settings": {**asdict(settings), "quality": quality},
+        "settings": {**asdict(settings), "quality": settings.quality.settings()},
         "camera": {**asdict(camera), "focal_px": camera.focal_px},
     }

@@ -80,11 +80,9 @@ def render_field(
 
 def field_description(person: Person, settings: FieldSettings, camera: Camera) -> dict[str, object]:
     """What `field.json` holds: what the pictures depend on, credits, and the camera as a capture reads it."""
-    # Threads change no picture.
-    quality = {key: value for key, value in asdict(settings.quality).items() if key != "threads"}
     return {
         "person": asdict(person.traits),
-        "settings": {**asdict(settings), "quality": quality},
+        "settings": {**asdict(settings), "quality": settings.quality.settings()},
         "camera": {
             **asdict(camera),
             "focal_px": camera.focal_px,
