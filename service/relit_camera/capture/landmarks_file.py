@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from relit_camera.errors import LightsError
+from relit_camera.face.schemes import landmark_scheme
 from relit_camera.space.images import Points
 
 _Layout = TypeAdapter(dict[str, list[tuple[float, float]]])
@@ -19,7 +20,8 @@ def read_landmarks(path: Path, required: bool) -> Mapping[str, Points]:
     """Landmarks (count, 2) float32 by scheme; empty if the file is not there and not `required`.
 
     Raises:
-        LightsError: required and missing, or not in the layout.
+        LightsError: required and missing, not in the layout, or not as many points as the scheme has.
+        NotFoundError: an unknown scheme.
     """
     if not path.is_file() and not required:
         return {}
@@ -28,4 +30,8 @@ def read_landmarks(path: Path, required: bool) -> Mapping[str, Points]:
     except (OSError, ValueError, ValidationError) as error:
         cure = "it must be JSON {scheme: [[x, y], …]}"
         raise LightsError(f"{path} holds no landmarks: {str(error).splitlines()[0]}", cure) from error
-    return {scheme: np.array(points, dtype=np.float32).reshape(-1, 2) for scheme, points in listed.items()}
+    for scheme, points in listed.items():
+        if len(points) != (count := landmark_scheme(scheme).count):
+            cure = "write all of the scheme's points, in its order"
+            raise LightsError(f"{path} holds {len(points)} points of {scheme}, which has {count}", cure)
+    return {scheme: np.array(points, dtype=np.float32) for scheme, points in listed.items()}
