@@ -7,8 +7,8 @@ from relit_camera.config.look import Lamp
 from relit_camera.errors import ImageError
 from relit_camera.light.lamps import lamp_map
 from relit_camera.light.maps import irradiance, total
-from relit_camera.space.directions import direction_from_degrees
-from relit_studio.mannequin.lights import light_directions, lights_from_map, room
+from relit_camera.space.directions import direction_from_degrees, fibonacci_directions
+from relit_studio.mannequin.lights import lights_from_map, room
 from relit_studio.mannequin.mesh import grid_triangles
 from relit_studio.mannequin.shading import ShadowMap, Surface, reflected
 
@@ -27,14 +27,14 @@ def test_white_wall_facing_the_light_reads_one() -> None:
 
 
 def test_lambert_under_light_from_all_sides_is_pi() -> None:
-    normals = light_directions(40)
-    lights = light_directions(400)
+    normals = fibonacci_directions(40)
+    lights = fibonacci_directions(400)
     summed = sum(reflected(patch(normals), light)[0] for light in lights) * (4 * np.pi / len(lights))
     np.testing.assert_allclose(summed, np.pi, rtol=0.005)
 
 
 def test_gloss_gives_back_about_the_share_it_is_named_by() -> None:
-    lights = light_directions(20000)
+    lights = fibonacci_directions(20000)
     flat = patch(np.array([[0, 0, 1.0]]), shine=0.05, exponent=60)
     energy = sum(reflected(flat, light)[1][0] for light in lights) * (4 * np.pi / len(lights))
     # In units where white Lambert gives π; Schlick's rise is small for a patch that faces the camera.
@@ -77,7 +77,7 @@ def test_lights_of_a_map_keep_its_energy_and_light_walls_as_it_does() -> None:
     assert len(lights.directions) == 48
     np.testing.assert_allclose(np.linalg.norm(lights.directions, axis=1), 1)
     np.testing.assert_allclose(lights.irradiance.sum(axis=0), total(light_map), rtol=1e-6)
-    for normal in light_directions(12):
+    for normal in fibonacci_directions(12):
         cosine = np.maximum(lights.directions @ normal, 0)
         np.testing.assert_allclose(cosine @ lights.irradiance, irradiance(light_map, normal), rtol=0.05)
 

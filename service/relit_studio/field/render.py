@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.files import atomic_path, write_atomic
 from relit_camera.space.colour import uint8_from_linear
+from relit_camera.space.directions import fibonacci_directions
 from relit_camera.space.picture_files import write_display
 from relit_studio.assets.manifest import manifest
 from relit_studio.begun import keep_settings
@@ -19,7 +20,6 @@ from relit_studio.cycles.exr import Passes, read_passes
 from relit_studio.cycles.figure import Figure
 from relit_studio.cycles.job import DistantLight, Picture, Quality, Scene
 from relit_studio.cycles.runner import render
-from relit_studio.mannequin.lights import light_directions
 from relit_studio.mannequin.olat import grey, lights_text
 from relit_studio.people.landmarks import canonical_origin, landmarks
 from relit_studio.people.person import Person
@@ -66,7 +66,7 @@ def render_field(
     camera = Camera(settings.size)
     keep_settings(folder, "field.json", field_description(person, settings, camera))
     scene = Figure(person).scene()
-    directions = light_directions(settings.lights)
+    directions = fibonacci_directions(settings.lights)
     digits = len(str(settings.lights - 1))
     names = [f"{index:0{digits}d}.exr" for index in range(settings.lights)]
     write_atomic(folder / "lights.lp", lights_text(names, directions))

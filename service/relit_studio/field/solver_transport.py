@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from relit_studio.mannequin.lights import light_directions
+from relit_camera.space.directions import fibonacci_directions
 from relit_studio.mannequin.mesh import Triangles
 from relit_studio.mannequin.raster import fragments
 from relit_studio.mannequin.shading import axes_along
@@ -51,7 +51,7 @@ def transport(vertices: Values, triangles: Triangles, directions: int, size: int
     open_ends, heard = np.zeros(count), np.zeros(count)
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     reach = float(np.linalg.norm(vertices - middle, axis=1).max()) * 1.001
-    for direction in light_directions(2 * directions)[:directions]:
+    for direction in fibonacci_directions(2 * directions)[:directions]:
         seen = (vertices - middle) @ axes_along(direction).T
         seen[:, :2] = (seen[:, :2] + reach) * (size / (2 * reach))
         vertex, upward, pixel = _layers(seen, both_sides, len(triangles), size)

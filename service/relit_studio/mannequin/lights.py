@@ -27,14 +27,6 @@ class DistantLights:
     irradiance: NDArray[np.float64]
 
 
-def light_directions(count: int) -> NDArray[np.float64]:
-    """Unit vectors (count, 3) spread evenly over the whole sphere, from the top down (golden spiral; Vogel 1979)."""
-    y = 1 - (2 * np.arange(count) + 1) / count
-    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
-    radius = np.sqrt(1 - y**2)
-    return np.stack([radius * np.sin(angle), y, radius * np.cos(angle)], axis=1)
-
-
 def room() -> LightMap:
     """A soft room: a large window at the picture's left, a lamp at the right, pale walls and a darker floor."""
     lamps = (

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from relit_camera.files import atomic_path, write_atomic
 from relit_camera.space.colour import uint8_from_linear
+from relit_camera.space.directions import fibonacci_directions
 from relit_camera.space.images import Mask
 from relit_camera.space.picture_files import write_display
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Posture, mannequin
-from relit_studio.mannequin.lights import light_directions
 from relit_studio.mannequin.renderer import View
 from relit_studio.progress import Progress, no_progress
 
@@ -37,7 +37,7 @@ def write_olat(folder: Path, size: int = 192, lights: int = 96, progress: Progre
     """
     camera, posture = Camera(size), Posture()
     view = View(posture, camera)
-    directions = light_directions(lights)
+    directions = fibonacci_directions(lights)
     names = [f"{index:03d}.png" for index in range(lights)]
     for index, (name, direction) in enumerate(zip(names, directions, strict=True)):
         write_display(folder / name, uint8_from_linear(view.under_light(direction)))
