@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from relit_camera.space.colour import luminance
-from relit_camera.space.directions import direction_from_degrees
+from relit_camera.space.directions import direction_from_degrees, fibonacci_directions
 from relit_camera.space.quality import psnr
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Posture
-from relit_studio.mannequin.lights import DistantLights, light_directions, lights_from_map
+from relit_studio.mannequin.lights import DistantLights, lights_from_map
 from relit_studio.mannequin.renderer import View
 
 SIZE = 96
@@ -61,7 +61,7 @@ def test_one_light_is_albedo_times_cosine_where_nothing_shades(view: View) -> No
 
 
 def test_many_lights_add_up(view: View) -> None:
-    directions = light_directions(6)
+    directions = fibonacci_directions(6)
     power = np.arange(1, 7)[:, None] * np.array([0.1, 0.2, 0.3])
     together = view.under_lights(DistantLights(directions, power))
     apart = sum(view.under_lights(DistantLights(d[None], p[None])) for d, p in zip(directions, power, strict=True))
