@@ -12,24 +12,31 @@ from relit_camera.space.images import Points
 
 @dataclass(frozen=True)
 class Camera:
-    """A square picture of `size` pixels, centred `middle_cm` above the head's origin.
+    """A picture centred `middle_cm` above the head's origin.
 
     Attributes:
-        size: pixels a side.
+        height: pixels.
+        width: pixels; as many as the height where None.
         distance_cm: from the head's origin, which lies between the ears; the nose is 12 cm before it.
-        view_cm: what a side spans at the head's origin.
+        view_cm: what the height spans at the head's origin.
         middle_cm: height of the optical axis.
     """
 
-    size: int
+    height: int
+    width: int | None = None
     distance_cm: float = 74.0
     view_cm: float = 38.0
     middle_cm: float = 2.2
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.width or self.height, self.height
+
+    @property
     def focal_px(self) -> float:
         """Focal length in pixels."""
-        return self.size * self.distance_cm / self.view_cm
+        return self.height * self.distance_cm / self.view_cm
 
     @property
     def position_cm(self) -> NDArray[np.float64]:
@@ -40,4 +47,5 @@ class Camera:
         """Pixels (count, 2) float32, centres at integers + ½, of room points (count, 3) in centimetres."""
         x, y, z = (np.asarray(points, np.float64) - self.position_cm).T
         scale = self.focal_px / -z
-        return np.stack([self.size / 2 + x * scale, self.size / 2 - y * scale], axis=1).astype(np.float32)
+        width, height = self.size
+        return np.stack([width / 2 + x * scale, height / 2 - y * scale], axis=1).astype(np.float32)

@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
+from relit_camera.cli.parse import size as parse_size
 from relit_studio.commands.options import (
     Environment,
     Out,
     PersonName,
     Samples,
-    Size,
     Threads,
     Truth,
     Turn,
@@ -27,9 +27,9 @@ from relit_studio.drive.render import DriveSettings, render_drive
 def drive(
     out: Out,
     who: PersonName = "adam",
-    environment: Environment = "window",
+    environment: Environment = "soft",
     turn: Turn = 0.0,
-    size: Size = 512,
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the video, pixels.")] = "960x540",
     every: Annotated[int, typer.Option(min=1, max=24, help="Make only every so manieth frame.")] = 1,
     frames: Annotated[int, typer.Option(min=1, max=FRAMES, help="Of the performance, from its beginning.")] = FRAMES,
     samples: Samples = None,
@@ -37,7 +37,10 @@ def drive(
     threads: Threads = 2,
 ) -> None:
     """Render a person who talks and turns in a room, with the truth; run it again to go on after a stop."""
-    settings = DriveSettings(size, every, frames, quality_of(truth, samples, threads, 48))
+    width, height = parse_size(size)
+    if not (32 <= min(width, height) and max(width, height) <= 4096) or width % 2 or height % 2:
+        raise typer.BadParameter(f"'{size}' has sides that are odd or not within 32 and 4096", param_hint="--size")
+    settings = DriveSettings((width, height), every, frames, quality_of(truth, samples, threads, 48))
     with shown_progress("frames") as progress:
         seconds = render_drive(load_person(who), load_room(environment, turn), out, settings, progress)
     if seconds:

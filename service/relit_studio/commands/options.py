@@ -13,6 +13,7 @@ from relit_camera.cli.progress import progress_bar
 from relit_camera.light.store import EnvironmentStore
 from relit_studio.cycles.job import Quality
 from relit_studio.drive.room import Room
+from relit_studio.drive.rooms import ROOMS, paint_room
 from relit_studio.people.person import Person, make_person
 from relit_studio.people.traits import find_traits
 from relit_studio.people.wardrobe import wardrobe
@@ -26,7 +27,9 @@ Truth = Annotated[
 ]
 Samples = Annotated[int | None, typer.Option("--samples", min=1, max=65536, help="A pixel.")]
 Size = Annotated[int, typer.Option("--size", min=32, max=4096, help="Of the pictures, pixels.")]
-Environment = Annotated[str, typer.Option("--environment", help="A stored name or a panorama file.")]
+Environment = Annotated[
+    str, typer.Option("--environment", help=f"One of {', '.join(ROOMS)}; or a stored name or a panorama file.")
+]
 Turn = Annotated[float, typer.Option("--turn", help="Of the environment, degrees; > 0 moves its front to the right.")]
 
 SHOW_SAMPLES, TRUTH_SAMPLES = 32, 512
@@ -49,13 +52,14 @@ def load_person(name: str) -> Person:
 
 
 def load_room(environment: str, turn_deg: float) -> Room:
-    """The environment of a name or a file, turned.
+    """A room of the studio, or the environment of a name or a file, turned.
 
     Raises:
         NotFoundError: there is none.
         PanoramaError: the file cannot be used.
     """
-    return Room(EnvironmentStore().resolve(environment), turn_deg)
+    known = paint_room(environment) if environment in ROOMS else EnvironmentStore().resolve(environment)
+    return Room(known, turn_deg)
 
 
 @contextmanager

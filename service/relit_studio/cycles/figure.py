@@ -64,7 +64,8 @@ class Figure:
             self._mesh("tears", vertices, np.zeros(len(part)), ("wet",)),
             self._mesh("lid_shade", vertices, np.zeros(len(part)), ("lid_shade",), None,
                        {"edge": lid_shade(self._model)}),
-            self._mesh("teeth", vertices, part == Part.TEETH, ("gums", "teeth")),
+            # Each tooth is a mesh of its own, which subdivision would shrink: gaps.
+            self._mesh("teeth", vertices, part == Part.TEETH, ("gums", "teeth"), subdivision=0),
         )  # fmt: skip
         shirt, brows, lashes = self.person.shirt, self.person.brows(posture), self.person.lashes(posture)
         clothes = (
@@ -103,6 +104,7 @@ class Figure:
         materials: tuple[str, ...],
         uv: Floats | None = None,
         attributes: dict[str, Floats] | None = None,
+        subdivision: int = 1,
     ) -> Mesh:
         """A part of the face model with the vertices that it uses; arrays are given for the whole model."""
         chosen, used = self._chosen[name], self._used[name]
@@ -117,7 +119,7 @@ class Figure:
             materials=materials,
             uv=None if uv is None else uv[used],
             attributes={key: values[used] for key, values in (attributes or {}).items()},
-            subdivision=1,
+            subdivision=subdivision,
         )
 
     def _materials(self) -> dict[str, Material]:

@@ -169,8 +169,8 @@ def write_job(folder: Path, scene: Scene, camera: Camera, quality: Quality, pict
         },
         "camera": {
             "focal_px": camera.focal_px,
-            "width": camera.size,
-            "height": camera.size,
+            "width": camera.size[0],
+            "height": camera.size[1],
             "position_cm": camera.position_cm.tolist(),
         },
         "quality": asdict(quality),

@@ -33,13 +33,13 @@ class DriveSettings:
     """What a driving video is rendered with.
 
     Attributes:
-        size: of the frames, pixels.
+        size: width and height of the frames, pixels.
         every: only every so manieth frame of the performance is made, with as many fewer frames a second.
         frames: of the performance, from its beginning.
         quality: one noise seed for all frames, so that nothing flickers.
     """
 
-    size: int = 512
+    size: tuple[int, int] = (960, 540)
     every: int = 1
     frames: int = FRAMES
     quality: Quality = field(default_factory=lambda: Quality(samples=48))
@@ -64,7 +64,8 @@ def render_drive(
         DeviceError: Cycles is not set up, or fails.
         StorageError: the folder cannot be written.
     """
-    camera = Camera(settings.size)
+    width, height = settings.size
+    camera = Camera(height, width)
     keep_settings(folder, "drive.json", _description(person, room, settings, camera))
     make_folder(folder / "frames")
     times = frame_times(settings.frames)[:: settings.every].tolist()
@@ -102,7 +103,7 @@ def write_clip(
         ImageError: a frame is damaged.
         StorageError: a file cannot be written.
     """
-    tracker, size = TruthTracker(person, camera), (camera.size, camera.size)
+    tracker, size = TruthTracker(person, camera), camera.size
     recorder, backdrop = TrackRecorder(tracker, size, settings.fps), room.backdrop(camera)
     with VideoWriter(folder / "clip.mp4", size, settings.fps) as writer:
         for index, (path, time_s) in enumerate(zip(paths, times, strict=True)):
@@ -130,7 +131,7 @@ def _truth(
         )
     return {
         "fps": settings.fps,
-        "size_px": camera.size,
+        "size_px": list(camera.size),
         "focal_px": camera.focal_px,
         "camera_distance_cm": camera.distance_cm,
         "environment": room.environment.name,

@@ -56,9 +56,9 @@ class Room:
         return PanoramaLight(str(path))
 
     def backdrop(self, camera: Camera) -> DisplayImage:
-        """What is seen behind the person, as exposed, uint8 sRGB (size, size, 3)."""
-        height_deg = float(np.degrees(2 * np.arctan(camera.size / 2 / camera.focal_px)))
-        view = EnvironmentView(self.environment.panorama, (camera.size, camera.size), height_deg, _BLUR)
+        """What is seen behind the person, as exposed, uint8 sRGB (height, width, 3)."""
+        height_deg = float(np.degrees(2 * np.arctan(camera.height / 2 / camera.focal_px)))
+        view = EnvironmentView(self.environment.panorama, camera.size, height_deg, _BLUR)
         return view.picture(rotation_from_angles(self.yaw_deg), self.scale)
 
     def shown(self, picture: LinearImage, alpha: Mask, backdrop: DisplayImage) -> DisplayImage:
