@@ -38,7 +38,7 @@ def drive(
 ) -> None:
     """Render a person who talks and turns in a room, with the truth; run it again to go on after a stop."""
     width, height = parse_size(size)
-    if not (32 <= min(width, height) and max(width, height) <= 4096) or width % 2 or height % 2:
+    if any(side % 2 or not 32 <= side <= 4096 for side in (width, height)):
         raise typer.BadParameter(f"'{size}' has sides that are odd or not within 32 and 4096", param_hint="--size")
     settings = DriveSettings((width, height), every, frames, quality_of(truth, samples, threads, 48))
     with shown_progress("frames") as progress:
