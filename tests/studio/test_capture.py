@@ -23,7 +23,7 @@ from relit_studio.capture.field_person import FieldPerson
 from relit_studio.capture.head_motion import REST, HeadMotion, Motion
 from relit_studio.capture.mannequin_person import MannequinPerson, phone_camera
 from relit_studio.capture.person import to_rest
-from relit_studio.capture.phone import EXPOSURE, Stages
+from relit_studio.capture.phone import SENSOR, Stages
 from relit_studio.capture.recording import record
 from relit_studio.capture.scene import Scene, Timing, dimmed
 from relit_studio.capture.torch import Torch
@@ -55,7 +55,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> tuple[np.ndarray, dict[st
     run("--out", str(folder), "--seconds", "6", "--size", f"{WIDTH}x{HEIGHT}", "--room", "overcast", "--plain")
     frames, truth = read(folder)
     assert {path.name for path in folder.iterdir()} == {"capture.mkv", "truth.json", "sheet.png"}
-    return (frames / np.float32(255 * EXPOSURE)).astype(np.float32), truth
+    return (frames / np.float32(255 * SENSOR.white)).astype(np.float32), truth
 
 
 def states(truth: dict[str, Any], state: str) -> list[int]:
@@ -214,7 +214,7 @@ def test_frames_of_other_settings_are_not_taken_up(brief: Scene, tmp_path: Path)
         record(brief, Stages(), tmp_path, "overcast", 2, _interrupt)
     record(brief, PLAIN, tmp_path, "overcast", 2)
     frames, _ = read(tmp_path)
-    plain_light = brief.light(brief.moment(0)) * EXPOSURE * 255
+    plain_light = brief.light(brief.moment(0)) * SENSOR.white * 255
     np.testing.assert_allclose(frames[0], np.clip(plain_light, 0, 255), atol=0.51)
 
 
@@ -225,7 +225,7 @@ def test_frames_of_another_ambient_light_are_not_taken_up(brief: Scene, tmp_path
         record(brief, PLAIN, tmp_path, "overcast", 2, _interrupt)
     record(lighter, PLAIN, tmp_path, "overcast", 2)
     frames, _ = read(tmp_path)
-    plain_light = lighter.light(lighter.moment(0)) * EXPOSURE * 255
+    plain_light = lighter.light(lighter.moment(0)) * SENSOR.white * 255
     np.testing.assert_allclose(frames[0], np.clip(plain_light, 0, 255), atol=0.51)
 
 

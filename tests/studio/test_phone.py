@@ -12,7 +12,8 @@ from relit_camera.errors import StorageError
 from relit_camera.space.colour import linear_from_uint8
 from relit_camera.stream.video import VideoReader
 from relit_studio.capture.lossless import LosslessWriter
-from relit_studio.capture.phone import EXPOSURE, Gains, Phone, Stages
+from relit_studio.capture.phone import SENSOR, Phone, Stages
+from relit_studio.processing import Gains
 
 OFF = Stages(gamma=False, noise=False, auto_exposure=False, white_balance=False, h264=False)
 MEAN = np.array([0.2, 0.2, 0.2], np.float32)
@@ -25,28 +26,28 @@ def scene(scale: float = 1.0, tint: tuple[float, float, float] = (1, 1, 1)) -> n
 
 def test_with_all_stages_off_the_code_is_the_light() -> None:
     coded = Phone(OFF, 1, MEAN).develop(scene(), Gains(), 0)
-    assert np.abs(coded / 255 / EXPOSURE - scene()).max() <= 0.5 / 255 / EXPOSURE + 1e-6
+    assert np.abs(coded / 255 / SENSOR.white - scene()).max() <= 0.5 / 255 / SENSOR.white + 1e-6
 
 
 def test_gamma_alone_is_undone_by_the_srgb_curve() -> None:
     coded = Phone(replace(OFF, gamma=True), 1, MEAN).develop(scene(), Gains(), 0)
-    wrong = np.abs(linear_from_uint8(coded) / EXPOSURE - scene())
+    wrong = np.abs(linear_from_uint8(coded) / SENSOR.white - scene())
     # Half a code of a curve that is at most 2.3 times as steep as the line.
-    assert wrong.max() <= 0.5 / 255 * 2.3 / EXPOSURE + 1e-4
+    assert wrong.max() <= 0.5 / 255 * 2.3 / SENSOR.white + 1e-4
 
 
 def test_gains_alone_are_undone_by_division() -> None:
     gains = Gains(exposure_ev=-0.4, balance=(0.1, -0.2))
     coded = Phone(OFF, 1, MEAN).develop(scene(), gains, 0)
-    back = coded / 255 / EXPOSURE / gains.exposure / np.array(gains.white_balance)
-    assert np.abs(back - scene()).max() <= 0.5 / 255 / EXPOSURE / gains.exposure / min(gains.white_balance) + 1e-6
+    back = coded / 255 / SENSOR.white / gains.exposure / np.array(gains.white_balance)
+    assert np.abs(back - scene()).max() <= 0.5 / 255 / SENSOR.white / gains.exposure / min(gains.white_balance) + 1e-6
 
 
 def test_noise_grows_with_light_and_is_the_same_again() -> None:
     phone = Phone(replace(OFF, noise=True), 1, MEAN)
     dark, bright = (np.full((64, 64, 3), value, np.float32) for value in (0.05, 0.6))
     spreads = [phone.develop(light, Gains(), 0).astype(float).std() / 255 for light in (dark, bright)]
-    expected = [np.sqrt(1.5e-4 * value * EXPOSURE + 1.2e-3**2 + 1 / 12 / 255**2) for value in (0.05, 0.6)]
+    expected = [np.sqrt(SENSOR.shot * value * SENSOR.white + SENSOR.read**2 + 1 / 12 / 255**2) for value in (0.05, 0.6)]
     assert spreads == pytest.approx(expected, rel=0.05)
     np.testing.assert_array_equal(phone.develop(bright, Gains(), 0), phone.develop(bright, Gains(), 0))
     assert (phone.develop(bright, Gains(), 0) != phone.develop(bright, Gains(), 1)).any()

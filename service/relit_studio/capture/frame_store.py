@@ -12,7 +12,7 @@ from typing import Any
 from relit_camera.files import make_folder, write_atomic
 from relit_camera.space.images import DisplayImage
 from relit_camera.space.picture_files import read_display, write_display
-from relit_studio.capture.phone import Gains
+from relit_studio.processing import Gains
 
 
 @dataclass(frozen=True, eq=False)

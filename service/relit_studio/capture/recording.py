@@ -14,9 +14,10 @@ from relit_camera.space.picture_files import write_display
 from relit_camera.stream.video_writer import VideoWriter
 from relit_studio.capture.frame_store import Done, FrameStore
 from relit_studio.capture.lossless import LosslessWriter
-from relit_studio.capture.phone import Gains, Phone, Stages
+from relit_studio.capture.phone import Phone, Stages
 from relit_studio.capture.scene import Scene
 from relit_studio.capture.truth import capture_truth, frame_truth
+from relit_studio.processing import Gains
 from relit_studio.progress import Progress, no_progress
 
 _CRF = 20

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from relit_studio.capture.flash import flash_state
 from relit_studio.capture.mirror_image import highlight_px
 from relit_studio.capture.person import to_rest
-from relit_studio.capture.phone import EXPOSURE, Gains, Stages
+from relit_studio.capture.phone import SENSOR, Stages
 from relit_studio.capture.scene import Moment, Scene
 from relit_studio.capture.torch import BEAM_EXPONENT, RADIUS_CM, REFERENCE_CM
+from relit_studio.processing import Gains
 
 VERSION = 1
 
@@ -55,7 +56,7 @@ def capture_truth(scene: Scene, stages: Stages, video: str, room: str, seed: int
             "exposure_s": scene.timing.exposure_s,
             "readout_s": scene.timing.readout_s,
         },
-        "sensor_value_of_white": EXPOSURE,
+        "sensor_value_of_white": SENSOR.white,
         "stages": asdict(stages),
     }
 

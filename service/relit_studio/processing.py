@@ -1,0 +1,105 @@
+"""What a small camera does to the light it gets: sensor noise, and automatics that follow the picture they made last.
+
+A phone (`capture.phone`) and a webcam (`drive.webcam`) differ in the numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from relit_camera.space.colour import luminance
+from relit_camera.space.images import LinearImage
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A sensor.
+
+    Attributes:
+        white: value of a white wall under unit irradiance before any gain; 1 is full.
+        shot: noise variance per sensor value.
+        read: standard deviation of the sensor's own noise.
+    """
+
+    white: float
+    shot: float
+    read: float
+
+    def noisy(self, values: LinearImage, seed: Sequence[int]) -> LinearImage:
+        """Sensor values (h, w, 3) with the noise of that seed; equal seeds are equal noise."""
+        variance = np.float32(self.shot) * np.maximum(values, 0) + np.float32(self.read**2)
+        noise = np.random.default_rng(seed).standard_normal(values.shape, np.float32)
+        return np.asarray(values + np.sqrt(variance) * noise, np.float32)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """What the automatics have set for a frame, and how these settings are moving.
+
+    Attributes:
+        exposure_ev: exposure relative to the fixed one, in stops.
+        exposure_speed: stops a frame.
+        balance: natural logarithms of the gains of red and blue; green's is 1.
+        balance_speed: the same a frame.
+    """
+
+    exposure_ev: float = 0.0
+    exposure_speed: float = 0.0
+    balance: tuple[float, float] = (0.0, 0.0)
+    balance_speed: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def exposure(self) -> float:
+        """Linear gain of the exposure."""
+        return float(2.0**self.exposure_ev)
+
+    @property
+    def white_balance(self) -> tuple[float, float, float]:
+        """Linear gains of red, green and blue."""
+        return float(np.exp(self.balance[0])), 1.0, float(np.exp(self.balance[1]))
+
+    def apply(self, values: LinearImage) -> LinearImage:
+        """Sensor values (h, w, 3) times the gains; the noise grows too: what a gain makes up for was not gathered."""
+        return values * np.float32(self.exposure) * np.array(self.white_balance, np.float32)
+
+
+@dataclass(frozen=True)
+class Automatics:
+    """Automatic exposure and white balance: each frame they go part of the way, and on as they went before.
+
+    Attributes:
+        pull: share of the error that is put right each frame.
+        momentum: share of the last change that goes on; with much of it they overshoot and come back.
+        exposure_limit_ev: of the exposure, in stops.
+        balance_limit: of the logarithm of the gains of red and blue.
+    """
+
+    pull: float
+    momentum: float
+    exposure_limit_ev: float
+    balance_limit: float
+
+    def expose(self, gains: Gains, mean: NDArray, wanted: NDArray) -> Gains:
+        """The next gains after a picture of mean light (3,), so that it gets as bright as the wanted mean (3,)."""
+        error = np.log2(luminance(wanted) / luminance(mean))
+        moved = self._pulled(gains.exposure_ev, gains.exposure_speed, error, self.exposure_limit_ev)
+        return replace(gains, exposure_ev=float(moved), exposure_speed=float(moved - gains.exposure_ev))
+
+    def balance(self, gains: Gains, mean: NDArray, wanted: NDArray) -> Gains:
+        """The next gains after a picture of mean light (3,), so that it gets the tint of the wanted mean (3,)."""
+        seen = np.log(mean / wanted)
+        moved = self._pulled(gains.balance, gains.balance_speed, seen[1] - seen[[0, 2]], self.balance_limit)
+        return replace(gains, balance=_pair(moved), balance_speed=_pair(moved - gains.balance))
+
+    def _pulled(self, setting: ArrayLike, speed: ArrayLike, wanted: ArrayLike, limit: float) -> NDArray[np.float64]:
+        """The next settings (...), drawn toward what is wanted (...)."""
+        setting, speed, wanted = (np.asarray(values, np.float64) for values in (setting, speed, wanted))
+        return np.clip(setting + self.momentum * speed + self.pull * (wanted - setting), -limit, limit)
+
+
+def _pair(values: NDArray) -> tuple[float, float]:
+    return float(values[0]), float(values[1])
