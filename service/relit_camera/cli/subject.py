@@ -1,8 +1,9 @@
-"""`relit subject`: look into subject files."""
+"""`relit subject`: look into subject files, and make them small."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -12,7 +13,7 @@ app = typer.Typer(no_args_is_help=True)
 
 @app.callback()
 def group() -> None:
-    """Look into subject files."""
+    """Look into subject files, and make them small."""
 
 
 @app.command()
@@ -34,3 +35,34 @@ def info(
         return
     for key, value in shown.items():
         typer.echo(f"{key:16} {value}")
+
+
+@app.command()
+def pack(
+    context: typer.Context,
+    subject: Annotated[str, typer.Argument(help="A stored subject's name, or a .relit file.")],
+    out: Annotated[Path, typer.Option(help="Subject file to write.", metavar="FILE")],
+    components: Annotated[int, typer.Option(min=1, help="Principal pictures to keep.")] = 48,
+) -> None:
+    """Make a small copy of a subject, to send or ship: fewer principal pictures, of 8 bits each."""
+    from statistics import median
+
+    from relit_camera.cli.settings import settings_of
+    from relit_camera.light.builtin.catalogue import BUILTIN_NAMES, builtin_environment
+    from relit_camera.relight.basis import BasisRelighter
+    from relit_camera.space.quality import psnr
+    from relit_camera.subject.file import read_subject, write_subject
+    from relit_camera.subject.pack import light_errors_db, packed
+    from relit_camera.subject.store import SubjectStore
+
+    _, full = SubjectStore(settings_of(context).storage.subjects).resolve(subject)
+    write_subject(out, packed(full, components), small=True)
+    small = read_subject(out)
+    before, after = BasisRelighter(full), BasisRelighter(small)
+    maps = {name: builtin_environment(name).light_map for name in BUILTIN_NAMES}
+    worst = min(psnr(after.relight(light), before.relight(light), full.matte) for light in maps.values())
+    lights = light_errors_db(small, full)
+    typer.echo(f"{out}: {out.stat().st_size / 1e6:.1f} MB, {components} of {full.metadata.components} components")
+    typer.echo(
+        f"built-in environments {worst:.1f} dB or more; single lights {median(lights):.1f} dB, worst {min(lights):.1f}"
+    )

@@ -15,6 +15,7 @@ from safetensors.numpy import save_file
 
 from relit_camera.errors import SubjectError
 from relit_camera.files import atomic_path
+from relit_camera.subject.pack import decode_basis, encode_basis
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
 
 SUFFIX = ".relit"
@@ -24,21 +25,31 @@ MAX_TENSORS = 64
 MAX_BYTES = 8 << 30
 REQUIRED = ("basis", "coefficients", "light_directions", "light_coefficients", "matte", "neutral")
 OPTIONAL = ("normals", "albedo", "depth")
-DTYPES = {"basis": np.float16, "neutral": np.uint8}
+SMALL_BASIS = "basis_webp"
+"""In place of `basis` in a small file: the pictures as bytes of one lossless WebP picture."""
+DTYPES = {"basis": np.float16, "neutral": np.uint8, SMALL_BASIS: np.uint8}
 """Every other tensor is float32."""
 STORED: dict[str, type[np.generic]] = {"F16": np.float16, "F32": np.float32, "U8": np.uint8}
 """What safetensors calls the types that a subject may hold."""
 
 
-def write_subject(path: Path, subject: Subject) -> None:
+def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
     """Write a subject whole or not at all.
+
+    Args:
+        path: file to write.
+        subject: what it holds.
+        small: keep the basis in 8 bits, a quarter of the size and less. Such a file is decoded when it is opened.
 
     Raises:
         StorageError: the file cannot be written.
+        InputError: `small`, and the basis is larger than a WebP picture may be.
     """
     tensors: dict[str, NDArray] = {name: getattr(subject, name) for name in REQUIRED}
     tensors |= {name: getattr(subject, name) for name in OPTIONAL if getattr(subject, name) is not None}
     tensors |= {LANDMARKS + scheme: points for scheme, points in subject.landmarks.items()}
+    if small:
+        tensors[SMALL_BASIS] = encode_basis(tensors.pop("basis"))
     contiguous = {name: np.ascontiguousarray(value) for name, value in tensors.items()}
     with atomic_path(path) as temporary:
         try:
@@ -52,6 +63,8 @@ def write_subject(path: Path, subject: Subject) -> None:
 
 def read_subject(path: Path) -> Subject:
     """Open a subject; its arrays are read-only views of the mapped file, which the system may drop and read again.
+
+    The basis of a small file is not: it is decoded into memory.
 
     Raises:
         SubjectError: missing, damaged, of another version, or with values that are not finite.
@@ -69,6 +82,8 @@ def read_subject(path: Path) -> Subject:
         tensors = _mapped(path, names)
     except (SafetensorError, OSError) as error:
         raise _damaged(path, str(error)) from error
+    if "basis" not in tensors and SMALL_BASIS in tensors:
+        tensors["basis"] = _decoded(path, tensors.pop(SMALL_BASIS), metadata)
     _check(path, tensors)
     landmarks = {n.removeprefix(LANDMARKS): t for n, t in tensors.items() if n.startswith(LANDMARKS)}
     arrays = {name: tensors[name] for name in (*REQUIRED, *OPTIONAL) if name in tensors}
@@ -112,6 +127,15 @@ def _mapped(path: Path, names: list[str]) -> dict[str, NDArray]:
         stored = mapped[start + first : start + last]
         tensors[name] = stored.view(STORED[kind]).reshape(header[name]["shape"])
     return tensors
+
+
+def _decoded(path: Path, encoded: NDArray, metadata: SubjectMetadata) -> NDArray[np.float16]:
+    if encoded.dtype != np.uint8 or encoded.ndim != 1:
+        raise _damaged(path, f"'{SMALL_BASIS}' is not a row of bytes")
+    try:
+        return decode_basis(encoded, (3, metadata.components, metadata.height, metadata.width))
+    except SubjectError as error:
+        raise _damaged(path, error.what) from error
 
 
 def _check(path: Path, tensors: Mapping[str, NDArray]) -> None:
