@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
+from relit_camera.compose.mattes import Matte
 from relit_camera.config.look import ColorBackground, Lighting, Look, NoBackground
-from relit_camera.models.session import SessionOptions
 from relit_camera.reenact.reenactor import Moved
 from relit_camera.space.display import display_from_linear
 from relit_camera.space.images import Frame, Mask
-from relit_camera.stream import composer as composer_module
 from relit_camera.stream.composer import Composer
 from relit_camera.stream.scene import Scene
 from relit_camera.stream.timing import StageTimer
@@ -19,8 +20,25 @@ SIZE = (64, 48)
 GREEN = ColorBackground(color="#00ff00")
 
 
-def composer(timer: StageTimer | None = None) -> Composer:
-    return Composer(SIZE, SessionOptions("cpu"), timer or StageTimer())
+class LeftHalf:
+    """A matte that takes the left half of the picture for the person."""
+
+    made = 0
+
+    def __init__(self) -> None:
+        type(self).made += 1
+
+    def matte(self, frame: Frame) -> Mask:
+        alpha = np.zeros((frame.size[1], frame.size[0]), np.float32)
+        alpha[:, : frame.size[0] // 2] = 1
+        return alpha
+
+    def reset(self) -> None:
+        """Nothing is kept."""
+
+
+def composer(timer: StageTimer | None = None, open_matte: Callable[[], Matte] = LeftHalf) -> Composer:
+    return Composer(SIZE, open_matte, timer or StageTimer())
 
 
 def scene(background: object = GREEN, **lighting: object) -> Scene:
@@ -68,31 +86,15 @@ def test_a_new_background_is_faded_in() -> None:
     assert (made.still(square(0.0), scene(blue, transition_s=1.0), 2.1) == [0, 0, 255]).all()
 
 
-def test_the_live_room_passes_without_a_matte(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(composer_module, "PersonMatte", pytest.fail)
+def test_the_live_room_passes_without_a_matte() -> None:
     light = np.full((SIZE[1], SIZE[0], 3), 0.3, np.float32)
     timer = StageTimer()
-    picture = composer(timer).live(light, live_frame(), scene(NoBackground()))
+    picture = composer(timer, pytest.fail).live(light, live_frame(), scene(NoBackground()))
     np.testing.assert_array_equal(picture, display_from_linear(light))
     assert "matte" not in timer.lap_ms()
 
 
-class LeftHalf:
-    """A matte that takes the left half of the picture for the person."""
-
-    made = 0
-
-    def __init__(self, options: SessionOptions) -> None:
-        type(self).made += 1
-
-    def matte(self, frame: Frame) -> Mask:
-        alpha = np.zeros((frame.size[1], frame.size[0]), np.float32)
-        alpha[:, : frame.size[0] // 2] = 1
-        return alpha
-
-
-def test_a_live_person_stands_before_the_chosen_background(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(composer_module, "PersonMatte", LeftHalf)
+def test_a_live_person_stands_before_the_chosen_background() -> None:
     LeftHalf.made = 0
     light, timer = np.full((SIZE[1], SIZE[0], 3), 0.3, np.float32), StageTimer()
     made = composer(timer)
@@ -104,8 +106,7 @@ def test_a_live_person_stands_before_the_chosen_background(monkeypatch: pytest.M
     assert (picture[:, 32:] == [0, 255, 0]).all()
 
 
-def test_background_gain_dims_the_room_and_not_the_person(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(composer_module, "PersonMatte", LeftHalf)
+def test_background_gain_dims_the_room_and_not_the_person() -> None:
     light = np.full((SIZE[1], SIZE[0], 3), 0.3, np.float32)
     dimmed = scene(NoBackground(), **Lighting(background_gain_ev=-1).model_dump(include={"background_gain_ev"}))
     picture = composer().live(light, live_frame(), dimmed)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from relit_camera.bench.live import NoddingTracker
+from relit_camera.compose.mattes import find_matte
 from relit_camera.config.look import ColorBackground, Lamp, Lighting, Look, Mode
 from relit_camera.config.settings import ReenactSettings, TrackerSettings
 from relit_camera.errors import ModelError
@@ -21,13 +22,16 @@ from relit_camera.stream.pipeline import Pipeline, fitted
 from relit_camera.stream.scene import Scene
 from tests.stream.small_camera import SIZE, SteadyTracker, difference, grey, small_subject
 
+CPU = SessionOptions("cpu")
 STUDIO = builtin_environment("studio")
 LAMP_RIGHT = Lighting(environment=None, lamps=(Lamp(azimuth_deg=90, elevation_deg=0),), transition_s=0)
 LAMP_LEFT = Lighting(environment=None, lamps=(Lamp(azimuth_deg=-90, elevation_deg=0),), transition_s=0)
 
 
 def pipeline(tracker: Tracker | None = None, size: tuple[int, int] = SIZE) -> Pipeline:
-    return Pipeline(tracker or SteadyTracker(), size, TrackerSettings(), ReenactSettings(), SessionOptions("cpu"))
+    return Pipeline(
+        tracker or SteadyTracker(), size, TrackerSettings(), ReenactSettings(), CPU, find_matte("selfie", CPU)
+    )
 
 
 def scene(subject: bool = True, mode: Mode = Mode.REENACT, **look: object) -> Scene:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relit_camera.compose.mattes import find_matte
 from relit_camera.config.look import Lighting, Look
 from relit_camera.config.settings import ReenactSettings, TrackerSettings
 from relit_camera.errors import VideoError
@@ -22,6 +23,9 @@ from relit_camera.stream.video_writer import VideoWriter
 from tests.stream.small_camera import SteadyTracker, small_subject
 
 COUNT, FPS = 12, 12.5
+
+
+CPU = SessionOptions("cpu")
 
 
 def clip(folder: Path, size: tuple[int, int] = (96, 64)) -> Path:
@@ -40,7 +44,7 @@ def play(video: Path, out: Path | None, tracker: Tracker, dark_from_s: float = 9
     )
 
     def pipeline_for(size: tuple[int, int]) -> Pipeline:
-        return Pipeline(tracker, size, TrackerSettings(), ReenactSettings(), SessionOptions("cpu"))
+        return Pipeline(tracker, size, TrackerSettings(), ReenactSettings(), CPU, find_matte("selfie", CPU))
 
     return replay(video, out, pipeline_for, lambda time_s: dark if time_s >= dark_from_s else bright)
 

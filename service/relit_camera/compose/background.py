@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from relit_camera.compose.live_room import LiveRoom, blurred
 from relit_camera.compose.view import EnvironmentView
@@ -161,12 +162,17 @@ def plain(color: str, size: tuple[int, int]) -> DisplayImage:
 
 def cropped_to_fill(image: DisplayImage, size: tuple[int, int]) -> DisplayImage:
     """The image scaled to cover `size` (width, height), and its middle cut out."""
-    height, width = image.shape[:2]
+    return cover(image, size, cv2.INTER_CUBIC)
+
+
+def cover(picture: NDArray[np.uint8], size: tuple[int, int], enlarging: int) -> NDArray[np.uint8]:
+    """`cropped_to_fill` for any uint8 picture (height, width, ...), enlarged with that interpolation of OpenCV's."""
+    height, width = picture.shape[:2]
     scale = max(size[0] / width, size[1] / height)
     columns, rows = min(width, round(size[0] / scale)), min(height, round(size[1] / scale))
     left, top = (width - columns) // 2, (height - rows) // 2
-    cut = np.ascontiguousarray(image[top : top + rows, left : left + columns])
-    filled: DisplayImage = cv2.resize(cut, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC)
+    cut = np.ascontiguousarray(picture[top : top + rows, left : left + columns])
+    filled: NDArray[np.uint8] = cv2.resize(cut, size, interpolation=cv2.INTER_AREA if scale < 1 else enlarging)
     return filled
 
 

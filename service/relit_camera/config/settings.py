@@ -131,6 +131,8 @@ class RelitSettings(BaseSettings):
     """A stored subject's name, or the path of a .relit file."""
     look: Look = Look()
     tracker: TrackerSettings = TrackerSettings()
+    matte: str = "selfie"
+    """What finds the person in the live picture (mode ratio): `selfie`, or `recorded:FILE.npz`."""
     reenact: ReenactSettings = ReenactSettings()
     inference: InferenceSettings = InferenceSettings()
     server: ServerSettings = ServerSettings()

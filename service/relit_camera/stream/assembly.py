@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from relit_camera.compose.mattes import find_matte
 from relit_camera.config.settings import InferenceSettings, RelitSettings
 from relit_camera.face.state import Tracker
 from relit_camera.face.trackers import TrackerOptions, open_tracker
@@ -27,5 +28,11 @@ def make_tracker(settings: RelitSettings) -> Tracker:
 
 
 def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, int]) -> Pipeline:
-    """The picture path for an output of `size` (width, height)."""
-    return Pipeline(tracker, size, settings.tracker, settings.reenact, session_options(settings.inference))
+    """The picture path for an output of `size` (width, height).
+
+    Raises:
+        NotFoundError: no matte of the settings' name.
+        InputError: `recorded:FILE` names no recorded mattes.
+    """
+    options = session_options(settings.inference)
+    return Pipeline(tracker, size, settings.tracker, settings.reenact, options, find_matte(settings.matte, options))

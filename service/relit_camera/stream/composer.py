@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from relit_camera.compose.background import Backdrop, Wanted, needs_room
 from relit_camera.compose.composite import foreground_colours, over, straight
 from relit_camera.compose.live_room import LiveRoom
-from relit_camera.compose.matte import PersonMatte
-from relit_camera.models.session import SessionOptions
+from relit_camera.compose.mattes import Matte
 from relit_camera.reenact.reenactor import Moved
 from relit_camera.space.display import display_from_linear
 from relit_camera.space.images import DisplayImage, Frame, LinearImage
@@ -19,11 +20,11 @@ from relit_camera.stream.timing import StageTimer
 class Composer:
     """Composes pictures of one size. Not thread-safe."""
 
-    def __init__(self, size: tuple[int, int], options: SessionOptions, timer: StageTimer) -> None:
-        """`size` is (width, height)."""
+    def __init__(self, size: tuple[int, int], open_matte: Callable[[], Matte], timer: StageTimer) -> None:
+        """`size` is (width, height); `open_matte` is called when a live person must first be parted from the room."""
         self._backdrop = Backdrop(size)
-        self._matte: PersonMatte | None = None
-        self._options = options
+        self._matte: Matte | None = None
+        self._open_matte = open_matte
         self._timer = timer
 
     def still(self, moved: Moved, scene: Scene, now: float) -> DisplayImage:
@@ -45,7 +46,7 @@ class Composer:
             return shown
         with self._timer.stage("matte"):
             if self._matte is None:
-                self._matte = PersonMatte(self._options)
+                self._matte = self._open_matte()
             alpha = self._matte.matte(frame)
         background = self._backdrop.live(_wanted(scene), LiveRoom(shown, alpha), frame.time_s)
         return over(foreground_colours(shown, alpha), alpha, np.ascontiguousarray(background))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.compose.background import cropped_to_fill
+from relit_camera.compose.mattes import Matte
 from relit_camera.config.look import Mode
 from relit_camera.config.settings import ReenactSettings, TrackerSettings
 from relit_camera.errors import SubjectError
@@ -85,6 +86,7 @@ class Pipeline:
         tracking: TrackerSettings,
         reenact: ReenactSettings,
         options: SessionOptions,
+        open_matte: Callable[[], Matte],
     ) -> None:
         self.timer = StageTimer()
         self._tracker = tracker
@@ -101,7 +103,7 @@ class Pipeline:
             ),
         )
         self._light = EasedLight()
-        self._composer = Composer(size, options, self.timer)
+        self._composer = Composer(size, open_matte, self.timer)
         self._beside = ThreadPoolExecutor(1, "follow")
         self._cast: _Cast | None = None
         self._lit: tuple[_Cast, LightMap, LinearImage] | None = None
