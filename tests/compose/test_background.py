@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.compose.background import Backdrop, Wanted, brightened, cropped_to_fill, faded, needs_room, neutral
+from relit_camera.compose.background import Backdrop, Wanted, brightened, cropped_to_fill, needs_room, neutral
 from relit_camera.compose.live_room import LiveRoom
 from relit_camera.config.look import (
     BlurBackground,
@@ -175,28 +175,42 @@ def test_no_trace_of_the_live_room_outlives_the_live_picture(
         np.testing.assert_array_equal(backdrop.still(wanted, 1.01), still(wanted))
 
 
-def test_a_change_is_faded_in() -> None:
+def test_a_change_is_faded_in_and_seen_at_once() -> None:
     backdrop, lighting = Backdrop(SIZE), Lighting(transition_s=2)
     black, white = (Wanted(ColorBackground(color=color), lighting) for color in ("#000000", "#ffffff"))
-    backdrop.still(black, 0.0)
-    shown = [int(backdrop.still(white, now)[0, 0, 0]) for now in (5.0, 5.5, 6.0, 6.5, 7.0, 8.0)]
-    assert shown == [0, 40, 128, 215, 255, 255]
+    backdrop.still(black, 4.5)
+    shown = [int(backdrop.still(white, now)[0, 0, 0]) for now in (5.0, 5.5, 6.5, 7.5)]
+    assert shown == [round(255 * (1 - (1 - share) ** 3)) for share in (0.25, 0.5, 1, 1)]
 
 
 def test_a_change_during_a_fade_goes_on_from_what_is_shown() -> None:
     backdrop, lighting = Backdrop(SIZE), Lighting(transition_s=2)
     colours = [Wanted(ColorBackground(color=color), lighting) for color in ("#000000", "#ffffff", "#ff0000")]
     backdrop.still(colours[0], 0.0)
-    backdrop.still(colours[1], 5.0)
-    middle = backdrop.still(colours[1], 6.0).copy()
-    np.testing.assert_array_equal(backdrop.still(colours[2], 6.0), middle)
-    assert tuple(backdrop.still(colours[2], 8.1)[0, 0]) == (255, 0, 0)
+    backdrop.still(colours[1], 0.0)
+    middle = backdrop.still(colours[1], 1.0).copy()
+    np.testing.assert_array_equal(backdrop.still(colours[2], 1.0), middle)
+    assert tuple(backdrop.still(colours[2], 3.1)[0, 0]) == (255, 0, 0)
+
+
+def test_a_background_that_is_turned_all_the_time_is_followed(environment: Environment) -> None:
+    backdrop, now = Backdrop(SIZE), 0.0
+    for now in np.arange(0, 4, 0.04):
+        turning = Lighting(yaw_deg=45 * now)
+        shown = backdrop.still(Wanted(EnvironmentBackground(), turning, environment), now)
+    errors = []
+    for behind_s in (0.0, 0.15, 4.0):
+        then = Wanted(EnvironmentBackground(), Lighting(yaw_deg=45 * max(now - behind_s, 0)), environment)
+        errors.append(np.abs(shown.astype(int) - still(then)).mean())
+    assert min(errors[:2]) < 0.25 * errors[2]
 
 
 def test_a_clock_set_back_ends_the_fade() -> None:
-    before, after = (np.full((2, 2, 3), value, np.uint8) for value in (0, 200))
-    assert faded(before, after, -3.0, 2.0) is after
-    assert faded(before, after, 0.5, 0.0) is after
+    backdrop, lighting = Backdrop(SIZE), Lighting(transition_s=2)
+    black, white = (Wanted(ColorBackground(color=color), lighting) for color in ("#000000", "#ffffff"))
+    backdrop.still(black, 5.0)
+    backdrop.still(white, 5.1)
+    assert (backdrop.still(white, 0.0) == 255).all()
 
 
 def test_lighting_that_a_background_does_not_show_does_not_make_it_anew() -> None:

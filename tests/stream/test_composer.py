@@ -80,10 +80,9 @@ def test_a_new_background_is_faded_in() -> None:
     made = composer()
     made.still(square(0.0), scene(transition_s=1.0), 0.0)
     blue = ColorBackground(color="#0000ff")
-    made.still(square(0.0), scene(blue, transition_s=1.0), 1.0)
-    half = made.still(square(0.0), scene(blue, transition_s=1.0), 1.5)
+    half = made.still(square(0.0), scene(blue, transition_s=1.0), 1 - 0.5 ** (1 / 3))
     assert (np.abs(half.astype(int) - [0, 128, 128]) <= 2).all()
-    assert (made.still(square(0.0), scene(blue, transition_s=1.0), 2.1) == [0, 0, 255]).all()
+    assert (made.still(square(0.0), scene(blue, transition_s=1.0), 1.1) == [0, 0, 255]).all()
 
 
 def test_the_live_room_passes_without_a_matte() -> None:

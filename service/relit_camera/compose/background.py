@@ -30,6 +30,7 @@ from relit_camera.light.panorama import Panorama
 from relit_camera.light.room import room_light
 from relit_camera.space.colour import linear_from_uint8, srgb_encode, uint8_from_linear
 from relit_camera.space.display import display_curve, inverse_display_curve
+from relit_camera.space.easing import eased_share
 from relit_camera.space.images import DisplayImage
 from relit_camera.space.rotation import rotation_from_angles
 
@@ -38,6 +39,10 @@ _NEUTRAL_LIGHT = (0.030, 0.032, 0.036)
 
 _NEUTRAL_EDGE = 0.25
 """Its share of that light far from there."""
+
+
+_SEEN = ("yaw_deg", "pitch_deg", "roll_deg", "exposure_ev", "saturation", "background_gain_ev")
+"""Fields of the lighting that change how an environment looks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +66,8 @@ class Wanted:
         if self.background != other.background or self.image is not other.image:
             return False
         if isinstance(self.background, EnvironmentBackground | BlurBackground):
-            return self.environment is other.environment and self.lighting == other.lighting
+            same = all(getattr(self.lighting, name) == getattr(other.lighting, name) for name in _SEEN)
+            return same and self.environment is other.environment
         return self.lighting.background_gain_ev == other.lighting.background_gain_ev
 
 
@@ -78,7 +84,7 @@ class Backdrop:
         self._size = size
         self._wanted: Wanted | None = None
         self._goal = self._shown = self._before = neutral(size)
-        self._changed_at = 0.0
+        self._changed_at = self._last = 0.0
         self._view: tuple[Panorama, float, float, EnvironmentView] | None = None
 
     def still(self, wanted: Wanted, now: float) -> DisplayImage:
@@ -92,9 +98,11 @@ class Backdrop:
         if self._wanted is None:
             self._goal = self._shown = self._before = self._made(wanted)
         elif not wanted.same_still(self._wanted):
-            self._before, self._goal, self._changed_at = self._shown, self._made(wanted), now
-        self._wanted = wanted
-        self._shown = faded(self._before, self._goal, now - self._changed_at, wanted.lighting.transition_s)
+            # The change began after the last picture: this one shows its first step already.
+            self._before, self._goal, self._changed_at = self._shown, self._made(wanted), min(self._last, now)
+        self._wanted, self._last = wanted, now
+        share = eased_share(now - self._changed_at, wanted.lighting.transition_s)
+        self._shown = faded(self._before, self._goal, share)
         return self._shown
 
     def live(self, wanted: Wanted, room: LiveRoom, now: float) -> DisplayImage:
@@ -186,12 +194,9 @@ def brightened(image: DisplayImage, gain_ev: float) -> DisplayImage:
     return result
 
 
-def faded(before: DisplayImage, after: DisplayImage, elapsed_s: float, transition_s: float) -> DisplayImage:
-    """From one picture to another, along a smooth step over `transition_s` seconds."""
-    # A file that starts again sets its clock back: then the change is over.
-    if not 0 <= elapsed_s < transition_s or before is after:
+def faded(before: DisplayImage, after: DisplayImage, share: float) -> DisplayImage:
+    """Between two pictures: `share` of `after`."""
+    if share >= 1 or before is after:
         return after
-    share = elapsed_s / transition_s
-    smooth = share * share * (3 - 2 * share)
-    mixed: DisplayImage = cv2.addWeighted(before, 1 - smooth, after, smooth, 0)
+    mixed: DisplayImage = cv2.addWeighted(before, 1 - share, after, share, 0)
     return mixed

@@ -69,6 +69,8 @@ class Lighting(Settings):
     background_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
     blend: Annotated[float, Field(ge=0, le=1)] = 1.0
     """0 the live picture (in reenact, where that stays private, the still as captured), 1 fully relit."""
+    split: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Before and after, in mode ratio: this share of the picture, from its left, stays as it was filmed."""
     transition_s: Annotated[float, Field(ge=0, le=60)] = 0.4
     """Seconds over which a change is eased."""
 

@@ -18,7 +18,8 @@ class Event:
     """One happening.
 
     Attributes:
-        kind: `state`, `tracking`, `neutral-pose`, `degraded`, `recovered`, or `collection` from the API.
+        kind: `state`, `tracking`, `neutral-pose`, `degraded`, `recovered`; `collection` from the API; `caption` from
+            the demonstration's tour.
         data: JSON-ready details.
         at: seconds since the epoch.
     """

@@ -9,6 +9,7 @@ from relit_camera.light.environment import Environment
 from relit_camera.light.exposure import display_scale
 from relit_camera.light.maps import LightMap
 from relit_camera.light.room import room_light
+from relit_camera.space.easing import eased_share
 from relit_camera.stream.scene import Scene
 
 
@@ -47,9 +48,7 @@ class EasedLight:
     def _shown(self, now: float) -> LightMap:
         assert self._target is not None
         assert self._key is not None
-        duration = self._key[1].transition_s
-        share = min(max(now - self._since, 0.0) / duration, 1.0) if duration > 0 else 1.0
+        share = eased_share(now - self._since, self._key[1].transition_s)
         if self._from is None or share >= 1:
             return self._target
-        eased = np.float32(1 - (1 - share) ** 3)
-        return np.asarray(self._from + (self._target - self._from) * eased, dtype=np.float32)
+        return np.asarray(self._from + (self._target - self._from) * np.float32(share), dtype=np.float32)

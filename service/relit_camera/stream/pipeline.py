@@ -226,7 +226,7 @@ class Pipeline:
             picture = moved.picture
             if blend < 1:
                 picture = linear_from_display(frame.image) * (1 - blend) + picture * blend
-            return self._composer.live(picture, frame, scene)
+            return with_before(self._composer.live(picture, frame, scene), frame.image, scene.look.lighting.split)
         return self._composer.still(moved, scene, frame.time_s)
 
 
@@ -236,6 +236,18 @@ def blended(subject: Subject, relit: LinearImage, share: float) -> LinearImage:
     Reenact has no live picture to blend with: that stays private.
     """
     return np.asarray(linear_from_uint8(subject.neutral) * (1 - share) + relit * share, dtype=np.float32)
+
+
+def with_before(after: DisplayImage, before: DisplayImage, share: float) -> DisplayImage:
+    """`after` with a `share` of its width, from the left, as it was `before`, and a white line between them."""
+    columns = round(share * after.shape[1])
+    if columns == 0:
+        return after
+    shown = after.copy()
+    shown[:, :columns] = before[:, :columns]
+    if columns < after.shape[1]:
+        shown[:, columns - 1 : columns + 1] = 255
+    return shown
 
 
 def _fit(size: tuple[int, int], to: tuple[int, int]) -> tuple[float, NDArray[np.float64]]:

@@ -26,6 +26,7 @@ const LIGHT = {
   exposure_ev: { label: "Exposure", min: -4, max: 4, step: 0.1, initial: 0, show: stops },
   saturation: { label: "Saturation", min: 0, max: 2, step: 0.05, initial: 1, show: percent },
   blend: { label: "Blend", min: 0, max: 1, step: 0.01, initial: 1, show: percent },
+  split: { label: "As filmed", min: 0, max: 1, step: 0.01, initial: 0, show: percent },
 };
 const MORE_LIGHT = {
   pitch_deg: { label: "Tilt", min: -90, max: 90, step: 1, initial: 0, show: degrees },
@@ -75,6 +76,7 @@ function mirrored() {
 function showScene(now) {
   scene = now;
   for (const [field, control] of Object.entries(sliders)) control.set(control.of(now.lighting[field]));
+  sliders.split.element.hidden = now.mode !== "ratio";
   if (lighting.idle) lamps.show(now.lighting.lamps);
   choose(byId("mode"), now.mode);
   byId("mode-hint").textContent = MODE_HINTS[now.mode];
@@ -117,11 +119,17 @@ function showStatus(status) {
   byId("notes").hidden = notes.length === 0;
 }
 
+function showCaption({ text }) {
+  byId("caption").textContent = text;
+  byId("caption").hidden = !text;
+}
+
 function openEvents() {
   const events = new EventSource("/api/v1/events");
   const on = (kind, show) => events.addEventListener(kind, (event) => show(JSON.parse(event.data)));
   on("scene", showScene);
   on("status", showStatus);
+  on("caption", showCaption);
   on("collection", ({ name }) => library.load(name).then(restore));
   events.onopen = () => {
     library.loadAll().then(restore);
