@@ -1,8 +1,7 @@
-"""The performance, and the truth of driving videos against what projects otherwise."""
+"""The truth of driving videos against what projects otherwise."""
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +16,13 @@ from relit_camera.light.store import EnvironmentStore
 from relit_camera.space.images import Frame
 from relit_camera.space.rotation import Angles
 from relit_studio.camera import Camera
-from relit_studio.drive.performance import FPS, FRAMES, frame_times, posture_at
+from relit_studio.drive.performance import FPS, Moment
+from relit_studio.drive.performances.away import AWAY
+from relit_studio.drive.performances.hands import HANDS
+from relit_studio.drive.performances.talk import TALK
 from relit_studio.drive.room import Room
-from relit_studio.drive.truth import TruthTracker, blendshapes, head_pose, true_state
+from relit_studio.drive.take import Take
+from relit_studio.drive.truth import TruthTracker, blendshapes, frame_truth, head_pose, true_state
 from relit_studio.people.expressions import NEUTRAL
 from relit_studio.people.eyes import gaze
 from relit_studio.people.face_model import CORNEA_MATERIALS
@@ -29,24 +32,6 @@ from relit_studio.people.posture import Posture, follows_head, rigid_motion, tur
 
 CAMERA = Camera(512)
 TURNED = Posture(Angles(22.0, -6.0, 5.0))
-
-
-def test_the_performance_is_eased_and_stays_within_what_is_asked() -> None:
-    postures = [posture_at(time_s) for time_s in frame_times()]
-    assert len(postures) == FRAMES == 6 * FPS
-    yaw, pitch, roll = np.array([posture.angles for posture in postures]).T
-    assert yaw.max() > 25
-    assert yaw.min() < -25
-    assert np.abs(yaw).max() < 30
-    assert np.abs([pitch, roll]).max() < 12
-    steps = np.abs(np.diff([yaw, pitch, roll], axis=1))
-    assert steps.max() < 4.5  # degrees a frame
-    lids = [posture.expression["eyeBlink_L"] for posture in postures]
-    assert sum(before < 0.9 <= after for before, after in pairwise(lids)) >= 4
-    assert all(0 <= weight <= 1.2 for posture in postures for weight in posture.expression.values())
-    for end in (postures[0], posture_at(6.0)):
-        np.testing.assert_allclose(end.angles, 0, atol=1e-9)
-        assert {name: weight for name, weight in end.expression.items() if weight} == NEUTRAL
 
 
 def test_the_head_moves_rigidly_and_the_shoulders_stand_still(person: Person) -> None:
@@ -63,7 +48,7 @@ def test_the_head_moves_rigidly_and_the_shoulders_stand_still(person: Person) ->
 @pytest.mark.parametrize("scheme", ["mesh478", "openseeface66"])
 def test_landmarks_move_with_the_pose_that_is_told(person: Person, scheme: str) -> None:
     upright = landmarks(person, Posture())[scheme]
-    state = true_state(person, CAMERA, TURNED, scheme)
+    state = true_state(Take(person, TALK, CAMERA), Moment(TURNED), scheme)
     np.testing.assert_allclose(state.landmarks, CAMERA.project(turned(upright, TURNED.rotation)), atol=1e-3)
     assert state.pose is not None
     np.testing.assert_allclose(state.pose.rotation.as_matrix(), TURNED.rotation.as_matrix())
@@ -97,8 +82,10 @@ def test_both_schemes_agree_where_they_name_the_same(person: Person) -> None:
 
 
 def test_lids_and_mouth_open_as_told(person: Person) -> None:
+    take = Take(person, TALK, CAMERA)
+
     def state(**weights: float) -> tuple[float, float, float]:
-        found = true_state(person, CAMERA, Posture(expression={**NEUTRAL, **weights}))
+        found = true_state(take, Moment(Posture(expression={**NEUTRAL, **weights})))
         return (*found.eyes, found.mouth)
 
     right, left, mouth = state()
@@ -127,19 +114,58 @@ def test_weights_get_the_names_that_others_use() -> None:
 
 
 def test_a_recorded_track_says_the_truth(person: Person, tmp_path: Path) -> None:
-    tracker = TruthTracker(person, CAMERA)
+    tracker = TruthTracker(Take(person, TALK, CAMERA))
     recorder = TrackRecorder(tracker, (512, 512), FPS)
     picture = np.zeros((512, 512, 3), np.uint8)
     for index in (0, 55, 90):
         recorder.add(tracker.track(Frame(picture, index, 0.0, index / FPS)), index / FPS)
     recorder.write(tmp_path / "track.json")
     track = read_track(tmp_path / "track.json")
-    state, posture = track.state(1), posture_at(55 / FPS)
+    state, moment = track.state(1), TALK.moment(55 / FPS)
     assert state.pose is not None
-    truth = head_pose(person, CAMERA, posture)
+    truth = head_pose(person, CAMERA, moment)
     assert (state.pose.rotation * truth.rotation.inv()).magnitude() < 1e-6
     np.testing.assert_allclose(state.pose.translation, truth.translation, atol=1e-6)
     assert state.pose.focal_px == CAMERA.focal_px
+
+
+def test_who_moves_aside_takes_landmarks_and_pose_along(person: Person) -> None:
+    take, shift = Take(person, TALK, CAMERA), (4.0, -2.0, -6.0)
+    at_rest, aside = (true_state(take, Moment(TURNED, shift_cm)) for shift_cm in ((0.0, 0.0, 0.0), shift))
+    points = landmarks(person, TURNED)["mesh478"] + shift
+    np.testing.assert_allclose(aside.landmarks, CAMERA.project(points), atol=1e-3)
+    assert at_rest.pose is not None
+    assert aside.pose is not None
+    moved = aside.pose.translation - at_rest.pose.translation
+    np.testing.assert_allclose(moved / np.linalg.norm(moved), shift / np.linalg.norm(shift), atol=1e-9)
+
+
+def test_nobody_is_found_while_nobody_is_there(person: Person, tmp_path: Path) -> None:
+    take = Take(person, AWAY, Camera(180, 320))
+    tracker, times = TruthTracker(take), (0.0, 3.0, 5.9)
+    recorder = TrackRecorder(tracker, (320, 180), FPS)
+    for index, time_s in enumerate(times):
+        recorder.add(tracker.track(Frame(np.zeros((180, 320, 3), np.uint8), index, 0.0, time_s)), time_s)
+    recorder.write(tmp_path / "track.json")
+    assert [frame.found for frame in read_track(tmp_path / "track.json").frames] == [True, False, True]
+    truths = [frame_truth(take, time_s) for time_s in times]
+    assert [truth["found"] for truth in truths] == [True, False, True]
+    assert [truth["visible_share"] for truth in truths] == [1, 0, 1]
+    assert [len(truth["landmarks66_hidden"]) for truth in truths] == [0, 66, 0]
+
+
+def test_a_raised_mug_covers_the_mouth_and_not_the_eyes(person: Person) -> None:
+    take = Take(person, HANDS, CAMERA)
+    at_rest, raised, drinking, passing = (frame_truth(take, time_s) for time_s in (0.0, 1.55, 2.4, 6.0))
+    assert at_rest["covered_share"] == 0
+    assert at_rest["landmarks66_hidden"] == []
+    assert 0 < raised["covered_share"] < drinking["covered_share"] < 0.6
+    mouth, eyes = set(range(48, 66)), set(range(36, 48))
+    assert mouth <= set(drinking["landmarks66_hidden"])
+    assert not eyes & set(drinking["landmarks66_hidden"])
+    assert passing["covered_share"] > 0.3
+    for truth in (at_rest, raised, drinking, passing):
+        assert truth["visible_share"] == pytest.approx(1 - truth["covered_share"], abs=1e-3)
 
 
 def test_a_turned_room_lights_from_where_it_is_seen() -> None:

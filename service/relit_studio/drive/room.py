@@ -13,7 +13,7 @@ from relit_camera.compose.view import EnvironmentView
 from relit_camera.light.environment import Environment
 from relit_camera.light.exposure import display_scale
 from relit_camera.light.maps import rotate
-from relit_camera.space.display import display_from_linear
+from relit_camera.space.display import display_from_linear, linear_from_display
 from relit_camera.space.images import DisplayImage, LinearImage, Mask
 from relit_camera.space.picture_files import write_linear
 from relit_camera.space.rotation import rotation_from_angles
@@ -60,6 +60,10 @@ class Room:
         height_deg = float(np.degrees(2 * np.arctan(camera.height / 2 / camera.focal_px)))
         view = EnvironmentView(self.environment.panorama, camera.size, height_deg, _BLUR)
         return view.picture(rotation_from_angles(self.yaw_deg), self.scale)
+
+    def behind(self, camera: Camera) -> LinearImage:
+        """The same as light, in the unit of rendered pictures; lamps no brighter than twice the backdrop's white."""
+        return linear_from_display(self.backdrop(camera)) / np.float32(self.scale)
 
     def shown(self, picture: LinearImage, alpha: Mask, backdrop: DisplayImage) -> DisplayImage:
         """A rendered picture (h, w, 3), premultiplied, over the backdrop, as the webcam gives it."""

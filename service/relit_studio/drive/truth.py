@@ -3,63 +3,91 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from relit_camera.face.schemes import landmark_scheme
-from relit_camera.face.state import FaceState, FaceStatus, HeadPose
+from relit_camera.face.state import LOST, FaceState, FaceStatus, HeadPose
 from relit_camera.space.images import Frame
 from relit_studio.camera import Camera
-from relit_studio.drive.performance import posture_at
+from relit_studio.drive.performance import Moment
+from relit_studio.drive.take import Take
 from relit_studio.people.expressions import Expression
-from relit_studio.people.landmarks import canonical_origin, landmarks
+from relit_studio.people.landmarks import canonical_origin
 from relit_studio.people.person import Person
-from relit_studio.people.posture import Posture, turned
+from relit_studio.people.posture import turned
 
 _BROW_INNER = "browInnerUp"
+_LOST, _UNCERTAIN = 0.35, 0.65
+"""Visible shares of the face below which nobody can say where it is, and below which much of it is a guess."""
 
 
 @dataclass(eq=False)
 class TruthTracker:
-    """Says of any frame of the performance what is so, by the frame's time."""
+    """Says of any frame of a take what is so, by the frame's time."""
 
-    person: Person
-    camera: Camera
+    take: Take
     name: str = "truth"
     scheme: str = "mesh478"
 
     def track(self, frame: Frame) -> FaceState:
         """The true state at the frame's time."""
-        return true_state(self.person, self.camera, posture_at(frame.time_s), self.scheme)
+        return true_state(self.take, self.take.performance.moment(frame.time_s), self.scheme)
 
     def reset(self) -> None:
         """Nothing is kept between frames."""
 
 
-def true_state(person: Person, camera: Camera, posture: Posture, scheme: str = "mesh478") -> FaceState:
-    """What a perfect tracker would say of this posture; openings are measured in the picture."""
-    known = landmark_scheme(scheme)
-    points = camera.project(landmarks(person, posture)[scheme])
+def true_state(take: Take, moment: Moment, scheme: str = "mesh478") -> FaceState:
+    """What a perfect tracker would say; openings are measured in the picture.
+
+    Its confidence is the share of the face that is visible: with little of it the face is uncertain, then lost.
+    """
+    points = take.landmarks(moment, scheme)
+    visible = take.visibility(moment, points).visible_share
+    if visible < _LOST:
+        return LOST
+    known, seen = landmark_scheme(scheme), take.camera.project(points)
     return FaceState(
-        status=FaceStatus.FOUND,
-        confidence=1.0,
+        status=FaceStatus.FOUND if visible >= _UNCERTAIN else FaceStatus.UNCERTAIN,
+        confidence=visible,
         scheme=scheme,
-        landmarks=points,
-        pose=head_pose(person, camera, posture),
-        eyes=known.eyes_opening(points),
-        mouth=known.mouth_opening(points),
-        blendshapes=blendshapes(posture.expression),
+        landmarks=seen,
+        pose=head_pose(take.person, take.camera, moment),
+        eyes=known.eyes_opening(seen),
+        mouth=known.mouth_opening(seen),
+        blendshapes=blendshapes(moment.posture.expression),
     )
 
 
-def head_pose(person: Person, camera: Camera, posture: Posture) -> HeadPose:
+def frame_truth(take: Take, time_s: float) -> dict[str, Any]:
+    """The truth of a frame as JSON: also where the face is while nobody can see it."""
+    moment = take.performance.moment(time_s)
+    points = take.landmarks(moment, "openseeface66")
+    seen = take.visibility(moment, points)
+    return {
+        "time_s": time_s,
+        "pose_deg": moment.posture.angles._asdict(),
+        "shift_cm": list(moment.shift_cm),
+        "expression": dict(moment.posture.expression),
+        "landmarks66_px": take.camera.project(points).astype(float).round(3).tolist(),
+        "landmarks66_hidden": np.flatnonzero(seen.hidden).tolist(),
+        "found": seen.visible_share >= _LOST,
+        "visible_share": round(seen.visible_share, 4),
+        "covered_share": round(seen.covered_share, 4),
+    }
+
+
+def head_pose(person: Person, camera: Camera, moment: Moment) -> HeadPose:
     """The canonical face's pose before the camera: the identity when the head is upright.
 
     The translation is in the canonical face's centimetres, so that its points project onto the head.
     """
     origin, scale = canonical_origin(person.model)
-    moved = turned(origin[None], posture.rotation)[0]
-    return HeadPose(posture.rotation, (moved - camera.position_cm) / scale, camera.focal_px)
+    rotation = moment.posture.rotation
+    moved = turned(origin[None], rotation)[0] + moment.shift_cm
+    return HeadPose(rotation, (moved - camera.position_cm) / scale, camera.focal_px)
 
 
 def blendshapes(expression: Expression) -> dict[str, float]:
