@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import cv2
@@ -83,6 +84,17 @@ def test_only_the_person_counts(truth: Path, matte: Path, tmp_path: Path) -> Non
     assert compare_videos(relit, truth, matte).psnr_db.min() > 40
 
 
+def test_frames_without_anybody_count_for_nothing(truth: Path, tmp_path: Path) -> None:
+    matte = write(tmp_path / "matte.mp4", [MATTE] * 3 + [MATTE * 0] * 2 + [MATTE] * 3)
+    light = compare_videos(write(tmp_path / "relit.mp4", [lit(0.5, 0.15)] * 8), truth, matte)
+    assert np.flatnonzero(np.isnan(light.psnr_db)).tolist() == [3, 4]
+    report = VideoReport(light)
+    figures = json.loads(json.dumps(video_json(report), allow_nan=False))
+    assert figures["light"]["gain_ev"] == pytest.approx(1, abs=0.02)
+    assert figures["jitter"]["brightness_share"] < 1e-3
+    assert not re.search(r"\bnan\b", video_page(report, "Clip") + video_text(report))
+
+
 def test_flicker_is_the_second_difference_of_the_brightness(truth: Path, tmp_path: Path) -> None:
     levels = [0.30, 0.33] * 4
     light = compare_videos(write(tmp_path / "relit.mp4", [lit(0.5, level) for level in levels]), truth)
@@ -102,7 +114,7 @@ def test_videos_that_do_not_fit_are_one_clear_error(truth: Path, tmp_path: Path)
         video.write(np.zeros((32, 32, 3), np.uint8), 0.0)
     with pytest.raises(VideoError, match="32x32"):
         compare_videos(tmp_path / "small.mp4", truth)
-    with pytest.raises(VideoError, match="empty in frame 0"):
+    with pytest.raises(VideoError, match="empty in every frame"):
         compare_videos(truth, truth, write(tmp_path / "black.mp4", [MATTE * 0] * 8))
 
 

@@ -24,11 +24,15 @@ SHADING_BLUR = 0.04
 """Sigma of the blur, as a share of the picture's width, after which light is compared and features hardly are."""
 KEPT_FRAMES = 6
 """Frames shown in the report, about so many."""
+_NOBODY = (np.nan,) * 6
+"""The figures of a frame with nobody in it."""
 
 
 @dataclass(frozen=True)
 class LightConsistency:
     """How the light in a relit video follows the truth, frame by frame; PSNR inside the matte, in linear light.
+
+    Frames whose matte is empty, nobody being there, have NaN.
 
     Attributes:
         psnr_db: (frames,) as it is.
@@ -70,7 +74,7 @@ def compare_videos(
         progress: called with the frames done.
 
     Raises:
-        VideoError: one cannot be read, they differ in size or length, or the matte is empty in a frame.
+        VideoError: one cannot be read, they differ in size or length, or the matte is empty in every frame.
     """
     rows: list[tuple[float, ...]] = []
     shown: list[tuple[int, DisplayImage, DisplayImage]] = []
@@ -89,13 +93,14 @@ def compare_videos(
                     "compare a whole replay with the truth of the same clip",
                 )
             inside = images[2][..., 1] > 127 if matte else np.ones(images[0].shape[:2], bool)
-            if not inside.any():
-                raise VideoError(f"{matte} is empty in frame {index}", "white must mark the person")
-            rows.append(_figures(linear_from_display(images[0]), linear_from_display(images[1]), inside))
+            light = linear_from_display(images[0]), linear_from_display(images[1])
+            rows.append(_figures(*light, inside) if inside.any() else _NOBODY)
             if index % every == every // 2:
                 shown.append((index, images[0], images[1]))
             progress(index + 1)
     plain, aligned, shading, gain, brightness, true_brightness = np.array(rows).T
+    if np.isnan(plain).all():
+        raise VideoError(f"{matte} is empty in every frame", "white must mark the person")
     return LightConsistency(plain, aligned, shading, gain, brightness, true_brightness, tuple(shown))
 
 
@@ -116,7 +121,7 @@ def _figures(relit: LinearImage, truth: LinearImage, inside: NDArray[np.bool_]) 
 
 
 def _flicker(brightness: NDArray[np.float64]) -> float:
-    return second_difference_rms(brightness) / max(float(brightness.mean()), 1e-12)
+    return second_difference_rms(brightness) / max(float(np.nanmean(brightness)), 1e-12)
 
 
 def _gain(seen: NDArray[np.float32], known: NDArray[np.float32]) -> float:

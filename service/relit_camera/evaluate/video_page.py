@@ -47,11 +47,11 @@ def video_json(report: VideoReport) -> dict[str, object]:
     return {
         "frames": len(light.psnr_db),
         "light": {
-            "psnr_db": float(light.psnr_db.mean()),
-            "gain_aligned_psnr_db": float(light.gain_aligned_db.mean()),
-            "shading_psnr_db": float(light.shading_db.mean()),
-            "gain_ev": float(light.gain_ev.mean()),
-            "gain_ev_std": float(light.gain_ev.std()),
+            "psnr_db": float(np.nanmean(light.psnr_db)),
+            "gain_aligned_psnr_db": float(np.nanmean(light.gain_aligned_db)),
+            "shading_psnr_db": float(np.nanmean(light.shading_db)),
+            "gain_ev": float(np.nanmean(light.gain_ev)),
+            "gain_ev_std": float(np.nanstd(light.gain_ev)),
         },
         "jitter": {
             "brightness_share": _known(light.flicker),
@@ -74,10 +74,11 @@ def video_json(report: VideoReport) -> dict[str, object]:
 def video_text(report: VideoReport) -> str:
     """The most important figures as a few lines of text."""
     light, pose = report.light, report.pose
+    plain, aligned, shading = map(np.nanmean, (light.psnr_db, light.gain_aligned_db, light.shading_db))
     lines = [
         f"{len(light.psnr_db)} frames",
-        f"light: PSNR {light.psnr_db.mean():.2f} dB, gain aligned {light.gain_aligned_db.mean():.2f} dB, shading alone "
-        f"{light.shading_db.mean():.2f} dB; gain {light.gain_ev.mean():+.2f} EV, varying by {light.gain_ev.std():.3f}",
+        f"light: PSNR {plain:.2f} dB, gain aligned {aligned:.2f} dB, shading alone {shading:.2f} dB; "
+        f"gain {np.nanmean(light.gain_ev):+.2f} EV, varying by {np.nanstd(light.gain_ev):.3f}",
         f"brightness jitter: {light.flicker:.3%} a frame, in truth {light.true_flicker:.3%}",
     ]
     if pose:
@@ -111,14 +112,14 @@ def _light(report: VideoReport) -> Iterator[str]:
         exact=False,
     )
     rows = [
-        ["as it is", light.psnr_db.mean(), light.psnr_db.min()],
-        ["brightness aligned", light.gain_aligned_db.mean(), light.gain_aligned_db.min()],
-        ["shading alone (blurred)", light.shading_db.mean(), light.shading_db.min()],
+        ["as it is", np.nanmean(light.psnr_db), np.nanmin(light.psnr_db)],
+        ["brightness aligned", np.nanmean(light.gain_aligned_db), np.nanmin(light.gain_aligned_db)],
+        ["shading alone (blurred)", np.nanmean(light.shading_db), np.nanmin(light.shading_db)],
     ]
     yield table(
         ["PSNR, dB", "mean", "worst frame"],
         rows,
-        f"Larger is better. Brightness aligned: one gain a frame, on average {light.gain_ev.mean():+.2f} stops. "
+        f"Larger is better. Brightness aligned: one gain a frame, on average {np.nanmean(light.gain_ev):+.2f} stops. "
         "Shading alone: both blurred, so that where features stand hardly counts.",
     )
     frames = np.arange(len(light.psnr_db))
