@@ -7,7 +7,9 @@ import sys
 import typer
 
 from relit_camera.errors import RelitError
+from relit_studio.commands.bundle import bundle
 from relit_studio.commands.capture import capture
+from relit_studio.commands.check import check
 from relit_studio.commands.drive import drive
 from relit_studio.commands.fetch import fetch
 from relit_studio.commands.field import field
@@ -21,7 +23,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Renders people whose truth is known. Begin with `setup` and `fetch`.",
 )
-for command in (setup, fetch, person, sheet, field, capture, drive):
+for command in (setup, fetch, person, sheet, check, field, capture, drive, bundle):
     app.command()(command)
 
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 
 import typer
 
@@ -18,8 +21,16 @@ from relit_camera.stream.director import Director
 from relit_camera.stream.sinks.factory import open_sink
 from relit_camera.stream.sources.factory import open_source
 
+Beside = Callable[[Daemon, str], AbstractContextManager[None]]
+"""What else goes on while the camera runs, given the camera and the panel's address."""
 
-def run_camera(settings: RelitSettings, environment: str | None = None) -> None:
+
+def run_camera(
+    settings: RelitSettings,
+    environment: str | None = None,
+    beside: Beside | None = None,
+    seconds: float | None = None,
+) -> None:
     """Run the camera until SIGTERM or SIGINT, then end within 3 s.
 
     Everything that can be wrong with the settings is found before a device is touched.
@@ -27,6 +38,8 @@ def run_camera(settings: RelitSettings, environment: str | None = None) -> None:
     Args:
         settings: of this run.
         environment: a stored environment's name or a panorama file, in place of the settings' own.
+        beside: entered when the panel can be reached, left when the camera is about to end.
+        seconds: end by itself after so long.
 
     Raises:
         RelitError: the port is in use, a file, device or model is missing …
@@ -55,6 +68,10 @@ def run_camera(settings: RelitSettings, environment: str | None = None) -> None:
         cleanup.callback(server.stop)
         leave_to_stay()
         typer.echo(f"Relit Camera runs; the panel is at {server.address.url}")
-        while not stop.wait(0.5):
-            pass
+        if beside is not None:
+            cleanup.enter_context(beside(daemon, server.address.url))
+        ends_at = None if seconds is None else time.monotonic() + seconds
+        while not stop.wait(0.5 if ends_at is None else max(0.0, min(0.5, ends_at - time.monotonic()))):
+            if ends_at is not None and time.monotonic() >= ends_at:
+                break
         daemon.begin_stop()

@@ -1,0 +1,1 @@
+"""The demonstration: a bundled person, their video, and a tour of places that light them."""

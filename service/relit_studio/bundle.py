@@ -1,0 +1,122 @@
+"""The files that `relit demo` is shipped with, from what `field` and `drive` have rendered of one person."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import cv2
+
+from relit_camera.capture.build import build_subject
+from relit_camera.capture.importing import import_samples
+from relit_camera.capture.landmarks_file import read_landmarks
+from relit_camera.compose.recorded_matte import write_mattes
+from relit_camera.demo import bundle
+from relit_camera.errors import InputError
+from relit_camera.face.track_file import read_track
+from relit_camera.files import make_folder, write_atomic
+from relit_camera.reflectance.method import DEFAULT_METHOD
+from relit_camera.space.images import Mask
+from relit_camera.subject.file import write_subject
+from relit_camera.subject.pack import packed
+from relit_studio.cycles.exr import read_rgba
+from relit_studio.progress import Progress, no_progress
+
+_MOST_BYTES = {bundle.SUBJECT.name: 8_000_000, bundle.CLIP.name: 4_000_000}
+_MATTE_SHRINK = 2
+
+
+def make_bundle(field: Path, clip: Path, out: Path, components: int, progress: Progress = no_progress) -> list[Path]:
+    """Write the demonstration's files into `out` and return them.
+
+    Args:
+        field: folder of `field`, rendered with Cycles.
+        clip: folder of `drive`, of the same person.
+        out: folder to write to.
+        components: principal pictures that the subject keeps.
+        progress: told of the field's pictures as they are read.
+
+    Raises:
+        InputError: a folder is not finished, or the person is not the same in both.
+        LightsError, ImageError, TrackError: a file in it is damaged.
+        StorageError: a file cannot be written.
+    """
+    _check_same_person(field / "field.json", clip / "drive.json")
+    frames = _frames(clip, len(read_track(clip / bundle.TRACK.name).frames))
+    make_folder(out)
+    with TemporaryDirectory(prefix=".bundle.", dir=out) as name:
+        made = _write(field, clip, frames, Path(name), components, progress)
+        for path in made:
+            most = _MOST_BYTES.get(path.name)
+            if most and path.stat().st_size > most:
+                raise InputError(
+                    f"{path.name} would have {path.stat().st_size / 1e6:.1f} MB; the demo's may have {most / 1e6:.0f}",
+                    "keep fewer components, or render smaller pictures",
+                )
+        return [path.replace(out / path.name) for path in made]
+
+
+def _write(
+    field: Path, clip: Path, frames: list[Path], folder: Path, components: int, progress: Progress
+) -> list[Path]:
+    """Write all files into `folder`."""
+    made = [folder / path.name for path in (bundle.SUBJECT, bundle.CLIP, bundle.TRACK, bundle.MATTES, bundle.CREDITS)]
+    subject_file, clip_file, track_file, mattes_file, credits_file = made
+    samples = import_samples(field / "lights.lp", "linear", progress)
+    points = read_landmarks(field / "landmarks.json", required=True)
+    subject = build_subject(samples, DEFAULT_METHOD, "lights.lp", "linear", points)
+    write_subject(subject_file, packed(subject, components), small=True)
+    shutil.copyfile(_existing(clip / bundle.CLIP.name), clip_file)
+    track = json.loads((clip / bundle.TRACK.name).read_text(encoding="utf-8"))
+    write_atomic(track_file, json.dumps(_rounded(track), separators=(",", ":")) + "\n")
+    write_mattes(mattes_file, [_matte(path) for path in frames])
+    lines = json.loads(_existing(clip / "truth.json").read_text(encoding="utf-8"))["credits"]
+    write_atomic(credits_file, _credits_text(lines))
+    return made
+
+
+def _check_same_person(field: Path, drive: Path) -> None:
+    names = [json.loads(_existing(path).read_text(encoding="utf-8"))["person"]["name"] for path in (field, drive)]
+    if names[0] != names[1]:
+        raise InputError(f"{field} is of {names[0]}, and {drive} of {names[1]}", "render both of one person")
+
+
+def _existing(path: Path) -> Path:
+    if not path.is_file():
+        raise InputError(f"there is no {path}", "render the folder to its end with `field` or `drive` first")
+    return path
+
+
+def _frames(clip: Path, count: int) -> list[Path]:
+    paths = sorted((clip / "frames").glob("*.exr"))
+    if len(paths) != count:
+        raise InputError(f"{clip} has {len(paths)} frames, its track {count}", "run `drive` again to its end")
+    return paths
+
+
+def _matte(path: Path) -> Mask:
+    """Of one frame, at half its size."""
+    _, alpha = read_rgba(path)
+    height, width = alpha.shape
+    small: Mask = cv2.resize(alpha, (width // _MATTE_SHRINK, height // _MATTE_SHRINK), interpolation=cv2.INTER_AREA)
+    return small
+
+
+def _rounded(value: Any) -> Any:
+    """JSON with its numbers to a thousandth: of a pixel, a degree, a centimetre."""
+    if isinstance(value, float):
+        return round(value, 3)
+    if isinstance(value, list):
+        return [_rounded(each) for each in value]
+    return {key: _rounded(each) for key, each in value.items()} if isinstance(value, dict) else value
+
+
+def _credits_text(lines: list[str]) -> str:
+    listed = "\n".join(f"- {line}" for line in lines)
+    return (
+        "# Credits\n\nThe person in this folder does not exist: they were rendered from\n\n"
+        f"{listed}\n\nThe pictures are changed much: fitted to one another, recoloured, given hair, eyes and clothes.\n"
+    )

@@ -1,0 +1,80 @@
+"""`check`: whether public face models see the studio's people."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from relit_camera.cli.parse import numbers
+from relit_camera.face.detector import FaceDetector
+from relit_camera.face.trackers import TrackerOptions, open_tracker
+from relit_camera.files import write_atomic
+from relit_camera.models.registry import model_path
+from relit_camera.space.picture_files import read_display, write_display
+from relit_camera.space.rotation import Angles
+from relit_studio.begun import keep_settings
+from relit_studio.camera import Camera
+from relit_studio.commands.options import (
+    Environment,
+    Out,
+    Samples,
+    Size,
+    Threads,
+    load_person,
+    load_room,
+    quality_of,
+    shown_progress,
+)
+from relit_studio.people.posture import Posture
+from relit_studio.recognition import recognise, recognised_table
+from relit_studio.still import render_stills
+
+_TRACKERS = ("mesh", "openseeface")
+
+
+def check(
+    out: Out,
+    people: Annotated[str, typer.Option(help="Names and numbers, with commas between.")] = "adam,bea,cem,1,2,3,4,5",
+    yaws: Annotated[str, typer.Option(help="Degrees, with commas between.")] = "-45,-30,-15,0,15,30,45",
+    pitches: Annotated[str, typer.Option(help="Degrees, with commas between.")] = "0",
+    environment: Environment = "soft",
+    size: Size = 256,
+    samples: Samples = None,
+    threads: Threads = 2,
+) -> None:
+    """Render people turned this way and that, and count how many the public models see, and how far off (check.json).
+
+    Finished pictures are left. The models are those of `relit models pull`.
+    """
+    detector = FaceDetector(model_path("face_detector_yunet"))
+    trackers = [open_tracker(name, TrackerOptions(blendshapes=False)) for name in _TRACKERS]
+    turns = [
+        Angles(yaw, pitch, 0.0)
+        for pitch in numbers(pitches, pitches.count(",") + 1, "--pitches")
+        for yaw in numbers(yaws, yaws.count(",") + 1, "--yaws")
+    ]
+    camera, room, quality = Camera(size), load_room(environment, 0.0), quality_of(False, samples, threads)
+    keep_settings(out, "settings.json", {"environment": environment, "size": size, "samples": quality.samples})
+    seen, names = [], people.split(",")
+    with shown_progress("people") as progress:
+        for done, who in enumerate(names):
+            person, postures = load_person(who), [Posture(angles) for angles in turns]
+            paths = [out / f"{who}-{angles.yaw:g}-{angles.pitch:g}.png" for angles in turns]
+            missing = [index for index, path in enumerate(paths) if not path.is_file()]
+            if missing:
+                wanted = [postures[index] for index in missing]
+                for index, picture in zip(missing, render_stills(person, wanted, room, camera, quality), strict=True):
+                    write_display(paths[index], picture)
+            for path, posture in zip(paths, postures, strict=True):
+                seen.append(recognise(read_display(path), person, posture, camera, detector, trackers))
+            progress(done + 1, len(names))
+    rows = recognised_table(seen)
+    write_atomic(out / "check.json", json.dumps(rows, indent=1) + "\n")
+    table = Table(*rows[0])
+    for row in rows:
+        table.add_row(*(f"{100 * value:.1f} %" if isinstance(value, float) else str(value) for value in row.values()))
+    Console(width=max(100, Console().width)).print(table)

@@ -1,0 +1,98 @@
+"""Whether public face models take the studio's people for people, and how far off their points are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from relit_camera.face.detector import FaceDetector
+from relit_camera.face.schemes import landmark_scheme
+from relit_camera.face.state import FaceStatus, Tracker
+from relit_camera.face.still import look_at
+from relit_camera.space.images import DisplayImage
+from relit_studio.camera import Camera
+from relit_studio.people.geometry import Floats
+from relit_studio.people.landmarks import landmarks
+from relit_studio.people.person import Person
+from relit_studio.people.posture import Posture
+
+FAR_OFF = 0.15
+"""Points that are off by more than this share of the eyes' distance, on average, are not on the face."""
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """What was seen in one picture.
+
+    Attributes:
+        yaw_deg, pitch_deg: the true pose.
+        detected: the detector found a face, and the true face's middle lies in its box.
+        errors: by tracker, the points' mean distance from the truth in distances of the outer eye corners; None where
+            the tracker found no face.
+    """
+
+    yaw_deg: float
+    pitch_deg: float
+    detected: bool
+    errors: Mapping[str, float | None]
+
+    def followed(self, tracker: str) -> bool:
+        """Whether the tracker found the face, and its points lie on it."""
+        error = self.errors[tracker]
+        return error is not None and error < FAR_OFF
+
+
+def recognise(
+    picture: DisplayImage,
+    person: Person,
+    posture: Posture,
+    camera: Camera,
+    detector: FaceDetector,
+    trackers: Sequence[Tracker],
+) -> Recognition:
+    """Show one picture of a person (uint8 sRGB) to the detector and to each tracker."""
+    places = landmarks(person, posture)
+    found = detector.detect(picture)
+    detected = False
+    if found is not None:
+        x, y = camera.project(places["openseeface66"]).mean(axis=0) - found.box[:2]
+        detected = bool(0 <= x <= found.box[2] and 0 <= y <= found.box[3])
+    errors: dict[str, float | None] = {}
+    for tracker in trackers:
+        state = look_at(picture, tracker)
+        if state.status is FaceStatus.LOST:
+            errors[tracker.name] = None
+        else:
+            true = places[tracker.scheme]
+            distance = np.linalg.norm(state.landmarks - camera.project(true), axis=1).mean()
+            errors[tracker.name] = float(distance / _eyes_px(true, tracker.scheme, camera))
+    return Recognition(posture.angles.yaw, posture.angles.pitch, detected, errors)
+
+
+def recognised_table(seen: Sequence[Recognition]) -> list[dict[str, float | str | int]]:
+    """Shares and errors over all pictures, and by the size of the yaw."""
+    yaws = sorted({abs(each.yaw_deg) for each in seen})
+    groups = [("all", list(seen))] + [(f"yaw ±{yaw:g}°", [s for s in seen if abs(s.yaw_deg) == yaw]) for yaw in yaws]
+    rows = []
+    for name, group in groups:
+        row: dict[str, float | str | int] = {
+            "frames": name,
+            "count": len(group),
+            "detected": float(np.mean([each.detected for each in group])),
+        }
+        for tracker in group[0].errors:
+            good = [each.errors[tracker] for each in group if each.followed(tracker)]
+            row[f"{tracker} followed"] = len(good) / len(group)
+            row[f"{tracker} error"] = float(np.mean(np.array(good, float))) if good else float("nan")
+        rows.append(row)
+    return rows
+
+
+def _eyes_px(points: Floats, scheme: str, camera: Camera) -> float:
+    """Distance of the outer eye corners as it would be seen from straight ahead, pixels."""
+    known = landmark_scheme(scheme)
+    right, left = points[known.right_eye.outer], points[known.left_eye.outer]
+    distance_cm = camera.position_cm[2] - (right[2] + left[2]) / 2
+    return float(np.linalg.norm(right - left) * camera.focal_px / distance_cm)
