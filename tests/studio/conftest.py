@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from relit_studio.mannequin.__main__ import main
+from relit_studio.people.cast import CAST
 from relit_studio.people.face_model import read_face_model
 from relit_studio.people.hairs import Hairs
+from relit_studio.people.identity import identity_weights
 from relit_studio.people.person import Person
 from relit_studio.people.shirt import Shirt
-from relit_studio.people.traits import CAST
 from relit_studio.people.wardrobe import Wardrobe
 
 NOTHING = np.zeros((0, 3))
@@ -32,4 +33,4 @@ def person(shared: Path) -> Person:
     bare = Shirt(NOTHING, NOTHING, NOTHING, NOTHING, np.zeros(len(model.vertices), bool))
     wardrobe = Wardrobe(model, np.zeros((len(model.vertices), 2)), NOTHING, NOTHING, Path())
     hair = Hairs(np.zeros((0, 2, 3)), np.zeros((0, 2)), np.zeros(0))
-    return Person(traits, wardrobe, model.neutral(traits.identity()), hair, bare)
+    return Person(traits, wardrobe, model.neutral(identity_weights(model, traits)), hair, bare)

@@ -13,7 +13,6 @@ from relit_studio.people.face_model import IDENTITIES, Part, read_face_model
 from relit_studio.people.geometry import Floats, Indices, Similarity, areas, scatter, vertex_normals
 from relit_studio.people.mesh478 import nearest_on_surface
 from relit_studio.people.registration import LANDMARKS, fit
-from relit_studio.people.traits import Traits, find_traits, random_traits
 from tests.studio.tiny_model import tiny_model
 
 
@@ -65,11 +64,3 @@ def test_a_damaged_model_is_said(data: bytes, tmp_path: Path) -> None:
     (tmp_path / "model.npz").write_bytes(data)
     with pytest.raises(InputError, match="no packed face model"):
         read_face_model(tmp_path / "model.npz")
-
-
-def test_a_person_is_the_same_each_time_and_unlike_the_next() -> None:
-    assert find_traits("17") == random_traits(17)
-    assert random_traits(17) != random_traits(18)
-    np.testing.assert_array_equal(Traits("x", 5).identity(), Traits("y", 5).identity())
-    tones = {random_traits(seed).skin for seed in range(60)}
-    assert len(tones) == 8

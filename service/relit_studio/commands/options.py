@@ -14,8 +14,8 @@ from relit_camera.light.store import EnvironmentStore
 from relit_studio.cycles.job import Quality
 from relit_studio.drive.room import Room
 from relit_studio.drive.rooms import ROOMS, paint_room
+from relit_studio.people.cast import find_traits
 from relit_studio.people.person import Person, make_person
-from relit_studio.people.traits import find_traits
 from relit_studio.people.wardrobe import wardrobe
 from relit_studio.progress import Progress
 

@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 from relit_camera.files import make_folder
 from relit_camera.space.picture_files import write_display
 from relit_studio.assets.store import cache_folder
+from relit_studio.cycles.extras import extra_materials, extra_objects, extra_shape
 from relit_studio.cycles.job import Material, Mesh, Scene, Shape, Strands
 from relit_studio.people.eyes import LIMBUS_CM, eye_map, eye_picture, lid_shade
 from relit_studio.people.face_model import CORNEA_MATERIALS, Part
 from relit_studio.people.geometry import Floats, vertices_of
+from relit_studio.people.hair import HANGING
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 from relit_studio.people.scalp import scalp
-from relit_studio.people.skin import lips, oil, skin_picture
+from relit_studio.people.skin import folds_picture, lips, oil, skin_picture
 
 _SKIN = (Part.FACE, Part.HEAD, Part.MOUTH, Part.SOCKET_LEFT, Part.SOCKET_RIGHT)
 _PARTS: dict[str, tuple[Part, ...]] = {
@@ -58,7 +60,7 @@ class Figure:
         skin_slots = np.where(part <= Part.HEAD, 0, np.where(part == Part.MOUTH, 1, 2))
         meshes = (
             self._mesh("head", vertices, skin_slots, ("skin", "mouth", "socket"), self.person.wardrobe.uv,
-                       {"lips": on_lips, "oil": oily, "scalp": scalp(self._model)}),
+                       {"lips": on_lips, "oil": oily, "scalp": scalp(self._model, self.person.traits.hair)}),
             self._mesh("eyes", vertices, np.isin(material, CORNEA_MATERIALS), ("iris", "cornea"), eyes.uv,
                        {"eccentricity": eyes.eccentricity}),
             self._mesh("tears", vertices, np.zeros(len(part)), ("wet",)),
@@ -79,21 +81,22 @@ class Figure:
             Strands("brows", *brows, "brow"),
             Strands("lashes", *lashes, "lash"),
         )
-        return Scene((*meshes, *clothes, *strands), self._materials())
+        return Scene((*meshes, *clothes, *strands, *extra_objects(self.person)), self._materials())
 
     def shape(self, posture: Posture) -> Shape:
         """What changes for a posture."""
         vertices = self.person.vertices(posture)
         moved = {f"{name}.vertices": vertices[used] for name, used in self._used.items()}
-        if self.person.traits.hair == "long":
+        if self.person.traits.hair in HANGING:
             hair: dict[str, NDArray] = {"hair.points": self.person.hair_points(posture)}
         else:
-            hair = {"hair.matrix": self.person.hair_motion(posture)}
+            hair = {"hair.matrix": self.person.head_motion(posture)}
         return {
             **moved,
             **hair,
             "brows.points": self.person.brows(posture).points,
             "lashes.points": self.person.lashes(posture).points,
+            **extra_shape(self.person, posture),
         }
 
     def _mesh(
@@ -131,6 +134,9 @@ class Figure:
                 "albedo": skin,
                 "pores": str(self.person.wardrobe.folder / "pores.png"),
                 "scalp_shade": 0.8 if traits.hair == "buzz" else 0.55,
+                "relief": traits.relief,
+                "folds": str(self._pictures / "folds.png"),
+                "age": traits.age,
             },
             "mouth": {"kind": "plain", "colour": [0.28, 0.06, 0.05], "roughness": 0.35, "scattering": 0.6},
             "socket": {"kind": "plain", "colour": [0.5, 0.2, 0.16], "roughness": 0.4},
@@ -141,14 +147,16 @@ class Figure:
             "gums": {"kind": "plain", "colour": [0.42, 0.12, 0.11], "roughness": 0.25, "scattering": 0.5},
             "teeth": {"kind": "plain", "colour": [0.66, 0.565, 0.42], "roughness": 0.2, "scattering": 0.4},
             "cloth": {"kind": "cloth", "colour": list(traits.shirt)},
-            "hair": {"kind": "hair", "melanin": traits.melanin, "redness": traits.redness},
+            "hair": {"kind": "hair", "melanin": traits.melanin, "redness": traits.redness, "grey": traits.grey},
             "brow": {
                 "kind": "hair",
                 "melanin": min(1.0, traits.melanin - 0.03),
                 "redness": traits.redness,
                 "roughness": 0.45,
+                "grey": 0.5 * traits.grey,
             },
             "lash": {"kind": "hair", "melanin": 1.0, "redness": 0.1, "roughness": 0.4},
+            **extra_materials(self.person),
         }
 
     @cached_property
@@ -156,6 +164,7 @@ class Figure:
         traits = self.person.traits
         folder = cache_folder() / "people" / traits.name
         make_folder(folder)
-        write_display(folder / "skin.png", skin_picture(self.person.wardrobe.albedo(traits.beard), traits))
+        write_display(folder / "skin.png", skin_picture(self.person.wardrobe.albedo(traits.shaved), traits))
         write_display(folder / "eye.png", eye_picture(traits))
+        write_display(folder / "folds.png", np.repeat(folds_picture(traits)[..., None], 3, axis=2))
         return folder

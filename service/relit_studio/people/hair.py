@@ -1,44 +1,82 @@
-"""Head hair: strands stepped along a comb, gathered into locks at two scales, with some that stray."""
+"""Head hair: strands that are combed, tied or let grow, gathered into locks at two scales, with some that stray."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
-from scipy.spatial import cKDTree
 
+from relit_studio.people import hair_styles
+from relit_studio.people.combing import Combing, combed, kept_out
 from relit_studio.people.face_model import FaceModel
-from relit_studio.people.geometry import Floats, Indices, find_nearest, smoothstep, unit
-from relit_studio.people.hair_styles import Combing, long, short
-from relit_studio.people.hairs import Hairs
+from relit_studio.people.geometry import Floats, smoothstep, unit
+from relit_studio.people.hairs import Hairs, joined
+from relit_studio.people.locks import Curl, Locks, curled, frayed, gathered, lock_guides
 from relit_studio.people.scalp import Obstacle, Roots, head_and_body, place_roots
-from relit_studio.people.traits import Traits
+from relit_studio.people.tied_hair import KNOTS, bun, drawn_back, tail
+from relit_studio.people.traits import HairStyle, Traits
 
-_COUNTS = {"short": 46_000, "long": 60_000, "buzz": 110_000}
+HANGING = ("long",)
+"""Styles that lie on the shoulders, which do not turn with the head."""
+FLATTENS_EARS = ("long", "bob")
 _RADIUS_CM = 0.0065
-_LOCKS = ((380, 0.7, 1.0, 0.28), (34, 0.88, 1.3, 0.10))
-"""Two scales: hairs a lock, how far they are drawn together at the tip, how late that begins, and by how many
-centimetres a whole lock's tip lies higher or lower than its neighbours'."""
-_HEAD_MIDDLE = np.array([0.0, 3.0, 0.0])
-_STRAYS = 0.03
-"""Share of hairs that leave their lock."""
 
 
-def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits) -> Hairs:
-    """Hair on a neutral head (vertices, 3) above clothes (n, 3)."""
+class _Style(NamedTuple):
+    comb: Callable[[Roots, np.random.Generator], Combing]
+    hairs: int
+    locks: tuple[Locks, ...] = (Locks(380, 0.7, 1.0, 0.28), Locks(34, 0.88, 1.3, 0.10))
+    curl: Curl | None = None
+    coarse: float = 1.0
+
+
+_CURLS = (Locks(300, 0.5, 0.8, 0.5, 0.5), Locks(60, 0.96, 0.5, 0.15, 0.4))
+_TRESSES = (Locks(700, 0.75, 0.8, 0.5, 0.6), Locks(60, 0.9, 0.9, 0.2, 0.5))
+_COMBED: dict[HairStyle, _Style] = {
+    "short": _Style(hair_styles.short, 46_000),
+    "swept": _Style(hair_styles.swept, 46_000, (Locks(260, 0.8, 0.9, 0.4, 0.5), Locks(30, 0.9, 1.2, 0.12))),
+    "back": _Style(hair_styles.back, 46_000, (Locks(200, 0.85, 0.8, 0.25, 0.6), Locks(30, 0.9, 1.1, 0.08))),
+    "crop": _Style(hair_styles.crop, 46_000, (Locks(170, 0.9, 0.8, 0.35, 0.6), Locks(24, 0.9, 1.0, 0.15))),
+    "receding": _Style(hair_styles.receding, 24_000, (Locks(90, 0.6, 1.0, 0.1), Locks(16, 0.8, 1.0, 0.05))),
+    "curly": _Style(hair_styles.curly, 40_000, _CURLS, Curl(0.38, 2.0), 1.25),
+    "bob": _Style(hair_styles.bob, 46_000, _TRESSES, Curl(0.55, 6.5)),
+    "long": _Style(hair_styles.long, 50_000, _TRESSES, Curl(0.6, 8.5)),
+}
+
+
+def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits, share: float = 1.0) -> Hairs:
+    """Hair on a neutral head (vertices, 3) above clothes (n, 3); `share` of it, for a quick look."""
     rng = np.random.default_rng(traits.seed + 100)
-    roots = place_roots(model, head, _COUNTS[traits.hair], rng)
-    if traits.hair == "buzz":
-        return _cropped(roots, rng)
-    combing = short(roots, rng) if traits.hair == "short" else long(roots, rng)
-    points = _combed(roots, combing, head_and_body(model, head, body), rng)
+    if traits.hair in ("buzz", "bald"):
+        count = 110_000 if traits.hair == "buzz" else 45_000
+        return _cropped(place_roots(model, head, int(share * count), rng, traits.hair), rng)
+    if traits.hair == "afro":
+        return _coiled(place_roots(model, head, int(share * 42_000), rng, traits.hair), share, rng)
+    if traits.hair in ("ponytail", "bun"):
+        roots = place_roots(model, head, int(share * 42_000), rng, traits.hair)
+        return _tied(roots, traits.hair, head_and_body(model, head, body), share, rng)
+    style = _COMBED[traits.hair]
+    roots = place_roots(model, head, int(share * style.hairs), rng, traits.hair)
+    combing = style.comb(roots, rng)
+    obstacle = head_and_body(model, head, body)
+    points = combed(roots, combing, obstacle, rng)
     shade = 0.35 * rng.normal(size=len(points))
-    for hairs, strength, onset, lift_cm in _LOCKS:
-        lock = _locks(points[:, 0], hairs, rng)
-        points = _gathered(points, lock, strength, onset, lift_cm, rng)
-        shade += 0.45 * rng.normal(size=len(points))[lock]
-    points = _frayed(points, combing, rng)
-    t = np.linspace(0, 1, combing.points)
-    thick = _RADIUS_CM * rng.uniform(0.8, 1.15, (len(points), 1)) * np.interp(t, [0, 0.7, 1], [1, 1, 0.3])
-    return Hairs(points, thick, shade)
+    for locks in style.locks:
+        guide = lock_guides(points[:, 0], share * locks.hairs, rng)
+        points = gathered(points, guide, locks, rng)
+        shade += locks.shade * rng.normal(size=len(points))[guide]
+    if style.curl is not None:
+        points = kept_out(curled(points, guide, style.curl, rng), obstacle)
+    points = frayed(points, combing.length_cm, combing.waviness_cm, combing.waves, rng)
+    return Hairs(points, _thickness(points, rng, style.coarse), shade)
+
+
+def _thickness(points: Floats, rng: np.random.Generator, coarse: float = 1.0) -> Floats:
+    t = np.linspace(0, 1, points.shape[1])
+    return np.asarray(
+        _RADIUS_CM * coarse * rng.uniform(0.8, 1.15, (len(points), 1)) * np.interp(t, [0, 0.7, 1], [1, 1, 0.3])
+    )
 
 
 def _cropped(roots: Roots, rng: np.random.Generator) -> Hairs:
@@ -53,80 +91,38 @@ def _cropped(roots: Roots, rng: np.random.Generator) -> Hairs:
     return Hairs(points, np.full((count, steps), 0.0052) * np.linspace(1, 0.6, steps), 0.5 * rng.normal(size=count))
 
 
-def _combed(roots: Roots, combing: Combing, obstacle: Obstacle, rng: np.random.Generator) -> Floats:
-    """Polylines (n, points, 3): at each step along the comb, down, and out of the head."""
-    count, last = len(roots.place), combing.points - 1
-    step = (combing.length_cm / last)[:, None]
-    place = roots.place.copy()
-    direction = unit(roots.normal * combing.lift[:, None] + combing.direction + 0.16 * rng.normal(size=(count, 3)))
-    grown = [place]
-    for index in range(1, combing.points):
-        along = index / last
-        _, normal = obstacle.nearest(place)
-        comb = combing.direction - (combing.direction * normal).sum(axis=1, keepdims=True) * normal
-        hold = 0.45 * float(np.clip(1 - along / combing.loose_from, 0, 1))
-        pull = combing.gravity[:, None] * np.array([0, -1, 0])
-        direction = unit(direction + hold * comb + pull + 0.03 * rng.normal(size=(count, 3)))
-        place = place + direction * step
-        surface, normal = obstacle.nearest(place)
-        wanted = combing.offset_cm * min(1, 4 * along) + combing.layer_cm * min(1, 3 * along)
-        gap = ((place - surface) * normal).sum(axis=1)
-        close = np.linalg.norm(place - surface, axis=1) < 4
-        push = np.where(close, np.clip(wanted - gap, 0, None), 0)[:, None]
-        if combing.frees_face:
-            place = _out_of_face(place)
-        place = place + normal * push
-        direction = unit(direction + 0.5 * normal * push / step)
-        grown.append(place)
-    return np.stack(grown, axis=1)
+def _coiled(roots: Roots, share: float, rng: np.random.Generator) -> Hairs:
+    """Tight coils that stand out all round and carry each other."""
+    count, steps = len(roots.place), 26
+    radial = unit(roots.place - [0, 4.5, -1.5])
+    low = smoothstep(roots.place[:, 1], 6, 0)
+    size = rng.uniform(3.0, 6.0)
+    length = size * (1 - 0.55 * low) * (0.35 + 0.65 * roots.density) * rng.uniform(0.8, 1.05, count)
+    direction = unit(0.5 * roots.normal + 0.7 * radial + 0.22 * rng.normal(size=(count, 3)))
+    t = np.linspace(0, 1, steps)[None, :, None]
+    points = roots.place[:, None] + direction[:, None] * length[:, None, None] * t
+    shade = 0.4 * rng.normal(size=count)
+    for locks in (Locks(420, 0.35, 1.0, 0.25, 0.4), Locks(40, 0.75, 0.7, 0.3, 0.5)):
+        guide = lock_guides(points[:, 0], share * locks.hairs, rng)
+        points = gathered(points, guide, locks, rng)
+        shade += locks.shade * rng.normal(size=count)[guide]
+    points = curled(points, guide, Curl(0.2, 0.75, 0.2), rng)
+    return Hairs(points, _thickness(points, rng, 1.1), shade)
 
 
-def _out_of_face(place: Floats) -> Floats:
-    """Points before the ears moved out and back, and those below drawn in."""
-    x, y, z = place.T
-    face = smoothstep(z, 2, 7) * smoothstep(9.5 - y, 0, 2) * smoothstep(8.6 - np.abs(x), 0, 2)
-    x = x + 0.9 * np.sign(x) * face
-    below = 0.13 * smoothstep(3.5 - y, 0, 5)
-    x = x - np.sign(x) * np.clip(np.abs(x) - 7.4, 0, None) * below
-    z = z - 1.1 * face + np.clip(-5.5 - z, 0, None) * below
-    return np.stack([x, y, z], axis=1)
-
-
-def _locks(roots: Floats, hairs: int, rng: np.random.Generator) -> Indices:
-    """The hair (n,) that guides each hair; about `hairs` have the same."""
-    guides = rng.choice(len(roots), max(1, len(roots) // hairs), replace=False)
-    # Straight borders between locks would show.
-    ragged = roots + 0.25 * np.sqrt(hairs / 400) * rng.normal(size=roots.shape)
-    _, nearest = find_nearest(cKDTree(roots[guides]), ragged)
-    return np.asarray(guides[nearest])
-
-
-def _gathered(
-    points: Floats, guide: Indices, strength: float, onset: float, lift_cm: float, rng: np.random.Generator
-) -> Floats:
-    """Hairs drawn to their guides, more so toward their tips; each lock lies a little higher or lower."""
-    roots = points[:, 0]
-    t = np.linspace(0, 1, points.shape[1])
-    apart = (roots - roots[guide])[:, None] * (1 - 0.75 * t)[None, :, None]
-    looseness = np.clip(rng.uniform(0.35, 1.15, (len(points), 1, 1)), 0, 1)
-    weight = strength * looseness * (t**onset)[None, :, None]
-    height = lift_cm * np.clip(rng.normal(size=len(points)), -0.6, 2)[guide]
-    outward = unit(roots[guide] - _HEAD_MIDDLE) * height[:, None]
-    goal = points[guide] + apart + outward[:, None] * t[None, :, None]
-    return np.asarray(points + weight * (goal - points))
-
-
-def _frayed(points: Floats, combing: Combing, rng: np.random.Generator) -> Floats:
-    """Each hair's own slight wave; a few stray from their lock, some of them far and upward: flyaways."""
-    count = len(points)
-    t = np.linspace(0, 1, points.shape[1])[None, :, None]
-    phase, amount = 6.28 * rng.random((count, 1, 3)), rng.random((count, 1, 1))
-    waved = points + combing.waviness_cm * amount * t * np.sin(6.28 * combing.waves * t + phase)
-    stray = rng.random(count) < _STRAYS
-    far = stray & (rng.random(count) < 0.35)
-    outward = unit(waved[:, -1] - _HEAD_MIDDLE)[:, None]
-    reach = np.minimum(combing.length_cm, 8)[:, None, None] / 5
-    drift = 0.45 * rng.normal(size=(count, 1, 3)) + far[:, None, None] * (
-        0.5 * outward + 0.3 * rng.normal(size=(count, 1, 3))
+def _tied(roots: Roots, style: HairStyle, obstacle: Obstacle, share: float, rng: np.random.Generator) -> Hairs:
+    knot = KNOTS[style]
+    surface, normal = obstacle.nearest(knot[None])
+    knot = surface[0] + 1.1 * normal[0]
+    points = drawn_back(roots, knot, obstacle, rng)
+    shade = 0.35 * rng.normal(size=len(points))
+    for locks in (Locks(260, 0.5, 0.5, 0.12, 0.6), Locks(40, 0.8, 0.5, 0.06, 0.45)):
+        guide = lock_guides(points[:, 0], share * locks.hairs, rng)
+        points = gathered(points, guide, locks, rng)
+        shade += locks.shade * rng.normal(size=len(points))[guide]
+    points = frayed(points, np.full(len(points), 2.0), 0.04, 1.0, rng)
+    knotted = (
+        tail(knot, obstacle, int(share * 9_000), rng) if style == "ponytail" else bun(knot, int(share * 12_000), rng)
     )
-    return np.asarray(waved + stray[:, None, None] * drift * reach * t**1.7)
+    tied = Hairs(knotted, _thickness(knotted, rng), 0.8 * rng.normal(size=len(knotted)))
+    return joined([Hairs(points, _thickness(points, rng), shade), tied])

@@ -6,13 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relit_studio.people.beard import grow_beard
 from relit_studio.people.brows import grow_brows
 from relit_studio.people.expressions import Expression
 from relit_studio.people.eyes import turn_eyes
 from relit_studio.people.face_model import FaceModel, Part
 from relit_studio.people.geometry import Floats
-from relit_studio.people.hair import grow_hair
+from relit_studio.people.glasses import Glasses, fit_glasses
+from relit_studio.people.hair import FLATTENS_EARS, grow_hair
 from relit_studio.people.hairs import Hairs
+from relit_studio.people.identity import neutral_face
 from relit_studio.people.lashes import grow_lashes
 from relit_studio.people.posture import Posture, follows_head, rigid_motion, turned
 from relit_studio.people.scalp import ears
@@ -34,6 +37,7 @@ class Person:
         neutral: (vertices, 3) the face model's vertices for this identity, upright, expression 0.
         hair: on the upright head.
         shirt: what they wear; it stands still.
+        glasses: on the upright head, with which they go, or None.
     """
 
     traits: Traits
@@ -41,6 +45,7 @@ class Person:
     neutral: Floats
     hair: Hairs
     shirt: Shirt
+    glasses: Glasses | None = None
 
     @property
     def model(self) -> FaceModel:
@@ -60,13 +65,19 @@ class Person:
         face, traits = self.face(posture.expression), self.traits
         return _turned_hairs(grow_brows(self.model, self.neutral, face, traits.seed, traits.brows), posture)
 
+    def beard(self, posture: Posture) -> Hairs | None:
+        """The beard in room axes, if there is one."""
+        face, traits = self.face(posture.expression), self.traits
+        grown = grow_beard(self.model, self.neutral, face, traits.seed, traits.beard)
+        return None if grown is None else _turned_hairs(grown, posture)
+
     def lashes(self, posture: Posture) -> Hairs:
         """Lashes in room axes."""
         face = self.face(posture.expression)
         return _turned_hairs(grow_lashes(self.model, face, self.traits.seed, self.traits.lashes), posture)
 
-    def hair_motion(self, posture: Posture) -> Floats:
-        """What takes `hair` to where it is in this posture: a matrix (4, 4) for hair that goes with the head."""
+    def head_motion(self, posture: Posture) -> Floats:
+        """A matrix (4, 4) that takes what goes with the head, hair and glasses, to where it is in this posture."""
         return rigid_motion(posture.rotation)
 
     def hair_points(self, posture: Posture) -> Floats:
@@ -79,14 +90,16 @@ class Person:
 def make_person(traits: Traits, wardrobe: Wardrobe) -> Person:
     """Build a person; some seconds, most of them for the hair."""
     model = wardrobe.model
-    neutral = model.neutral(traits.identity())
-    if traits.hair == "long":
+    neutral = neutral_face(model, traits)
+    if traits.hair in FLATTENS_EARS:
         # Ears lie flat under long hair.
         beyond = np.clip(np.abs(neutral[:, 0]) - 7.1, 0, None)
         neutral[:, 0] -= np.sign(model.vertices[:, 0]) * ears(model) * beyond * 0.75
-    shirt = sew_shirt(wardrobe.body, wardrobe.body_triangles, neutral, model.triangles(Part.FACE, Part.HEAD))
+    skin = model.triangles(Part.FACE, Part.HEAD)
+    shirt = sew_shirt(wardrobe.body, wardrobe.body_triangles, neutral, skin, traits.neckline)
     hair = grow_hair(model, neutral, shirt.cloth[shirt.cloth[:, 1] < _SHIRT_HAIR_CM], traits)
-    return Person(traits, wardrobe, neutral, hair, shirt)
+    glasses = None if traits.glasses is None else fit_glasses(model, neutral, traits.glasses)
+    return Person(traits, wardrobe, neutral, hair, shirt, glasses)
 
 
 def _turned_hairs(hairs: Hairs, posture: Posture) -> Hairs:

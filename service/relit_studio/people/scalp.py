@@ -19,6 +19,7 @@ from relit_studio.people.geometry import (
     unit,
     vertex_normals,
 )
+from relit_studio.people.traits import HairStyle
 
 _HAIRLINE = np.array(
     [
@@ -29,12 +30,25 @@ _HAIRLINE = np.array(
 """Height of the hairline on the mean head over the azimuth from the front, degrees and centimetres."""
 
 
-def scalp(model: FaceModel) -> Floats:
+def scalp(model: FaceModel, style: HairStyle = "short") -> Floats:
     """0..1 (vertices,) where hair grows."""
     mean = model.vertices
     azimuth = np.degrees(np.arctan2(np.abs(mean[:, 0]), mean[:, 2]))
     above = mean[:, 1] - np.interp(azimuth, *_HAIRLINE)
-    return smoothstep(above, -0.25, 0.75) * (model.vertex_part <= Part.HEAD) * (mean[:, 1] > -6)
+    grown = smoothstep(above, -0.25, 0.75) * (model.vertex_part <= Part.HEAD) * (mean[:, 1] > -6)
+    return grown * _left(mean, style)
+
+
+def _left(mean: Floats, style: HairStyle) -> Floats:
+    """0..1 (vertices,) of what would grow that has not fallen out."""
+    x, y, z = np.abs(mean[:, 0]), mean[:, 1], mean[:, 2]
+    if style == "receding":
+        corners = np.exp(-(((x - 4.6) / 2.0) ** 2)) * smoothstep(z, 0.5, 4.0) * smoothstep(y, 8.0, 9.5)
+        front = smoothstep(z, 5.2, 6.8) * smoothstep(y, 8.0, 9.5)
+        return (1 - np.clip(1.3 * corners, 0, 1)) * (1 - 0.9 * front)
+    if style == "bald":
+        return np.asarray(1 - smoothstep(y + 0.1 * z, 6.2, 8.2))
+    return np.ones(len(mean))
 
 
 def ears(model: FaceModel) -> Floats:
@@ -72,10 +86,10 @@ class Obstacle:
         return self.points[index], self.normals[index]
 
 
-def place_roots(model: FaceModel, head: Floats, count: int, rng: np.random.Generator) -> Roots:
+def place_roots(model: FaceModel, head: Floats, count: int, rng: np.random.Generator, style: HairStyle) -> Roots:
     """`count` roots on the scalp of a head (vertices, 3)."""
     triangles = model.triangles(Part.FACE, Part.HEAD)
-    mask = scalp(model)
+    mask = scalp(model, style)
     density = areas(head, triangles) * mask[triangles].mean(axis=1) ** 1.5
     surface: SurfacePoints = scatter(triangles, density, count, rng)
     normals = vertex_normals(head, triangles)

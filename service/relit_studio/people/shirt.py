@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from relit_studio.people.collar import fold_collar
 from relit_studio.people.geometry import (
     Floats,
     Indices,
@@ -18,6 +19,7 @@ from relit_studio.people.geometry import (
     unit,
     vertex_normals,
 )
+from relit_studio.people.traits import Neckline
 
 _POINT = np.array([0.0, -11.3, -1.5])
 _NORMAL = unit([0.0, 1.0, 0.40])
@@ -37,6 +39,7 @@ class Shirt:
         cloth, cloth_faces: (n, 3) and (m, 4), -1 in the last column.
         collar, collar_faces: (k, 3) and (l, 4).
         covered: (vertices,) what of the face model's skin lies under it.
+        under: vertices and faces of the collar of a shirt worn below, or None.
     """
 
     cloth: Floats
@@ -44,9 +47,12 @@ class Shirt:
     collar: Floats
     collar_faces: Indices
     covered: NDArray[np.bool_]
+    under: tuple[Floats, Indices] | None = None
 
 
-def sew_shirt(body: Floats, triangles: Indices, skin: Floats, skin_triangles: Indices) -> Shirt:
+def sew_shirt(
+    body: Floats, triangles: Indices, skin: Floats, skin_triangles: Indices, neckline: Neckline = "crew"
+) -> Shirt:
     """A shirt from the scan's surface over the skin of one identity."""
     body = body + [-body[body[:, 1] < -14, 0].mean(), 0, 0]
     body = body + 0.5 * vertex_normals(body, triangles)
@@ -58,12 +64,20 @@ def sew_shirt(body: Floats, triangles: Indices, skin: Floats, skin_triangles: In
     # Sleeves hang farther down than the scan reaches.
     cloth[:, 1] = np.where(cloth[:, 1] < -13, -13 + 1.45 * (cloth[:, 1] + 13), cloth[:, 1])
 
-    middle, collar = _collar(skin[np.unique(skin_triangles)])
+    neck = skin[np.unique(skin_triangles)]
+    middle, outward = _neckline(neck, 70)
+    collar = _collar(middle, outward)
     _, nearest = find_nearest(cKDTree(middle), cloth)
     share = 0.9 * smoothstep((cloth - _POINT) @ _NORMAL, -3, 0) * low
     cloth = cloth + share[:, None] * (middle[nearest] - cloth) * [1, 0.4, 1]
     faces = np.column_stack([triangles[kept], np.full(int(kept.sum()), -1)])
-    return Shirt(cloth, faces, collar, _tube_faces(), (skin - _POINT) @ _NORMAL < -0.5)
+    covered = (skin - _POINT) @ _NORMAL < -0.5
+    under = None
+    if neckline == "collar":
+        under = fold_collar(
+            _neckline(neck, 25)[0], _NORMAL, np.concatenate([cloth[np.unique(triangles[kept])], collar])
+        )
+    return Shirt(cloth, faces, collar, _tube_faces(), covered, under)
 
 
 def _fitted(body: Floats, triangles: Indices, low: NDArray[np.bool_], skin: Floats, skin_triangles: Indices) -> Floats:
@@ -84,24 +98,29 @@ def _fitted(body: Floats, triangles: Indices, low: NDArray[np.bool_], skin: Floa
     return cloth
 
 
-def _collar(skin: Floats) -> tuple[Floats, Floats]:
-    """The neckline round the neck (96, 3), and a rolled tube about it (96 · 12, 3)."""
+def _neckline(skin: Floats, percentile: float) -> tuple[Floats, Floats]:
+    """A line (96, 3) about the neck in the plane, outside so many per cent of the skin near it; and outward of it."""
     neck = skin[(skin[:, 1] < -8) & (np.abs((skin - _POINT) @ _NORMAL) < 1.4)]
     centre = np.array([neck[:, 0].mean(), _POINT[1], (neck[:, 2].min() + neck[:, 2].max()) / 2])
     offset = neck - centre
     angle, radius = np.arctan2(offset[:, 0], offset[:, 2]), np.hypot(offset[:, 0], offset[:, 2])
     around = np.linspace(-np.pi, np.pi, _COLLAR_SECTIONS, endpoint=False)
     apart = np.abs((angle[None] - around[:, None] + np.pi) % (2 * np.pi) - np.pi)
-    wide = np.array([np.percentile(radius[row < 0.25], 70) for row in apart])
+    wide = np.array([np.percentile(radius[row < 0.25], percentile) for row in apart])
     for _ in range(6):
         wide = (np.roll(wide, 1) + wide + np.roll(wide, -1)) / 3
     outward = np.stack([np.sin(around), np.zeros_like(around), np.cos(around)], axis=1)
     middle = centre + outward * (wide + 0.38)[:, None]
     middle[:, 1] = _POINT[1] - (middle - _POINT)[:, 2] * _NORMAL[2] / _NORMAL[1]
+    return middle, outward
+
+
+def _collar(middle: Floats, outward: Floats) -> Floats:
+    """A rolled tube (96 · 12, 3) about the neckline."""
     section = np.linspace(0, 2 * np.pi, _COLLAR_POINTS, endpoint=False)
     sideways, upward = 0.30 * np.cos(section) - 0.45 * np.sin(section), 1.05 * np.sin(section) - 0.3
     tube = middle[:, None] + outward[:, None] * sideways[None, :, None] + _NORMAL * upward[None, :, None]
-    return middle, tube.reshape(-1, 3)
+    return tube.reshape(-1, 3)
 
 
 def _tube_faces() -> Indices:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from relit_camera.space.colour import linear_from_uint8, uint8_from_linear
 from relit_camera.space.images import DisplayImage
+from relit_studio.people.folds import age_spots, folds
 from relit_studio.people.geometry import Floats, smoothstep
 from relit_studio.people.scan_pictures import lips_mask, scalp_mask
 from relit_studio.people.traits import Traits
@@ -18,6 +20,12 @@ _FACE = slice(600, 1450)
 """Rows and columns of the map that hold the face."""
 _MELANIN_SPOT = np.array([0.35, 0.6, 0.8])
 """What a spot takes of each channel."""
+_FOLD_SHADE = np.array([0.16, 0.26, 0.26])
+"""What a fold takes of each channel."""
+_BLOOD = np.array([0.04, 0.24, 0.20])
+"""What blood takes of each channel."""
+_FLUSHED = (((392, 400), 48, 0.9), ((638, 400), 48, 0.9), ((513, 405), 26, 0.7), ((513, 590), 40, 0.3))
+"""Cheeks, nose and chin: middle and radius in pixels of 1024 x 1024, and how red they are wont to be."""
 
 
 def skin_picture(photo: DisplayImage, traits: Traits) -> DisplayImage:
@@ -28,7 +36,18 @@ def skin_picture(photo: DisplayImage, traits: Traits) -> DisplayImage:
     albedo = albedo * (1 - scalp) + np.array(traits.skin) * 0.82 * scalp
     lips = lips_mask(SIDE)[..., None]
     albedo = albedo * (1 - lips + lips * np.array(traits.lips))
-    return uint8_from_linear((albedo * (1 - _spots(traits.seed)[..., None] * _MELANIN_SPOT)).astype(np.float32))
+    if traits.flush:
+        albedo = albedo * (1 - traits.flush * _blood(traits.seed)[..., None] * _BLOOD)
+    if traits.age:
+        albedo = albedo * (1 - traits.age * folds(traits.seed)[..., None] * _FOLD_SHADE)
+        albedo = albedo * (1 - age_spots(traits.seed, traits.age)[..., None] * _MELANIN_SPOT)
+    spots = _spots(traits.seed, traits.freckles)[..., None]
+    return uint8_from_linear((albedo * (1 - spots * _MELANIN_SPOT)).astype(np.float32))
+
+
+def folds_picture(traits: Traits) -> NDArray[np.uint8]:
+    """Relief (2048, 2048) of an old skin's folds; 255 is level."""
+    return np.asarray(255 * (1 - np.clip(folds(traits.seed), 0, 1)), np.uint8)
 
 
 def oil(mean: Floats) -> Floats:
@@ -45,11 +64,24 @@ def lips(mean: Floats, ring: Floats) -> Floats:
     return smoothstep(inside, -0.08, 0.12) * (mean[:, 2] > 8.5)
 
 
-def _spots(seed: int) -> Floats:
-    """0..1 (2048, 2048): many faint freckles, a few moles, and of these one or two that are raised dark."""
+def _blood(seed: int) -> Floats:
+    """-1..1 (2048, 2048): how much more blood than the photographed skin has, by cheeks and nose, and in blotches."""
+    rng = np.random.default_rng(seed + 500)
+    y, x = np.mgrid[:SIDE, :SIDE].astype(np.float32)
+    red = np.zeros((SIDE, SIDE), np.float32)
+    for (column, row), radius, strength in _FLUSHED:
+        apart = np.hypot(x - 2 * column - 25 * rng.normal(), y - 2 * row - 25 * rng.normal())
+        red += strength * rng.uniform(0.5, 1.2) * np.exp(-((apart / (2 * radius)) ** 2))
+    coarse = cv2.resize(rng.normal(size=(24, 24)).astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_CUBIC)
+    fine = cv2.resize(rng.normal(size=(110, 110)).astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_CUBIC)
+    return np.asarray(np.clip(red + 0.22 * coarse + 0.12 * fine, -1, 1.5), np.float64)
+
+
+def _spots(seed: int, amount: float) -> Floats:
+    """0..1 (2048, 2048): many faint freckles, `amount` times as many as usual; a few moles, one or two of them dark."""
     rng = np.random.default_rng(seed)
     canvas = np.zeros((SIDE, SIDE), np.float32)
-    freckles, moles = int(rng.integers(80, 400)), int(rng.integers(3, 12))
+    freckles, moles = int(amount * rng.integers(80, 400)), int(rng.integers(3, 12))
     for radius, depth, count in (((1, 3), (0.05, 0.25), freckles), ((2, 5), (0.35, 0.8), moles)):
         for _ in range(count):
             middle = tuple(int(place) for place in rng.integers(_FACE.start, _FACE.stop, 2))

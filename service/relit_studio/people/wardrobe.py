@@ -41,9 +41,9 @@ class Wardrobe:
     body_triangles: Indices
     folder: Path
 
-    def albedo(self, beard: bool) -> DisplayImage:
+    def albedo(self, shaved: bool) -> DisplayImage:
         """The cleaned photographed skin (1024, 1024, 3), sRGB."""
-        return read_display(self.folder / ("stubble.png" if beard else "clean.png"))
+        return read_display(self.folder / ("stubble.png" if shaved else "clean.png"))
 
 
 @lru_cache(maxsize=1)

@@ -10,6 +10,7 @@ from relit_studio.cycles.worker.nodes import Nodes, Socket
 Colour = list[float]
 _SHADE = 0.07
 """What a strand's shade of 1 adds to its melanin."""
+_GREY_MELANIN = 0.05
 
 
 def build_material(name: str, description: Mapping[str, Any]) -> Any:
@@ -18,7 +19,9 @@ def build_material(name: str, description: Mapping[str, Any]) -> Any:
     return _KINDS[arguments.pop("kind")](Nodes(name), **arguments)
 
 
-def _skin(nodes: Nodes, albedo: str, pores: str, scalp_shade: float) -> Any:
+def _skin(
+    nodes: Nodes, albedo: str, pores: str, scalp_shade: float, relief: float, folds: str = "", age: float = 0.0
+) -> Any:
     """Photographed albedo over subsurface scattering; oily where the mesh says so, and moist on the lips."""
     lips, oil, scalp = (nodes.attribute(name) for name in ("lips", "oil", "scalp"))
     where = nodes.position()
@@ -27,8 +30,13 @@ def _skin(nodes: Nodes, albedo: str, pores: str, scalp_shade: float) -> Any:
     )
     cells = nodes.add("TexVoronoi", {"Vector": where, "Scale": 26.0}, feature="SMOOTH_F1").outputs["Distance"]
     normal = nodes.add("Bump", {"Strength": 0.35, "Distance": 0.012, "Height": cells}).outputs[0]
-    relief = nodes.picture(pores, linear=True)
-    normal = nodes.add("Bump", {"Strength": 0.9, "Distance": 0.14, "Height": relief, "Normal": normal}).outputs[0]
+    height = nodes.picture(pores, linear=True)
+    normal = nodes.add(
+        "Bump", {"Strength": min(relief, 1.0), "Distance": 0.14 * max(relief, 1.0), "Height": height, "Normal": normal}
+    ).outputs[0]
+    if age:
+        height = nodes.picture(folds, linear=True)
+        normal = nodes.add("Bump", {"Strength": age, "Distance": 0.16, "Height": height, "Normal": normal}).outputs[0]
     # The lips' upright creases: without them a hard lamp makes one white streak.
     squeeze = nodes.add("Mapping", {"Vector": where, "Scale": (1.0, 0.25, 0.22)}).outputs[0]
     creases = nodes.add("TexNoise", {"Vector": squeeze, "Scale": 9.0, "Detail": 3.0}).outputs[0]
@@ -55,12 +63,13 @@ def _skin(nodes: Nodes, albedo: str, pores: str, scalp_shade: float) -> Any:
     return nodes.finish(shader.outputs[0])
 
 
-def _plain(nodes: Nodes, colour: Colour, roughness: float = 0.5, scattering: float = 0.0) -> Any:
+def _plain(nodes: Nodes, colour: Colour, roughness: float = 0.5, scattering: float = 0.0, metallic: float = 0.0) -> Any:
     shader = nodes.add(
         "BsdfPrincipled",
         {
             "Base Color": colour,
             "Roughness": roughness,
+            "Metallic": metallic,
             "Subsurface Weight": scattering,
             "Subsurface Radius": (1.0, 0.4, 0.3),
             "Subsurface Scale": 0.15,
@@ -101,6 +110,11 @@ def _wet(nodes: Nodes) -> Any:
     return nodes.finish(_film(nodes, 1.36, 0.05))
 
 
+def _lens(nodes: Nodes) -> Any:
+    """Thin coated glass: what is behind it stays in its place, and little is reflected."""
+    return nodes.finish(_film(nodes, 1.16, 0.015))
+
+
 def _film(nodes: Nodes, index: float, roughness: float) -> Socket:
     """Clear and without refraction, so without noise: Fresnel's share is reflected."""
     fresnel = nodes.add("Fresnel", {"IOR": index}).outputs[0]
@@ -138,10 +152,15 @@ def _cloth(nodes: Nodes, colour: Colour) -> Any:
     return nodes.finish(shader.outputs[0])
 
 
-def _hair(nodes: Nodes, melanin: float, redness: float, roughness: float = 0.26) -> Any:
+def _hair(nodes: Nodes, melanin: float, redness: float, roughness: float = 0.26, grey: float = 0.0) -> Any:
+    """Hair of the given pigments; the share `grey` of the strands has next to none."""
     shader = nodes.add("BsdfHairPrincipled", model="CHIANG", parametrization="MELANIN")
+    pigment = nodes.scaled_sum(melanin, (nodes.attribute("shade"), _SHADE))
+    if grey:
+        coloured = nodes.math("GREATER_THAN", nodes.add("HairInfo").outputs["Random"], grey)
+        pigment = nodes.scaled_sum(_GREY_MELANIN, (nodes.math("MULTIPLY", pigment, coloured), 1.0))
     values = {
-        "Melanin": nodes.scaled_sum(melanin, (nodes.attribute("shade"), _SHADE)),
+        "Melanin": pigment,
         "Melanin Redness": redness,
         "Roughness": roughness,
         "Radial Roughness": 0.45,
@@ -160,6 +179,7 @@ _KINDS: dict[str, Callable[..., Any]] = {
     "iris": _iris,
     "cornea": _cornea,
     "wet": _wet,
+    "lens": _lens,
     "lid_shade": _lid_shade,
     "cloth": _cloth,
     "hair": _hair,

@@ -1,0 +1,79 @@
+"""Hair drawn back to a knot, and what hangs or lies there: a ponytail or a bun."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relit_studio.people.geometry import Floats, smoothstep, unit
+from relit_studio.people.scalp import Obstacle, Roots
+
+KNOTS = {"ponytail": np.array([0.0, 8.6, -9.0]), "bun": np.array([0.0, 14.6, -6.0])}
+"""Where the mean head's hair is tied."""
+POINTS = 30
+_CENTRE = np.array([0.0, 4.0, -0.5])
+_BUN_CM = 2.9
+
+
+def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Generator) -> Floats:
+    """Polylines (n, 30, 3) over the head from each root to the knot."""
+    count = len(roots.place)
+    offset, goal = roots.place - _CENTRE, knot - _CENTRE
+    reach, goal_reach = np.linalg.norm(offset, axis=1), float(np.linalg.norm(goal))
+    start, end = offset / reach[:, None], np.tile(goal / goal_reach, (count, 1))
+    angle = np.arccos(np.clip((start * end).sum(axis=1), -0.999, 0.999))[:, None]
+    layer = 0.12 + 0.5 * rng.random(count)
+    slack = 0.35 * rng.normal(size=(count, 3))
+    places = []
+    for t in np.linspace(0, 1, POINTS):
+        # Along the great circle, which is the way a brush takes.
+        direction = (np.sin((1 - t) * angle) * start + np.sin(t * angle) * end) / np.sin(angle)
+        place = _CENTRE + direction * ((1 - t) * reach + t * goal_reach)[:, None] + slack * np.sin(np.pi * t)
+        surface, normal = obstacle.nearest(place)
+        gap = ((place - surface) * normal).sum(axis=1)
+        wanted = layer * min(1.0, 6 * t) + 0.9 * smoothstep(t, 0.75, 1.0)
+        lifted = place + normal * np.clip(wanted - gap, -0.8 * min(1.0, 4 * t), None)[:, None]
+        loose = float(smoothstep(t, 0.8, 1.0))
+        places.append(lifted * (1 - loose) + (knot + 0.35 * slack) * loose)
+    places[0] = roots.place
+    return np.stack(places, axis=1)
+
+
+def tail(knot: Floats, obstacle: Obstacle, count: int, rng: np.random.Generator) -> Floats:
+    """Polylines (count, 30, 3) of a ponytail: out of the knot, and down behind one shoulder."""
+    side = 1.0 if rng.random() < 0.5 else -1.0
+    around = 6.28 * rng.random(count)
+    spread = np.sqrt(rng.random(count))[:, None]
+    disc = np.stack([np.cos(around), np.sin(around), np.zeros(count)], axis=1) * spread
+    place = knot + 0.6 * disc
+    direction = unit(np.array([0.35 * side, 0.15, -1.0]) + 0.45 * disc)
+    length = rng.uniform(15, 21, count)
+    places = [place]
+    for index in range(1, POINTS):
+        t = index / (POINTS - 1)
+        outward = np.array([0.035 * side, 0, 0.01 * smoothstep(t, 0.3, 1)])
+        direction = unit(direction + [0, -0.24, 0] + outward + 0.03 * disc * (1 - 1.6 * t))
+        place = place + direction * (length / (POINTS - 1))[:, None]
+        surface, normal = obstacle.nearest(place)
+        gap = ((place - surface) * normal).sum(axis=1)
+        place = place + normal * np.clip(0.5 - gap, 0, 1.5)[:, None]
+        places.append(place)
+    return np.stack(places, axis=1)
+
+
+def bun(knot: Floats, count: int, rng: np.random.Generator) -> Floats:
+    """Polylines (count, 30, 3) wound about a ball over the knot."""
+    up = unit(knot - _CENTRE)
+    aside = unit(np.cross(up, [0, 0, 1]))
+    ahead = np.cross(aside, up)
+    strand = rng.integers(7, size=count)
+    tube = rng.random((2, count))
+    start = 6.28 * (strand / 7 + 0.03 * rng.normal(size=count))
+    t = np.linspace(0, 1, POINTS)[None]
+    turn = start[:, None] + 6.28 * 0.8 * t
+    # A rope round a ring: strands twist about each other while they go round.
+    twist = 6.28 * (tube[0][:, None] * 0.35 + strand[:, None] * 0.37 + 0.9 * t)
+    thick = 0.55 * _BUN_CM * np.sqrt(tube[1])[:, None] ** 0.3
+    radius = 0.52 * _BUN_CM + thick * np.cos(twist)
+    height = 0.45 * _BUN_CM + 1.1 * thick * np.sin(twist)
+    flat = radius[..., None] * (np.cos(turn)[..., None] * aside + np.sin(turn)[..., None] * ahead)
+    return np.asarray(knot + flat + height[..., None] * up)
