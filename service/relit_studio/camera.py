@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.space.images import Points
+from relit_studio.pinhole import Pinhole
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,5 @@ class Camera:
 
     def project(self, points: NDArray) -> Points:
         """Pixels (count, 2) float32, centres at integers + ½, of room points (count, 3) in centimetres."""
-        x, y, z = (np.asarray(points, np.float64) - self.position_cm).T
-        scale = self.focal_px / -z
-        width, height = self.size
-        return np.stack([width / 2 + x * scale, height / 2 - y * scale], axis=1).astype(np.float32)
+        seen = Pinhole(*self.size, self.focal_px).project(np.asarray(points, np.float64) - self.position_cm)
+        return seen[:, :2].astype(np.float32)

@@ -9,12 +9,12 @@ import numpy as np
 from relit_camera.light.builtin.catalogue import builtin_environment
 from relit_studio.camera import Camera
 from relit_studio.capture.field_person import FieldPerson
-from relit_studio.capture.pinhole import Pinhole
 from relit_studio.field.render import FieldSettings, field_description
 from relit_studio.field.solver import DISTANCE_CM, SolverSettings, write_solver_field
 from relit_studio.people.landmarks import canonical_origin, landmarks
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
+from relit_studio.pinhole import Pinhole
 
 
 def test_the_camera_that_is_told_sees_points_where_they_are(person: Person) -> None:

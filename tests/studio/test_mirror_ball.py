@@ -9,8 +9,8 @@ from scipy.optimize import minimize
 from relit_camera.space.directions import texel_directions
 from relit_studio.capture.mirror_ball import MirrorBall
 from relit_studio.capture.mirror_image import Room, highlight_px, room_in_ball, torch_in_ball
-from relit_studio.capture.pinhole import Pinhole
 from relit_studio.capture.torch import RADIUS_CM, Torch
+from relit_studio.pinhole import Pinhole
 
 CAMERA = Pinhole(240, 200, 230.0)
 METAL = np.array([0.9, 0.8, 0.7], np.float32)

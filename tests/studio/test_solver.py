@@ -10,12 +10,12 @@ import pytest
 
 from relit_camera.capture.importing import import_samples
 from relit_camera.space.directions import direction_from_degrees, texel_directions, texel_solid_angles
-from relit_studio.capture.pinhole import Pinhole
 from relit_studio.field.solver import SolverSettings, solve, write_solver_field
 from relit_studio.field.solver_gloss import glossy
 from relit_studio.field.solver_scene import Surfaces
 from relit_studio.field.solver_transport import bounced, transport
 from relit_studio.mannequin.mesh import grid_triangles
+from relit_studio.pinhole import Pinhole
 
 CAMERA = Pinhole(48, 36, 60.0)
 SETTINGS = SolverSettings(bounces=1, bundles=24, rays=64, supersampling=2, shadow=240)

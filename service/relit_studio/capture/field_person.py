@@ -27,8 +27,8 @@ from relit_camera.space.directions import texel_directions, texel_solid_angles
 from relit_camera.space.images import LinearImage
 from relit_studio.capture.head_motion import Motion
 from relit_studio.capture.person import FACE_REACH_CM, Layers
-from relit_studio.capture.pinhole import Pinhole
 from relit_studio.capture.torch import Torch
+from relit_studio.pinhole import Pinhole
 
 CAMERA_NAME, TRUTH_NAME = "field.json", "truth.npz"
 

@@ -10,13 +10,13 @@ from relit_camera.light.maps import LightMap
 from relit_camera.space.images import LinearImage
 from relit_studio.capture.head_motion import REST, Motion
 from relit_studio.capture.person import FACE_REACH_CM, Layers
-from relit_studio.capture.pinhole import Pinhole
 from relit_studio.capture.point_shadow import PointShadow
 from relit_studio.capture.torch import Torch
 from relit_studio.mannequin.figure import Posture, mannequin
 from relit_studio.mannequin.lights import lights_from_map
 from relit_studio.mannequin.raster import Hits, rasterise
 from relit_studio.mannequin.shading import ShadowMap, Surface, Values, reflected
+from relit_studio.pinhole import Pinhole
 
 _SEAT_CM = (0.0, -2.0, -62.0)
 """The head's origin at rest."""

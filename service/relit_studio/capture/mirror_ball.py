@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from relit_studio.capture.pinhole import Pinhole
+from relit_studio.pinhole import Pinhole
 
 Vectors = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ from scipy.special import ndtr
 from relit_camera.space.directions import map_position_from_direction
 from relit_camera.space.images import LinearImage, Mask
 from relit_studio.capture.mirror_ball import MirrorBall
-from relit_studio.capture.pinhole import Pinhole
 from relit_studio.capture.torch import RADIUS_CM, Torch
 from relit_studio.mannequin.shading import axes_along
+from relit_studio.pinhole import Pinhole
 
 _SUPERSAMPLING = 4
 _DISC_SAMPLES = 64

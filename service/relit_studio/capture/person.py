@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from relit_camera.space.images import LinearImage, Mask
 from relit_studio.capture.head_motion import Motion
-from relit_studio.capture.pinhole import Pinhole
 from relit_studio.capture.torch import Torch
+from relit_studio.pinhole import Pinhole
 
 FACE_REACH_CM = 9.0
 """What is seen of the person within this distance of the head's origin counts as the face's surface."""

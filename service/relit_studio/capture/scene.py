@@ -16,8 +16,8 @@ from relit_studio.capture.head_motion import HeadMotion, Motion
 from relit_studio.capture.mirror_ball import MirrorBall
 from relit_studio.capture.mirror_image import Room, room_in_ball, torch_in_ball
 from relit_studio.capture.person import Person
-from relit_studio.capture.pinhole import Pinhole
 from relit_studio.capture.torch import HandPath, Torch
+from relit_studio.pinhole import Pinhole
 
 _BALL_AT = (0.7, 0.46)
 """Its place: shares of what half the picture spans, to the right and up, at the head's distance."""

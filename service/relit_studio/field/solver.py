@@ -21,7 +21,6 @@ from relit_camera.space.directions import texel_directions
 from relit_camera.space.images import LinearImage, Mask
 from relit_camera.space.picture_files import write_display, write_linear
 from relit_studio.begun import keep_settings
-from relit_studio.capture.pinhole import Pinhole
 from relit_studio.field.solver_gloss import glossy, schlick
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
 from relit_studio.field.solver_transport import Transport, bounced, transport
@@ -29,6 +28,7 @@ from relit_studio.mannequin.figure import Posture, mannequin
 from relit_studio.mannequin.olat import grey, lights_text
 from relit_studio.mannequin.raster import Hits, rasterise
 from relit_studio.mannequin.shading import ShadowMap
+from relit_studio.pinhole import Pinhole
 from relit_studio.progress import Progress, no_progress
 
 Values = NDArray[np.float32]

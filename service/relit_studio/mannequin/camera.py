@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from relit_camera.face.state import HeadPose
 from relit_studio.mannequin.figure import PIVOT, Posture
+from relit_studio.pinhole import Pinhole
 
 DISTANCE_CM = 50.0
 VIEW_CM = 36.5
@@ -29,10 +30,7 @@ class Camera:
 
     def project(self, points: NDArray) -> NDArray:
         """Pixels (count, 2), centres at integers + ½, and 1 / distance as third column, of room points (count, 3)."""
-        x, y, z = (points + np.array(_PLACE, points.dtype)).T
-        inverse = -1 / z
-        half = self.size / 2
-        return np.stack([half + self.focal_px * x * inverse, half - self.focal_px * y * inverse, inverse], axis=1)
+        return Pinhole(self.size, self.size, self.focal_px).project(points + np.array(_PLACE, points.dtype))
 
     def towards(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
         """Unit vectors (count, 3) from room points (count, 3) to the camera."""

@@ -1,7 +1,7 @@
-"""The phone's camera: a pinhole at the origin of the capture's axes.
+"""The pinhole that every camera of the studio is.
 
-Camera axes, for everything in `capture`: X right in the picture, Y up, Z toward the camera, centimetres, the camera at
-the origin, so that what it sees has z < 0.
+Camera axes: X right in the picture, Y up, Z toward the camera, centimetres, the camera at the origin, so that what it
+sees has z < 0.
 """
 
 from __future__ import annotations
