@@ -6,7 +6,10 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from relit_camera.space.images import DisplayImage
+import cv2
+import numpy as np
+
+from relit_camera.space.images import DisplayImage, LinearImage, Mask
 from relit_studio.camera import Camera
 from relit_studio.cycles.exr import read_rgba
 from relit_studio.cycles.figure import Figure
@@ -16,6 +19,8 @@ from relit_studio.drive.room import Room
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 from relit_studio.progress import Progress, no_progress
+
+_EDGE_PX = 0.8
 
 
 def render_stills(
@@ -40,4 +45,11 @@ def render_stills(
         ]
         render(figure.scene(), camera, quality, pictures, progress)
         backdrop = room.backdrop(camera)
-        return [room.shown(*read_rgba(picture.path), backdrop) for picture in pictures]
+        return [room.shown(*_calmed(*read_rgba(picture.path)), backdrop) for picture in pictures]
+
+
+def _calmed(picture: LinearImage, alpha: Mask) -> tuple[LinearImage, Mask]:
+    """A premultiplied picture (h, w, 3) and its alpha (h, w) with soft edges: Cycles denoises colours, but no alpha."""
+    edge = cv2.dilate(np.asarray((alpha > 0.02) & (alpha < 0.98), np.uint8), np.ones((3, 3), np.uint8)) > 0
+    soft = np.where(edge, cv2.GaussianBlur(alpha, (0, 0), _EDGE_PX), alpha)
+    return np.where(edge[..., None], cv2.GaussianBlur(picture, (0, 0), _EDGE_PX), picture), np.asarray(soft, np.float32)

@@ -21,6 +21,7 @@ from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 from relit_studio.people.scalp import scalp
 from relit_studio.people.skin import folds_picture, lips, oil, skin_picture
+from relit_studio.people.traits import Traits
 
 _SKIN = (Part.FACE, Part.HEAD, Part.MOUTH, Part.SOCKET_LEFT, Part.SOCKET_RIGHT)
 _PARTS: dict[str, tuple[Part, ...]] = {
@@ -133,9 +134,9 @@ class Figure:
                 "kind": "skin",
                 "albedo": skin,
                 "pores": str(self.person.wardrobe.folder / "pores.png"),
-                "scalp_shade": 0.8 if traits.hair == "buzz" else 0.55,
+                "scalp_shade": _scalp_shade(traits),
                 "relief": traits.relief,
-                "folds": str(self._pictures / "folds.png"),
+                "folds": str(self._pictures / "folds.png") if traits.age else "",
                 "age": traits.age,
             },
             "mouth": {"kind": "plain", "colour": [0.28, 0.06, 0.05], "roughness": 0.35, "scattering": 0.6},
@@ -166,5 +167,12 @@ class Figure:
         make_folder(folder)
         write_display(folder / "skin.png", skin_picture(self.person.wardrobe.albedo(traits.shaved), traits))
         write_display(folder / "eye.png", eye_picture(traits))
-        write_display(folder / "folds.png", np.repeat(folds_picture(traits)[..., None], 3, axis=2))
+        if traits.age:
+            write_display(folder / "folds.png", np.repeat(folds_picture(traits)[..., None], 3, axis=2))
         return folder
+
+
+def _scalp_shade(traits: Traits) -> float:
+    """How much darker than other skin the scalp is, which shows between hairs: less so between pale ones."""
+    pale = min(1.0, traits.melanin / 0.6) * (1 - 0.6 * traits.grey)
+    return (0.8 if traits.hair == "buzz" else 0.55) * pale

@@ -21,7 +21,7 @@ def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Ge
     reach, goal_reach = np.linalg.norm(offset, axis=1), float(np.linalg.norm(goal))
     start, end = offset / reach[:, None], np.tile(goal / goal_reach, (count, 1))
     angle = np.arccos(np.clip((start * end).sum(axis=1), -0.999, 0.999))[:, None]
-    layer = 0.12 + 0.5 * rng.random(count)
+    layer = 0.2 + 0.75 * rng.random(count)
     slack = 0.35 * rng.normal(size=(count, 3))
     places = []
     for t in np.linspace(0, 1, POINTS):
