@@ -136,6 +136,7 @@ class Figure:
                 "pores": str(self.person.wardrobe.folder / "pores.png"),
                 "scalp_shade": _scalp_shade(traits),
                 "relief": traits.relief,
+                "gloss": traits.gloss,
                 "folds": str(self._pictures / "folds.png") if traits.age else "",
                 "age": traits.age,
             },

@@ -23,7 +23,7 @@ Choice = TypeVar("Choice", bound=str)
 
 SKINS: tuple[Colour, ...] = (
     (0.66, 0.44, 0.35), (0.60, 0.385, 0.295), (0.56, 0.345, 0.24), (0.48, 0.285, 0.19), (0.40, 0.225, 0.145),
-    (0.31, 0.17, 0.105), (0.225, 0.118, 0.072), (0.16, 0.080, 0.050), (0.115, 0.058, 0.037), (0.088, 0.046, 0.031),
+    (0.31, 0.17, 0.105), (0.225, 0.118, 0.072), (0.165, 0.080, 0.046), (0.125, 0.058, 0.033), (0.098, 0.045, 0.026),
 )  # fmt: skip
 """Linear albedo from light to dark."""
 _LIGHT_IRISES: tuple[Colour, ...] = ((0.13, 0.24, 0.33), (0.17, 0.22, 0.12), (0.16, 0.20, 0.22), (0.20, 0.14, 0.06))
@@ -83,6 +83,7 @@ def random_traits(seed: int) -> Traits:
         freckles=float(
             rng.uniform(0.3, 1.5) + (5 * rng.random() if pigment.redness > 0.9 or rng.random() < 0.15 else 0)
         ),
+        gloss=0.15 + 0.6 * dark,
         flush=float(rng.uniform(0.1, 0.7)),
         shaved=not feminine and dark < 0.5 and (beard != "none" or bool(rng.random() < 0.6)),
         hair=hair,
@@ -151,7 +152,7 @@ def _resting(rng: np.random.Generator) -> Resting:
         eyes_wide=float(rng.uniform(-0.45, 0.05)),
         smile=float(rng.uniform(-0.25, 0.3)),
         brows_up=float(rng.uniform(-0.15, 0.25)),
-        lips_pressed=float(rng.uniform(-0.1, 0.3)),
+        lips_pressed=float(rng.uniform(-0.1, 0.12)),
     )
 
 

@@ -92,7 +92,8 @@ def eye_picture(traits: Traits) -> DisplayImage:
     radius, angle = np.hypot(x, y), np.arctan2(y, x)
     iris = _iris(traits, radius, angle, rng)
     veins = _veins(rng)[..., None]
-    sclera = np.array(_SCLERA) * (1 - veins * [0.15, 0.6, 0.6])
+    # Beside dark skin the full white would stare.
+    sclera = np.array(_SCLERA) * min(1.0, traits.skin[1] / 0.25) ** 0.2 * (1 - veins * [0.15, 0.6, 0.6])
     sclera = sclera * (1 - 0.25 * smoothstep(radius, 0.8, 1.5)[..., None] * [0.4, 0.9, 1.0])
     share = smoothstep(radius, LIMBUS_CM - 0.06, LIMBUS_CM + 0.07)[..., None]
     return uint8_from_linear((iris.clip(0, 1) * (1 - share) + sclera * share).astype(np.float32))

@@ -45,13 +45,14 @@ def tail(knot: Floats, obstacle: Obstacle, count: int, rng: np.random.Generator)
     spread = np.sqrt(rng.random(count))[:, None]
     disc = np.stack([np.cos(around), np.sin(around), np.zeros(count)], axis=1) * spread
     place = knot + 0.6 * disc
-    direction = unit(np.array([0.35 * side, 0.15, -1.0]) + 0.45 * disc)
-    length = rng.uniform(15, 21, count)
+    direction = unit(np.array([0.9 * side, 0.25, -0.8]) + 0.45 * disc)
+    length = rng.uniform(17, 25, count)
     places = [place]
     for index in range(1, POINTS):
         t = index / (POINTS - 1)
-        outward = np.array([0.035 * side, 0, 0.01 * smoothstep(t, 0.3, 1)])
-        direction = unit(direction + [0, -0.24, 0] + outward + 0.03 * disc * (1 - 1.6 * t))
+        # Over the shoulder, where it is seen.
+        ahead = np.array([0.07 * side, -0.22, 0.16 * smoothstep(t, 0.2, 0.6)])
+        direction = unit(direction + ahead + 0.03 * disc * (1 - 1.6 * t))
         place = place + direction * (length / (POINTS - 1))[:, None]
         surface, normal = obstacle.nearest(place)
         gap = ((place - surface) * normal).sum(axis=1)

@@ -80,6 +80,7 @@ class Traits:
         relief: strength of pores and lines.
         age: of the skin, 0 young to 1 old: folds, spots, bags under the eyes.
         freckles: factor on their number.
+        gloss: how narrow its highlights are, 0 dull to 1 oiled.
         flush: how red cheeks and nose are, 0..1.
         shaved: whether the skin shows a shaved beard.
         hair: style.
@@ -105,6 +106,7 @@ class Traits:
     relief: float = 0.9
     age: float = 0.0
     freckles: float = 1.0
+    gloss: float = 0.0
     flush: float = 0.0
     shaved: bool = True
     hair: HairStyle = "short"

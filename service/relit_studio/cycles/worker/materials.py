@@ -20,7 +20,14 @@ def build_material(name: str, description: Mapping[str, Any]) -> Any:
 
 
 def _skin(
-    nodes: Nodes, albedo: str, pores: str, scalp_shade: float, relief: float, folds: str = "", age: float = 0.0
+    nodes: Nodes,
+    albedo: str,
+    pores: str,
+    scalp_shade: float,
+    relief: float,
+    gloss: float = 0.0,
+    folds: str = "",
+    age: float = 0.0,
 ) -> Any:
     """Photographed albedo over subsurface scattering; oily where the mesh says so, and moist on the lips."""
     lips, oil, scalp = (nodes.attribute(name) for name in ("lips", "oil", "scalp"))
@@ -50,10 +57,10 @@ def _skin(
             "Subsurface Weight": 1.0,
             "Subsurface Scale": 0.16,
             "Subsurface Radius": (1.0, 0.42, 0.24),
-            "Roughness": nodes.scaled_sum(0.42, (blotches, 0.16), (oil, -0.07), (lips, -0.02)),
+            "Roughness": nodes.scaled_sum(0.42 - 0.14 * gloss, (blotches, 0.16), (oil, -0.07), (lips, -0.02)),
             "IOR": 1.42,
             "Specular IOR Level": nodes.scaled_sum(0.42, (lips, -0.10)),
-            "Coat Weight": nodes.scaled_sum(0.0, (lips, 0.07), (oil, 0.10)),
+            "Coat Weight": nodes.scaled_sum(0.0, (lips, 0.07), (oil, 0.10 + 0.12 * gloss)),
             "Coat Roughness": nodes.scaled_sum(0.24, (lips, 0.08)),
             "Coat IOR": 1.4,
             "Normal": normal,
