@@ -13,9 +13,9 @@ from relit_camera.space.images import DisplayImage, LinearImage
 from relit_studio.capture.wander import Wander
 from relit_studio.processing import Automatics, Gains, Sensor
 
-SENSOR = Sensor(white=0.25, shot=3e-4, read=2e-3)
+SENSOR = Sensor(white=0.25, shot=3e-4, read=1.2e-3)
 """Made for a room by day: in a dark one the gain, and with it the noise, goes up."""
-_AUTOMATICS = Automatics(pull=0.035, momentum=0.6, exposure_limit_ev=3.5, balance_limit=0.2)
+_AUTOMATICS = Automatics(pull=0.035, momentum=0.6, exposure_limit_ev=2.5, balance_limit=0.2)
 _WANTED = 0.25
 """Luminance that the exposure brings the middle of the picture to."""
 _MIDDLE = 0.2
