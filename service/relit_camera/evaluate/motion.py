@@ -21,6 +21,7 @@ class _Angles(Record):
 
 
 class _Frame(Record):
+    found: bool = True
     pose: _Angles | None = None
     pose_deg: _Angles | None = None
     landmarks: tuple[tuple[float, float], ...] = ()
@@ -65,12 +66,15 @@ class PoseError:
 def read_motion(path: Path) -> Motion:
     """Read `frames[].pose` (or `pose_deg`) `{yaw, pitch, roll}` in degrees, and `landmarks` where there are some.
 
+    Frames that say `found: false` have no pose.
+
     Raises:
         TrackError: missing, no JSON, without frames, or with a varying number of landmarks.
     """
     cure = "give a track, a replay's report, or a truth.json, whose frames have a pose"
     document = read_json(path, _File, cure, TrackError)
-    poses = [frame.pose or frame.pose_deg for frame in document.frames]
+    # A truth knows a pose where nobody can see it.
+    poses = [(frame.pose or frame.pose_deg) if frame.found else None for frame in document.frames]
     angles = [(pose.yaw, pose.pitch, pose.roll) if pose else (np.nan,) * 3 for pose in poses]
     counts = {len(frame.landmarks) for frame in document.frames if frame.landmarks}
     if len(counts) > 1:
