@@ -46,6 +46,16 @@ def test_angles_that_are_no_numbers_are_a_usage_error(tmp_path: Path) -> None:
     assert not (tmp_path / "sheet").exists()
 
 
+def test_a_drive_that_cannot_be_is_refused_before_the_work(tmp_path: Path) -> None:
+    out = ["drive", "--out", str(tmp_path / "drive")]
+    assert "has 144 frames" in refused(*out, "--frames", "145")
+    assert "--size" in refused(*out, "--size", "191x108")
+    result = CliRunner().invoke(app, [*out, "--performance", "dance"])
+    assert isinstance(result.exception, InputError)
+    assert "talk, turn, hands, away" in result.exception.cure
+    assert not (tmp_path / "drive").exists()
+
+
 def test_a_picture_that_cannot_be_written_is_said_before_the_work(tmp_path: Path) -> None:
     assert "--out" in refused("person", "--out", str(tmp_path / "adam.gif"))
     result = CliRunner().invoke(app, ["person", "--out", str(tmp_path / "none" / "adam.png")])

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from relit_camera.space.rotation import Angles, rotation_from_angles
-from relit_studio.capture.wander import Wander
 from relit_studio.mannequin.figure import PIVOT
+from relit_studio.wander import Wander
 
 _ANGLES_DEG = np.array([0.7, 0.5, 0.35])
 """RMS of yaw, pitch and roll."""

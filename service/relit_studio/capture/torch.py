@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from relit_camera.space.directions import direction_from_degrees
-from relit_studio.capture.wander import Wander
+from relit_studio.wander import Wander
 
 Vector = NDArray[np.float64]
 

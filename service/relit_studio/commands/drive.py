@@ -24,7 +24,7 @@ from relit_studio.commands.options import (
 from relit_studio.drive.performances.catalogue import PERFORMANCES, find_performance
 from relit_studio.drive.render import DriveSettings, render_drive
 
-_PERFORMANCES = "; ".join(f"{name} {each.summary}" for name, each in PERFORMANCES.items())
+_PERFORMANCES = "; ".join(f"{name} ({each.summary})" for name, each in PERFORMANCES.items())
 
 
 def drive(

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from relit_camera.space.colour import luminance, uint8_from_linear
 from relit_camera.space.images import DisplayImage, LinearImage
-from relit_studio.capture.wander import Wander
 from relit_studio.processing import Automatics, Gains, Sensor
+from relit_studio.wander import Wander
 
 SENSOR = Sensor(white=0.25, shot=3e-4, read=1.2e-3)
 """Made for a room by day: in a dark one the gain, and with it the noise, goes up."""

@@ -1,4 +1,4 @@
-"""Smooth random movement of a hand or a head."""
+"""Smooth random movement: of a hand, of a head, of a setting that drifts."""
 
 from __future__ import annotations
 
