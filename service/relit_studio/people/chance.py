@@ -84,7 +84,7 @@ def random_traits(seed: int) -> Traits:
             rng.uniform(0.3, 1.5) + (5 * rng.random() if pigment.redness > 0.9 or rng.random() < 0.15 else 0)
         ),
         gloss=0.15 + 0.6 * dark,
-        flush=float(rng.uniform(0.1, 0.7)),
+        flush=float(rng.uniform(0.1, 0.5)),
         shaved=not feminine and dark < 0.5 and (beard != "none" or bool(rng.random() < 0.6)),
         hair=hair,
         melanin=float(np.clip(pigment.melanin + 0.03 * rng.normal(), 0.2, 1)),

@@ -78,8 +78,8 @@ def kept_out(points: Floats, obstacle: Obstacle) -> Floats:
 
 
 def out_of_face(place: Floats) -> Floats:
-    """Points before the ears moved out and back, those beside the neck out of its front, and those below drawn in."""
-    x, y, z = place.T
+    """Points (..., 3) before the ears moved out and back, those at the throat aside, and those below drawn in."""
+    x, y, z = np.moveaxis(place, -1, 0)
     throat = smoothstep(z, -1.5, 2.5) * smoothstep(-2.5 - y, 0, 3) * smoothstep(7.4 - np.abs(x), 0, 2)
     x = x + 0.7 * np.sign(x) * throat
     face = smoothstep(z, 2, 7) * smoothstep(9.5 - y, 0, 2) * smoothstep(8.6 - np.abs(x), 0, 2)
@@ -87,4 +87,4 @@ def out_of_face(place: Floats) -> Floats:
     below = 0.13 * smoothstep(3.5 - y, 0, 5)
     x = x - np.sign(x) * np.clip(np.abs(x) - 7.4, 0, None) * below
     z = z - 1.1 * face + np.clip(-5.5 - z, 0, None) * below
-    return np.stack([x, y, z], axis=1)
+    return np.stack([x, y, z], axis=-1)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from relit_studio.people import hair_styles
-from relit_studio.people.combing import Combing, combed, kept_out
+from relit_studio.people.combing import Combing, combed, kept_out, out_of_face
 from relit_studio.people.face_model import FaceModel
 from relit_studio.people.geometry import Floats, smoothstep, unit
 from relit_studio.people.hairs import Hairs, joined
@@ -67,7 +67,10 @@ def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits, shar
         points = gathered(points, guide, locks, rng)
         shade += locks.shade * rng.normal(size=len(points))[guide]
     if style.curl is not None:
-        points = kept_out(curled(points, guide, style.curl, rng), obstacle)
+        points = curled(points, guide, style.curl, rng)
+        if combing.frees_face:
+            points = out_of_face(out_of_face(points))
+        points = kept_out(points, obstacle)
     points = frayed(points, combing.length_cm, combing.waviness_cm, combing.waves, rng)
     return Hairs(points, _thickness(points, rng, style.coarse), shade)
 

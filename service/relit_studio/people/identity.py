@@ -7,7 +7,7 @@ from dataclasses import asdict
 import numpy as np
 
 from relit_studio.people.face_model import IDENTITIES, FaceModel
-from relit_studio.people.geometry import Floats
+from relit_studio.people.geometry import Floats, smoothstep
 from relit_studio.people.traits import Proportions, Traits
 
 _DECAY = 35
@@ -51,6 +51,10 @@ def identity_weights(model: FaceModel, traits: Traits) -> Floats:
 def neutral_face(model: FaceModel, traits: Traits) -> Floats:
     """The model's vertices (count, 3) for this person, expression 0."""
     neutral = model.neutral(identity_weights(model, traits))
+    if traits.proportions is not None:
+        # Below the neck everybody is the mean person, for whom the shirt is cut.
+        own = smoothstep(model.vertices[:, 1] + 0.25 * model.vertices[:, 2], -11.5, -6.5)[:, None]
+        neutral = model.vertices + own * (neutral - model.vertices)
     for name, shapes in _RESTING.items():
         if weight := getattr(traits.resting, name):
             neutral += model.displacement(dict.fromkeys(shapes, weight))

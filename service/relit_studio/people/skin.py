@@ -22,7 +22,7 @@ _MELANIN_SPOT = np.array([0.35, 0.6, 0.8])
 """What a spot takes of each channel."""
 _FOLD_SHADE = np.array([0.16, 0.26, 0.26])
 """What a fold takes of each channel."""
-_BLOOD = np.array([0.04, 0.24, 0.20])
+_BLOOD = np.array([0.04, 0.22, 0.18])
 """What blood takes of each channel."""
 _FLUSHED = (((392, 400), 48, 0.9), ((638, 400), 48, 0.9), ((513, 405), 26, 0.7), ((513, 590), 40, 0.3))
 """Cheeks, nose and chin: middle and radius in pixels of 1024 x 1024, and how red they are wont to be."""
@@ -74,7 +74,7 @@ def _blood(seed: int) -> Floats:
         red += strength * rng.uniform(0.5, 1.2) * np.exp(-((apart / (2 * radius)) ** 2))
     coarse = cv2.resize(rng.normal(size=(24, 24)).astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_CUBIC)
     fine = cv2.resize(rng.normal(size=(110, 110)).astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_CUBIC)
-    return np.asarray(np.clip(red + 0.22 * coarse + 0.12 * fine, -1, 1.5), np.float64)
+    return np.asarray(np.clip(red + 0.14 * coarse + 0.08 * fine, -1, 1.5), np.float64)
 
 
 def _spots(seed: int, amount: float) -> Floats:

@@ -7,11 +7,11 @@ import numpy as np
 from relit_studio.people.geometry import Floats, smoothstep, unit
 from relit_studio.people.scalp import Obstacle, Roots
 
-KNOTS = {"ponytail": np.array([0.0, 8.6, -9.0]), "bun": np.array([0.0, 14.6, -6.0])}
+KNOTS = {"ponytail": np.array([0.0, 8.6, -9.0]), "bun": np.array([0.0, 16.0, -3.6])}
 """Where the mean head's hair is tied."""
 POINTS = 30
 _CENTRE = np.array([0.0, 4.0, -0.5])
-_BUN_CM = 2.9
+_BUN_CM = 3.5
 
 
 def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Generator) -> Floats:
