@@ -41,6 +41,8 @@ def test_hair_stays_out_of_the_head_and_the_face(person: Person, style: HairStyl
     brows, chin = person.neutral[person.model.landmarks68[[19, 8]], 1]
     face = (np.abs(points[:, 0]) < 4) & (points[:, 2] > 7.5) & (points[:, 1] < brows) & (points[:, 1] > chin)
     assert face.mean() < 0.001
+    throat = (np.abs(points[:, 0]) < 2.5) & (points[:, 2] > 3) & (points[:, 1] < chin)
+    assert throat.mean() < 0.002
 
 
 def test_the_bald_are_bare_on_top_and_the_receding_at_the_temples(person: Person) -> None:

@@ -10,9 +10,9 @@ import pytest
 from relit_camera.errors import NotFoundError
 from relit_studio.people.cast import CAST, find_traits
 from relit_studio.people.chance import PIGMENTS, SKINS, random_traits
-from relit_studio.people.identity import identity_weights, proportion_shapes
+from relit_studio.people.identity import identity_weights, neutral_face, proportion_shapes
 from relit_studio.people.person import Person
-from relit_studio.people.traits import BeardStyle, HairStyle, LensShape, Neckline, Proportions, Traits
+from relit_studio.people.traits import BeardStyle, HairStyle, LensShape, Neckline, Proportions, Resting, Traits
 
 CROWD = [random_traits(seed) for seed in range(200)]
 
@@ -78,3 +78,15 @@ def test_faces_have_the_proportions_that_are_asked_for(person: Person) -> None:
     assert np.linalg.norm(weights - other) > 0.5 * np.linalg.norm(
         identity_weights(model, plain) - identity_weights(model, Traits("x", 6))
     )
+
+
+def test_heads_differ_and_shoulders_fit_the_shirt(person: Person) -> None:
+    model = person.model
+    first, second = (neutral_face(model, random_traits(seed)) for seed in (1, 2))
+    shoulders = model.vertices[:, 1] < -13
+    assert shoulders.sum() > 100
+    np.testing.assert_allclose(first[shoulders], model.vertices[shoulders], atol=0.02)
+    assert np.linalg.norm((first - second)[model.landmarks68], axis=1).mean() > 0.15
+    tired = Traits("x", 5, resting=Resting(eyes_wide=-0.4))
+    lids = [neutral_face(model, each)[model.landmarks68[[37, 41]], 1] for each in (Traits("x", 5), tired)]
+    assert np.subtract(*lids[1]) < np.subtract(*lids[0]) - 0.05
