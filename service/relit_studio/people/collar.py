@@ -13,17 +13,10 @@ _COLUMNS = 72
 _THICK_CM = 0.12
 _PROFILE = np.array(
     [
-        [-0.2, -1.2],
-        [-0.25, 0.0],
-        [-0.2, 0.6],
-        [-0.05, 1.0],
-        [0.2, 1.05],
-        [0.5, 0.6],
-        [0.85, -0.1],
-        [1.15, -0.8],
-        [1.4, -1.3],
+        (-0.2, -1.2), (-0.25, 0.0), (-0.2, 0.6), (-0.05, 1.0), (0.2, 1.05), (0.5, 0.6), (0.85, -0.1), (1.15, -0.8),
+        (1.4, -1.3),
     ]
-)
+)  # fmt: skip
 """Outward and upward of the neckline, from the stand inside over the fold to the edge, centimetres."""
 _POINT_CM = 1.3
 """How far its two points reach below its edge."""

@@ -12,12 +12,12 @@ from relit_studio.people.combing import Combing, combed, kept_out, out_of_face
 from relit_studio.people.face_model import FaceModel
 from relit_studio.people.geometry import Floats, smoothstep, unit
 from relit_studio.people.hairs import Hairs, joined
-from relit_studio.people.locks import Curl, Locks, curled, frayed, gathered, lock_guides
+from relit_studio.people.locks import Curl, Locks, curled, frayed, in_locks
 from relit_studio.people.scalp import Obstacle, Roots, head_and_body, place_roots
 from relit_studio.people.tied_hair import KNOTS, bun, drawn_back, tail
 from relit_studio.people.traits import HairStyle, Traits
 
-HANGING = ("long",)
+HANGING = ("long", "ponytail")
 """Styles that lie on the shoulders, which do not turn with the head."""
 FLATTENS_EARS = ("long", "bob")
 _RADIUS_CM = 0.0065
@@ -33,6 +33,8 @@ class _Style(NamedTuple):
 
 _CURLS = (Locks(300, 0.5, 0.8, 0.5, 0.5), Locks(60, 0.96, 0.5, 0.15, 0.4))
 _TRESSES = (Locks(700, 0.75, 0.8, 0.5, 0.6), Locks(60, 0.9, 0.9, 0.2, 0.5))
+_COILS = (Locks(420, 0.35, 1.0, 0.25, 0.4), Locks(40, 0.75, 0.7, 0.3, 0.5))
+_DRAWN = (Locks(260, 0.5, 0.5, 0.12, 0.6), Locks(40, 0.8, 0.5, 0.06, 0.45))
 _COMBED: dict[HairStyle, _Style] = {
     "short": _Style(hair_styles.short, 46_000),
     "swept": _Style(hair_styles.swept, 46_000, (Locks(260, 0.8, 0.9, 0.4, 0.5), Locks(30, 0.9, 1.2, 0.12))),
@@ -61,11 +63,7 @@ def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits, shar
     combing = style.comb(roots, rng)
     obstacle = head_and_body(model, head, body)
     points = combed(roots, combing, obstacle, rng)
-    shade = 0.35 * rng.normal(size=len(points))
-    for locks in style.locks:
-        guide = lock_guides(points[:, 0], share * locks.hairs, rng)
-        points = gathered(points, guide, locks, rng)
-        shade += locks.shade * rng.normal(size=len(points))[guide]
+    points, shade, guide = in_locks(points, style.locks, share, rng)
     if style.curl is not None:
         points = curled(points, guide, style.curl, rng)
         if combing.frees_face:
@@ -104,11 +102,7 @@ def _coiled(roots: Roots, share: float, rng: np.random.Generator) -> Hairs:
     direction = unit(0.5 * roots.normal + 0.7 * radial + 0.22 * rng.normal(size=(count, 3)))
     t = np.linspace(0, 1, steps)[None, :, None]
     points = roots.place[:, None] + direction[:, None] * length[:, None, None] * t
-    shade = 0.4 * rng.normal(size=count)
-    for locks in (Locks(420, 0.35, 1.0, 0.25, 0.4), Locks(40, 0.75, 0.7, 0.3, 0.5)):
-        guide = lock_guides(points[:, 0], share * locks.hairs, rng)
-        points = gathered(points, guide, locks, rng)
-        shade += locks.shade * rng.normal(size=count)[guide]
+    points, shade, guide = in_locks(points, _COILS, share, rng)
     points = curled(points, guide, Curl(0.2, 0.75, 0.2), rng)
     return Hairs(points, _thickness(points, rng, 1.1), shade)
 
@@ -118,11 +112,7 @@ def _tied(roots: Roots, style: HairStyle, obstacle: Obstacle, share: float, rng:
     surface, normal = obstacle.nearest(knot[None])
     knot = surface[0] + 1.1 * normal[0]
     points = drawn_back(roots, knot, obstacle, rng)
-    shade = 0.35 * rng.normal(size=len(points))
-    for locks in (Locks(260, 0.5, 0.5, 0.12, 0.6), Locks(40, 0.8, 0.5, 0.06, 0.45)):
-        guide = lock_guides(points[:, 0], share * locks.hairs, rng)
-        points = gathered(points, guide, locks, rng)
-        shade += locks.shade * rng.normal(size=len(points))[guide]
+    points, shade, _ = in_locks(points, _DRAWN, share, rng)
     points = frayed(points, np.full(len(points), 2.0), 0.04, 1.0, rng)
     knotted = (
         tail(knot, obstacle, int(share * 9_000), rng) if style == "ponytail" else bun(knot, int(share * 12_000), rng)

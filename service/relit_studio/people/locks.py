@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,23 @@ class Curl(NamedTuple):
     own: float = 0.08
 
 
-def lock_guides(roots: Floats, hairs: float, rng: np.random.Generator) -> Indices:
+def in_locks(
+    points: Floats, scales: Sequence[Locks], share: float, rng: np.random.Generator
+) -> tuple[Floats, Floats, Indices]:
+    """Hairs (n, points, 3) gathered at each scale in turn, of which only a `share` has been grown.
+
+    Returns their points, their shades (n,), and each one's guide (n,) at the last scale.
+    """
+    guide = np.arange(len(points))
+    shade = 0.35 * rng.normal(size=len(points))
+    for locks in scales:
+        guide = _guides(points[:, 0], share * locks.hairs, rng)
+        points = _gathered(points, guide, locks, rng)
+        shade += locks.shade * rng.normal(size=len(points))[guide]
+    return points, shade, guide
+
+
+def _guides(roots: Floats, hairs: float, rng: np.random.Generator) -> Indices:
     """The hair (n,) that guides each hair; about `hairs` have the same."""
     guides = rng.choice(len(roots), max(1, int(len(roots) / hairs)), replace=False)
     # Straight borders between locks would show.
@@ -45,7 +62,7 @@ def lock_guides(roots: Floats, hairs: float, rng: np.random.Generator) -> Indice
     return np.asarray(guides[nearest])
 
 
-def gathered(points: Floats, guide: Indices, locks: Locks, rng: np.random.Generator) -> Floats:
+def _gathered(points: Floats, guide: Indices, locks: Locks, rng: np.random.Generator) -> Floats:
     """Hairs (n, points, 3) drawn to their guides, more so toward their tips; each lock lies a little off."""
     roots = points[:, 0]
     t = np.linspace(0, 1, points.shape[1])

@@ -39,7 +39,7 @@ def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Ge
 
 
 def tail(knot: Floats, obstacle: Obstacle, count: int, rng: np.random.Generator) -> Floats:
-    """Polylines (count, 30, 3) of a ponytail: out of the knot, and down behind one shoulder."""
+    """Polylines (count, 30, 3) of a ponytail: out of the knot, and down toward one shoulder."""
     side = 1.0 if rng.random() < 0.5 else -1.0
     around = 6.28 * rng.random(count)
     spread = np.sqrt(rng.random(count))[:, None]
