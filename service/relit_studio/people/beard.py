@@ -41,9 +41,9 @@ class _Style(NamedTuple):
 
 _STYLES: dict[BeardStyle, _Style] = {
     "stubble": _Style(15_000, 0.14, 0.16, 0.14, 0.0042),
-    "moustache": _Style(3_600, 0.85, 0.0, 0.0, 0.0058),
-    "goatee": _Style(6_000, 0.75, 1.3, 0.0, 0.0058),
-    "full": _Style(17_000, 0.8, 1.9, 1.0, 0.0058),
+    "moustache": _Style(3_600, 0.75, 0.0, 0.0, 0.0058),
+    "goatee": _Style(6_000, 0.65, 1.3, 0.0, 0.0058),
+    "full": _Style(17_000, 0.7, 1.9, 1.0, 0.0058),
 }
 
 
@@ -77,8 +77,8 @@ def beard_area(model: FaceModel) -> tuple[Floats, Floats, Floats]:
     below = smoothstep(np.interp(x, *_CHEEK) - y, -0.25, 0.55)
     neck = smoothstep(y + 0.3 * (z - 7), _NECK_CM - 0.6, _NECK_CM + 0.8)
     upper = smoothstep(y, -3.8, -3.2) * smoothstep(x, 3.1, 2.4) * smoothstep(y, -1.3, -1.7) * (z > 8.5)
-    # The philtrum is nearly bare, and so are the corners under the lower lip.
-    upper = upper * (1 - 0.55 * np.exp(-((x / 0.22) ** 2)))
+    # The philtrum is barer, and so are the corners under the lower lip.
+    upper = upper * (1 - 0.35 * np.exp(-((x / 0.18) ** 2)))
     bare = np.exp(-(((x - 1.35) / 0.6) ** 2) - ((y + 4.95) / 0.45) ** 2)
     middle = smoothstep(x, 3.0, 2.3) * smoothstep(y, -3.4, -4.2) * (z > 6)
     chin = middle * neck * (1 - 0.75 * bare)
@@ -94,7 +94,7 @@ def _scatter_roots(
     thickness = areas_of.max(axis=1)
     lengths = (areas_of * kind[1:4]).sum(axis=1) / np.maximum(areas_of.sum(axis=1), 1e-6)
     # The moustache's strip is narrow, and its hairs lie side by side.
-    crowded = np.maximum(thickness, 2.2 * areas_of[:, 0])
+    crowded = np.maximum(thickness, 2.6 * areas_of[:, 0])
     surface = scatter(triangles, areas(neutral, triangles) * crowded[triangles].mean(axis=1), kind.hairs, rng)
     return _Roots(surface, surface.of(thickness), surface.of(lengths))
 
@@ -104,7 +104,7 @@ def _hairs(roots: _Roots, rest: Floats, place: Floats, normal: Floats, kind: _St
     count = len(place)
     aside = np.sign(rest[:, 0]) * smoothstep(np.abs(rest[:, 0]), 0.05, 0.6)
     moustache = smoothstep(rest[:, 1], -4.2, -3.4) * (rest[:, 2] > 8)
-    down = np.stack([aside * (0.15 + 0.95 * moustache), -1 + 0.35 * moustache, 0.12 * (1 - moustache)], axis=1)
+    down = np.stack([aside * (0.15 + 0.5 * moustache), -1 + 0.2 * moustache, 0.12 * (1 - moustache)], axis=1)
     along = unit(down - (down * normal).sum(axis=1, keepdims=True) * normal)
     direction = unit(along + 0.42 * normal + 0.22 * rng.normal(size=(count, 3)))
     length = roots.length_cm * rng.uniform(0.55, 1.1, count) * (0.35 + 0.65 * roots.density)
