@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from relit_studio.people.combing import kept_out
 from relit_studio.people.face_model import FaceModel, Part
 from relit_studio.people.geometry import (
     Floats,
@@ -20,6 +21,7 @@ from relit_studio.people.geometry import (
     vertex_normals,
 )
 from relit_studio.people.hairs import Hairs
+from relit_studio.people.scalp import Obstacle
 from relit_studio.people.skin import lips
 from relit_studio.people.traits import BeardStyle
 
@@ -63,9 +65,13 @@ def grow_beard(model: FaceModel, neutral: Floats, vertices: Floats, seed: int, s
     kind, rng = _STYLES[style], np.random.default_rng(seed + 400)
     triangles = model.triangles(Part.FACE, Part.HEAD)
     roots = _scatter_roots(model, neutral, triangles, kind, rng)
-    place = roots.surface.of(vertices)
-    normal = unit(roots.surface.of(vertex_normals(vertices, triangles)))
-    return _hairs(roots, roots.surface.of(neutral), place, normal, kind, rng)
+    place, normals = roots.surface.of(vertices), vertex_normals(vertices, triangles)
+    hairs = _hairs(roots, roots.surface.of(neutral), place, unit(roots.surface.of(normals)), kind, rng)
+    skin = np.unique(triangles)
+    obstacle = Obstacle(vertices[skin], normals[skin], cKDTree(vertices[skin]))
+    # What hangs over the hollow below the lip would enter the chin. Roots stay.
+    outside = kept_out(hairs.points[:, 1:], obstacle)
+    return hairs._replace(points=np.concatenate([hairs.points[:, :1], outside], axis=1))
 
 
 def beard_area(model: FaceModel) -> tuple[Floats, Floats, Floats]:
