@@ -10,6 +10,7 @@ from relit_camera.errors import RelitError
 from relit_studio.commands.bundle import bundle
 from relit_studio.commands.capture import capture
 from relit_studio.commands.check import check
+from relit_studio.commands.compare import compare
 from relit_studio.commands.drive import drive
 from relit_studio.commands.fetch import fetch
 from relit_studio.commands.field import field
@@ -23,7 +24,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Renders people whose truth is known. Begin with `setup` and `fetch`.",
 )
-for command in (setup, fetch, person, sheet, check, field, capture, drive, bundle):
+for command in (setup, fetch, person, sheet, check, field, compare, capture, drive, bundle):
     app.command()(command)
 
 

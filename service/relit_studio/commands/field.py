@@ -19,7 +19,8 @@ from relit_studio.commands.options import (
     shown_progress,
 )
 from relit_studio.field.render import FieldSettings, render_field
-from relit_studio.field.solver import write_solver_field
+from relit_studio.field.solver import SolverSettings, write_solver_field
+from relit_studio.field.twin import render_twin
 
 
 class Renderer(StrEnum):
@@ -53,6 +54,9 @@ def field(
         with shown_progress("lights") as progress:
             write_solver_field(out, progress=progress)
         who = "mannequin"
+    elif who == "mannequin":
+        with shown_progress("lights") as progress:
+            render_twin(out, SolverSettings(), quality_of(True, samples, threads), progress)
     else:
         settings = FieldSettings(lights, size, light_size_deg, quality_of(truth, samples, threads))
         with shown_progress("lights") as progress:

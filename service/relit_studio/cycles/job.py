@@ -85,6 +85,7 @@ class Quality:
         clamp_indirect: brightest indirect sample, against fireflies; 0 clamps nothing.
         seed: of the noise; the same in all pictures, so that a video does not flicker.
         threads: of the renderer.
+        pixel_filter: Cycles' own, soft and 1.5 pixels wide, or the mean over the pixel.
     """
 
     samples: int = 32
@@ -92,6 +93,7 @@ class Quality:
     clamp_indirect: float = 6.0
     seed: int = 0
     threads: int = 2
+    pixel_filter: Literal["BLACKMAN_HARRIS", "BOX"] = "BLACKMAN_HARRIS"
 
     @staticmethod
     def truth(samples: int, threads: int) -> Quality:

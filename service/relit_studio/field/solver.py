@@ -21,7 +21,7 @@ from relit_camera.space.directions import texel_directions
 from relit_camera.space.images import LinearImage, Mask
 from relit_camera.space.picture_files import write_display, write_linear
 from relit_studio.begun import keep_settings
-from relit_studio.field.solver_gloss import glossy, schlick
+from relit_studio.field.solver_gloss import gloss_albedo, glossy
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
 from relit_studio.field.solver_transport import Transport, bounced, transport
 from relit_studio.mannequin.figure import Posture, mannequin
@@ -118,9 +118,7 @@ def solve(
     received = bounced(direct, surfaces.albedo[used], between, settings.bounces)
     to_samples = _interpolation(positions, normals, nodes, node_normals, between)
     facing = np.maximum(np.einsum("ij,ij->i", normals, views), 0)
-    # Light from all sides meets Fresnel's mean over the hemisphere, f0 + (1 - f0) / 21 by Schlick's formula.
-    mean_fresnel = np.where(finish[:, 0] > 0, finish[:, 0] + (1 - finish[:, 0]) / 21, 0)
-    base = ((1 - schlick(finish[:, 0], facing)) * (1 - mean_fresnel))[:, None] * albedo
+    base = (1 - gloss_albedo(finish[:, 0], finish[:, 1], facing))[:, None] * albedo
     for index, picture in enumerate(pictures):
         picture += averaged(base * (to_samples @ received[:, index]))
 

@@ -53,6 +53,14 @@ def pullover() -> Part:
     return grid_part("pullover", vertices, colour, CLOTH, closed=True, caster_step=4)
 
 
+def base() -> Part:
+    """The pullover's lower end, closed, below every picture: light from below must not shine through the body."""
+    edge = _body(np.full((1, len(_AROUND)), _PROFILE[0, 0]), 0.32)
+    middle = edge.mean(axis=1, keepdims=True)
+    shrunk = np.array([1, 0.5, 0.01])[:, None, None]
+    return grid_part("base", middle + shrunk * (edge - middle), _CLOTH_TONE, CLOTH, closed=True, caster_step=1)
+
+
 def _body(heights: Floats, offset: ArrayLike) -> Floats:
     """Points (rows, columns, 3) of the body at these heights (rows, columns), `offset` away from it."""
     profile = PchipInterpolator(_PROFILE[:, 0], _PROFILE[:, 1:])(np.clip(heights, -28, -3))

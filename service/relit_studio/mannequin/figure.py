@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from relit_camera.space.rotation import Angles, rotation_from_angles
 from relit_studio.mannequin import features
-from relit_studio.mannequin.bust import neck, pullover
+from relit_studio.mannequin.bust import base, neck, pullover
 from relit_studio.mannequin.expression import Expression, control_vertices, gaze_rotation, jaw_motion
 from relit_studio.mannequin.hair import hair
 from relit_studio.mannequin.head import FACE_COUNT, SCHEME, control_head, eye_centre
@@ -131,6 +131,7 @@ def mannequin() -> Figure:
         hair(skin.vertices),
         neck(),
         pullover(),
+        base(),
     ]
     counts = [len(part.vertices) for part in listed]
     starts = np.cumsum([0, *counts])

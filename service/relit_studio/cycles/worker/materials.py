@@ -85,6 +85,18 @@ def _plain(nodes: Nodes, colour: Colour, roughness: float = 0.5, scattering: flo
     return nodes.finish(shader.outputs[0])
 
 
+def _painted(nodes: Nodes) -> Any:
+    """Diffuse below GGX, as the mesh's vertices say: red, green, blue, f0 and GGX width alpha."""
+    red, green, blue, f0, alpha = (nodes.attribute(name) for name in ("red", "green", "blue", "f0", "alpha"))
+    colour = nodes.add("CombineColor", {"Red": red, "Green": green, "Blue": blue}).outputs[0]
+    root = nodes.math("SQRT", f0, 0.0)
+    index = nodes.math("DIVIDE", nodes.math("ADD", 1.0, root), nodes.math("SUBTRACT", 1.0, root))
+    shader = nodes.add(
+        "BsdfPrincipled", {"Base Color": colour, "IOR": index, "Roughness": nodes.math("SQRT", alpha, 0.0)}
+    )
+    return nodes.finish(shader.outputs[0])
+
+
 def _iris(nodes: Nodes, picture: str) -> Any:
     inputs: dict[str | int, Any] = {"Base Color": nodes.picture(picture), "Roughness": 0.4, "Specular IOR Level": 0.2}
     return nodes.finish(nodes.add("BsdfPrincipled", inputs).outputs[0])
@@ -183,6 +195,7 @@ def _hair(nodes: Nodes, melanin: float, redness: float, roughness: float = 0.26,
 _KINDS: dict[str, Callable[..., Any]] = {
     "skin": _skin,
     "plain": _plain,
+    "painted": _painted,
     "iris": _iris,
     "cornea": _cornea,
     "wet": _wet,

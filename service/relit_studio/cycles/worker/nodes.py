@@ -8,6 +8,8 @@ import bpy
 
 Socket = Any
 """bpy.types.NodeSocket."""
+REST = "rest"
+"""The vertex attribute that holds where vertices were when the scene was built."""
 
 
 class Nodes:
@@ -55,8 +57,8 @@ class Nodes:
         return self.add("Attribute", attribute_name=name).outputs["Fac"]
 
     def position(self) -> Socket:
-        """The object's own coordinates."""
-        return self.add("TexCoord").outputs["Object"]
+        """The surface's coordinates as the scene was built: what moves takes its texture along."""
+        return self.add("Attribute", attribute_name=REST).outputs["Vector"]
 
     def picture(self, path: str, *, linear: bool = False) -> Socket:
         """A picture file's colour at the mesh's texture coordinates."""

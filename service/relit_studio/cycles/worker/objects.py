@@ -11,6 +11,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from relit_studio.cycles.worker.axes import matrix_to_blender, to_blender
+from relit_studio.cycles.worker.nodes import REST
 
 Arrays = Mapping[str, NDArray]
 """Arrays by "object.field"."""
@@ -28,6 +29,9 @@ def add_mesh(description: Mapping[str, Any], arrays: Arrays, materials: Mapping[
         mesh.loops.foreach_get("vertex_index", corners)
         layer = mesh.uv_layers.new(name="uv")
         layer.data.foreach_set("uv", arrays[f"{name}.uv"][corners].astype(np.float32).ravel())
+    mesh.attributes.new(REST, "FLOAT_VECTOR", "POINT").data.foreach_set(
+        "vector", to_blender(arrays[f"{name}.vertices"]).astype(np.float32).ravel()
+    )
     for attribute in description["attributes"]:
         data = mesh.attributes.new(attribute, "FLOAT", "POINT").data
         data.foreach_set("value", arrays[f"{name}.{attribute}"].astype(np.float32))

@@ -35,7 +35,7 @@ def set_quality(quality: Mapping[str, Any]) -> None:
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device, cycles.samples, cycles.seed = "CPU", quality["samples"], quality["seed"]
-    cycles.use_adaptive_sampling = False
+    cycles.use_adaptive_sampling, cycles.pixel_filter_type = False, quality["pixel_filter"]
     cycles.use_denoising, cycles.denoiser = quality["denoise"], "OPENIMAGEDENOISE"
     cycles.denoising_input_passes, cycles.denoising_prefilter = "RGB_ALBEDO_NORMAL", "ACCURATE"
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 8, 3, 3

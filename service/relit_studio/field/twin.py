@@ -1,0 +1,61 @@
+"""The solver's scene in Cycles: the same surfaces, camera and lights, so that the two can be compared."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from relit_camera.files import write_atomic
+from relit_camera.space.directions import texel_directions
+from relit_studio.begun import keep_settings
+from relit_studio.camera import Camera
+from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene
+from relit_studio.cycles.runner import render
+from relit_studio.field.solver import BELOW_AXIS_CM, DISTANCE_CM, HEIGHT_CM, SolverSettings
+from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
+from relit_studio.mannequin.olat import lights_text
+from relit_studio.progress import Progress, no_progress
+
+
+def surfaces_scene(surfaces: Surfaces) -> Scene:
+    """Surfaces in room axes as Cycles takes them; its normals are its own, smooth over the triangles."""
+    triangles = np.asarray(surfaces.triangles)
+    names = ("red", "green", "blue")
+    colours = {name: surfaces.albedo[:, channel] for channel, name in enumerate(names)}
+    mesh = Mesh(
+        name="surfaces",
+        vertices=surfaces.vertices,
+        faces=np.column_stack([triangles, np.full(len(triangles), -1)]),
+        slots=np.zeros(len(triangles)),
+        materials=("painted",),
+        attributes={**colours, "f0": surfaces.f0, "alpha": surfaces.alpha},
+    )
+    return Scene((mesh,), {"painted": {"kind": "painted"}})
+
+
+def render_twin(
+    folder: Path, settings: SolverSettings, quality: Quality, progress: Progress = no_progress
+) -> dict[str, float]:
+    """Render what `write_solver_field` solves; lights that are there already are left. Returns seconds by picture.
+
+    Raises:
+        InputError: the folder holds a field of other settings.
+        DeviceError: Cycles is not set up, or fails.
+        StorageError: the folder cannot be written.
+    """
+    # As the solver averages its samples.
+    quality = replace(quality, pixel_filter="BOX")
+    camera = Camera(settings.height, settings.width, DISTANCE_CM, HEIGHT_CM, BELOW_AXIS_CM)
+    described = {"width": settings.width, "height": settings.height, "map_rows": settings.map_rows}
+    keep_settings(folder, "field.json", {"person": "mannequin", **described, "quality": quality.settings()})
+    directions = texel_directions(settings.map_rows, 2 * settings.map_rows).reshape(-1, 3)
+    digits = len(str(len(directions) - 1))
+    names = [f"{index:0{digits}d}.exr" for index in range(len(directions))]
+    write_atomic(folder / "lights.lp", lights_text(names, directions))
+    pictures = [
+        Picture(folder / name, DistantLight((x, y, z), size_deg=0.0))
+        for name, (x, y, z) in zip(names, directions.tolist(), strict=True)
+    ]
+    return render(surfaces_scene(mannequin_surfaces(np.zeros(3))), camera, quality, pictures, progress)
