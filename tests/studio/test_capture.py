@@ -239,7 +239,7 @@ def field(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("field")
     write_olat(folder, size=96, lights=120)
     camera = {"focal_px": 96 * 50 / 36.5, "depth_zero_cm": 50.0}
-    (folder / "field.json").write_text(json.dumps({"camera": camera}))
+    (folder / "field.json").write_text(json.dumps({"camera": camera, "credits": ["Somebody, CC-BY 3.0"]}))
     return folder
 
 
@@ -249,6 +249,7 @@ def test_person_of_a_field_looks_like_the_one_rendered_anew(field: Path) -> None
     seat = np.array([0.0, 1.4, -50.0])
     rendered = MannequinPerson(interpolated.camera, light_map, seat)
     np.testing.assert_allclose(interpolated.origin, seat, atol=0.5)
+    assert interpolated.credits == ("Somebody, CC-BY 3.0",)
     motion = Motion(Angles(1.5, -1.0, 1.0), np.array([0.3, 0.2, -0.3]))
     position = seat + np.array([-35.0, 25.0, 55.0])
     torch = Torch(position, (seat - position) / np.linalg.norm(seat - position))

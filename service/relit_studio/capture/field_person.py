@@ -60,7 +60,7 @@ class FieldPerson:
         samples = import_samples(folder / "lights.lp", gamma)
         self._pictures, self._matte = samples.pictures, samples.matte
         self._directions = samples.directions
-        field_camera, depth_zero_cm = _read_camera(folder / CAMERA_NAME, self._matte.shape)
+        field_camera, depth_zero_cm, self.credits = _read_description(folder / CAMERA_NAME, self._matte.shape)
         depth = _read_depth(folder / TRUTH_NAME, self._matte.shape)
         scale = height / field_camera.height
         self.camera = Pinhole(round(field_camera.width * scale), height, field_camera.focal_px * scale)
@@ -179,11 +179,12 @@ def _head_origin(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(nose - _NOSE_CM)
 
 
-def _read_camera(path: Path, shape: tuple[int, ...]) -> tuple[Pinhole, float]:
-    """The field's camera, and how far before it the depth is 0, centimetres."""
+def _read_description(path: Path, shape: tuple[int, ...]) -> tuple[Pinhole, float, tuple[str, ...]]:
+    """The field's camera, how far before it the depth is 0, centimetres, and whom to credit."""
     cure = "make the field again with `python -m relit_studio field`"
     try:
-        told = json.loads(path.read_text())["camera"]
+        described = json.loads(path.read_text())
+        told, named = described["camera"], tuple(map(str, described.get("credits", ())))
         camera = Pinhole(shape[1], shape[0], float(told["focal_px"]))
         depth_zero_cm = float(told["depth_zero_cm"])
     except OSError as error:
@@ -192,7 +193,7 @@ def _read_camera(path: Path, shape: tuple[int, ...]) -> tuple[Pinhole, float]:
         raise LightsError(f"{path} does not describe the field's camera: {error!r}", cure) from error
     if not (camera.focal_px > 0 and depth_zero_cm > 0):
         raise LightsError(f"{path} has a camera of focal_px {camera.focal_px}, depth_zero_cm {depth_zero_cm}", cure)
-    return camera, depth_zero_cm
+    return camera, depth_zero_cm, named
 
 
 def _read_depth(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -40,6 +40,7 @@ class MannequinPerson:
     """The generated bust; its head turns on its neck, the shoulders sway with it (see `person.Person`)."""
 
     name = "mannequin"
+    credits: tuple[str, ...] = ()
 
     def __init__(self, camera: Pinhole, room: LightMap, origin: ArrayLike = _SEAT_CM) -> None:
         """Seat it before `camera` in a room of this light, its head's origin at `origin` (3,), camera axes."""

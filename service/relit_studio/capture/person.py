@@ -33,10 +33,17 @@ class Layers:
 
 
 class Person(Protocol):
-    """Somebody before the camera who can be lit from anywhere near."""
+    """Somebody before the camera who can be lit from anywhere near.
+
+    Attributes:
+        name: of the person or their field.
+        camera: before them.
+        credits: whom to name where they are shown.
+    """
 
     name: str
     camera: Pinhole
+    credits: tuple[str, ...]
 
     @property
     def origin(self) -> NDArray[np.float64]:

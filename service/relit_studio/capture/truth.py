@@ -58,6 +58,7 @@ def capture_truth(scene: Scene, stages: Stages, video: str, room: str, seed: int
         },
         "sensor_value_of_white": SENSOR.white,
         "stages": asdict(stages),
+        "credits": list(scene.person.credits),
     }
 
 
