@@ -43,7 +43,7 @@ class _Style(NamedTuple):
 
 _STYLES: dict[BeardStyle, _Style] = {
     "stubble": _Style(15_000, 0.14, 0.16, 0.14, 0.0042),
-    "moustache": _Style(3_600, 0.75, 0.0, 0.0, 0.0058),
+    "moustache": _Style(2_600, 0.7, 0.0, 0.0, 0.0058),
     "goatee": _Style(6_000, 0.65, 1.3, 0.0, 0.0058),
     "full": _Style(17_000, 0.7, 1.9, 1.0, 0.0058),
 }

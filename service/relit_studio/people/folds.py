@@ -32,7 +32,7 @@ _BOTH_SIDES = (
 """As the left half of the picture has them."""
 _ACROSS = tuple(
     _Fold(tuple((x, row + sag * ((x - _MIDDLE) / 90) ** 2) for x in range(425, 601, 16)), depth, 2.0)
-    for row, sag, depth in ((222, 8, 0.5), (241, 6, 0.6), (259, 4, 0.4))
+    for row, sag, depth in ((208, 8, 0.45), (226, 6, 0.5), (242, 5, 0.35))
 )
 
 
