@@ -71,13 +71,13 @@ def recognise(
     return Recognition(posture.angles.yaw, posture.angles.pitch, detected, errors)
 
 
-def recognised_table(seen: Sequence[Recognition]) -> list[dict[str, float | str | int]]:
-    """Shares and errors over all pictures, and by the size of the yaw."""
+def recognised_table(seen: Sequence[Recognition]) -> list[dict[str, float | str | int | None]]:
+    """Shares and errors over all pictures, and by the size of the yaw; None is the error where nobody was followed."""
     yaws = sorted({abs(each.yaw_deg) for each in seen})
     groups = [("all", list(seen))] + [(f"yaw ±{yaw:g}°", [s for s in seen if abs(s.yaw_deg) == yaw]) for yaw in yaws]
     rows = []
     for name, group in groups:
-        row: dict[str, float | str | int] = {
+        row: dict[str, float | str | int | None] = {
             "frames": name,
             "count": len(group),
             "detected": float(np.mean([each.detected for each in group])),
@@ -85,7 +85,7 @@ def recognised_table(seen: Sequence[Recognition]) -> list[dict[str, float | str 
         for tracker in group[0].errors:
             good = [each.errors[tracker] for each in group if each.followed(tracker)]
             row[f"{tracker} followed"] = len(good) / len(group)
-            row[f"{tracker} error"] = float(np.mean(np.array(good, float))) if good else float("nan")
+            row[f"{tracker} error"] = float(np.mean(np.array(good, float))) if good else None
         rows.append(row)
     return rows
 

@@ -89,3 +89,9 @@ def test_the_table_counts_by_yaw() -> None:
     assert everything["off followed"] == 0.5
     assert everything["off error"] == pytest.approx(0.03)
     assert turned["off followed"] == pytest.approx(1 / 3)
+
+
+def test_who_is_never_followed_has_no_error() -> None:
+    everything, _ = recognised_table([Recognition(0.0, 0.0, False, {"off": None})])
+    assert everything["off followed"] == 0
+    assert everything["off error"] is None  # JSON has no NaN

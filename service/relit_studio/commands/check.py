@@ -76,5 +76,11 @@ def check(
     write_atomic(out / "check.json", json.dumps(rows, indent=1) + "\n")
     table = Table(*rows[0])
     for row in rows:
-        table.add_row(*(f"{100 * value:.1f} %" if isinstance(value, float) else str(value) for value in row.values()))
+        table.add_row(*map(_cell, row.values()))
     Console(width=max(100, Console().width)).print(table)
+
+
+def _cell(value: float | str | int | None) -> str:
+    if value is None:
+        return "–"
+    return f"{100 * value:.1f} %" if isinstance(value, float) else str(value)
