@@ -56,9 +56,12 @@ def test_frames_without_a_face_do_not_count() -> None:
 
 
 def test_a_true_pose_that_nobody_could_see_does_not_count(tmp_path: Path) -> None:
-    frames = [{"found": index != 1, "pose_deg": {"yaw": index, "pitch": 0, "roll": 0}} for index in range(3)]
+    pose = {"yaw": 1, "pitch": 0, "roll": 0}
+    frames = [{"found": index != 1, "pose_deg": pose, "landmarks": [[3, 4]]} for index in range(3)]
     (tmp_path / "truth.json").write_text(json.dumps({"frames": frames}))
-    assert np.isnan(read_motion(tmp_path / "truth.json").angles_deg).all(axis=1).tolist() == [False, True, False]
+    motion = read_motion(tmp_path / "truth.json")
+    assert np.isnan(motion.angles_deg).all(axis=1).tolist() == [False, True, False]
+    assert np.isnan(motion.landmarks).all(axis=(1, 2)).tolist() == [False, True, False]
 
 
 def test_steady_motion_has_no_jitter_and_noise_has_its_own() -> None:

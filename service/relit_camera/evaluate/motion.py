@@ -66,7 +66,7 @@ class PoseError:
 def read_motion(path: Path) -> Motion:
     """Read `frames[].pose` (or `pose_deg`) `{yaw, pitch, roll}` in degrees, and `landmarks` where there are some.
 
-    Frames that say `found: false` have no pose.
+    Frames that say `found: false` have neither.
 
     Raises:
         TrackError: missing, no JSON, without frames, or with a varying number of landmarks.
@@ -74,13 +74,14 @@ def read_motion(path: Path) -> Motion:
     cure = "give a track, a replay's report, or a truth.json, whose frames have a pose"
     document = read_json(path, _File, cure, TrackError)
     # A truth knows a pose where nobody can see it.
-    poses = [(frame.pose or frame.pose_deg) if frame.found else None for frame in document.frames]
+    frames = [frame if frame.found else _Frame() for frame in document.frames]
+    poses = [frame.pose or frame.pose_deg for frame in frames]
     angles = [(pose.yaw, pose.pitch, pose.roll) if pose else (np.nan,) * 3 for pose in poses]
-    counts = {len(frame.landmarks) for frame in document.frames if frame.landmarks}
+    counts = {len(frame.landmarks) for frame in frames if frame.landmarks}
     if len(counts) > 1:
         raise TrackError(f"{path} has frames of {min(counts)} and of {max(counts)} landmarks", "track the video again")
     count = counts.pop() if counts else 0
-    points = [frame.landmarks or [(np.nan, np.nan)] * count for frame in document.frames]
+    points = [frame.landmarks or [(np.nan, np.nan)] * count for frame in frames]
     return Motion(np.array(angles, float), np.array(points, float).reshape(len(points), count, 2))
 
 
