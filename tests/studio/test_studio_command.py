@@ -41,6 +41,14 @@ def test_the_solver_takes_none_of_the_options_of_cycles(tmp_path: Path) -> None:
     assert not (tmp_path / "x").exists()
 
 
+def test_the_solvers_scene_in_cycles_has_its_own_size_and_lights(tmp_path: Path) -> None:
+    out = ("--out", str(tmp_path / "x"))
+    said = refused("field", "--person", "mannequin", "--samples", "4", "--size", "64", "--denoise", *out)
+    assert "--person mannequin takes no --size" in said
+    assert "--samples" not in said
+    assert not (tmp_path / "x").exists()
+
+
 def test_angles_that_are_no_numbers_are_a_usage_error(tmp_path: Path) -> None:
     assert "--yaws" in refused("sheet", "--out", str(tmp_path / "sheet"), "--yaws", "0,left")
     assert not (tmp_path / "sheet").exists()

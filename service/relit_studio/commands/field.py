@@ -37,7 +37,7 @@ def field(
         Renderer,
         typer.Option(
             help="cycles: a person, as the other options say. solver: our own, without Cycles and without other "
-            "options: the mannequin, 64x48 pixels under 16x8 lights."
+            "options: the mannequin, 64x48 pixels under 16x8 lights, which Cycles renders as --person mannequin."
         ),
     ] = Renderer.CYCLES,
     who: PersonName = "adam",
@@ -50,11 +50,12 @@ def field(
 ) -> None:
     """Render a person under one light after another, with the truth; with Cycles run it again to go on after a stop."""
     if renderer is Renderer.SOLVER:
-        _refuse_other_options(context)
+        _refuse_other_options(context, "--renderer solver", "renderer")
         with shown_progress("lights") as progress:
             write_solver_field(out, progress=progress)
         who = "mannequin"
     elif who == "mannequin":
+        _refuse_other_options(context, "--person mannequin", "renderer", "who", "samples", "threads")
         with shown_progress("lights") as progress:
             render_twin(out, SolverSettings(), quality_of(True, samples, threads), progress)
     else:
@@ -66,13 +67,14 @@ def field(
     typer.echo(f"relit capture import {out / 'lights.lp'} --out {who}.relit")
 
 
-def _refuse_other_options(context: typer.Context) -> None:
+def _refuse_other_options(context: typer.Context, choice: str, *taken: str) -> None:
+    """Say which of the options given `choice` leaves no room for; it takes the parameters `taken`."""
     given = [
         parameter.opts[0]
         for parameter in context.command.params
-        if parameter.name not in ("out", "renderer", None)
+        if parameter.name not in ("out", *taken, None)
         and (source := context.get_parameter_source(parameter.name)) is not None
         and source.name == "COMMANDLINE"
     ]
     if given:
-        raise typer.BadParameter(f"solver takes no {', '.join(given)}", param_hint="--renderer")
+        raise typer.BadParameter(f"{choice} takes no {', '.join(given)}")
