@@ -10,14 +10,12 @@ import pytest
 from relit_camera.errors import InputError
 from relit_camera.space.directions import fibonacci_directions
 from relit_camera.space.picture_files import write_linear
-from relit_studio.camera import Camera
 from relit_studio.cycles.job import Mesh
 from relit_studio.field.compare import compare_fields
-from relit_studio.field.solver import BELOW_AXIS_CM, DISTANCE_CM, HEIGHT_CM, SolverSettings
+from relit_studio.field.solver import BELOW_AXIS_CM, DISTANCE_CM, SolverSettings, solver_camera
 from relit_studio.field.solver_scene import mannequin_surfaces
-from relit_studio.field.twin import surfaces_scene
+from relit_studio.field.twin import surfaces_scene, twin_camera
 from relit_studio.mannequin.olat import lights_text
-from relit_studio.pinhole import Pinhole
 
 LIGHTS, SIDE = 12, 16
 
@@ -63,15 +61,14 @@ def test_cycles_gets_the_solvers_surfaces() -> None:
 
 def test_both_cameras_see_alike() -> None:
     settings = SolverSettings()
-    camera = Camera(settings.height, settings.width, DISTANCE_CM, HEIGHT_CM, BELOW_AXIS_CM)
-    solver = Pinhole(settings.width, settings.height, settings.height * DISTANCE_CM / HEIGHT_CM)
+    camera, solver = twin_camera(settings), solver_camera(settings)
     points = mannequin_surfaces(np.zeros(3)).vertices
     placed = points + np.float32([0, -BELOW_AXIS_CM, -DISTANCE_CM])
     np.testing.assert_allclose(camera.project(points), solver.project(placed)[:, :2], atol=1e-3)
 
 
 def test_no_light_from_below_shines_through_the_body() -> None:
-    """Under every triangle that faces down on the inside there is one on the outside: the body is closed below."""
+    """What is lowest faces down and is as large as the body's cross-section: the body is closed below."""
     surfaces = mannequin_surfaces(np.zeros(3))
     corners = surfaces.vertices[surfaces.triangles]
     lowest = corners[corners[..., 1].max(axis=1) < -27.9]

@@ -20,7 +20,7 @@ from relit_studio.cycles.exr import Passes, read_passes
 from relit_studio.cycles.figure import Figure
 from relit_studio.cycles.job import DistantLight, Picture, Quality, Scene
 from relit_studio.cycles.runner import render
-from relit_studio.mannequin.olat import grey, lights_text
+from relit_studio.mannequin.olat import grey, light_names, lights_text
 from relit_studio.people.landmarks import canonical_origin, landmarks
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
@@ -67,8 +67,7 @@ def render_field(
     keep_settings(folder, "field.json", field_description(person, settings, camera))
     scene = Figure(person).scene()
     directions = fibonacci_directions(settings.lights)
-    digits = len(str(settings.lights - 1))
-    names = [f"{index:0{digits}d}.exr" for index in range(settings.lights)]
+    names = light_names(settings.lights)
     write_atomic(folder / "lights.lp", lights_text(names, directions))
     _write_truth(person, scene, camera, folder, settings.quality)
     pictures = [

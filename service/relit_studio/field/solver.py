@@ -25,7 +25,7 @@ from relit_studio.field.solver_gloss import gloss_albedo, glossy
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
 from relit_studio.field.solver_transport import Transport, bounced, transport
 from relit_studio.mannequin.figure import Posture, mannequin
-from relit_studio.mannequin.olat import grey, lights_text
+from relit_studio.mannequin.olat import grey, light_names, lights_text
 from relit_studio.mannequin.raster import Hits, rasterise
 from relit_studio.mannequin.shading import ShadowMap
 from relit_studio.pinhole import Pinhole
@@ -132,6 +132,11 @@ def solve(
     )
 
 
+def solver_camera(settings: SolverSettings) -> Pinhole:
+    """The camera before the mannequin."""
+    return Pinhole(settings.width, settings.height, settings.height * DISTANCE_CM / HEIGHT_CM)
+
+
 def write_solver_field(folder: Path, settings: SolverSettings | None = None, progress: Progress = no_progress) -> None:
     """Solve the neutral mannequin's field and write it, as `relit capture import` reads it.
 
@@ -149,15 +154,14 @@ def write_solver_field(folder: Path, settings: SolverSettings | None = None, pro
         StorageError: a file cannot be written.
     """
     settings = settings or SolverSettings()
-    camera = Pinhole(settings.width, settings.height, settings.height * DISTANCE_CM / HEIGHT_CM)
+    camera = solver_camera(settings)
     seen_by = {"focal_px": camera.focal_px, "depth_zero_cm": DISTANCE_CM}
     described = {"person": "mannequin", "settings": asdict(settings), "camera": seen_by}
     keep_settings(folder, "field.json", described)
     place = np.array([0.0, -BELOW_AXIS_CM, -DISTANCE_CM])
     directions = texel_directions(settings.map_rows, 2 * settings.map_rows).reshape(-1, 3)
     solved = solve(mannequin_surfaces(place), camera, directions, settings, progress)
-    digits = len(str(len(directions) - 1))
-    names = [f"{index:0{digits}d}.exr" for index in range(len(directions))]
+    names = light_names(len(directions))
     for name, picture in zip(names, solved.pictures, strict=True):
         write_linear(folder / name, picture)
     write_display(folder / "matte.png", grey(solved.matte))

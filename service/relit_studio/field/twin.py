@@ -15,7 +15,7 @@ from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene
 from relit_studio.cycles.runner import render
 from relit_studio.field.solver import BELOW_AXIS_CM, DISTANCE_CM, HEIGHT_CM, SolverSettings
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
-from relit_studio.mannequin.olat import lights_text
+from relit_studio.mannequin.olat import light_names, lights_text
 from relit_studio.progress import Progress, no_progress
 
 
@@ -35,6 +35,11 @@ def surfaces_scene(surfaces: Surfaces) -> Scene:
     return Scene((mesh,), {"painted": {"kind": "painted"}})
 
 
+def twin_camera(settings: SolverSettings) -> Camera:
+    """The solver's camera, in room axes."""
+    return Camera(settings.height, settings.width, DISTANCE_CM, HEIGHT_CM, BELOW_AXIS_CM)
+
+
 def render_twin(
     folder: Path, settings: SolverSettings, quality: Quality, progress: Progress = no_progress
 ) -> dict[str, float]:
@@ -47,15 +52,13 @@ def render_twin(
     """
     # As the solver averages its samples.
     quality = replace(quality, pixel_filter="BOX")
-    camera = Camera(settings.height, settings.width, DISTANCE_CM, HEIGHT_CM, BELOW_AXIS_CM)
     described = {"width": settings.width, "height": settings.height, "map_rows": settings.map_rows}
     keep_settings(folder, "field.json", {"person": "mannequin", **described, "quality": quality.settings()})
     directions = texel_directions(settings.map_rows, 2 * settings.map_rows).reshape(-1, 3)
-    digits = len(str(len(directions) - 1))
-    names = [f"{index:0{digits}d}.exr" for index in range(len(directions))]
+    names = light_names(len(directions))
     write_atomic(folder / "lights.lp", lights_text(names, directions))
     pictures = [
         Picture(folder / name, DistantLight((x, y, z), size_deg=0.0))
         for name, (x, y, z) in zip(names, directions.tolist(), strict=True)
     ]
-    return render(surfaces_scene(mannequin_surfaces(np.zeros(3))), camera, quality, pictures, progress)
+    return render(surfaces_scene(mannequin_surfaces(np.zeros(3))), twin_camera(settings), quality, pictures, progress)

@@ -50,6 +50,12 @@ def write_olat(folder: Path, size: int = 192, lights: int = 96, progress: Progre
         np.savez_compressed(temporary, normals=view.normals(), albedo=view.albedo(), depth=view.depth())
 
 
+def light_names(count: int) -> list[str]:
+    """Names of the linear pictures of `count` lights: 000.exr …, in order by name as well."""
+    digits = len(str(count - 1))
+    return [f"{index:0{digits}d}.exr" for index in range(count)]
+
+
 def lights_text(names: Sequence[str], directions: NDArray[np.float64]) -> str:
     """An .lp file: the count, then each picture's name and unit vector (count, 3)."""
     lines = [f"{name} {x:.7f} {y:.7f} {z:.7f}" for name, (x, y, z) in zip(names, directions, strict=True)]
