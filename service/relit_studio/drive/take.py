@@ -48,7 +48,7 @@ class Take:
         if self._held and moment.gesture:
             motions = self._held.motions(moment.posture, moment.gesture)
             shape |= {f"{name}.matrix": motion for name, motion in motions.items()}
-        # Objects are moved rather than their vertices: patterns in their own coordinates stay on them.
+        # Over whatever else moves in an object: vertices, strands, or all of it.
         shift = np.eye(4)
         shift[:3, 3] = moment.shift_cm
         for each in self.scene.objects:

@@ -15,7 +15,7 @@ from relit_studio.people.geometry import Floats, Indices
 _HEIGHT = 180
 """Of the picture in which it is measured, pixels."""
 _WIDER = 5
-"""It is so many times as wide as the camera's, so that who has left it is there still."""
+"""It is so many times as wide as the camera's, so that who has left it sideways, as people do, is there still."""
 _SLACK_CM = 0.3
 """What lies no farther behind another surface counts as touching it."""
 

@@ -16,9 +16,9 @@ _FINGER_CREASE, _PALM_CREASE, _JOIN = 0.1, 0.45, 0.3
 """How soft the creases are between fingers, in the palm, and where they meet, in centimetres."""
 
 GRIP_WRIST = np.array([-9.4, -1.2, -4.6])
-"""Of the hand that holds the mug, in the mug's axes; its arm goes on along `GRIP_ARM`."""
-GRIP_ARM = np.array([-0.5, -0.8, -0.33])
-OPEN_ARM = np.array([0.0, -1.0, 0.0])
+"""Of the hand that holds the mug, in the mug's axes; its arm goes on along `_GRIP_ARM`."""
+_GRIP_ARM = np.array([-0.5, -0.8, -0.33])
+_OPEN_ARM = np.array([0.0, -1.0, 0.0])
 _STUB_CM = 5.0
 """How far a hand goes on into its sleeve."""
 
@@ -37,7 +37,7 @@ def gripping_hand() -> Solid:
     ]
     thumb = _chain((-8.2, 2.2, -4.4, 1.3), (-6.7, 5.0, -4.0, 1.15), (-5.4, 6.9, -3.1, 0.95), (-3.6, 8.1, -3.3, 0.8))
     return joined(
-        [Blob(tuple(fingers), _FINGER_CREASE), Blob((*palm, thumb, _stub(GRIP_WRIST, GRIP_ARM)), _PALM_CREASE)],
+        [Blob(tuple(fingers), _FINGER_CREASE), Blob((*palm, thumb, _stub(GRIP_WRIST, _GRIP_ARM)), _PALM_CREASE)],
         _JOIN,
         _STEP_CM,
     )
@@ -59,7 +59,7 @@ def open_hand() -> Solid:
     ]
     thumb = _chain((1.3, 1.5, -0.4, 1.35), (3.4, 4.0, -1.0, 1.2), (5.0, 6.2, -1.4, 0.95), (6.0, 8.4, -1.7, 0.78))
     return joined(
-        [Blob(tuple(fingers), _FINGER_CREASE), Blob((*palm, thumb, _stub(np.zeros(3), OPEN_ARM)), _PALM_CREASE)],
+        [Blob(tuple(fingers), _FINGER_CREASE), Blob((*palm, thumb, _stub(np.zeros(3), _OPEN_ARM)), _PALM_CREASE)],
         _JOIN,
         _STEP_CM,
     )
