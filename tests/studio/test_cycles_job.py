@@ -60,7 +60,14 @@ def test_a_job_says_everything(tmp_path: Path) -> None:
     moved = Picture(tmp_path / "a.exr", DistantLight((1.0, 0.0, 0.0)), {"head.vertices": np.ones((3, 3))})
     path = write_job(tmp_path / "job", scene(), Camera(64), Quality.truth(256, 1), [moved])
     job = json.loads(path.read_text())
-    assert job["quality"] == {"samples": 256, "denoise": False, "clamp_indirect": 0.0, "seed": 0, "threads": 1, "pixel_filter": "BLACKMAN_HARRIS"}
+    assert job["quality"] == {
+        "samples": 256,
+        "denoise": False,
+        "clamp_indirect": 0.0,
+        "seed": 0,
+        "threads": 1,
+        "pixel_filter": "BLACKMAN_HARRIS",
+    }
     assert job["camera"]["focal_px"] == Camera(64).focal_px
     assert [each["name"] for each in job["scene"]["objects"]] == ["head", "hair"]
     assert job["pictures"][0]["light"]["direction"] == [1, 0, 0]
