@@ -73,6 +73,17 @@ def test_import_and_info(method: str, tmp_path: Path) -> None:
     assert "sphere" in done(call("subject", "info", subject)).out
 
 
+def test_a_subject_is_packed_and_asking_for_too_much_leaves_nothing(tmp_path: Path) -> None:
+    subject, small = tmp_path / "sphere.relit", tmp_path / "small.relit"
+    lights = write_lights(tmp_path / "capture", sphere_samples(40, 24))
+    done(call("capture", "import", lights, "--out", subject, "--method", "barycentric"))
+    call("subject", "pack", subject, "--out", small, "--components", 1000).complains("1000 were asked for")
+    assert not small.exists()
+    assert "12 of" in done(call("subject", "pack", subject, "--out", small, "--components", 12)).out
+    assert small.stat().st_size < subject.stat().st_size
+    assert json.loads(done(call("subject", "info", small, "--json")).out)["components"] == 12
+
+
 @pytest.mark.parametrize("command", GROUPS)
 def test_every_command_has_help(command: str) -> None:
     answer = call(command, "--help")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from safetensors import safe_open
@@ -37,6 +38,13 @@ def test_a_basis_comes_back_within_half_a_step() -> None:
     assert error.max() > 0.3 / 127
 
 
+def test_red_is_red_in_the_picture_too() -> None:
+    basis = np.zeros((3, 1, 8, 8), np.float32)
+    basis[0] = 1
+    bgr = cv2.imdecode(encode_basis(basis), cv2.IMREAD_UNCHANGED)
+    assert (bgr == [128, 128, 255]).all()
+
+
 def test_environments_come_out_nearly_as_they_were(subject: Subject) -> None:
     small = packed(subject, 40)
     for name in ("studio", "sunset", "party"):
@@ -68,7 +76,10 @@ def test_a_small_file_is_read_as_it_was_written(subject: Subject, tmp_path: Path
     assert saved > basis_bytes / 2
 
 
-@pytest.mark.parametrize("wrong", [np.zeros(10, np.uint8), np.zeros((2, 2), np.uint8), np.zeros(10, np.float32)])
+@pytest.mark.parametrize(
+    "wrong",
+    [np.zeros(0, np.uint8), np.zeros(10, np.uint8), np.zeros((2, 2), np.uint8), np.zeros(10, np.float32)],
+)
 def test_a_damaged_small_file_is_refused(subject: Subject, tmp_path: Path, wrong: np.ndarray) -> None:
     path = tmp_path / "small.relit"
     write_subject(path, packed(subject, 4), small=True)

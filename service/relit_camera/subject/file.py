@@ -27,7 +27,7 @@ REQUIRED = ("basis", "coefficients", "light_directions", "light_coefficients", "
 OPTIONAL = ("normals", "albedo", "depth")
 SMALL_BASIS = "basis_webp"
 """In place of `basis` in a small file: the pictures as bytes of one lossless WebP picture."""
-DTYPES = {"basis": np.float16, "neutral": np.uint8, SMALL_BASIS: np.uint8}
+DTYPES = {"basis": np.float16, "neutral": np.uint8}
 """Every other tensor is float32."""
 STORED: dict[str, type[np.generic]] = {"F16": np.float16, "F32": np.float32, "U8": np.uint8}
 """What safetensors calls the types that a subject may hold."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import cv2
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.errors import InputError, SubjectError
 from relit_camera.space.quality import psnr
+from relit_camera.space.quiet import quiet_decoders
 from relit_camera.subject.subject import Subject
 
 _LARGEST_WEBP = 16383
@@ -84,9 +86,9 @@ def encode_basis(basis: NDArray) -> NDArray[np.uint8]:
     codes = np.full((3, across * down, height, width), 128, np.uint8)
     codes[:, :components] = np.rint(rooted * 127 + 128).astype(np.uint8)
     tiled = codes.reshape(3, down, across, height, width).transpose(1, 3, 2, 4, 0)
-    picture = np.ascontiguousarray(tiled.reshape(down * height, across * width, 3))
+    picture = tiled.reshape(down * height, across * width, 3)
     # A quality above 100 is OpenCV's word for lossless.
-    _, encoded = cv2.imencode(".webp", picture, [cv2.IMWRITE_WEBP_QUALITY, 101])
+    _, encoded = cv2.imencode(".webp", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_WEBP_QUALITY, 101])
     return np.asarray(encoded, np.uint8).ravel()
 
 
@@ -98,10 +100,12 @@ def decode_basis(encoded: NDArray[np.uint8], shape: tuple[int, int, int, int]) -
     """
     _, components, height, width = shape
     across, down = _grid(components)
-    picture = cv2.imdecode(np.array(encoded), cv2.IMREAD_UNCHANGED)
+    with quiet_decoders():
+        picture = cv2.imdecode(np.array(encoded), cv2.IMREAD_UNCHANGED) if encoded.size else None
     if picture is None or picture.shape != (down * height, across * width, 3):
         raise SubjectError("its principal pictures cannot be decoded", "restore the file from a copy")
-    tiled = picture.reshape(down, height, across, width, 3).transpose(4, 0, 2, 1, 3)
+    coloured = cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
+    tiled = coloured.reshape(down, height, across, width, 3).transpose(4, 0, 2, 1, 3)
     codes = tiled.reshape(3, across * down, height, width)[:, :components]
     rooted = (np.arange(256, dtype=np.float32) - 128) / 127
     return np.ascontiguousarray((np.sign(rooted) * rooted**2).astype(np.float16)[codes])
@@ -113,7 +117,9 @@ def _grid(components: int) -> tuple[int, int]:
     return across, -(-components // across)
 
 
-def _light_pictures(subject: Subject) -> list[NDArray[np.float32]]:
+def _light_pictures(subject: Subject) -> Iterator[NDArray[np.float32]]:
     meta = subject.metadata
     planes = subject.basis.astype(np.float32).transpose(1, 2, 3, 0).reshape(meta.components, -1)
-    return [(each @ planes).reshape(meta.height, meta.width, 3) for each in subject.light_coefficients.T]
+    # One after another: together they are some gigabytes.
+    for amounts in subject.light_coefficients.T:
+        yield (amounts @ planes).reshape(meta.height, meta.width, 3)
