@@ -46,11 +46,21 @@ def test_it_is_scaled_and_cut_as_the_frame_is(path: Path, size: tuple[int, int])
 
 
 def test_a_file_that_holds_none_is_refused(tmp_path: Path) -> None:
-    other, text = tmp_path / "other.npz", tmp_path / "text.npz"
+    other, text, bare = tmp_path / "other.npz", tmp_path / "text.npz", tmp_path / "bare.npy"
     np.savez(other, alpha=np.zeros((2, 3), np.float32))
     text.write_text("mattes")
-    for path, words in ((other, "float32"), (text, "holds no"), (tmp_path / "gone.npz", "cannot read")):
+    np.save(bare, np.zeros((2, 3, 4), np.uint8))
+    reasons = (other, "float32"), (text, "holds no"), (bare, "holds no"), (tmp_path / "gone.npz", "cannot read")
+    for path, words in reasons:
         with pytest.raises(InputError, match=words):
+            RecordedMatte(path)
+
+
+def test_a_damaged_file_is_refused(path: Path) -> None:
+    whole = path.read_bytes()
+    for damage in (whole[:-40], whole[:80] + b"\xff" * 40 + whole[120:]):
+        path.write_bytes(damage)
+        with pytest.raises(InputError, match="holds no"):
             RecordedMatte(path)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from zipfile import BadZipFile
@@ -31,7 +32,7 @@ class RecordedMatte:
                 self._alpha: NDArray[np.uint8] = kept["alpha"]
         except OSError as error:
             raise InputError(f"cannot read {path}: {error.strerror or error}", cure) from error
-        except (ValueError, KeyError, EOFError, BadZipFile) as error:
+        except (ValueError, TypeError, KeyError, EOFError, BadZipFile, zlib.error) as error:  # TypeError: a bare .npy
             raise InputError(f"{path} holds no recorded mattes: {error}", cure) from error
         if self._alpha.dtype != np.uint8 or self._alpha.ndim != 3 or 0 in self._alpha.shape:
             raise InputError(f"the mattes in {path} are {self._alpha.dtype} {self._alpha.shape}", cure)
