@@ -101,6 +101,47 @@ def test_whoever_changes_the_look_has_the_camera(director: Director) -> None:
     guide.stop()
 
 
+@pytest.mark.parametrize("mine", [0.0, 0.4])
+def test_before_and_after_goes_with_the_tour_but_not_ones_own(director: Director, mine: float) -> None:
+    ended = threading.Event()
+    guide = Guide(director, lambda: True, lambda caption: ended.set() if caption == "" else None)
+    guide.start()
+    assert director.scene.look.lighting.split == 1
+    changes = {"environment": "party"} | ({"split": mine} if mine else {})
+    director.update_look(lambda look: look.model_copy(update={"lighting": look.lighting.model_copy(update=changes)}))
+    assert ended.wait(5)
+    guide.stop()
+    assert director.scene.look.lighting.environment == "party"
+    assert director.scene.look.lighting.split == mine
+
+
+def test_whoever_freezes_the_picture_has_the_camera(director: Director) -> None:
+    ended = threading.Event()
+    guide = Guide(director, lambda: True, lambda caption: ended.set() if caption == "" else None)
+    guide.start()
+    director.set_frozen(True)
+    assert ended.wait(1.5)  # within the first stop, where nothing moves
+    guide.stop()
+
+
+def test_where_nothing_moves_nothing_is_changed(director: Director) -> None:
+    before = director.scene
+    guide = Guide(director, lambda: True, lambda caption: None)
+    guide.start()
+    time.sleep(0.5)
+    guide.stop()
+    assert director.scene is before
+
+
+def test_a_caption_is_told_again_for_who_comes_late(director: Director) -> None:
+    told: list[str] = []
+    guide = Guide(director, lambda: True, told.append)
+    guide.start()
+    wait_for(lambda: len(told) == 2)
+    guide.stop()
+    assert told == [STOPS[0].caption] * 2 + [""]
+
+
 def test_the_tour_waits_until_there_is_something_to_see(director: Director) -> None:
     told: list[str] = []
     ready = threading.Event()

@@ -18,8 +18,12 @@ from relit_camera.config.look import (
     NoBackground,
 )
 from relit_camera.stream.director import Director
+from relit_camera.stream.scene import Scene
 
 TICK_S = 0.05
+TELL_EVERY_S = 1.0
+"""A caption is told again, for who has begun to look since."""
+STOP_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -48,10 +52,10 @@ def tour_at(time_s: float) -> tuple[Stop, Look]:
 
 
 class Guide:
-    """Leads a camera through the tour, until it is stopped or somebody changes the look."""
+    """Leads a camera through the tour, until it is stopped or somebody else changes the scene."""
 
     def __init__(self, director: Director, ready: Callable[[], bool], tell: Callable[[str], None]) -> None:
-        """`ready` says when to begin; `tell` hears each stop's caption, and "" when the tour is over."""
+        """`ready` says when to begin; `tell` hears the caption each second, and "" when the tour is over."""
         self._director, self._ready, self._tell = director, ready, tell
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._lead, name="tour", daemon=True)
@@ -64,38 +68,49 @@ class Guide:
         """End it; harmless when repeated, or before it has begun."""
         self._stopping.set()
         if self._thread.ident is not None:
-            self._thread.join()
+            self._thread.join(STOP_S)
 
     def _lead(self) -> None:
-        shown = self._director.scene.look
+        shown = self._director.scene
         while not self._ready():
             if self._stopping.wait(TICK_S):
                 return
-        began, caption = time.monotonic(), ""
+        began, told, tell_at = time.monotonic(), "", 0.0
         try:
             while not self._stopping.wait(TICK_S):
-                stop, wanted = tour_at(time.monotonic() - began)
-                if stop.caption != caption:
-                    caption = stop.caption
-                    self._tell(caption)
-                shown = self._director.update_look(_unless_changed(shown, wanted)).look
+                now = time.monotonic()
+                stop, look = tour_at(now - began)
+                if stop.caption != told or now >= tell_at:
+                    told, tell_at = stop.caption, now + TELL_EVERY_S
+                    self._tell(told)
+                shown = self._show(look, shown)
         except _TakenOverError:
-            pass
+            self._director.update_look(lambda look: _whole(look, shown.look.lighting.split))
         finally:
             self._tell("")
 
+    def _show(self, look: Look, shown: Scene) -> Scene:
+        """Show the look, if what the tour has `shown` still stands."""
+
+        def unless_changed(_: Look) -> Look:
+            if self._director.scene is not shown:
+                raise _TakenOverError
+            return look
+
+        if look == shown.look and self._director.scene is shown:
+            return shown  # every page hears of each change
+        return self._director.update_look(unless_changed)
+
 
 class _TakenOverError(Exception):
-    """Somebody else has changed the look."""
+    """Somebody else has changed the scene."""
 
 
-def _unless_changed(expected: Look, wanted: Look) -> Callable[[Look], Look]:
-    def change(look: Look) -> Look:
-        if look != expected:
-            raise _TakenOverError
-        return wanted
-
-    return change
+def _whole(look: Look, left_split: float) -> Look:
+    """The look without the tour's own before and after, behind which a change would not be seen."""
+    if look.lighting.split != left_split:
+        return look
+    return look.model_copy(update={"lighting": look.lighting.model_copy(update={"split": 0.0})})
 
 
 def _place(environment: str, yaw_deg: float = 0.0, split: float = 0.0) -> Look:

@@ -120,6 +120,7 @@ function showStatus(status) {
 }
 
 function showCaption({ text }) {
+  if (byId("caption").textContent === text) return; // it is told again and again
   byId("caption").textContent = text;
   byId("caption").hidden = !text;
 }
@@ -132,6 +133,7 @@ function openEvents() {
   on("caption", showCaption);
   on("collection", ({ name }) => library.load(name).then(restore));
   events.onopen = () => {
+    showCaption({ text: "" });
     library.loadAll().then(restore);
     openPreview();
   };
