@@ -19,7 +19,6 @@ def demo(
 ) -> None:
     """Show a bundled person in one place after another; whoever touches the panel takes over."""
     import time
-    import webbrowser
     from collections.abc import Iterator
     from contextlib import contextmanager
 
@@ -27,12 +26,15 @@ def demo(
 
     from relit_camera.cli.serving import run_camera
     from relit_camera.cli.settings import settings_of
+    from relit_camera.config.settings import OutputSettings
     from relit_camera.demo import bundle
     from relit_camera.demo.tour import Guide, tour_at
     from relit_camera.errors import DeviceError, ModelError
     from relit_camera.models.registry import model_path
     from relit_camera.stream.daemon import Daemon
+    from relit_camera.stream.sinks.base import Sink
     from relit_camera.stream.sinks.factory import open_sink
+    from relit_camera.stream.sinks.null import NullSink
     from relit_camera.stream.status import CameraState
 
     def installed(*models: str) -> bool:
@@ -41,31 +43,28 @@ def demo(
         except ModelError:
             return False
 
-    def published(settings_sink: str) -> str:
-        if settings_sink != "camera":
-            return settings_sink
+    def camera_or_nothing(output: OutputSettings) -> Sink:
         try:
-            open_sink(settings_of(context).output).close()
+            return open_sink(output)
         except DeviceError as error:
             typer.echo(f"No virtual camera, so the page alone shows it: {error.what} (relit doctor tells the cure)")
-            return "null"
-        return "camera"
+            return NullSink((output.width, output.height))
 
     tracker = "mesh" if installed("face_mesh", "face_detector_yunet") else f"recorded:{bundle.TRACK}"
     matte = "selfie" if installed("selfie_landscape", "selfie_square") else f"recorded:{bundle.MATTES}"
     if tracker != "mesh":
         typer.echo("No public models (relit models pull gets them): the clip's own record tells where the face is")
-    _, look = tour_at(0.0)
     settings = settings_of(
         context,
         source={"source": str(bundle.CLIP)},
-        output={"sink": published(settings_of(context).output.sink)},
         subject=str(bundle.SUBJECT),
-        look=look.model_dump(mode="json"),
         tracker={"name": tracker},
         matte=matte,
         server={"host": host, "port": port},
     )
+    _, look = tour_at(0.0)
+    # In place of the user's own look, not over it: their colour is no part of another kind of background.
+    settings = settings.model_copy(update={"look": look})
 
     @contextmanager
     def guided(daemon: Daemon, url: str) -> Iterator[None]:
@@ -77,11 +76,22 @@ def demo(
 
         guide = Guide(daemon.director, live, lambda caption: daemon.events.publish("caption", text=caption))
         guide.start()
-        if not headless and not webbrowser.open(url):
-            typer.echo(f"Open {url} in a browser to see it")
         try:
+            if not headless and not opens_in_browser(url):
+                typer.echo(f"Open {url} in a browser to see it")
             yield
         finally:
             guide.stop()
 
-    run_camera(settings, beside=guided, seconds=seconds)
+    run_camera(settings, beside=guided, seconds=seconds, sink_for=camera_or_nothing)
+
+
+def opens_in_browser(url: str) -> bool:
+    """Whether a window opens. A browser of the terminal's own would show no picture, and keep Ctrl-C to itself."""
+    import os
+    import sys
+    import webbrowser
+
+    if sys.platform == "linux" and not os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY", "BROWSER"}:
+        return False
+    return webbrowser.open(url)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import signal
 import threading
 import time
@@ -13,11 +14,12 @@ import typer
 
 from relit_camera.api.app import create_app
 from relit_camera.api.server import listen, serve
-from relit_camera.config.settings import RelitSettings
+from relit_camera.config.settings import OutputSettings, RelitSettings
 from relit_camera.cores import leave_to_stay, share_cores
 from relit_camera.stream.assembly import make_tracker
 from relit_camera.stream.daemon import Daemon
 from relit_camera.stream.director import Director
+from relit_camera.stream.sinks.base import Sink
 from relit_camera.stream.sinks.factory import open_sink
 from relit_camera.stream.sources.factory import open_source
 
@@ -30,6 +32,7 @@ def run_camera(
     environment: str | None = None,
     beside: Beside | None = None,
     seconds: float | None = None,
+    sink_for: Callable[[OutputSettings], Sink] = open_sink,
 ) -> None:
     """Run the camera until SIGTERM or SIGINT, then end within 3 s.
 
@@ -40,6 +43,7 @@ def run_camera(
         environment: a stored environment's name or a panorama file, in place of the settings' own.
         beside: entered when the panel can be reached, left when the camera is about to end.
         seconds: end by itself after so long.
+        sink_for: opens what the settings name.
 
     Raises:
         RelitError: the port is in use, a file, device or model is missing …
@@ -59,7 +63,7 @@ def run_camera(
         tracker = make_tracker(settings)
         source = open_source(settings.source, own_label=settings.output.label)
         cleanup.callback(source.close)
-        sink = open_sink(settings.output)
+        sink = sink_for(settings.output)
         cleanup.callback(sink.close)
         daemon = Daemon(settings, director, source, sink, tracker)
         cleanup.callback(daemon.stop)
@@ -70,8 +74,7 @@ def run_camera(
         typer.echo(f"Relit Camera runs; the panel is at {server.address.url}")
         if beside is not None:
             cleanup.enter_context(beside(daemon, server.address.url))
-        ends_at = None if seconds is None else time.monotonic() + seconds
-        while not stop.wait(0.5 if ends_at is None else max(0.0, min(0.5, ends_at - time.monotonic()))):
-            if ends_at is not None and time.monotonic() >= ends_at:
-                break
+        ends_at = time.monotonic() + (math.inf if seconds is None else seconds)
+        while not stop.is_set() and (left := ends_at - time.monotonic()) > 0:
+            stop.wait(min(left, 0.5))
         daemon.begin_stop()
