@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from relit_camera.space.images import DisplayImage, LinearImage, Mask
+from relit_camera.space.picture_files import write_display
 from relit_studio.camera import Camera
 from relit_studio.cycles.exr import read_rgba
 from relit_studio.cycles.figure import Figure
@@ -46,6 +47,28 @@ def render_stills(
         render(figure.scene(), camera, quality, pictures, progress)
         backdrop = room.backdrop(camera)
         return [room.shown(*_calmed(*read_rgba(picture.path)), backdrop) for picture in pictures]
+
+
+def finish_stills(
+    paths: Sequence[Path],
+    person: Person,
+    postures: Sequence[Posture],
+    room: Room,
+    camera: Camera,
+    quality: Quality,
+) -> None:
+    """Render those of the files that are not there yet, one a posture.
+
+    Raises:
+        DeviceError: Cycles is not set up, or fails.
+        StorageError: a file cannot be written.
+    """
+    missing = [(path, posture) for path, posture in zip(paths, postures, strict=True) if not path.is_file()]
+    if not missing:
+        return
+    pictures = render_stills(person, [posture for _, posture in missing], room, camera, quality)
+    for (path, _), picture in zip(missing, pictures, strict=True):
+        write_display(path, picture)
 
 
 def _calmed(picture: LinearImage, alpha: Mask) -> tuple[LinearImage, Mask]:

@@ -14,7 +14,7 @@ from relit_camera.face.detector import FaceDetector
 from relit_camera.face.trackers import TrackerOptions, open_tracker
 from relit_camera.files import write_atomic
 from relit_camera.models.registry import model_path
-from relit_camera.space.picture_files import read_display, write_display
+from relit_camera.space.picture_files import read_display
 from relit_camera.space.rotation import Angles
 from relit_studio.begun import keep_settings
 from relit_studio.camera import Camera
@@ -31,7 +31,7 @@ from relit_studio.commands.options import (
 )
 from relit_studio.people.posture import Posture
 from relit_studio.recognition import recognise, recognised_table
-from relit_studio.still import render_stills
+from relit_studio.still import finish_stills
 
 _TRACKERS = ("mesh", "openseeface")
 
@@ -64,11 +64,7 @@ def check(
         for done, who in enumerate(names):
             person, postures = load_person(who), [Posture(angles) for angles in turns]
             paths = [out / f"{who}-{angles.yaw:g}-{angles.pitch:g}.png" for angles in turns]
-            missing = [index for index, path in enumerate(paths) if not path.is_file()]
-            if missing:
-                wanted = [postures[index] for index in missing]
-                for index, picture in zip(missing, render_stills(person, wanted, room, camera, quality), strict=True):
-                    write_display(paths[index], picture)
+            finish_stills(paths, person, postures, room, camera, quality)
             for path, posture in zip(paths, postures, strict=True):
                 seen.append(recognise(read_display(path), person, posture, camera, detector, trackers))
             progress(done + 1, len(names))

@@ -26,7 +26,7 @@ from relit_studio.commands.options import (
 )
 from relit_studio.people.expressions import find_expression
 from relit_studio.people.posture import Posture
-from relit_studio.still import render_stills
+from relit_studio.still import finish_stills
 
 
 def sheet(
@@ -55,10 +55,7 @@ def sheet(
         for done, who in enumerate(names):
             paths = [out / f"{who}-{name}-{yaw:g}.png" for name, yaw in looks]
             if not all(path.is_file() for path in paths):
-                for path, picture in zip(
-                    paths, render_stills(load_person(who), postures, room, camera, quality), strict=True
-                ):
-                    write_display(path, picture)
+                finish_stills(paths, load_person(who), postures, room, camera, quality)
             cells += [read_display(path) for path in paths]
             progress(done + 1, len(names))
     rows = [cells[start : start + columns] for start in range(0, len(cells), columns)]
