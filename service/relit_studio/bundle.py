@@ -6,7 +6,6 @@ import json
 import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import cv2
 
@@ -70,8 +69,10 @@ def _write(
     subject = build_subject(samples, DEFAULT_METHOD, "lights.lp", "linear", points)
     write_subject(subject_file, packed(subject, components), small=True)
     shutil.copyfile(_existing(clip / bundle.CLIP.name), clip_file)
-    track = json.loads((clip / bundle.TRACK.name).read_text(encoding="utf-8"))
-    write_atomic(track_file, json.dumps(_rounded(track), separators=(",", ":")) + "\n")
+    # To a thousandth of a pixel, a degree, a centimetre.
+    text = (clip / bundle.TRACK.name).read_text(encoding="utf-8")
+    track = json.loads(text, parse_float=lambda number: round(float(number), 3))
+    write_atomic(track_file, json.dumps(track, separators=(",", ":")) + "\n")
     write_mattes(mattes_file, [_matte(path) for path in frames])
     lines = json.loads(_existing(clip / "truth.json").read_text(encoding="utf-8"))["credits"]
     write_atomic(credits_file, _credits_text(lines))
@@ -103,15 +104,6 @@ def _matte(path: Path) -> Mask:
     height, width = alpha.shape
     small: Mask = cv2.resize(alpha, (width // _MATTE_SHRINK, height // _MATTE_SHRINK), interpolation=cv2.INTER_AREA)
     return small
-
-
-def _rounded(value: Any) -> Any:
-    """JSON with its numbers to a thousandth: of a pixel, a degree, a centimetre."""
-    if isinstance(value, float):
-        return round(value, 3)
-    if isinstance(value, list):
-        return [_rounded(each) for each in value]
-    return {key: _rounded(each) for key, each in value.items()} if isinstance(value, dict) else value
 
 
 def _credits_text(lines: list[str]) -> str:
