@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from relit_studio.commands.options import shown_progress
+from relit_studio.commands.options import ROOM_HELP, load_room, shown_progress
 
 
 def capture(
@@ -15,7 +15,7 @@ def capture(
     person: Annotated[str, typer.Option(help="'mannequin', or a field's folder (lights.lp with its truth).")] = (
         "mannequin"
     ),
-    room: Annotated[str, typer.Option(help="The room: a stored environment's name, or a panorama file.")] = "window",
+    room: Annotated[str, typer.Option(help=ROOM_HELP)] = "window",
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT; a field keeps its shape and takes the height.")] = "540x720",
     seconds: Annotated[float, typer.Option(min=0.2, max=600, help="Length of the video.")] = 30.0,
     seed: Annotated[int, typer.Option(min=0, help="Of hand, head, flash phase and noise.")] = 1,
@@ -33,7 +33,6 @@ def capture(
 ) -> None:
     """Film a person under a blinking hand-held torch, a mirror ball beside them. Run it again to go on."""
     from relit_camera.cli.parse import size as parse_size
-    from relit_camera.light.store import EnvironmentStore
     from relit_studio.capture.field_person import FieldPerson
     from relit_studio.capture.mannequin_person import MannequinPerson, phone_camera
     from relit_studio.capture.person import Person
@@ -44,7 +43,7 @@ def capture(
     width, height = parse_size(size)
     if not (64 <= width <= 4096 and 64 <= height <= 4096):
         raise typer.BadParameter(f"'{size}' has sides that are not within 64 and 4096", param_hint="--size")
-    environment = EnvironmentStore().resolve(room)
+    environment = load_room(room, 0.0).environment
     light, light_map = dimmed(environment, ambient)
     on = not plain
     stages = Stages(on and gamma, on and noise, on and auto_exposure, on and white_balance, on and h264)

@@ -27,9 +27,8 @@ Truth = Annotated[
 ]
 Samples = Annotated[int | None, typer.Option("--samples", min=1, max=65536, help="A pixel.")]
 Size = Annotated[int, typer.Option("--size", min=32, max=4096, help="Of the pictures, pixels.")]
-Environment = Annotated[
-    str, typer.Option("--environment", help=f"One of {', '.join(ROOMS)}; or a stored name or a panorama file.")
-]
+ROOM_HELP = f"One of {', '.join(ROOMS)}; or a stored name or a panorama file."
+Environment = Annotated[str, typer.Option("--environment", help=ROOM_HELP)]
 Turn = Annotated[float, typer.Option("--turn", help="Of the environment, degrees; > 0 moves its front to the right.")]
 
 SHOW_SAMPLES, TRUTH_SAMPLES = 32, 512
