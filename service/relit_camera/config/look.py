@@ -70,7 +70,7 @@ class Lighting(Settings):
     blend: Annotated[float, Field(ge=0, le=1)] = 1.0
     """0 the live picture (in reenact, where that stays private, the still as captured), 1 fully relit."""
     split: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Before and after, in mode ratio: this share of the picture, from its left, is as filmed, whatever the background."""
+    """Before and after, in mode ratio: this share of the picture, from its left, is as filmed, room and all."""
     transition_s: Annotated[float, Field(ge=0, le=60)] = 0.4
     """Seconds over which a change is eased."""
 
