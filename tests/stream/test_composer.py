@@ -33,9 +33,6 @@ class LeftHalf:
         alpha[:, : frame.size[0] // 2] = 1
         return alpha
 
-    def reset(self) -> None:
-        """Nothing is kept."""
-
 
 def composer(timer: StageTimer | None = None, open_matte: Callable[[], Matte] = LeftHalf) -> Composer:
     return Composer(SIZE, open_matte, timer or StageTimer())

@@ -24,10 +24,6 @@ class Matte(Protocol):
         """
         ...
 
-    def reset(self) -> None:
-        """Forget the previous frame (after a cut, or with a new source)."""
-        ...
-
 
 def find_matte(name: str, options: SessionOptions) -> Callable[[], Matte]:
     """What opens the matte `selfie` (networks, found when they are first needed) or `recorded:FILE` (read at once).

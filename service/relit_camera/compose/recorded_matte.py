@@ -46,9 +46,6 @@ class RecordedMatte:
         filled = cover(alpha, frame.size, cv2.INTER_LINEAR)
         return np.multiply(filled, np.float32(1 / 255), dtype=np.float32)
 
-    def reset(self) -> None:
-        """Nothing is kept between frames."""
-
 
 def write_mattes(path: Path, mattes: Sequence[Mask]) -> None:
     """Keep mattes (height, width) 0..1 in 8 bits.
