@@ -71,7 +71,8 @@ def demo(
         def live() -> bool:
             if daemon.status().state is not CameraState.LIVE:
                 return False
-            typer.echo(f"First picture {time.time() - psutil.Process().create_time():.1f} s after the command")
+            seconds_ago = time.time() - psutil.Process().create_time()
+            typer.echo(f"First picture {seconds_ago:.1f} s after the command; Ctrl-C ends it")
             return True
 
         guide = Guide(daemon.director, live, lambda caption: daemon.events.publish("caption", text=caption))

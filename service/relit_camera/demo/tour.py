@@ -158,7 +158,7 @@ def _eased(share: float, keys: tuple[tuple[float, float], ...]) -> float:
 
 
 STOPS = (
-    Stop("As filmed: a room, a window", 2.0, _as_filmed),
+    Stop("As filmed. Touch anything, and the camera is yours", 4.0, _as_filmed),
     Stop("Relit: sunset", 7.0, _wiped),
     Stop("A studio, its lights led round", 8.0, _turned),
     Stop("A street at night", 4.0, lambda _: _place("night-street")),
