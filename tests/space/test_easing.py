@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.space.easing import eased_share
+from relit_camera.space.easing import eased_share, eased_value
 
 
 def test_a_change_grows_from_nothing_to_all_and_is_fast_at_first() -> None:
@@ -20,3 +20,13 @@ def test_a_change_grows_from_nothing_to_all_and_is_fast_at_first() -> None:
 @pytest.mark.parametrize(("elapsed_s", "transition_s"), [(-3.0, 2.0), (2.0, 2.0), (9.0, 2.0), (0.0, 0.0), (0.5, 0.0)])
 def test_before_its_beginning_and_after_its_end_a_change_is_over(elapsed_s: float, transition_s: float) -> None:
     assert eased_share(elapsed_s, transition_s) == 1
+
+
+def test_keys_are_met_and_held_beyond_the_ends_and_left_gently() -> None:
+    keys = [(0.0, 1.0), (2.0, 5.0), (3.0, 5.0), (4.0, -1.0)]
+    assert [eased_value(place, keys) for place in (-1, 0, 1, 2, 2.5, 3.5, 4, 9)] == pytest.approx(
+        [1, 1, 3, 5, 5, 2, -1, -1]
+    )
+    for place, value in keys:
+        for near in (place - 1e-3, place + 1e-3):
+            assert eased_value(near, keys) == pytest.approx(value, abs=1e-4)

@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 from relit_camera.config.look import (
     ColorBackground,
@@ -17,6 +16,7 @@ from relit_camera.config.look import (
     Mode,
     NoBackground,
 )
+from relit_camera.space.easing import eased_value
 from relit_camera.stream.director import Director
 from relit_camera.stream.scene import Scene
 
@@ -126,17 +126,17 @@ def _as_filmed(_: float) -> Look:
 def _wiped(share: float) -> Look:
     """From the live picture to the relit one, left after right, and once back and forth so that both are seen."""
     keys = ((0.0, 1.0), (0.3, 0.0), (0.55, 0.0), (0.7, 0.5), (0.85, 0.5), (1.0, 0.0))
-    return _place("sunset", split=_eased(share, keys))
+    return _place("sunset", split=eased_value(share, keys))
 
 
 def _turned(share: float) -> Look:
     """The light of the studio led once round the head; the place behind turns with it."""
-    return _place("studio", yaw_deg=_eased(share, ((0.0, 0.0), (0.15, 0.0), (0.9, -360.0), (1.0, -360.0))))
+    return _place("studio", yaw_deg=eased_value(share, ((0.0, 0.0), (0.15, 0.0), (0.9, -360.0), (1.0, -360.0))))
 
 
 def _lamps(share: float) -> Look:
     """A warm lamp that is moved across, and a cold one that stays behind."""
-    azimuth = _eased(share, ((0.0, -100.0), (0.45, 80.0), (0.6, 80.0), (1.0, -100.0)))
+    azimuth = eased_value(share, ((0.0, -100.0), (0.45, 80.0), (0.6, 80.0), (1.0, -100.0)))
     lamps = (
         Lamp(azimuth_deg=azimuth, elevation_deg=22, size_deg=24, kelvin=3000, intensity=0.85),
         Lamp(azimuth_deg=145, elevation_deg=18, size_deg=30, kelvin=12000, intensity=0.7),
@@ -148,15 +148,6 @@ def _lamps(share: float) -> Look:
     )
 
 
-def _eased(share: float, keys: tuple[tuple[float, float], ...]) -> float:
-    """The value at a share between keys (share, value), gently begun and ended."""
-    for (start, before), (end, after) in pairwise(keys):
-        if share <= end:
-            t = (share - start) / (end - start)
-            return before + (after - before) * t * t * (3 - 2 * t)
-    return keys[-1][1]
-
-
 STOPS = (
     Stop("As filmed. Touch anything, and the camera is yours", 4.0, _as_filmed),
     Stop("Relit: sunset", 7.0, _wiped),
@@ -165,5 +156,5 @@ STOPS = (
     Stop("Two lamps in the dark", 7.0, _lamps),
     Stop("A party", 4.0, lambda _: _place("party")),
     Stop("Outdoors, overcast", 4.0, lambda _: _place("overcast")),
-    Stop("By the window", 4.0, lambda share: _place("window", split=_eased(share, ((0, 0), (0.6, 0), (1, 1))))),
+    Stop("By the window", 4.0, lambda share: _place("window", split=eased_value(share, ((0, 0), (0.6, 0), (1, 1))))),
 )

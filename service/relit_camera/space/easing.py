@@ -1,6 +1,10 @@
-"""How what a person changes is eased over time."""
+"""How what changes is eased over time."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
 
 
 def eased_share(elapsed_s: float, transition_s: float) -> float:
@@ -12,3 +16,12 @@ def eased_share(elapsed_s: float, transition_s: float) -> float:
     if not 0 <= elapsed_s < transition_s:
         return 1.0
     return 1 - (1 - elapsed_s / transition_s) ** 3
+
+
+def eased_value(at: float, keys: Sequence[tuple[float, float]]) -> float:
+    """The value between keys (place, value) of rising places, eased in and out of each (Hermite)."""
+    places, values = np.array(keys).T
+    after = int(np.clip(np.searchsorted(places, at, side="right"), 1, len(keys) - 1))
+    share = np.clip((at - places[after - 1]) / (places[after] - places[after - 1]), 0, 1)
+    eased = share**2 * (3 - 2 * share)
+    return float(values[after - 1] + (values[after] - values[after - 1]) * eased)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.space.easing import eased_value
 from relit_camera.space.rotation import Angles
 from relit_studio.mannequin.expression import Expression
 from relit_studio.mannequin.figure import Posture
@@ -52,15 +51,6 @@ def posture_at(time_s: float) -> Posture:
 def frame_times(frames: int = FRAMES) -> NDArray[np.float64]:
     """Presentation times (frames,) in seconds."""
     return np.arange(frames) / FPS
-
-
-def eased_value(time_s: float, keys: Sequence[tuple[float, float]]) -> float:
-    """The value between keys (time, value), eased in and out of each."""
-    times, values = np.array(keys).T
-    after = int(np.clip(np.searchsorted(times, time_s, side="right"), 1, len(keys) - 1))
-    share = np.clip((time_s - times[after - 1]) / (times[after] - times[after - 1]), 0, 1)
-    eased = share**2 * (3 - 2 * share)
-    return float(values[after - 1] + (values[after] - values[after - 1]) * eased)
 
 
 def _blink(time_s: float, middle_s: float, half_s: float = 0.1) -> float:

@@ -13,7 +13,7 @@ from relit_studio.people.geometry import smoothstep
 from relit_studio.people.posture import Posture
 
 Keys = tuple[tuple[float, float], ...]
-"""(seconds, value): held and eased between, by `mannequin.performance.eased_value`."""
+"""(seconds, value): held and eased between, by `space.easing.eased_value`."""
 Syllables = tuple[tuple[float, str], ...]
 """When (seconds) the mouth reaches which of the shapes `VISEMES`."""
 

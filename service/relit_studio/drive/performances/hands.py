@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from relit_camera.space.easing import eased_value
 from relit_studio.drive.performance import FPS, Moment, Performance
 from relit_studio.drive.performances.acting import Keys, Syllables, add, blink, look, speak, swaying
-from relit_studio.mannequin.performance import eased_value
 from relit_studio.people.expressions import NEUTRAL
 from relit_studio.props.held import Gesture
 
