@@ -85,11 +85,10 @@ def render_drive(
 
 
 def _description(take: Take, room: Room, settings: DriveSettings) -> dict[str, object]:
-    """What the frames depend on; the performance only where it is not the usual one, as older folders have it."""
-    named = {} if take.performance is TALK else {"performance": take.performance.name}
+    """What the frames depend on."""
     return {
         "person": asdict(take.person.traits),
-        **named,
+        "performance": take.performance.name,
         "environment": room.environment.name,
         "environment_yaw_deg": room.yaw_deg,
         "settings": {**asdict(settings), "quality": settings.quality.settings()},
