@@ -23,7 +23,8 @@ from relit_studio.drive.take import Take
 from relit_studio.drive.truth import TruthTracker, frame_truth
 from relit_studio.drive.webcam import SENSOR, Webcam
 
-_MATTE_CRF = 12
+_CRF = 12
+"""Finer than videos are usually kept: what is measured on them is not to be the encoder's doing."""
 
 
 def write_clip(
@@ -49,8 +50,8 @@ def write_clip(
     recorder = TrackRecorder(tracker, size, FPS / step)
     truths = [frame_truth(take, time_s) for time_s in times]
     with ExitStack() as files:
-        clip = files.enter_context(VideoWriter(folder / "clip.mp4", size, FPS / step))
-        matte = files.enter_context(VideoWriter(folder / "matte.mp4", size, FPS / step, crf=_MATTE_CRF))
+        clip = files.enter_context(VideoWriter(folder / "clip.mp4", size, FPS / step, crf=_CRF))
+        matte = files.enter_context(VideoWriter(folder / "matte.mp4", size, FPS / step, crf=_CRF))
         pictures = _plain(take, room, frames) if webcam_seed is None else _filmed(take, room, frames, webcam_seed, step)
         for index, (image, alpha, gains) in enumerate(pictures):
             clip.write(image, times[index])
