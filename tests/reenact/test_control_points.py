@@ -23,6 +23,7 @@ from relit_camera.reenact.control_points import (
     still_anchors,
 )
 from relit_camera.reenact.dense_motion import DenseMotion
+from relit_camera.reenact.face_mesh import face_mesh
 from relit_camera.reenact.first_order import moved_flow
 from relit_camera.reenact.transfer import transfer, turned_about
 from tests.reenact.people import SCHEME, face_of, motion, person
@@ -103,9 +104,11 @@ def test_a_shut_eye_has_no_iris(face, points):
 def test_a_blink_shows_the_upper_lid_above_the_slit_and_the_lower_lid_below_it(face, points):
     """The eyeball between the still's open lids is nowhere to be seen."""
     moved = transfer(face, points, motion(expression=lids_lowered(face)))
-    patches = moved_flow(DenseMotion(SessionOptions()), face, points, moved.points, moved.landmarks)
+    patches = moved_flow(
+        DenseMotion(SessionOptions()), face_mesh(face), points, moved.points, moved.landmarks, moved.pose
+    )
     still = face.landmarks.astype(float)
-    for eye, patch in zip((SCHEME.right_eye, SCHEME.left_eye), patches[1:3], strict=True):
+    for eye, patch in zip((SCHEME.right_eye, SCHEME.left_eye), patches[2:4], strict=True):
         rows, columns = patch.flow.shape[:2]
         x, y = np.meshgrid(
             np.linspace(patch.region[0], patch.region[2], columns), np.linspace(patch.region[1], patch.region[3], rows)

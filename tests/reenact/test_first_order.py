@@ -93,8 +93,7 @@ def test_features_go_where_the_turned_head_has_them(feature, angles):
     start = before[:, :2] @ stage.face.landmarks[index] + before[:, 2]
     way = np.linalg.norm(expected - start)
     assert way > pixel  # it had somewhere to go
-    # The flow is a soft mixture: what sticks out, such as the nose, is held back a little by what lies round it.
-    assert np.linalg.norm(centroid(moved) - expected) < 0.5 * pixel + 0.4 * way
+    assert np.linalg.norm(centroid(moved) - expected) < 0.5 * pixel + 0.1 * way
 
 
 def test_brows_go_up_with_the_drivers():
@@ -102,7 +101,8 @@ def test_brows_go_up_with_the_drivers():
     stage = stage_of(subject, SIZE)
     expression = np.zeros((SCHEME.count, 3))
     brow = list(SCHEME.right_brow)
-    expression[brow, 1] = 0.6
+    away = np.linalg.norm(SCHEME.canonical[:, None, :2] - SCHEME.canonical[None, brow, :2], axis=2).min(axis=1)
+    expression[:, 1] = 0.6 * np.exp(-((away / 1.5) ** 2))  # a brow takes the skin above and below it along
     relit = marked(subject, stage.face.landmarks[brow].mean(axis=0))
     reenactor = FirstOrderReenactor(stage)
     rest = centroid(moved_by(reenactor, relit, motion(), live_frame()))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.face.follow import FaceMotion
+from relit_camera.face.state import HeadPose
 from relit_camera.reenact.control_points import (
     COARSE_GRID,
     ControlPoints,
@@ -19,10 +20,10 @@ from relit_camera.reenact.control_points import (
 )
 from relit_camera.reenact.cutout import Cutout
 from relit_camera.reenact.dense_motion import DenseMotion, region_around
+from relit_camera.reenact.face_mesh import FaceMesh, face_mesh
 from relit_camera.reenact.mouth import Mouth
 from relit_camera.reenact.placement import inverse_affine, moved_body, still_from_output, visible_box
 from relit_camera.reenact.reenactor import Move, Moved, Stage
-from relit_camera.reenact.source_face import SourceFace
 from relit_camera.reenact.transfer import transfer, transfer_in_frame
 from relit_camera.reenact.warp import FlowPatch, Warp
 from relit_camera.space.images import Frame, LinearImage
@@ -40,6 +41,7 @@ class FirstOrderReenactor:
         self._person = Cutout(stage.subject)
         anchors = head_anchors(stage.face.pose, stage.face.size) if self._person.whole else np.zeros((0, 2))
         self._points = control_points(stage.face, anchors)
+        self._mesh = face_mesh(stage.face)
         self._motion = DenseMotion(stage.options)
         self._mouth = Mouth(stage.face, stage.subject.neutral)
         self._placed = still_from_output(stage.subject.size, stage.size)
@@ -48,7 +50,7 @@ class FirstOrderReenactor:
         """See `Reenactor.follow`."""
         face = self._face
         target = (transfer if self._person.whole else transfer_in_frame)(face, self._points, motion)
-        patches = moved_flow(self._motion, face, self._points, target.points, target.landmarks)
+        patches = moved_flow(self._motion, self._mesh, self._points, target.points, target.landmarks, target.pose)
         if not self._person.whole:
             patches = tuple(held_at_border(patch, face.size) for patch in patches)
         placed = moved_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
@@ -67,26 +69,32 @@ class FirstOrderReenactor:
 
 def moved_flow(
     motion: DenseMotion,
-    face: SourceFace,
+    mesh: FaceMesh,
     points: ControlPoints,
     target: NDArray[np.float64],
     landmarks: NDArray[np.float64],
+    pose: HeadPose,
+    fine: bool = True,
 ) -> tuple[FlowPatch, ...]:
-    """The flow that brings the still's control points to `target`: coarse over the head, fine at eyes and mouth.
+    """The flow that brings the still's control points to `target`: over the head, the face, then eyes and mouth.
 
     Args:
         motion: the graph.
-        face: the still's face.
+        mesh: of the still's face.
         points: its control points.
         target: (count, 2) where they must go, still pixels.
         landmarks: (count, 2) where all landmarks go, still pixels.
+        pose: of the head that goes there.
+        fine: eyes and mouth too: they open and close, as the mesh's seams cannot.
     """
+    face = mesh.face
     head = region_around(np.vstack([points.source, target]), 0.6 * points.unit, *COARSE_GRID)
-    regions = [head, *fine_regions(face, landmarks)]
+    regions = [head, *(fine_regions(face, landmarks) if fine else ())]
     scheme = face.scheme
     up = scheme.eye_centres(landmarks.astype(np.float32)).mean(axis=0) - landmarks[list(scheme.lips)].mean(axis=0)
     influence = points.influence(target, up / max(float(np.linalg.norm(up)), 1e-6))
-    return motion.flow(points.source, influence, points.radius, points.unit, regions)
+    whole, *features = motion.flow(points.source, influence, points.radius, points.unit, regions)
+    return whole, mesh.over(whole, landmarks, pose), *features
 
 
 def held_at_border(patch: FlowPatch, size: tuple[int, int]) -> FlowPatch:

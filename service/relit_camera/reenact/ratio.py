@@ -14,6 +14,7 @@ from relit_camera.face.follow import FaceMotion
 from relit_camera.reenact.control_points import control_points, head_anchors
 from relit_camera.reenact.cutout import feathered
 from relit_camera.reenact.dense_motion import DenseMotion
+from relit_camera.reenact.face_mesh import face_mesh
 from relit_camera.reenact.first_order import moved_flow
 from relit_camera.reenact.reenactor import Move, Moved, Stage
 from relit_camera.reenact.room_probe import RoomProbe
@@ -49,6 +50,7 @@ class RatioReenactor:
         self._face = stage.face
         self._relighter = stage.relighter
         self._points = control_points(stage.face, head_anchors(stage.face.pose, stage.face.size))
+        self._mesh = face_mesh(stage.face)
         self._motion = DenseMotion(stage.options)
         self._probe = RoomProbe(stage.subject, stage.face)
         self._weight = trusted(feathered(stage.subject.matte))
@@ -119,7 +121,9 @@ class RatioReenactor:
         target = live @ still_from_live[:, :2].T + still_from_live[:, 2]
         moved = landmarks @ still_from_live[:, :2].T + still_from_live[:, 2]
         still_from_live = still_from_live @ np.diag([COARSE, COARSE, 1.0])
-        return Warp(still_from_live, moved_flow(self._motion, face, self._points, target, moved))
+        # Lids and lips are the live picture's; the light on them is that of the skin round them.
+        flow = moved_flow(self._motion, self._mesh, self._points, target, moved, motion.pose, fine=False)
+        return Warp(still_from_live, flow)
 
 
 def shape_difference(points: NDArray[np.float64], face: SourceFace) -> float:
