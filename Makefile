@@ -18,8 +18,8 @@ $(INSTALLED): pyproject.toml scripts/setup.sh
 	PYTHON=$(PYTHON) sh scripts/setup.sh $(VENV)
 	@touch $@
 
-demo: setup ## relight a recorded video under three environments, into build/demo
-	BIN=$(BIN) sh scripts/demo.sh build/demo
+demo: setup ## show the camera in a browser with a bundled person, until Ctrl-C; make demo DEMO="--seconds 20 --headless"
+	$(BIN)/relit demo $(DEMO)
 
 test: check ## all checks and tests, as CI runs them
 

@@ -17,6 +17,7 @@ from typer.core import TyperGroup
 from relit_camera.errors import RelitError
 
 GROUPS = {
+    "demo": ("relit_camera.cli.demo", "Show a bundled person in one place after another, in a page of its own."),
     "run": ("relit_camera.cli.run", "Run the camera: webcam in, relit virtual camera out, REST API and panel."),
     "replay": ("relit_camera.cli.replay", "Relight a recorded video into another video."),
     "track": ("relit_camera.cli.track", "Follow the face in a video and write what was seen as JSON."),

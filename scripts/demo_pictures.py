@@ -1,0 +1,70 @@
+"""Draws the demonstration: `python scripts/demo_pictures.py [FOLDER]` (build/demo if not given), about two minutes.
+
+sheet.jpg shows twelve frames of the bundled clip, live and under six environments; demo.jpg, the README's picture,
+five of them under three. Nothing need be downloaded: the clip's own track and mattes are used.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from relit_camera.compose.sheet import contact_sheet
+from relit_camera.config.look import EnvironmentBackground, Lighting, Look, Mode
+from relit_camera.config.settings import RelitSettings, TrackerSettings
+from relit_camera.demo import bundle
+from relit_camera.files import make_folder, write_atomic
+from relit_camera.space.images import DisplayImage
+from relit_camera.space.picture_files import encode_display
+from relit_camera.stream.assembly import make_pipeline, make_tracker
+from relit_camera.stream.director import Director
+from relit_camera.stream.replay import replay
+
+ENVIRONMENTS = ("studio", "window", "sunset", "night-street", "party", "overcast")
+SHEET_FRAMES = 12
+FADE_IN = 12
+"""Frames over which the live picture gives way to the relit one when a face is first seen."""
+README_ENVIRONMENTS, README_FRAMES = ("studio", "sunset", "party"), (1, 5, 6, 9, 10)
+
+
+def main() -> None:
+    """Draw both pictures."""
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "build/demo")
+    make_folder(folder)
+    rows: dict[str, list[DisplayImage]] = {}
+    for environment in ENVIRONMENTS:
+        rows["live"], rows[environment] = relit(environment)
+        print(environment)
+    sheet = contact_sheet(list(rows.values()), list(rows), cell_width=320)
+    write_atomic(folder / "sheet.jpg", encode_display(sheet, ".jpg"))
+    chosen = ("live", *README_ENVIRONMENTS)
+    small = contact_sheet([[rows[name][index] for index in README_FRAMES] for name in chosen], chosen, cell_width=240)
+    write_atomic(folder / "demo.jpg", encode_display(small, ".jpg"))
+
+
+def relit(environment: str) -> tuple[list[DisplayImage], list[DisplayImage]]:
+    """`SHEET_FRAMES` frames of the clip as they are, and under the environment, before it."""
+    settings = RelitSettings(
+        subject=str(bundle.SUBJECT),
+        tracker=TrackerSettings(name=f"recorded:{bundle.TRACK}"),
+        matte=f"recorded:{bundle.MATTES}",
+    )
+    director = Director(settings.storage)
+    director.set_subject(settings.subject)
+    light = Lighting(environment=environment)
+    director.set_look(Look(mode=Mode.RATIO, lighting=light, background=EnvironmentBackground()))
+    tracker = make_tracker(settings)
+    before, after = [], []
+
+    def keep(index: int, live: DisplayImage, shown: DisplayImage) -> None:
+        before.append(live)
+        after.append(shown)
+
+    replay(bundle.CLIP, None, lambda size: make_pipeline(settings, tracker, size), lambda _: director.scene, keep)
+    every = (len(after) - FADE_IN) / SHEET_FRAMES
+    indices = [FADE_IN + int((index + 0.5) * every) for index in range(SHEET_FRAMES)]
+    return [before[index] for index in indices], [after[index] for index in indices]
+
+
+if __name__ == "__main__":
+    main()

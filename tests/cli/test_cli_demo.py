@@ -1,0 +1,152 @@
+"""`relit demo` as a process, with nothing but what it is shipped with."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import httpx
+import numpy as np
+import pytest
+
+from relit_camera.cli.demo import opens_in_browser
+from relit_camera.demo import bundle
+from relit_camera.face.track_file import read_track
+from relit_camera.stream.video import VideoReader, probe
+from relit_camera.subject.file import read_subject
+from tests.cli.relit_command import call, start
+
+START_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[list[str], httpx.Client]]:
+    """The demo without public models, webcam or virtual camera: what it said, and its API."""
+    folder = tmp_path_factory.mktemp("demo")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RELIT_MODELS_DIR", str(folder / "no models"))
+        settings = folder / "settings.yaml"
+        settings.write_text(
+            "output: {label: A camera that nobody has}\n"
+            "look: {background: {kind: color, color: '#ff0000'}, lighting: {saturation: 0}}\n"
+        )
+        process = start("--config", settings, "demo", "--headless", "--port", 0, folder=folder)
+    try:
+        said = [_line(process) for _ in range(4)]
+        address = next(line for line in said if "the panel is at" in line).split()[-1]
+        with httpx.Client(base_url=address + "api/v1/", timeout=START_S) as http:
+            yield said, http
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def _line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    assert line, process.stderr and process.stderr.read()
+    return line.strip()
+
+
+def status(http: httpx.Client) -> dict[str, Any]:
+    answer: dict[str, Any] = http.get("status").raise_for_status().json()
+    return answer
+
+
+def snapshot(http: httpx.Client) -> np.ndarray:
+    answer = http.get("snapshot.jpg").raise_for_status()
+    return cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR).astype(np.float32)
+
+
+def test_it_says_what_there_is_not_and_when_the_first_picture_came(demo: tuple[list[str], httpx.Client]) -> None:
+    said = "\n".join(demo[0])
+    assert "No public models" in said
+    assert "No virtual camera" in said
+    assert "First picture" in said
+
+
+def test_the_bundled_person_is_live_and_in_ratio(demo: tuple[list[str], httpx.Client]) -> None:
+    now = status(demo[1])
+    assert now["state"] == "live"
+    assert (now["subject"], now["mode"]) == ("adam", "ratio")
+    assert now["degraded"] == []
+
+
+def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[str], httpx.Client]) -> None:
+    _, http = demo
+    until, seen = time.monotonic() + START_S, set()
+    while time.monotonic() < until and len(seen) < 4:
+        lighting = http.get("lighting").raise_for_status().json()
+        seen.add((lighting["environment"], round(lighting["split"], 1)))
+        time.sleep(0.1)
+    assert len(seen) >= 4
+    http.patch("lighting", json={"environment": "party", "split": 0, "transition_s": 0}).raise_for_status()
+    time.sleep(3)
+    assert http.get("lighting").json()["environment"] == "party"
+    party = snapshot(http)
+    http.patch("lighting", json={"environment": "overcast"}).raise_for_status()
+    time.sleep(2)
+    assert np.abs(snapshot(http) - party).mean() > 10
+
+
+def test_it_ends_by_itself_when_told_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no models"))
+    process = start("demo", "--headless", "--port", 0, "--seconds", 1, folder=tmp_path)
+    out, err = process.communicate(timeout=START_S)
+    assert process.returncode == 0, err
+    assert "the panel is at" in out
+
+
+def test_the_clip_its_track_and_its_mattes_are_of_one_length_and_large_enough() -> None:
+    info = probe(bundle.CLIP)
+    track = read_track(bundle.TRACK)
+    assert min(info.width, info.height) >= 512
+    assert info.fps >= 24
+    assert info.frames == len(track.frames)
+    assert track.size == (info.width, info.height)
+    with np.load(bundle.MATTES) as kept:
+        assert len(kept["alpha"]) == info.frames
+    yaws = [frame.pose.yaw for frame in track.frames if frame.pose]
+    assert max(yaws) > 20
+    assert min(yaws) < -20
+    mouths = [frame.mouth for frame in track.frames]
+    assert max(mouths) - min(mouths) > 0.1
+
+
+def test_the_clip_does_not_flicker() -> None:
+    """The wall behind is still: what it changes from frame to frame is what the codec and noise do."""
+    with VideoReader(bundle.CLIP) as video:
+        walls = np.stack([frame.image[:80, -200:].astype(np.float32) for frame in video])
+    assert np.abs(np.diff(walls, axis=0)).mean() < 0.5
+
+
+def test_credits_are_with_the_person() -> None:
+    text = bundle.CREDITS.read_text(encoding="utf-8")
+    assert "Lee Perry-Smith" in text
+    assert "CC-BY 3.0" in text
+    assert "ICT-FaceKit" in text
+
+
+def test_the_bundled_subject_is_as_any_other() -> None:
+    subject = read_subject(bundle.SUBJECT)
+    assert "mesh478" in subject.landmarks
+    answer = call("subject", "info", bundle.SUBJECT)
+    assert answer.code == 0
+    assert "adam" in answer.out
+
+
+def test_no_browser_of_the_terminal_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or True)
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
+        monkeypatch.delenv(name, raising=False)
+    assert not opens_in_browser("http://127.0.0.1:1/")
+    assert opened == []
+    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    assert opens_in_browser("http://127.0.0.1:1/")
+    assert opened == ["http://127.0.0.1:1/"]
