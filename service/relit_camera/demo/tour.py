@@ -138,8 +138,8 @@ def _lamps(share: float) -> Look:
     """A warm lamp that is moved across, and a cold one that stays behind."""
     azimuth = eased_value(share, ((0.0, -100.0), (0.45, 80.0), (0.6, 80.0), (1.0, -100.0)))
     lamps = (
-        Lamp(azimuth_deg=azimuth, elevation_deg=22, size_deg=24, kelvin=3000, intensity=0.85),
-        Lamp(azimuth_deg=145, elevation_deg=18, size_deg=30, kelvin=12000, intensity=0.7),
+        Lamp(azimuth_deg=azimuth, elevation_deg=22, size_deg=24, kelvin=3000, intensity=1.0),
+        Lamp(azimuth_deg=150, elevation_deg=20, size_deg=30, kelvin=12000, intensity=2.0),
     )
     return Look(
         mode=Mode.RATIO,
