@@ -80,4 +80,4 @@ def test_outside_the_face_the_flow_is_the_heads(face):
     _, head, mesh = patches_of(face, Rotation.from_euler("Y", 15, degrees=True))
     left, top, right, bottom = mesh.region
     corners = np.array([(left, top), (right, top), (left, bottom), (right, bottom)])
-    np.testing.assert_allclose(looks_at(mesh, corners), looks_at(head, corners), atol=0.01)
+    np.testing.assert_allclose(looks_at(mesh, corners), looks_at(head, corners), atol=0.03)  # remap counts in 32nds

@@ -93,7 +93,7 @@ def test_features_go_where_the_turned_head_has_them(feature, angles):
     start = before[:, :2] @ stage.face.landmarks[index] + before[:, 2]
     way = np.linalg.norm(expected - start)
     assert way > pixel  # it had somewhere to go
-    assert np.linalg.norm(centroid(moved) - expected) < 0.5 * pixel + 0.1 * way
+    assert np.linalg.norm(centroid(moved) - expected) < 0.5 * pixel + 0.15 * way
 
 
 def test_brows_go_up_with_the_drivers():

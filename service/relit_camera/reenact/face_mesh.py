@@ -19,10 +19,10 @@ from relit_camera.reenact.warp import FlowPatch
 
 GRID = (160, 160)
 """Rows and columns over the face: the ridge of a nose is some ten of them wide."""
-MARGIN = 0.25
-"""Eye distances round the face, over which the mesh hands over to the flow round it."""
-SOFT = 1.5
-"""Standard deviation, in grid points, by which the mesh's outline is blurred."""
+MARGIN = 0.1
+"""Eye distances round the face that the grid takes in."""
+HAND_OVER = 0.2
+"""Eye distances inside the face's outline, over which the mesh hands over to the flow round it."""
 SUBPIXEL_BITS = 4
 
 
@@ -51,7 +51,8 @@ class FaceMesh:
             pose: of the head that goes there: it says which of two parts is nearer.
         """
         target, source = landmarks[self.members], self.face.landmarks[self.members].astype(np.float64)
-        region = region_around(target, MARGIN * self.face.scheme.eye_span(self.face.landmarks), *GRID)
+        span = self.face.scheme.eye_span(self.face.landmarks)
+        region = region_around(target, MARGIN * span, *GRID)
         step = (region.box[2:] - region.box[:2]) / [region.columns - 1, region.rows - 1]
         depth = (self.face.scheme.canonical[self.members] @ pose.rotation.as_matrix().T)[:, 2]
         shown = self._nearest((target - region.box[:2]) / step, depth)
@@ -62,10 +63,9 @@ class FaceMesh:
         affine = _affine(target[self.triangles], source[self.triangles])
         chosen = affine[shown[covered]]
         mesh[covered] = np.einsum("nj,nji->ni", grid[covered], chosen[:, :2]) + chosen[:, 2] - grid[covered]
-        # Inside the outline alone, so that no position outside is extrapolated from a triangle.
-        inside = cv2.erode(covered.astype(np.float32), np.ones((3, 3), np.uint8), iterations=2)
-        share = cv2.GaussianBlur(inside, (0, 0), SOFT)[..., None]
-        return FlowPatch((flow + share * (mesh - flow)).astype(np.float32), region.box)
+        inward = cv2.distanceTransform(covered.astype(np.uint8), cv2.DIST_L2, 3) * step.min()
+        share = np.clip(inward / (HAND_OVER * span), 0, 1)[..., None]
+        return FlowPatch((flow + share * share * (3 - 2 * share) * (mesh - flow)).astype(np.float32), region.box)
 
     def _nearest(self, corners: NDArray[np.float64], depth: NDArray[np.float64]) -> NDArray[np.int32]:
         """The triangle that shows at each grid point, −1 where none does: (rows, columns).
