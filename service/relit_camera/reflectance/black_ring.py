@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,9 +51,15 @@ def ring_directions(directions: NDArray[np.float64], distance_deg: float = DISTA
 def with_black_ring(samples: Samples, distance_deg: float = DISTANCE_DEG) -> Samples:
     """The samples with the black ring: there the field fades instead of ending.
 
+    What is to use the person's shape must know it before: the ring's pictures are no shadows.
+
     Raises:
         LightsError: the directions span no region.
     """
     ring = ring_directions(samples.directions, distance_deg)
     black = np.zeros((len(ring), *samples.pictures.shape[1:]), np.float32)
-    return Samples(np.concatenate([samples.pictures, black]), np.concatenate([samples.directions, ring]), samples.matte)
+    return replace(
+        samples,
+        pictures=np.concatenate([samples.pictures, black]),
+        directions=np.concatenate([samples.directions, ring]),
+    )
