@@ -147,7 +147,7 @@ def triangle(
         queries=query[None] / np.linalg.norm(query),
         triangles=np.array([[0, 1, 2]]),
         weights=np.array(weights, np.float32)[None, :, None],
-        colours=np.tile(np.array(colours, np.float32)[None, :, None, None], (1, 1, 1, 3)),
+        colours=np.tile(np.array(colours, np.float32)[None, :, None, None], (1, 1, 3, 1)),
         geometry=flat(normal, 1),
         pixels=np.array([0]),
     )
@@ -191,7 +191,7 @@ def test_light_from_behind_the_surface_never_makes_it_brighter() -> None:
 
 def seen_as(corners: Corners, at_corners: tuple[float, float, float], here: float) -> float:
     visibility = np.array(at_corners, np.float32)[None, :, None], np.array([[here]], np.float32)
-    colours = by_visibility(corners, visibility, lambda w, c: (w[..., None] * c.colours).sum(axis=1))
+    colours = by_visibility(corners, visibility, lambda w, c: (w[:, :, None] * c.colours).sum(axis=1))
     return float(colours[0, 0, 0])
 
 

@@ -23,11 +23,11 @@ class Adaptation:
 
     def mix(self, corners: Corners) -> Values:
         """See `triangles.Mix`."""
-        return adapted(np.broadcast_to(corners.weights, corners.colours.shape[:3]), corners)
+        return adapted(np.broadcast_to(corners.weights, corners.cosines[0].shape), corners)
 
 
 def adapted(weights: Values, corners: Corners) -> Values:
-    """Colours (count, pixels, 3) by Eq. 5.1 to 5.3, which are one formula.
+    """Colours (count, channels, pixels) by Eq. 5.1 to 5.3, which are one formula.
 
     Corners behind the surface (a cosine factor of 0 or less) have indirect light only: c_ind, interpolated, of weight
     w_ind. It is taken from the others before their direct light is scaled, and faded back in:
@@ -45,7 +45,7 @@ def adapted(weights: Values, corners: Corners) -> Values:
     at_corners, here = corners.cosines
     direct = np.clip(at_corners / GRAZING, 0, 1)
     indirect_weights = weights * (1 - direct)
-    total = indirect_weights.sum(axis=1)[..., None]
+    total = indirect_weights.sum(axis=1)[:, None]
     indirect = barycentric(indirect_weights, corners.colours)
     scale = weights * direct * np.maximum(here, 0)[:, None] / np.maximum(at_corners, 1e-6)
     scaled = barycentric(scale, np.maximum(corners.colours - indirect[:, None], 0))

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.geometry.geometry import Geometry
-from relit_camera.reflectance.barycentric import locate
+from relit_camera.reflectance.barycentric import Located, locate
 from relit_camera.reflectance.samples import Samples
 from relit_camera.subject.field import texel_vectors
 
 Values = NDArray[np.float32]
 
-BLOCK = 1 << 16
-"""Pairs of direction and pixel mixed at a time: 2.4 MB of colours."""
+BLOCK = 1 << 17
+"""Pairs of direction and pixel mixed at a time: 4.7 MB of colours."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Corners:
         queries: (count, 3) float64 unit vectors inside the triangles.
         triangles: (count, 3) lights at the corners.
         weights: (count, 3, 1) float32 barycentric.
-        colours: (count, 3, pixels, 3) float32 of the corners' pictures.
+        colours: (count, 3, channels, pixels) float32 of the corners' pictures; pixels last, for numpy's inner loops.
         geometry: the person's shape.
         pixels: (pixels,) row-major.
     """
@@ -63,12 +63,16 @@ class Corners:
 
 
 Mix = Callable[[Corners], Values]
-"""Colours (count, pixels, 3) of the queries."""
+"""Colours (count, channels, pixels) of the queries."""
 
 
 def barycentric(weights: Values, colours: Values) -> Values:
-    """Σ over corners of weights (count, 3, pixels or 1) times colours (count, 3, pixels, 3): (count, pixels, 3)."""
-    return np.asarray((weights[..., None] * colours).sum(axis=1))
+    """Σ over corners of weights (count, 3, pixels or 1) · colours (count, 3, channels, pixels).
+
+    Corner by corner: many times as fast as a sum over an axis of three.
+    """
+    first, second, third = (weights[:, corner, None] * colours[:, corner] for corner in range(3))
+    return np.asarray(first + second + third)
 
 
 @dataclass(frozen=True)
@@ -90,25 +94,32 @@ class TriangleField:
 
     def dense(self, start: int, stop: int) -> Values:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
-        return np.ascontiguousarray(self.at(texel_vectors(), np.arange(start, stop)).transpose(1, 0, 2))
+        found = self._answer(texel_vectors(), self._texels, np.arange(start, stop))
+        return np.ascontiguousarray(found.transpose(1, 0, 2))
 
     def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Values:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
-        known = self.samples.directions
-        found = locate(known, directions)
-        pictures = self.samples.pictures.reshape(len(known), -1, 3)
+        return self._answer(directions, locate(self.samples.directions, directions), pixels)
+
+    @cached_property
+    def _texels(self) -> Located:
+        return locate(self.samples.directions, texel_vectors())
+
+    def _answer(self, directions: NDArray[np.float64], found: Located, pixels: NDArray[np.intp]) -> Values:
+        lights = self.samples.directions
+        pictures = self.samples.pictures.reshape(len(lights), -1, 3)
         result = np.zeros((len(directions), len(pixels), 3), np.float32)
         step = max(1, BLOCK // max(1, len(found.covered)))
         for start in range(0, len(pixels), step):
             block = pixels[start : start + step]
             corners = Corners(
-                lights=known,
+                lights=lights,
                 queries=directions[found.covered],
                 triangles=found.corners,
                 weights=found.weights[..., None],
-                colours=pictures[:, block][found.corners],
+                colours=np.ascontiguousarray(pictures[:, block].transpose(0, 2, 1))[found.corners],
                 geometry=self.samples.geometry,
                 pixels=block,
             )
-            result[found.covered, start : start + step] = self.mix(corners)
+            result[found.covered, start : start + step] = self.mix(corners).transpose(0, 2, 1)
         return result

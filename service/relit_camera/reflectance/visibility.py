@@ -20,7 +20,7 @@ from relit_camera.space.directions import (
 )
 
 Interpolate = Callable[[Values, Corners], Values]
-"""Weights (count, 3, pixels or 1) of the corners that are lit → colours (count, pixels, 3)."""
+"""Weights (count, 3, pixels) of the corners that are lit → colours (count, channels, pixels)."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def smoothed_visibility(geometry: Geometry, directions: NDArray[np.float64], pix
 
 
 def by_visibility(corners: Corners, visibility: tuple[Values, Values], lit_colours: Interpolate) -> Values:
-    """Colours (count, pixels, 3) by the rule of thesis 5.3.
+    """Colours (count, channels, pixels) by the rule of thesis 5.3.
 
     The corner seen least counts as in shadow, the one seen most as lit. The third is taken once as lit and once as in
     shadow, and both are mixed by how near it is to those two. Each time the colour goes from that of the corners in
@@ -94,14 +94,14 @@ def by_visibility(corners: Corners, visibility: tuple[Values, Values], lit_colou
     rank = np.argsort(order, axis=1)
     least, middle, most = np.take_along_axis(seen, order, axis=1).transpose(1, 0, 2)
     as_lit = _share(middle, least, most)
-    stepped = np.zeros((*here.shape, 3), np.float32)
+    stepped = np.zeros_like(corners.colours[:, 0])
     for first_lit, low, high, weight in ((1, least, middle, as_lit), (2, middle, most, 1 - as_lit)):
         is_lit = rank >= first_lit
         lit = lit_colours(_only(corners.weights, is_lit), corners)
         dark = barycentric(_only(corners.weights, ~is_lit), corners.colours)
-        stepped += weight[..., None] * (dark + _share(here, low, high)[..., None] * (lit - dark))
+        stepped += weight[:, None] * (dark + _share(here, low, high)[:, None] * (lit - dark))
     plain = barycentric(corners.weights, corners.colours)
-    return np.asarray(plain + (most - least)[..., None] * (stepped - plain))
+    return np.asarray(plain + (most - least)[:, None] * (stepped - plain))
 
 
 def _share(value: Values, low: Values, high: Values) -> Values:
