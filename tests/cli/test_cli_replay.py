@@ -61,7 +61,7 @@ def test_track_plays_back_as_it_was_recorded(material: Material, tmp_path: Path)
         assert b["mouth"] == pytest.approx(a["mouth"])
 
 
-@pytest.mark.parametrize("method", ["planar", "barycentric", "nearest", "default"])
+@pytest.mark.parametrize("method", ["planar", "barycentric", "nearest", "ptm", "gp", "thesis", "default"])
 def test_import_and_info(method: str, tmp_path: Path) -> None:
     lights = write_lights(tmp_path / "capture", sphere_samples(40, 24))
     subject = tmp_path / "sphere.relit"

@@ -91,7 +91,8 @@ def test_directions_without_extent_are_refused(directions: np.ndarray) -> None:
 
 
 def test_methods_are_found_by_name() -> None:
-    assert {"barycentric", "planar", "nearest"} <= set(method_names())
+    thesis = {"planar", "barycentric", "visibility", "visibility-sharp", "adaptation", "thesis"}
+    assert thesis | {"nearest", "ptm", "sh3", "rbf", "gp"} <= set(method_names())
     assert open_method("default") == SphericalBarycentric()
     with pytest.raises(NotFoundError, match="there are: default"):
         open_method("magic")

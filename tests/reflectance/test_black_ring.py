@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from relit_camera.reflectance.barycentric import SphericalBarycentric
-from relit_camera.reflectance.black_ring import boundary, ring_directions, with_black_ring
+from relit_camera.reflectance.black_ring import boundary, region_share, ring_directions, with_black_ring
 from relit_camera.space.directions import direction_from_degrees
 from tests.evaluate.ball import cap, lambert
 from tests.synthetic import fibonacci_directions
@@ -44,3 +44,12 @@ def test_the_field_fades_over_the_ring_and_stays_the_same_inside() -> None:
     half_way = samples.pictures[boundary(samples.directions)].max()
     assert 0.3 * half_way < after[2].max() < 0.7 * half_way
     assert after[3].max() == 0
+
+
+def test_the_share_of_a_region_is_one_inside_and_falls_over_the_ring() -> None:
+    captured = cap(120, 50)
+    share = region_share(captured, direction_from_degrees([0, 20, 48, 62, 90], [0, 30, 0, 0, 0]), 20)
+    np.testing.assert_allclose(share[:3], 1, atol=1e-6)
+    assert 0.2 < share[3] < 0.8
+    assert share[4] == 0
+    np.testing.assert_allclose(region_share(fibonacci_directions(100), captured), 1, atol=1e-6)

@@ -125,7 +125,7 @@ def test_compression_takes_no_more_than_the_error_asks() -> None:
     mix = rng.random((40, 5), dtype=np.float32)
     pictures = np.tensordot(mix, hidden, axes=(1, 0))
     weights = rng.random((40, 2048), dtype=np.float32) / 40
-    field = FactoredField(pictures, np.tile([0.0, 0.0, 1.0], (40, 1)), weights)
+    field = FactoredField(pictures, np.tile([0.0, 0.0, 1.0], (40, 1)), lambda texels: weights)
     compressed = compress(field, np.ones((12, 10), np.float32))
     assert compressed.basis.shape[1] == 5
     assert compressed.psnr_db >= 50

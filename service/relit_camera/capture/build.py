@@ -9,13 +9,13 @@ import numpy as np
 
 from relit_camera import __version__
 from relit_camera.capture.landmarks import find_landmarks
-from relit_camera.errors import InputError
 from relit_camera.reflectance.method import DEFAULT_METHOD, open_method
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.colour import Gamma, luminance, uint8_from_linear
 from relit_camera.space.directions import texel_directions, texel_solid_angles
 from relit_camera.space.images import DisplayImage, LinearImage, Mask, Points
-from relit_camera.subject.compress import compress
+from relit_camera.subject.compress import CompressedField, compress
+from relit_camera.subject.compress_dense import compress_dense
 from relit_camera.subject.field import FactoredField
 from relit_camera.subject.subject import Subject, SubjectMetadata
 
@@ -48,13 +48,12 @@ def build_subject(
     """
     method = DEFAULT_METHOD if method == "default" else method
     field = open_method(method).build(samples)
-    if not isinstance(field, FactoredField):
-        raise InputError(
-            f"the field of method '{method}' cannot be compressed yet", "use barycentric, planar or nearest"
-        )
-    frontal = frontal_picture(field)
+    if isinstance(field, FactoredField):
+        compressed = compress(field, samples.matte)
+    else:
+        compressed = compress_dense(field, samples.pictures, samples.matte)
+    frontal = frontal_picture(compressed)
     still = neutral_picture(frontal, samples.matte)
-    compressed = compress(field, samples.matte)
     lights, height, width = samples.pictures.shape[:3]
     return Subject(
         metadata=SubjectMetadata(
@@ -81,12 +80,13 @@ def build_subject(
     )
 
 
-def frontal_picture(field: FactoredField) -> LinearImage:
+def frontal_picture(field: CompressedField) -> LinearImage:
     """The face under soft light from the front, a cosine lobe about the camera: a white wall facing it reads 1."""
     lobe = np.maximum(texel_directions()[..., 2], 0) * texel_solid_angles()
     lobe /= (lobe * np.maximum(texel_directions()[..., 2], 0)).sum()
-    mixed = np.tensordot(field.weights @ lobe.ravel().astype(np.float32), field.pictures, axes=(0, 0))
-    return np.asarray(mixed, dtype=np.float32)
+    amounts = field.coefficients @ lobe.ravel().astype(np.float32)
+    planes = np.tensordot(field.basis.astype(np.float32), amounts, axes=(1, 0))
+    return np.ascontiguousarray(planes.transpose(1, 2, 0), dtype=np.float32)
 
 
 def over_black(samples: Samples) -> bool:

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from relit_camera.evaluate.truth import pixels_of
 from relit_camera.reflectance.black_ring import with_black_ring
 from relit_camera.reflectance.method import LinearMethod, Method, method_names, open_method
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.directions import MAP_HEIGHT, MAP_WIDTH, map_position_from_direction
+from relit_camera.subject.field import ExactField, ReflectanceField
 from relit_camera.subject.subject import Subject
 
 RINGED = "barycentric"
@@ -66,8 +66,7 @@ def method_candidates(samples: Samples, inside: NDArray[np.intp], names: Sequenc
     for name in names or _all_names():
         used = with_black_ring(samples) if name == RING else samples
         method = open_method(RINGED if name == RING else name)
-        answer = _linear_lookup(method, used) if isinstance(method, LinearMethod) else _dense_lookup(method, used)
-        candidates.append(Candidate(name, inside, answer))
+        candidates.append(Candidate(name, inside, _lookup(method, used)))
     return candidates
 
 
@@ -76,36 +75,34 @@ def _all_names() -> list[str]:
     return [*installed, RING] if RINGED in installed else installed
 
 
-def _linear_lookup(method: LinearMethod, samples: Samples) -> Lookup:
-    def answer(directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
-        weights = method.weights(samples.directions, directions)
-        return np.asarray(np.tensordot(weights.T, pixels_of(samples, pixels), 1), np.float32)
-
-    return answer
-
-
-def _dense_lookup(method: Method, samples: Samples) -> Lookup:
-    """For a method that knows texels only: its map is read between their centres."""
+def _lookup(method: Method, samples: Samples) -> Lookup:
+    """Of the method's field, which is built when it is first asked."""
     field = cache(lambda: method.build(samples))
 
     def answer(directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
-        lookup = map_lookup(directions)
-        pictures = np.empty((len(directions), len(pixels), 3), np.float32)
-        order = np.argsort(pixels)
-        for start in range(0, len(pixels), _BLOCK):
-            chosen = order[start : start + _BLOCK]
-            first, last = int(pixels[chosen[0]]), int(pixels[chosen[-1]])
-            # Pixels of a matte lie close together, chosen spots do not: never the dense field of all between them.
-            block = (
-                field().dense(first, last + 1)[pixels[chosen] - first]
-                if last - first < 4 * _BLOCK
-                else np.concatenate([field().dense(int(pixel), int(pixel) + 1) for pixel in pixels[chosen]])
-            )
-            by_texel = block.transpose(1, 0, 2).reshape(block.shape[1], -1)
-            pictures[:, chosen] = (lookup @ by_texel).reshape(len(directions), len(chosen), 3)
-        return pictures
+        built = field()
+        return built.at(directions, pixels) if isinstance(built, ExactField) else _read(built, directions, pixels)
 
     return answer
+
+
+def _read(field: ReflectanceField, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
+    """Colours (count, some, 3) of a field that knows texels only: its map is read between their centres."""
+    lookup = map_lookup(directions)
+    pictures = np.empty((len(directions), len(pixels), 3), np.float32)
+    order = np.argsort(pixels)
+    for start in range(0, len(pixels), _BLOCK):
+        chosen = order[start : start + _BLOCK]
+        first, last = int(pixels[chosen[0]]), int(pixels[chosen[-1]])
+        # Pixels of a matte lie close together, chosen spots do not: never the dense field of all between them.
+        block = (
+            field.dense(first, last + 1)[pixels[chosen] - first]
+            if last - first < 4 * _BLOCK
+            else np.concatenate([field.dense(int(pixel), int(pixel) + 1) for pixel in pixels[chosen]])
+        )
+        by_texel = block.transpose(1, 0, 2).reshape(block.shape[1], -1)
+        pictures[:, chosen] = (lookup @ by_texel).reshape(len(directions), len(chosen), 3)
+    return pictures
 
 
 def subject_candidate(name: str, subject: Subject, inside: NDArray[np.intp]) -> Candidate:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.errors import LightsError
-from relit_camera.evaluate import harmonics
 from relit_camera.evaluate.candidates import RINGED, Candidate
 from relit_camera.evaluate.ghosts import Between, clearest, histogram, mid_tone_share, spots_between
 from relit_camera.evaluate.measure import (
@@ -22,6 +21,7 @@ from relit_camera.evaluate.measure import (
 )
 from relit_camera.evaluate.points import Spot
 from relit_camera.evaluate.truth import Truth, sampled_region, unseen
+from relit_camera.light import harmonics
 from relit_camera.light.maps import LightMap
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.directions import texel_directions

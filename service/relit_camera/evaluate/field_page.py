@@ -12,7 +12,6 @@ from relit_camera.evaluate.candidates import RING
 from relit_camera.evaluate.charts import line_chart
 from relit_camera.evaluate.field import PROFILE_BINS, FieldReport, places_of
 from relit_camera.evaluate.ghost_page import ghost_blocks
-from relit_camera.evaluate.harmonics import coefficient_count, project, reconstruct
 from relit_camera.evaluate.page import chart, heading, page, paragraph, picture, table
 from relit_camera.evaluate.pictures import (
     directions_picture,
@@ -22,6 +21,7 @@ from relit_camera.evaluate.pictures import (
     marked_picture,
     reflectance_picture,
 )
+from relit_camera.light.harmonics import coefficient_count, project, reconstruct
 from relit_camera.light.maps import LightMap
 from relit_camera.reflectance.black_ring import ring_directions
 from relit_camera.space.colour import luminance

@@ -33,19 +33,9 @@ class SphericalBarycentric:
 
     def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
         """Weights (lights, queries); see `LinearMethod.weights`."""
-        triangles = spherical_delaunay(directions, self.max_gap_deg)
-        corners = directions[triangles]
-        # A direction is inside a triangle if it is on the inner side of all three great circles of its edges.
-        edges = np.cross(corners, np.roll(corners, -1, axis=1))
-        edges /= np.linalg.norm(edges, axis=2, keepdims=True)
-        inside = np.einsum("tec,qc->qte", edges, queries).min(axis=2)
-        # A direction on an edge or a vertex lies in several triangles, all of which give it the same weights.
-        chosen = inside.argmax(axis=1)
-        covered = np.flatnonzero(inside[np.arange(len(queries)), chosen] >= -TOLERANCE)
+        found = locate(directions, queries, self.max_gap_deg)
         weights = np.zeros((len(directions), len(queries)), dtype=np.float32)
-        vertices = triangles[chosen[covered]]
-        local = spherical_barycentric(queries[covered], directions[vertices])
-        np.add.at(weights, (vertices.T, covered[None, :]), local.T.astype(np.float32))
+        np.add.at(weights, (found.corners.T, found.covered[None, :]), found.weights.T)
         return weights
 
 
@@ -85,6 +75,41 @@ class PlanarBarycentric:
         vertices = triangulation.simplices[chosen[covered]]
         np.add.at(weights, (vertices.T, covered[None, :]), local.T.astype(np.float32))
         return weights
+
+
+@dataclass(frozen=True)
+class Located:
+    """Where directions lie among the sampled ones.
+
+    Attributes:
+        covered: (count,) indices of the queries that lie in a triangle.
+        corners: (count, 3) lights at its corners.
+        weights: (count, 3) float32, the query's barycentric coordinates in it; they sum to 1.
+    """
+
+    covered: NDArray[np.intp]
+    corners: NDArray[np.intp]
+    weights: NDArray[np.float32]
+
+
+def locate(directions: NDArray[np.float64], queries: NDArray[np.float64], max_gap_deg: float = MAX_GAP_DEG) -> Located:
+    """The spherical Delaunay triangle of unit vectors (lights, 3) in which each query (count, 3) lies.
+
+    Raises:
+        LightsError: fewer than four directions, or all on one circle.
+    """
+    triangles = spherical_delaunay(directions, max_gap_deg)
+    corners = directions[triangles]
+    # A direction is inside a triangle if it is on the inner side of all three great circles of its edges.
+    edges = np.cross(corners, np.roll(corners, -1, axis=1))
+    edges /= np.linalg.norm(edges, axis=2, keepdims=True)
+    inside = np.einsum("tec,qc->qte", edges, queries).min(axis=2)
+    # A direction on an edge or a vertex lies in several triangles, all of which give it the same weights.
+    chosen = inside.argmax(axis=1)
+    covered = np.flatnonzero(inside[np.arange(len(queries)), chosen] >= -TOLERANCE)
+    vertices = triangles[chosen[covered]]
+    weights = spherical_barycentric(queries[covered], directions[vertices])
+    return Located(covered, vertices, weights.astype(np.float32))
 
 
 def spherical_delaunay(directions: NDArray[np.float64], max_gap_deg: float = MAX_GAP_DEG) -> NDArray[np.intp]:

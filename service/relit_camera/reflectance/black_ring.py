@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.reflectance.barycentric import spherical_delaunay
+from relit_camera.reflectance.barycentric import SphericalBarycentric, spherical_delaunay
 from relit_camera.reflectance.samples import Samples
 
 DISTANCE_DEG = 25.0
@@ -49,9 +51,31 @@ def ring_directions(directions: NDArray[np.float64], distance_deg: float = DISTA
 def with_black_ring(samples: Samples, distance_deg: float = DISTANCE_DEG) -> Samples:
     """The samples with the black ring: there the field fades instead of ending.
 
+    What is to use the person's shape must know it before: the ring's pictures are no shadows.
+
     Raises:
         LightsError: the directions span no region.
     """
     ring = ring_directions(samples.directions, distance_deg)
     black = np.zeros((len(ring), *samples.pictures.shape[1:]), np.float32)
-    return Samples(np.concatenate([samples.pictures, black]), np.concatenate([samples.directions, ring]), samples.matte)
+    return replace(
+        samples,
+        pictures=np.concatenate([samples.pictures, black]),
+        directions=np.concatenate([samples.directions, ring]),
+    )
+
+
+def region_share(
+    directions: NDArray[np.float64], queries: NDArray[np.float64], distance_deg: float = DISTANCE_DEG
+) -> NDArray[np.float32]:
+    """1 for queries (count, 3) in the region of the lights (lights, 3), falling to 0 over the ring: (count,).
+
+    Fitted methods are worth nothing far from their data; this ends them as the black ring ends interpolation.
+
+    Raises:
+        LightsError: the directions span no region.
+    """
+    ringed = np.concatenate([directions, ring_directions(directions, distance_deg)])
+    fading = SphericalBarycentric().weights(ringed, queries)[: len(directions)].sum(axis=0)
+    # With the ring's points, triangles at the region's edge may be others than without.
+    return np.asarray(np.maximum(fading, SphericalBarycentric().weights(directions, queries).sum(axis=0)))

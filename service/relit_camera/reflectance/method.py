@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from importlib.metadata import entry_points
 from typing import Protocol, runtime_checkable
 
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from relit_camera.errors import NotFoundError
 from relit_camera.reflectance.samples import Samples
-from relit_camera.space.directions import texel_directions
 from relit_camera.subject.field import FactoredField, ReflectanceField
 
 DEFAULT_METHOD = "barycentric"
@@ -41,7 +41,7 @@ class LinearMethod(Protocol):
             queries: (count, 3) unit vectors.
 
         Returns:
-            (lights, count) float32; a column sums to 1, or to 0 where nothing was captured.
+            (lights, count) float32; a column sums to 1 in the sampled region, to 0 where nothing was captured.
 
         Raises:
             LightsError: the directions cannot carry it.
@@ -50,9 +50,8 @@ class LinearMethod(Protocol):
 
 
 def factored_field(method: LinearMethod, samples: Samples) -> FactoredField:
-    """The field of a linear method, its weights evaluated at the texel centres (thesis 5.1, 5.2)."""
-    weights = method.weights(samples.directions, texel_directions().reshape(-1, 3))
-    return FactoredField(samples.pictures, samples.directions, weights)
+    """The field of a linear method (thesis 5.1, 5.2)."""
+    return FactoredField(samples.pictures, samples.directions, partial(method.weights, samples.directions))
 
 
 def method_names() -> list[str]:

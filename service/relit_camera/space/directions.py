@@ -39,6 +39,16 @@ def direction_from_degrees(azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> 
     return direction_from_spherical(np.radians(azimuth_deg), np.radians(elevation_deg))
 
 
+def bearing_from_direction(direction: ArrayLike) -> tuple[Floats, Floats]:
+    """Bearing in the picture, counter-clockwise from its right, and height over its plane toward the camera.
+
+    Both in radians, (...), of vectors (..., 3) of any positive length: (0, 1, 0) has (π/2, 0), (0, 0, 1) has (0, π/2).
+    """
+    vector = np.asarray(direction, dtype=np.float64)
+    bearing = np.arctan2(vector[..., 1], vector[..., 0])
+    return bearing, np.arctan2(vector[..., 2], np.hypot(vector[..., 0], vector[..., 1]))
+
+
 def fibonacci_directions(count: int) -> Floats:
     """Unit vectors (count, 3) spread evenly over the sphere, from the top down (golden spiral; Vogel 1979)."""
     y = 1 - (2 * np.arange(count) + 1) / count

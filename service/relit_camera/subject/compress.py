@@ -68,7 +68,7 @@ def _project(
     vectors: NDArray[np.float64],
     importance: NDArray[np.float64],
     matte: NDArray[np.float32],
-    field_peak: float,
+    peak: float,
     size: tuple[int, int],
 ) -> CompressedField:
     lights, rank = vectors.shape
@@ -79,17 +79,32 @@ def _project(
     # Each picture fills float16's exact range; its scale goes into the coefficients.
     basis = (components / scale[:, None, None, None]).transpose(3, 0, 1, 2).astype(np.float16)
     light_coefficients = ((vectors / importance[:, None]).T * scale[:, None]).astype(np.float32)
-    rounded = basis.astype(np.float32).transpose(1, 2, 3, 0).reshape(rank, -1)
-    worst = np.inf
-    for start in range(0, lights, BATCH):
-        stop = min(start + BATCH, lights)
-        restored = (light_coefficients[:, start:stop].T @ rounded).reshape(-1, *size, 3)
-        for picture, truth in zip(restored, field.pictures[start:stop], strict=True):
-            own_peak = float(np.percentile(truth[matte > 0.5], 99.5))
-            worst = min(worst, psnr(picture, truth, matte, peak=max(own_peak, 0.1 * field_peak)))
     return CompressedField(
         basis=np.ascontiguousarray(basis),
         coefficients=light_coefficients @ field.weights,
         light_coefficients=light_coefficients,
-        psnr_db=worst,
+        psnr_db=worst_light_db(basis, light_coefficients, field.pictures, matte, peak),
     )
+
+
+def worst_light_db(
+    basis: NDArray[np.float16],
+    light_coefficients: NDArray[np.float32],
+    captured: NDArray[np.float32],
+    matte: NDArray[np.float32],
+    peak: float,
+) -> float:
+    """PSNR in dB of the captured light (lights, height, width, 3) that comes back worst, inside the matte.
+
+    Lights too dark to have a peak of their own are judged by a tenth of the field's `peak`.
+    """
+    lights, height, width, _ = captured.shape
+    rounded = basis.astype(np.float32).transpose(1, 2, 3, 0).reshape(len(light_coefficients), -1)
+    worst = np.inf
+    for start in range(0, lights, BATCH):
+        stop = min(start + BATCH, lights)
+        restored = (light_coefficients[:, start:stop].T @ rounded).reshape(-1, height, width, 3)
+        for picture, truth in zip(restored, captured[start:stop], strict=True):
+            own_peak = float(np.percentile(truth[matte > 0.5], 99.5))
+            worst = min(worst, psnr(picture, truth, matte, peak=max(own_peak, 0.1 * peak)))
+    return worst

@@ -6,13 +6,15 @@ sample. Solid angles are no part of it: they belong to the operator that sums ov
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.space.directions import MAP_HEIGHT, MAP_WIDTH
+from relit_camera.space.directions import MAP_HEIGHT, MAP_WIDTH, texel_directions
 
 TEXELS = MAP_HEIGHT * MAP_WIDTH
 
@@ -30,6 +32,20 @@ class ReflectanceField(Protocol):
         ...
 
 
+@runtime_checkable
+class ExactField(ReflectanceField, Protocol):
+    """A field that answers any direction, not only texels."""
+
+    def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
+        """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
+        ...
+
+
+def texel_vectors() -> NDArray[np.float64]:
+    """Unit vectors (2048, 3) toward the texels of a light map, in its order."""
+    return texel_directions().reshape(TEXELS, 3)
+
+
 @dataclass(frozen=True)
 class FactoredField:
     """A field whose interpolation weights are the same for all pixels: R[p, l] = Σ_n pictures[n, p] · weights[n, l].
@@ -39,26 +55,36 @@ class FactoredField:
     Attributes:
         pictures: (lights, height, width, 3) float32 linear, each under unit irradiance from its own direction.
         directions: (lights, 3) float64 unit vectors.
-        weights: (lights, 2048) float32; a column sums to 1 inside the sampled region and to 0 outside.
+        interpolation: unit vectors (count, 3) → weights (lights, count) float32; a column sums to 1 inside the sampled
+            region and to 0 far from it.
     """
 
     pictures: NDArray[np.float32]
     directions: NDArray[np.float64]
-    weights: NDArray[np.float32]
+    interpolation: Callable[[NDArray[np.float64]], NDArray[np.float32]]
 
     def __post_init__(self) -> None:
         lights = self.pictures.shape[0]
-        if self.pictures.ndim != 4 or self.directions.shape != (lights, 3) or self.weights.shape != (lights, TEXELS):
-            shapes = self.pictures.shape, self.directions.shape, self.weights.shape
-            raise ValueError(f"pictures, directions and weights do not fit together: {shapes}")
+        if self.pictures.ndim != 4 or self.directions.shape != (lights, 3):
+            raise ValueError(f"pictures and directions do not fit: {self.pictures.shape}, {self.directions.shape}")
 
     @property
     def size(self) -> tuple[int, int]:
         """Height and width in pixels."""
         return self.pictures.shape[1], self.pictures.shape[2]
 
+    @cached_property
+    def weights(self) -> NDArray[np.float32]:
+        """The weights (lights, 2048) of the texels."""
+        return self.interpolation(texel_vectors())
+
     def dense(self, start: int, stop: int) -> NDArray[np.float32]:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
         lights = self.pictures.shape[0]
         block = self.pictures.reshape(lights, -1, 3)[:, start:stop]
         return np.asarray(np.einsum("npc,nl->plc", block, self.weights, optimize=True), dtype=np.float32)
+
+    def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
+        """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
+        block = self.pictures.reshape(len(self.pictures), -1, 3)[:, pixels]
+        return np.asarray(np.tensordot(self.interpolation(directions).T, block, 1), np.float32)

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import lebedev_rule
 from scipy.special import sph_harm_y
 
-from relit_camera.evaluate.harmonics import basis, coefficient_count, project, reconstruct
+from relit_camera.light.harmonics import basis, coefficient_count, project, reconstruct
 from relit_camera.light.maps import total
 from relit_camera.space.directions import direction_from_spherical, texel_directions
 

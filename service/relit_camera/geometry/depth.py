@@ -1,0 +1,124 @@
+"""Depth whose slopes are given normals, with steps where the surface has steps.
+
+Bilateral normal integration (Cao, Santo, Shi, Okura and Matsushita, ECCV 2022). Along each axis a pixel's normal says
+how far its two neighbours lie before or behind it. On a continuous surface both are right; at a step one is wrong, and
+the side that fits better is believed: its weight is a sigmoid of how much worse the other fits. Weights and depth are
+found in turn; every round is a weighted Poisson equation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.linalg import LinearOperator, cg, splu
+from scipy.special import expit
+
+Floats = NDArray[np.float32]
+Values = NDArray[np.float64]
+
+SHARPNESS = 2.0
+"""k of the sigmoid: how decidedly one side is believed (the paper's value)."""
+ROUNDS = 6
+CHANGE = 1e-3
+"""Rounds end when the energy changes by less than this share."""
+ACCURACY = 1e-3
+"""Of each round's equations, relative."""
+MIN_FACING = 0.15
+"""Least z of a normal: a slope of 6.6. Steeper ones are seen too narrowly to be measured."""
+ANCHOR = 1e-6
+"""Weight that holds every part of the picture near 0: pieces that do not touch have no common depth."""
+
+
+@dataclass(frozen=True)
+class _Side:
+    """What the normals say of the step to the neighbour at one side, for all pixels: matrix @ depth = steps."""
+
+    matrix: csr_array
+    steps: Values
+
+
+def integrate_normals(
+    normals: Floats, inside: NDArray[np.bool_], trust: Floats | None = None, focal_px: float | None = None
+) -> Floats:
+    """Depth (height, width) float32 in pixels, toward the camera, mean 0; NaN outside.
+
+    Args:
+        normals: (height, width, 3) unit vectors.
+        inside: (height, width) pixels that have depth.
+        trust: (height, width), how much each pixel's normal counts; all alike where None.
+        focal_px: the camera's focal length, its axis through the picture's middle; parallel projection where None. With
+            it a pixel is what it spans at the person's mean distance.
+    """
+    facing, right, up = _slopes(normals, inside, focal_px)
+    count = len(facing)
+    sides = [
+        _side(inside, facing, 0, 1, right),
+        _side(inside, -facing, 0, -1, right),
+        _side(inside, facing, -1, 0, up),
+        _side(inside, -facing, 1, 0, up),
+    ]
+    share = np.ones(count) if trust is None else trust[inside].astype(np.float64)
+    weights = [0.5 * share] * 4
+    depth, energy, precondition = np.zeros(count), np.inf, None
+    for _ in range(ROUNDS):
+        matrix, target = _normal_equations(sides, weights)
+        if precondition is None:
+            # Weights of later rounds differ little from the first's: its factors serve all.
+            factors = splu(csc_array(matrix), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+            precondition = LinearOperator(matrix.shape, factors.solve, dtype=np.float64)
+        depth, _ = cg(matrix, target, x0=depth, M=precondition, rtol=ACCURACY, maxiter=200)
+        misfits = [(side.matrix @ depth - side.steps) ** 2 for side in sides]
+        before, energy = energy, sum(float(w @ m) for w, m in zip(weights, misfits, strict=True))
+        if abs(before - energy) < CHANGE * energy:
+            break
+        first, third = (expit(SHARPNESS * (misfits[i + 1] - misfits[i])) for i in (0, 2))
+        weights = [share * w for w in (first, 1 - first, third, 1 - third)]
+    if focal_px is not None:
+        depth = focal_px * -np.expm1(-(depth - depth.mean()) / focal_px)
+    result = np.full(inside.shape, np.nan, np.float32)
+    result[inside] = depth - depth.mean()
+    return result
+
+
+def _slopes(normals: Floats, inside: NDArray[np.bool_], focal_px: float | None) -> tuple[Values, Values, Values]:
+    """Of each pixel inside: z of its normal as the pixel's ray sees it, and that times its slope to the right and up.
+
+    In perspective the unknown is −f·log of the distance, whose slopes are -n_x and -n_y over n_z − (n_x·x + n_y·y) / f
+    for a pixel at (x, y) from the axis.
+    """
+    x, y, z = normals[inside].astype(np.float64).T
+    if focal_px is not None:
+        height, width = inside.shape
+        row, column = np.nonzero(inside)
+        z = z - (x * (column + 0.5 - width / 2) + y * (height / 2 - row - 0.5)) / focal_px
+    return np.maximum(z, MIN_FACING), -x, -y
+
+
+def _side(inside: NDArray[np.bool_], facing: Values, down: int, right: int, steps: Values) -> _Side:
+    """The equations facing · (neighbour − pixel) = steps toward the neighbour `down` rows and `right` columns away.
+
+    For neighbours at the left and below, facing and so the step come with the other sign. Pixels without that neighbour
+    have none.
+    """
+    height, width = inside.shape
+    number = np.full((height + 2, width + 2), -1)
+    number[1:-1, 1:-1][inside] = np.arange(len(facing))
+    neighbour = number[1 + down : 1 + down + height, 1 + right : 1 + right + width][inside]
+    own = np.flatnonzero(neighbour >= 0)
+    values = np.concatenate([facing[own], -facing[own]])
+    places = np.concatenate([own, own]), np.concatenate([neighbour[own], own])
+    matrix = csr_array((values, places), shape=(len(facing), len(facing)))
+    return _Side(matrix, np.where(neighbour >= 0, steps, 0))
+
+
+def _normal_equations(sides: list[_Side], weights: list[Values]) -> tuple[csr_array, Values]:
+    matrix = csr_array(diags_array(np.full(len(weights[0]), ANCHOR)))
+    target = np.zeros(len(weights[0]))
+    for side, weight in zip(sides, weights, strict=True):
+        weighted = side.matrix.T @ diags_array(weight)
+        matrix = matrix + weighted @ side.matrix
+        target += weighted @ side.steps
+    return csr_array(matrix), target
