@@ -111,4 +111,6 @@ def _credits_text(lines: list[str]) -> str:
     return (
         "# Credits\n\nThe person in this folder does not exist: they were rendered from\n\n"
         f"{listed}\n\nThe pictures are changed much: fitted to one another, recoloured, given hair, eyes and clothes.\n"
+        "ICT-FaceKit: https://github.com/ICT-VGL/ICT-FaceKit. The scan: https://www.ir-ltd.net, under\n"
+        "https://creativecommons.org/licenses/by/3.0/. Whoever passes these files on keeps this page with them.\n"
     )

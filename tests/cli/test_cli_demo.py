@@ -74,6 +74,9 @@ def test_the_bundled_person_is_live_and_in_ratio(demo: tuple[list[str], httpx.Cl
     assert now["state"] == "live"
     assert (now["subject"], now["mode"]) == ("adam", "ratio")
     assert now["degraded"] == []
+    time.sleep(3)  # longer than a stranger is on trial
+    assert status(demo[1])["mode"] == "ratio"
+    assert status(demo[1])["degraded"] == []
 
 
 def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[str], httpx.Client]) -> None:

@@ -28,9 +28,9 @@ NEUTRAL = Neutral(SCHEME.canonical.copy(), LIVE_NEUTRAL)
 
 
 class Looker:
-    """A tracker that is only asked for its scheme."""
+    """A recording: it is only asked for its scheme."""
 
-    name, scheme = "looker", "mesh478"
+    name, scheme = "recorded", "mesh478"
 
 
 @cache

@@ -60,7 +60,7 @@ def test_every_landmark_of_a_face_that_hides_nothing_is_met(face, yaw):
         for patch in (mesh, head)
     )
     assert error < 0.1
-    assert error <= 0.5 * before + 1e-3
+    assert error <= 0.5 * before + 0.02  # a grid point on a border is drawn with the neighbour's triangle
 
 
 @pytest.mark.parametrize(
@@ -74,6 +74,19 @@ def test_a_turned_nose_covers_its_far_side(face, yaw, hidden, seen):
     # The viewer sees the ridge there, on the hither side of the wing.
     beyond = (far - face.landmarks[hidden])[0] * np.sign(face.landmarks[seen] - face.landmarks[hidden])[0]
     assert beyond > 0.2 * step
+
+
+@pytest.mark.parametrize("angles", [(35, 25, 10), (-35, -25, 5), (0, 25, 0), (28, -10, -10)])
+def test_no_point_looks_far_from_where_its_neighbours_look(face, angles):
+    """Thin triangles, seen from the side, throw nothing away: all look inside the face."""
+    _, _, mesh = patches_of(face, Rotation.from_euler("YXZ", angles, degrees=True))
+    rows, columns = mesh.flow.shape[:2]
+    x, y = (np.linspace(mesh.region[i], mesh.region[i + 2], n) for i, n in ((0, columns), (1, rows)))
+    seen = mesh.flow + np.dstack(np.meshgrid(x, y))
+    inner = seen[rows // 4 : -rows // 4, columns // 4 : -columns // 4].reshape(-1, 2)
+    low, high = face.landmarks.min(axis=0), face.landmarks.max(axis=0)
+    assert (inner > low - 0.1 * (high - low)).all()
+    assert (inner < high + 0.1 * (high - low)).all()
 
 
 def test_outside_the_face_the_flow_is_the_heads(face):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from relit_camera.face.landmarks import Scheme
+from relit_camera.face.landmarks import Indices, Scheme
 from relit_camera.face.pose import project
 from relit_camera.face.state import HeadPose
 from relit_camera.reenact.dense_motion import Influence, Region, region_around
@@ -120,8 +120,12 @@ def fine_regions(face: SourceFace, target: NDArray[np.float64]) -> list[Region]:
         target: (count, 2) moved landmarks in still pixels.
     """
     scheme, span = face.scheme, face.scheme.eye_span(face.landmarks)
-    groups = (scheme.right_eye.lids, scheme.left_eye.lids, scheme.lips)
-    return [region_around(target[list(group)], 0.12 * span, *FINE_GRID) for group in groups]
+    return [region_around(target[list(group)], 0.12 * span, *FINE_GRID) for group in feature_landmarks(scheme)]
+
+
+def feature_landmarks(scheme: Scheme) -> tuple[Indices, ...]:
+    """Lids of both eyes and lips, in the order of `fine_regions`."""
+    return scheme.right_eye.lids, scheme.left_eye.lids, scheme.lips
 
 
 def choose_landmarks(scheme: Scheme, landmarks: NDArray[np.float64]) -> NDArray[np.intp]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from relit_camera.face.state import HeadPose
-from relit_camera.reenact.dense_motion import region_around
+from relit_camera.reenact.dense_motion import Region, region_around
 from relit_camera.reenact.source_face import SourceFace
 from relit_camera.reenact.warp import FlowPatch
 
@@ -22,7 +22,11 @@ GRID = (160, 160)
 MARGIN = 0.1
 """Eye distances round the face that the grid takes in."""
 HAND_OVER = 0.2
-"""Eye distances inside the face's outline, over which the mesh hands over to the flow round it."""
+"""Eye distances inside the face's outline in the still, over which the mesh hands over to the flow round it."""
+FEATURE_REACH = 0.1
+"""Eye distances round lids and lips: what lies farther off by that and as much again is not theirs."""
+BEYOND = 0.25
+"""Share of a triangle by which points outside may look beyond its own part of the still."""
 SUBPIXEL_BITS = 4
 
 
@@ -35,12 +39,15 @@ class FaceMesh:
         members: (points,) the landmarks that are corners: all but the irises, which roll behind the lids.
         triangles: (count, 3) rows of `members`.
         clockwise: (count,) the sign of each triangle's area in the still.
+        trust: (points,) 0 at the outline of them all, rising to 1 inside: how far the mesh counts beside the flow
+            round it.
     """
 
     face: SourceFace
     members: NDArray[np.intp]
     triangles: NDArray[np.intp]
     clockwise: NDArray[np.float64]
+    trust: NDArray[np.float64]
 
     def over(self, head: FlowPatch, landmarks: NDArray[np.float64], pose: HeadPose) -> FlowPatch:
         """The flow of the mesh over the face, and `head`'s where the mesh does not reach.
@@ -59,13 +66,28 @@ class FaceMesh:
         covered = shown >= 0
         grid = region.grid.reshape(region.rows, region.columns, 2)
         flow = _resampled(head, grid)
-        mesh = flow.copy()
-        affine = _affine(target[self.triangles], source[self.triangles])
-        chosen = affine[shown[covered]]
-        mesh[covered] = np.einsum("nj,nji->ni", grid[covered], chosen[:, :2]) + chosen[:, 2] - grid[covered]
-        inward = cv2.distanceTransform(covered.astype(np.uint8), cv2.DIST_L2, 3) * step.min()
-        share = np.clip(inward / (HAND_OVER * span), 0, 1)[..., None]
-        return FlowPatch((flow + share * share * (3 - 2 * share) * (mesh - flow)).astype(np.float32), region.box)
+        triangles = self.triangles[shown[covered]]
+        weights = _barycentric(grid[covered], target[triangles])
+        trust = np.einsum("nk,nk->n", weights, self.trust[triangles])[:, None]
+        looks_at = np.einsum("nk,nki->ni", weights, source[triangles])
+        flow[covered] += trust * (looks_at - grid[covered] - flow[covered])
+        return FlowPatch(flow, region.box)
+
+    def before(self, patch: FlowPatch, mesh: FlowPatch, feature: NDArray[np.float64]) -> FlowPatch:
+        """A fine patch, but where the mesh shows something else in front of it: a nose before the far eye.
+
+        Args:
+            patch: the flow of an eye or the mouth.
+            mesh: what `over` has given.
+            feature: (count, 2) its landmarks in the still.
+        """
+        rows, columns = patch.flow.shape[:2]
+        grid = Region(patch.region, rows, columns).grid.reshape(rows, columns, 2)
+        flow = _resampled(mesh, grid)
+        reach = FEATURE_REACH * self.face.scheme.eye_span(self.face.landmarks)
+        beside = np.maximum(feature.min(axis=0) - (grid + flow), (grid + flow) - feature.max(axis=0)).max(axis=2)
+        share = np.clip(beside / reach - 1, 0, 1)[..., None].astype(np.float32)
+        return FlowPatch(patch.flow + share * (flow - patch.flow), patch.region)
 
     def _nearest(self, corners: NDArray[np.float64], depth: NDArray[np.float64]) -> NDArray[np.int32]:
         """The triangle that shows at each grid point, −1 where none does: (rows, columns).
@@ -88,8 +110,20 @@ def face_mesh(face: SourceFace) -> FaceMesh:
     irises = {*face.scheme.right_eye.iris, *face.scheme.left_eye.iris}
     members = np.array([index for index in range(face.scheme.count) if index not in irises], dtype=np.intp)
     corners = face.landmarks[members].astype(np.float64)
-    triangles = np.asarray(Delaunay(corners).simplices, dtype=np.intp)
-    return FaceMesh(face, members, triangles, np.sign(_doubled_areas(corners[triangles])))
+    delaunay = Delaunay(corners)
+    triangles = np.asarray(delaunay.simplices, dtype=np.intp)
+    outline = np.array([corners[row] for row in delaunay.convex_hull])
+    share = np.clip(_distance(corners, outline) / (HAND_OVER * face.scheme.eye_span(face.landmarks)), 0, 1)
+    trust = share * share * (3 - 2 * share)
+    return FaceMesh(face, members, triangles, np.sign(_doubled_areas(corners[triangles])), trust)
+
+
+def _distance(points: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of points (count, 2) from the nearest of line segments (some, 2, 2): (count,)."""
+    start, along = sides[:, 0], sides[:, 1] - sides[:, 0]
+    offset = points[:, None] - start
+    share = np.clip((offset * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
+    return np.asarray(np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1))
 
 
 def _doubled_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -98,14 +132,21 @@ def _doubled_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(ax * by - ay * bx)
 
 
-def _affine(corners: NDArray[np.float64], onto: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The maps (count, 3, 2), [x y 1] @ map, that bring triangles (count, 3, 2) `onto` others; 0 of flat ones."""
-    homogeneous = np.concatenate([corners, np.ones((*corners.shape[:2], 1))], axis=2)
-    flat = np.abs(_doubled_areas(corners)) < 1e-9
-    homogeneous[flat] = np.eye(3)
-    maps = np.linalg.solve(homogeneous, onto)
-    maps[flat] = 0
-    return np.asarray(maps)
+def _barycentric(points: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights (count, 3) of points (count, 2) in triangles (count, 3, 2), none farther outside than by `BEYOND`.
+
+    A drawn triangle takes in points beyond its border, in a thin one by many times its own width.
+    """
+    (ax, ay), (bx, by), (px, py) = (
+        (corners[:, 1] - corners[:, 0]).T,
+        (corners[:, 2] - corners[:, 0]).T,
+        (points - corners[:, 0]).T,
+    )
+    area = ax * by - ay * bx
+    area = np.where(np.abs(area) < 1e-9, 1e-9, area)
+    second, third = (px * by - py * bx) / area, (ax * py - ay * px) / area
+    weights = np.clip(np.stack([1 - second - third, second, third], axis=1), -BEYOND, 1 + BEYOND)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def _resampled(patch: FlowPatch, points: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -15,6 +15,7 @@ from relit_camera.reenact.control_points import (
     COARSE_GRID,
     ControlPoints,
     control_points,
+    feature_landmarks,
     fine_regions,
     head_anchors,
 )
@@ -94,7 +95,10 @@ def moved_flow(
     up = scheme.eye_centres(landmarks.astype(np.float32)).mean(axis=0) - landmarks[list(scheme.lips)].mean(axis=0)
     influence = points.influence(target, up / max(float(np.linalg.norm(up)), 1e-6))
     whole, *features = motion.flow(points.source, influence, points.radius, points.unit, regions)
-    return whole, mesh.over(whole, landmarks, pose), *features
+    over = mesh.over(whole, landmarks, pose)
+    groups = feature_landmarks(face.scheme) if fine else ()
+    still = face.landmarks.astype(np.float64)
+    return whole, over, *(mesh.before(p, over, still[list(g)]) for p, g in zip(features, groups, strict=True))
 
 
 def held_at_border(patch: FlowPatch, size: tuple[int, int]) -> FlowPatch:

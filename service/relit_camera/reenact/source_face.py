@@ -41,18 +41,28 @@ class SourceFace:
 
 
 def source_face(subject: Subject, tracker: Tracker) -> SourceFace:
-    """Find the face in the subject's still: as stored with the subject, else as `tracker` sees it.
+    """Find the face in the subject's still: as `tracker` sees it, where it is to be compared with what it sees live.
+
+    Where it is a recording, or finds none, the landmarks stored with the subject count: models and people who mark
+    faces do not mean quite the same points.
 
     Raises:
         SubjectError: the subject keeps no landmarks of the tracker's scheme and the tracker finds no face in it.
         ModelError: a recorded track is played back, the subject keeps no landmarks, and the models are missing.
     """
     scheme = landmark_scheme(tracker.scheme)
-    landmarks = subject.landmarks.get(scheme.name)
+    recorded = tracker.name == "recorded"
+    landmarks = None if recorded else _seen(subject, tracker)
     if landmarks is None:
+        landmarks = subject.landmarks.get(scheme.name)
+    if landmarks is None and recorded:
         # A recording has not seen the still; the tracker that gives such landmarks finds them.
-        sees = open_tracker(SCHEME_TRACKERS[scheme.name]) if tracker.name == "recorded" else tracker
-        landmarks = _find(subject, sees)
+        landmarks = _seen(subject, open_tracker(SCHEME_TRACKERS[scheme.name]))
+    if landmarks is None:
+        raise SubjectError(
+            f"tracker '{tracker.name}' finds no face in the subject's still",
+            "choose a subject whose face looks into the camera, or another tracker",
+        )
     if len(landmarks) != scheme.count:
         raise SubjectError(
             f"the subject keeps {len(landmarks)} landmarks of scheme '{scheme.name}', which has {scheme.count}",
@@ -64,11 +74,6 @@ def source_face(subject: Subject, tracker: Tracker) -> SourceFace:
     return SourceFace(scheme, landmarks, pose, unproject(landmarks, pose, scheme, subject.size), subject.size)
 
 
-def _find(subject: Subject, tracker: Tracker) -> Points:
+def _seen(subject: Subject, tracker: Tracker) -> Points | None:
     state = look_at(subject.neutral, tracker)
-    if not state.visible:
-        raise SubjectError(
-            f"tracker '{tracker.name}' finds no face in the subject's still",
-            "choose a subject whose face looks into the camera, or another tracker",
-        )
-    return state.landmarks
+    return state.landmarks if state.visible else None
