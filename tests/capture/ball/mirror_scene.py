@@ -76,7 +76,29 @@ class MirrorScene:
     ) -> LinearImage:
         """Linear RGB, clipped to 1 as a camera does."""
         width, height = self.size
-        x, y = np.meshgrid((np.arange(width * FINE) + 0.5) / FINE, (np.arange(height * FINE) + 0.5) / FINE)
+        light = self.room(self.rays(*np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)))
+        rows, columns = self._box()
+        light[rows, columns] = self._ball(rows, columns, lamp, brightness)
+        light = light * exposure
+        if self.noise:
+            light = light + np.random.default_rng(seed).normal(0, self.noise, light.shape)
+        return np.repeat(np.clip(light, 0, 1)[..., None], 3, axis=2).astype(np.float32)
+
+    def _box(self) -> tuple[slice, slice]:
+        """Rows and columns that the ball and its glare reach."""
+        x, y = self.project(self.centre)
+        reach = 1.25 * self.focal_px * self.radius_cm / -self.centre[2] + 6
+        return (
+            slice(max(0, int(y - reach)), min(self.size[1], int(y + reach))),
+            slice(max(0, int(x - reach)), min(self.size[0], int(x + reach))),
+        )
+
+    def _ball(self, rows: slice, columns: slice, lamp: Vector | None, brightness: float) -> Vector:
+        """The light there, many rays a pixel, blurred by the lens."""
+        height, width = rows.stop - rows.start, columns.stop - columns.start
+        x, y = np.meshgrid(
+            columns.start + (np.arange(width * FINE) + 0.5) / FINE, rows.start + (np.arange(height * FINE) + 0.5) / FINE
+        )
         rays = self.rays(x, y)
         seen = self.room(rays)
         hit, points = self.hit(rays)
@@ -86,16 +108,13 @@ class MirrorScene:
             ball = ball + self.lamp_seen(points[hit], mirrored, lamp, brightness)
         seen[hit] = self.reflectance * ball
         seen = cv2.GaussianBlur(seen, (0, 0), self.lens_px * FINE)
-        light = seen.reshape(height, FINE, width, FINE).mean(axis=(1, 3)) * exposure
-        if self.noise:
-            light = light + np.random.default_rng(seed).normal(0, self.noise, light.shape)
-        return np.repeat(np.clip(light, 0, 1)[..., None], 3, axis=2).astype(np.float32)
+        return np.asarray(seen.reshape(height, FINE, width, FINE).mean(axis=(1, 3)))
 
     def outline(self) -> tuple[float, float, float]:
         """Centre and radius of the circle of the outline's area, counted out."""
         x0, y0 = self.project(self.centre)
         reach = 1.4 * self.focal_px * self.radius_cm / np.linalg.norm(self.centre)
-        x, y = np.meshgrid(np.linspace(x0 - reach, x0 + reach, 1200), np.linspace(y0 - reach, y0 + reach, 1200))
+        x, y = np.meshgrid(np.linspace(x0 - reach, x0 + reach, 600), np.linspace(y0 - reach, y0 + reach, 600))
         hit, _ = self.hit(self.rays(x, y))
         area = hit.mean() * (2 * reach) ** 2
         return float(x[hit].mean()), float(y[hit].mean()), float(np.sqrt(area / np.pi))

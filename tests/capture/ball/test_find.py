@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.capture.ball.find import find_ball, find_balls, refine_ball
+from relit_camera.capture.ball.find import FoundBall, find_ball, find_balls, given_ball, refine_ball
 from relit_camera.capture.ball.focal import given_focal, typical_focal
 from relit_camera.capture.ball.highlight import Highlight, find_highlight
 from relit_camera.capture.ball.outline import Outline
-from relit_camera.capture.ball.sample import SceneSample, sample_scene
+from relit_camera.capture.ball.sample import sample_scene
 from relit_camera.capture.ball.view import DistantView
 from relit_camera.errors import CaptureError
 from relit_camera.space.images import LinearImage
@@ -65,6 +65,7 @@ def test_among_other_round_things(frames: list[LinearImage]) -> None:
     assert centre < 0.02
     assert radius < 0.02
     assert ball.glints == pytest.approx(0.5)
+    assert ball.evidence is not None
     assert ball.evidence > 0.6
 
 
@@ -99,6 +100,15 @@ def test_over_exposed(frames: list[LinearImage]) -> None:
         cv2.circle(frame, (round(x), round(y)), round(radius), (1.0, 1.0, 1.0), -1, cv2.LINE_AA)
     with pytest.raises(CaptureError, match="over-exposed"):
         find_ball(sample_scene(white), GIVEN)
+
+
+def test_a_given_circle_is_taken_as_it_is(frames: list[LinearImage]) -> None:
+    given = Outline(*SCENE.outline())
+    ball = given_ball(sample_scene(frames), given, GIVEN)
+    assert ball.outline == given
+    assert ball.glints == pytest.approx(0.5)
+    with pytest.raises(CaptureError, match="cut off by the picture's top edge"):
+        given_ball(sample_scene(frames), Outline(100, 3, 20), GIVEN)
 
 
 def test_a_given_circle_is_measured(frames: list[LinearImage]) -> None:
@@ -160,24 +170,21 @@ def published(shared: Path, photographs: list[LinearImage]) -> tuple[float, floa
 
 
 @pytest.fixture(scope="module")
-def photographed(photographs: list[LinearImage]) -> SceneSample:
-    return sample_scene(photographs)
+def found(photographs: list[LinearImage]) -> FoundBall:
+    sample = sample_scene(photographs)
+    return find_ball(sample, typical_focal(sample.size))
 
 
-def test_a_real_ball(photographed: SceneSample, published: tuple[float, float, float]) -> None:
-    ball = find_ball(photographed, typical_focal(photographed.size))
-    assert max(off(ball.outline, published)) < 0.01
+def test_a_real_ball(found: FoundBall, published: tuple[float, float, float]) -> None:
+    assert max(off(found.outline, published)) < 0.01
+    assert found.glints == 1
 
 
 def test_real_lights_and_never_the_second_highlight(
-    shared: Path,
-    photographs: list[LinearImage],
-    photographed: SceneSample,
-    published: tuple[float, float, float],
+    shared: Path, photographs: list[LinearImage], found: FoundBall, published: tuple[float, float, float]
 ) -> None:
     lights = np.loadtxt(shared / "olat/psbox_cat/ball/light_directions.txt").T
-    found = find_ball(photographed, typical_focal(photographed.size)).outline
-    for outline in (found, Outline(*published)):
+    for outline in (found.outline, Outline(*published)):
         view = DistantView(outline)
         angles = []
         for photograph, light in zip(photographs, lights, strict=True):

@@ -6,8 +6,8 @@ import numpy as np
 
 from relit_camera.capture.ball.highlight import Highlight, find_highlight
 from relit_camera.capture.ball.outline import Outline
-from relit_camera.capture.ball.two_balls import locate_light
-from relit_camera.capture.ball.view import PinholeView, Vectors
+from relit_camera.capture.ball.two_balls import BallHighlight, locate_light
+from relit_camera.capture.ball.view import PinholeView
 from tests.capture.ball.mirror_scene import MirrorScene
 
 SCENES = [
@@ -16,11 +16,11 @@ SCENES = [
 ]
 
 
-def seen(scene: MirrorScene, lamp: np.ndarray) -> tuple[PinholeView, float, Vectors]:
+def seen(scene: MirrorScene, lamp: np.ndarray) -> BallHighlight:
     view = PinholeView(Outline(*scene.outline()), scene.size, scene.focal_px)
     place = find_highlight(scene.photograph(lamp), view)
     assert isinstance(place, Highlight)
-    return view, scene.radius_cm, place.normal
+    return BallHighlight(view, scene.radius_cm, place.normal)
 
 
 def test_the_place_of_a_lamp() -> None:

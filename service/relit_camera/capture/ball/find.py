@@ -33,14 +33,14 @@ class FoundBall:
 
     Attributes:
         outline: in pixels of the frames.
-        evidence: share of the outline that shows in the pictures. Below about a half the outline is uncertain by several
-            per cent of the radius.
+        evidence: share of the outline that shows in the pictures. Below about 0.6 the outline may be off by several
+            per cent of the radius, and the light by as many degrees. None for a circle that was given.
         glints: share of the pictures in which it shows the lamp.
         focal: of the camera: what was known, improved by the outline's shape.
     """
 
     outline: Outline
-    evidence: float
+    evidence: float | None
     glints: float
     focal: Focal
 
@@ -79,6 +79,17 @@ def find_balls(sample: SceneSample, focal: Focal, count: int) -> list[FoundBall]
         raise _nothing_found(sample, edges, circles)
     _check_whole(limbs[0].outline, sample)
     return [_measured(sample, limb.outline, glints, focal) for limb in limbs[:count]]
+
+
+def given_ball(sample: SceneSample, given: Outline, focal: Focal) -> FoundBall:
+    """A ball whose outline is given in pixels of the frames, taken as it is.
+
+    Raises:
+        CaptureError: it is cut off by the picture's edge.
+    """
+    circle = given.scaled(sample.scale)
+    _check_whole(circle, sample)
+    return FoundBall(given, None, Glints(sample).share(circle), focal)
 
 
 def refine_ball(sample: SceneSample, given: Outline, focal: Focal) -> FoundBall:

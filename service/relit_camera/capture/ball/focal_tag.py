@@ -1,8 +1,8 @@
 """The focal length that a phone writes into its video.
 
-Apple's cameras write `com.apple.quicktime.camera.focal_length.35mm_equivalent` into the video track ("26", or "50.00mm":
+Apple's cameras write `com.apple.quicktime.camera.focal_length.35mm_equivalent` into the video track ("26", "50.00mm":
 see AVMetadataIdentifier.quickTimeMetadataCameraFocalLength35mmEquivalent); FFmpeg reports such items only where they
-belong to the whole file. No other maker is known to write one, Android's recorder does not.
+belong to the whole file. No other maker is known to write one.
 """
 
 from __future__ import annotations

@@ -38,7 +38,11 @@ class Glints:
         self._dark = np.quantile(self._lights, _STILL_SHARE, axis=0).astype(np.float32) if enough else None
 
     def share(self, circle: Outline) -> float:
-        """Share of the pictures in which one small place in this circle (pixels of the sample) is bright by the lamp."""
+        """Share of the pictures in which one small place in this circle is bright by the lamp.
+
+        Args:
+            circle: in pixels of the sample.
+        """
         small = circle.scaled(self._factor)
         view = DistantView(small)
         found = (brightest_place(light, view, self._dark) for light in self._lights)

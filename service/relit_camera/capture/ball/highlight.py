@@ -110,7 +110,7 @@ def brightest_place(
         return NoHighlight(f"nothing in the ball is brighter by more than {level:.2f} of white")
     if dark is not None and np.median(excess[inside]) > _LIT * level:
         return NoHighlight("all of the ball is lit by the lamp, as no mirror is")
-    weights = np.clip(excess, 0, level) - _THRESHOLD * level
+    weights = np.clip(excess, 0, level) - np.float32(_THRESHOLD * level)
     blob = _brightest(weights)
     area = int(blob.sum())
     if area > _LARGEST * inside.sum():

@@ -13,6 +13,11 @@ from relit_camera.capture.ball.outline import Outline
 
 _STEP_PX = 0.25
 _TRIALS = 400
+_LEAST_POINTS = 12
+_FAR = 0.15
+"""Share of the radius by which middle and radius may be off at first."""
+_ROUGH = 0.012
+"""Share of the radius within which an edge is near a circle at first: a ball's outline is an ellipse."""
 _WIDE, _NARROW = (0.85, 1.15), (0.93, 1.07)
 """Bands about the circle that are looked at, in radii: at first, and once it is known better."""
 _FAINT = 0.03
@@ -88,32 +93,31 @@ def _edge_points(edges: EdgeMap, about: Outline, band: tuple[float, float]) -> _
 
 def _consensus(points: _Edges, about: Outline) -> Outline | None:
     """The circle through three points that most others are near to."""
-    if len(points.angle) < 12:
+    if len(points.angle) < _LEAST_POINTS:
         return None
     chance = np.random.default_rng(0)
     x, y = points.distance * np.cos(points.angle), points.distance * np.sin(points.angle)
     share = points.weight / points.weight.sum()
-    tolerance = max(1.0, 0.012 * about.radius)
-    best, found = 0.0, None
-    for _ in range(_TRIALS):
-        three = chance.choice(len(x), 3, replace=False, p=share)
-        equations = np.stack([2 * x[three], 2 * y[three], np.ones(3)], axis=1)
-        if abs(np.linalg.det(equations)) < 1e-3 * about.radius**2:
-            continue
-        across, down, rest = np.linalg.solve(equations, x[three] ** 2 + y[three] ** 2)
-        radius = float(np.sqrt(max(rest + across**2 + down**2, 0)))
-        if np.hypot(across, down) > 0.15 * about.radius or abs(radius / about.radius - 1) > 0.15:
-            continue
-        off = (np.hypot(x - across, y - down) - radius) / tolerance
-        near = np.zeros(points.rays)
-        np.maximum.at(near, points.ray, points.weight * np.exp(-(off**2)))
-        if near.sum() > best:
-            best, found = float(near.sum()), Outline(about.x + float(across), about.y + float(down), radius)
-    return found
+    three = chance.choice(len(x), (_TRIALS, 3), p=share)
+    equations = np.stack([2 * x[three], 2 * y[three], np.ones(three.shape)], axis=2)
+    equations = equations[proper := np.abs(np.linalg.det(equations)) > 1e-3 * about.radius**2]
+    squares = (x[three] ** 2 + y[three] ** 2)[proper]
+    across, down, rest = np.linalg.solve(equations, squares[..., None])[..., 0].T
+    radius = np.sqrt(np.maximum(rest + across**2 + down**2, 0))
+    near = (np.hypot(across, down) < _FAR * about.radius) & (np.abs(radius / about.radius - 1) < _FAR)
+    across, down, radius = across[near, None], down[near, None], radius[near, None]
+    if not len(radius):
+        return None
+    off = (np.hypot(x - across, y - down) - radius) / max(1.0, _ROUGH * about.radius)
+    # Of several edges on one ray only the nearest counts.
+    starts = np.flatnonzero(np.diff(points.ray, prepend=-1))
+    score = np.maximum.reduceat(points.weight * np.exp(-(off**2)), starts, axis=1).sum(axis=1)
+    best = int(np.argmax(score))
+    return Outline(about.x + float(across[best, 0]), about.y + float(down[best, 0]), float(radius[best, 0]))
 
 
 def _fit(edges: EdgeMap, points: _Edges, about: Outline) -> Limb | None:
-    if len(points.angle) < 12:
+    if len(points.angle) < _LEAST_POINTS:
         return None
     width, height = edges.size
     away = np.arctan2(about.y - height / 2, about.x - width / 2)
@@ -127,7 +131,7 @@ def _fit(edges: EdgeMap, points: _Edges, about: Outline) -> Limb | None:
         axis=1,
     )
     found = np.array([about.radius, 0.0, 0.0, 0.0])
-    tolerance = max(1.5, 0.012 * about.radius)
+    tolerance = max(1.5, _ROUGH * about.radius)
     off = points.distance - terms @ found
     weight = points.weight
     for _ in range(_ROUNDS):

@@ -37,8 +37,8 @@ class LimbModel:
     """Likelihood of brightness profiles across the limb, for each place that it may have in them.
 
     A Gaussian process. Outside, a profile is a random walk in pixels from an unknown level. Inside, it goes on from the
-    level at the limb, less what the metal takes, as a random walk in the angle by which the ball turns the rays: that is
-    2 acos(ρ) at ρ radii from the middle, so it sets in steeply. The lens blurs both.
+    level at the limb, less what the metal takes, as a random walk in the angle by which the ball turns the rays: that
+    is 2 acos(ρ) at ρ radii from the middle, so it sets in steeply. The lens blurs both.
     """
 
     def __init__(self, step_px: float, radius: float, blur_px: float) -> None:

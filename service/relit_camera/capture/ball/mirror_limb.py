@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import fmin
 
 from relit_camera.capture.ball.limb_model import SHIFTS, LimbModel
 from relit_camera.capture.ball.outline import Outline
@@ -25,8 +25,9 @@ _TELLING = 1.0
 _GRID = np.arange(-5.0, 5.1, 1.0)
 """Offsets of x, y and radius that are tried first, in sample distances."""
 _ROUNDS = 3
-_OUTLINE_ERROR_PX = 0.5
-"""Of the outline along a diameter: what compression and clutter leave of a limb that shows well."""
+_OUTLINE_ERROR_PX = 0.4
+"""Of the outline along a diameter: what compression and clutter leave of a limb that shows all around. Where parts are
+missing, a diameter's two ends are seldom both seen."""
 
 Floats = NDArray[np.float64]
 
@@ -72,7 +73,7 @@ def fit_mirror_limb(
     outline = Outline(float(found[0]), float(found[1]), float(found[2]))
     # An ellipse's stretch falls with the focal length's square; so sure is what the fitted stretch says of it.
     stretch = 2 * np.log(PinholeView(outline, (lights.shape[2], lights.shape[1]), float(np.exp(log_focal))).elongation)
-    error = np.sqrt(2) * _OUTLINE_ERROR_PX / outline.radius / max(stretch, 1e-9)
+    error = np.sqrt(2) * _OUTLINE_ERROR_PX / max(evidence, 0.1) / outline.radius / max(stretch, 1e-9)
     share = log_focal_error**2 / (log_focal_error**2 + error**2)
     combined = log_focal + share * float(found[3] - log_focal)
     return MirrorLimb(outline, evidence, combined, float(log_focal_error * np.sqrt(1 - share)))
@@ -111,9 +112,9 @@ class _Rays:
             return float(known - _robust(*self._at(self._off(parameters))))
 
         sides = np.diag([self._step, self._step, self._step, prior[1]])
-        options = {"initial_simplex": start + np.vstack([np.zeros(4), sides]), "xatol": 3e-3, "fatol": 1e-2}
-        result = minimize(cost, start, method="Nelder-Mead", options=options)
-        return np.asarray(result.x), -float(result.fun)
+        simplex = start + np.vstack([np.zeros(4), sides])
+        best = np.asarray(fmin(cost, start, initial_simplex=simplex, xtol=3e-3, ftol=1e-2, disp=False))
+        return best, -cost(best)
 
     def evidence(self, parameters: Floats) -> float:
         """Share of all rays that prefer the limb there to anywhere."""
@@ -125,15 +126,16 @@ class _Rays:
         """How far (rays,) an outline's line is outside the base's, in sample distances."""
         moved = parameters[0] - self._base[0], parameters[1] - self._base[1]
         wider = self._line(parameters, self._angle) - self._line(self._base, self._angle)
-        return (wider + moved[0] * np.cos(self._angle) + moved[1] * np.sin(self._angle)) / self._step
+        return np.asarray((wider + moved[0] * np.cos(self._angle) + moved[1] * np.sin(self._angle)) / self._step)
 
     def _at(self, off: Floats) -> tuple[Floats, Floats]:
-        """Log likelihoods (..., rays), 0 the best, of a limb so far off, and how far that is beyond what was looked at."""
+        """Log likelihoods (..., rays), 0 the best, of a limb so far off, and how far that is outside what was tried."""
         column = (off - SHIFTS[0]) / (SHIFTS[1] - SHIFTS[0])
         inside = np.clip(column, 0, len(SHIFTS) - 1.001)
         left, ray = inside.astype(int), np.arange(len(self._likely))
         part = inside - left
-        return self._likely[ray, left] * (1 - part) + self._likely[ray, left + 1] * part, np.abs(column - inside)
+        value = self._likely[ray, left] * (1 - part) + self._likely[ray, left + 1] * part
+        return np.asarray(value), np.abs(column - inside)
 
     def _line(self, parameters: Floats, angle: Floats) -> Floats:
         """Distance (rays,) of an outline from its centre."""

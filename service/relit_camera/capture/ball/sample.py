@@ -38,7 +38,7 @@ class SceneSample:
         return linear_from_uint8(self.codes[index])
 
     def averages(self, count: int) -> NDArray[np.float32]:
-        """Linear luminance (at most count, height, width): means over the darkest pictures, the next brighter ones …"""
+        """Linear luminance (at most count, height, width): means over the darkest pictures, the next, and so on."""
         order = np.argsort(self.codes.mean(axis=(1, 2)), kind="stable")
         groups = np.array_split(order, min(count, len(order)))
         return np.stack([np.mean([self.luminance(index) for index in group], axis=0) for group in groups])

@@ -22,15 +22,28 @@ class LightPosition:
     gap_cm: float
 
 
-def locate_light(
-    first: tuple[PinholeView, float, Vectors], second: tuple[PinholeView, float, Vectors]
-) -> LightPosition | None:
-    """Where the rays that two balls mirror come closest, half way between them; None where they part.
+@dataclass(frozen=True, eq=False)
+class BallHighlight:
+    """A highlight on a ball whose size is known.
 
-    Args:
-        first, second: of each ball its view, its radius in centimetres, and the surface's normal (3,) at the highlight.
+    Attributes:
+        view: of the ball.
+        radius_cm: of the ball.
+        normal: (3,) of its surface at the highlight.
     """
-    (start_a, ray_a), (start_b, ray_b) = (_ray(*ball) for ball in (first, second))
+
+    view: PinholeView
+    radius_cm: float
+    normal: Vectors
+
+    def ray(self) -> tuple[Vectors, Vectors]:
+        """Where the mirrored ray starts, and its direction."""
+        return self.radius_cm * (self.view.centre + self.normal), self.view.mirrored(self.normal)
+
+
+def locate_light(first: BallHighlight, second: BallHighlight) -> LightPosition | None:
+    """Where the rays that two balls mirror come closest, half way between them; None where they part."""
+    (start_a, ray_a), (start_b, ray_b) = first.ray(), second.ray()
     between, cosine = start_b - start_a, float(ray_a @ ray_b)
     under = 1 - cosine**2
     if under < 1e-9:
@@ -41,7 +54,3 @@ def locate_light(
         return None
     a, b = start_a + along_a * ray_a, start_b + along_b * ray_b
     return LightPosition((a + b) / 2, float(np.linalg.norm(a - b)))
-
-
-def _ray(view: PinholeView, radius_cm: float, normal: Vectors) -> tuple[Vectors, Vectors]:
-    return radius_cm * (view.centre + normal), view.mirrored(normal)

@@ -113,9 +113,8 @@ class BallWatch:
                 [0, 1 / factor, self._outline.y * scale - 0.5 - (_SIDE_PX - 1) / 2 / factor],
             ]
         )
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        window = cv2.warpAffine(smooth, inverse, (_SIDE_PX, _SIDE_PX), flags=flags, borderMode=cv2.BORDER_REPLICATE)
-        return cv2.GaussianBlur(uint8_from_linear(window).astype(np.float32), (0, 0), 1.0)
+        codes = uint8_from_linear(_warped(smooth, inverse)).astype(np.float32)
+        return np.asarray(cv2.GaussianBlur(codes, (0, 0), 1.0), np.float32)
 
     def _far(self, window: Plane) -> tuple[float, float]:
         """Where in the window the ball fits best, to a pixel."""
@@ -128,7 +127,8 @@ class BallWatch:
         """Likeness and shift in window pixels: least squares in shift, gain and offset (Lucas and Kanade 1981)."""
         shift = np.array(start, np.float64)
         disc, flat = self._disc, np.ones(int(self._disc.sum()))
-        usual, down, across = self._usual[disc], *(slope[disc] for slope in np.gradient(self._usual))
+        down, across = (np.asarray(slope)[disc] for slope in np.gradient(self._usual))
+        usual = self._usual[disc]
         likeness = 0.0
         for _ in range(_ROUNDS):
             back = np.array([[1, 0, shift[0]], [0, 1, shift[1]]])
@@ -146,6 +146,13 @@ class BallWatch:
             if np.hypot(*step) < 0.01 or np.abs(shift - start).max() > _SIDE_PX / 8:
                 break
         return likeness, (float(shift[0]), float(shift[1]))
+
+
+def _warped(picture: Plane, from_window: NDArray[np.float64]) -> Plane:
+    """What a picture shows at the places (2, 3) of the window's pixels."""
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    size = (_SIDE_PX, _SIDE_PX)
+    return np.asarray(cv2.warpAffine(picture, from_window, size, flags=flags, borderMode=cv2.BORDER_REPLICATE))
 
 
 def _correlation(a: Plane, b: Plane) -> float:
