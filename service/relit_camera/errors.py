@@ -9,6 +9,7 @@ RelitError                   what happened, and what cures it
 │   ├── LightsError          an .lp file, or the pictures that it names, are wrong
 │   ├── SubjectError         a .relit file is damaged or of another version
 │   ├── VideoError           a video cannot be read, is truncated, or shows no face
+│   ├── CaptureError         what a capture needs is not in its pictures: no flash, no mirror ball …
 │   ├── TrackError           a recorded track does not fit
 │   └── ModelError           a model is missing, has the wrong hash, or breaks its contract
 ├── DeviceError              a camera, virtual camera or provider is missing or in use
@@ -68,6 +69,10 @@ class SubjectError(InputError):
 
 class VideoError(InputError):
     """A video cannot be read, is truncated, or shows no face."""
+
+
+class CaptureError(InputError):
+    """What a capture needs is not in its pictures."""
 
 
 class TrackError(InputError):

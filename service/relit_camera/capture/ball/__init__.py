@@ -1,0 +1,1 @@
+"""The mirror ball: from pictures to the direction of the light."""
