@@ -12,7 +12,7 @@ import cv2
 
 from relit_camera.compose.sheet import contact_sheet
 from relit_camera.space.images import DisplayImage
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 
 FRAMES = (4, 20, 36, 56, 68)
 ENVIRONMENTS = ("studio", "sunset", "party")
