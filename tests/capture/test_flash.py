@@ -85,11 +85,11 @@ def test_a_light_that_looks_away_is_weak():
     times = np.array([frame.time_s for frame in weak])
     assert {3, 6} == set(np.round(times).astype(int))
     assert all("weak flash" in frame.reason for frame in weak)
-    # The light's strength there is 1 - 0.85 exp(-(t / 0.25)²): below one half within 0.18 s.
+    # The light's strength there is 1 - 0.85 exp(-(t / 0.25)²): below 0.4 within 0.15 s.
     bright = lit.min(axis=1) >= 0.98
     away = np.min(np.abs(seen.times_s[:, None] - scene.lapses), axis=1)
     kinds = kinds_of(flashes)
-    assert (kinds[bright & (away < 0.12)] == "rejected").all()
+    assert (kinds[bright & (away < 0.1)] == "rejected").all()
     assert (kinds[bright & (away > 0.4)] == "bright").mean() > 0.95
 
 

@@ -12,7 +12,7 @@ from relit_camera.capture.flash.signal import Signal
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-WEAKEST = 0.5
+WEAKEST = 0.4
 """A flash that adds less than this share of the usual light points elsewhere or comes from too far."""
 
 _UNLIT, _STRAY = 0.75, 0.1
@@ -66,7 +66,7 @@ def strengths(seen: Brightness, signal: Signal, bright: Indices, dark: Indices, 
 
 
 def _from_neighbours(level: Floats, index: Indices) -> Floats:
-    """Levels (count, blocks) interpolated from those before and after, by index; at the ends that of the next one."""
+    """Levels (count, blocks) interpolated from those before and after, by index; at the ends their own."""
     way = ((index[1:-1] - index[:-2]) / (index[2:] - index[:-2]))[:, None]
     inner = level[:-2] * (1 - way) + level[2:] * way
-    return np.concatenate([level[1:2], inner, level[-2:-1]])
+    return np.concatenate([level[:1], inner, level[-1:]])
