@@ -12,6 +12,10 @@ ROWS, COLUMNS = 32, 24
 _MOMENTS = 120
 
 
+LIT_ROWS, LIT_COLUMNS = slice(8, 32), slice(4, 28)
+"""Of the 32 places, those where anything is seen of the light."""
+
+
 @dataclass(frozen=True)
 class Blinking:
     """A video of a person under a blinking light.

@@ -15,8 +15,12 @@ Indices = NDArray[np.intp]
 WEAKEST = 0.4
 """A flash that adds less than this share of the usual light points elsewhere or comes from too far."""
 
-_UNLIT, _STRAY = 0.75, 0.1
-"""A block of a bright frame with less of its neighbours' light than this, or a dark one's with more, is unlike them."""
+_UNLIT, _UNLIT_ALONE, _STRAY = 0.75, 0.5, 0.1
+"""A block of a bright frame with less of its neighbours' light than this, or of a dark one with more, is unlike them:
+by what the whole frame has, since automatics may change from frame to frame. Between two flashes the light moves on,
+and a frame that is alone in its flash may differ more."""
+_ALONE = 2
+"""Frames to the nearest bright one beyond which it belongs to another flash."""
 _FAINT = 0.3
 """Blocks that the flash reaches by less than this share of the usual are not asked."""
 _STRENGTH_PERCENTILE = 98
@@ -36,9 +40,12 @@ def unlike_neighbours(blocks: Blocks, bright: Indices, dark: Indices) -> dict[in
     lit, unlit = blocks.between(bright), blocks.between(dark)
     height = np.maximum(lit - unlit, 1e-9)
     clear = height > _FAINT * np.median(height[bright])
-    expected = np.maximum(_from_neighbours(blocks.level[bright], bright) - unlit[bright], 1e-9)
-    missing = ((blocks.level[bright] - unlit[bright]) / expected < _UNLIT) & clear[bright]
-    stray = (blocks.level[dark] - _from_neighbours(blocks.level[dark], dark)) / height[dark] > _STRAY
+    shares = ((blocks.level - unlit) / height)[bright]
+    gap = np.diff(bright, prepend=-_ALONE - 1, append=2 * bright[-1])
+    least = np.where(np.minimum(gap[:-1], gap[1:]) > _ALONE, _UNLIT_ALONE, _UNLIT)
+    missing = (shares < np.median(shares, axis=1, keepdims=True) * least[:, None]) & clear[bright]
+    usual = np.median(blocks.level / np.maximum(unlit, 1e-9), axis=1, keepdims=True)
+    stray = ((blocks.level - usual * unlit) / height > _STRAY)[dark]
     doubtful = [(bright[missing.any(axis=1)], "bright"), (dark[(stray & clear[dark]).any(axis=1)], "dark")]
     return {int(index): f"not lit like the {kind} frames beside it" for found, kind in doubtful for index in found}
 
@@ -63,10 +70,3 @@ def strengths(seen: Brightness, signal: Signal, bright: Indices, dark: Indices, 
         without = steady[dark[near : near + 4]].mean(axis=0)
         added[each] = np.percentile(steady[lit].mean(axis=0) - without, _STRENGTH_PERCENTILE)
     return np.asarray(added / np.nanmedian(added))
-
-
-def _from_neighbours(level: Floats, index: Indices) -> Floats:
-    """Levels (count, blocks) interpolated from those before and after, by index; at the ends their own."""
-    way = ((index[1:-1] - index[:-2]) / (index[2:] - index[:-2]))[:, None]
-    inner = level[:-2] * (1 - way) + level[2:] * way
-    return np.concatenate([level[:1], inner, level[-1:]])

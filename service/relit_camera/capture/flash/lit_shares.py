@@ -17,9 +17,11 @@ Floats = NDArray[np.float64]
 
 _BLOCKS = 6
 """Along either side of what the flash reaches."""
+_SMALL = 0.3
+"""Blocks with less than this share of the usual number of cells are left out: a highlight that moves on a ball."""
 _NEAR = 3
 """Frames looked at before and after an edge."""
-_LEAST_REACH, _MOST_REACH = 3, 8
+_LEAST_REACH, _MOST_REACH = 3, 4
 """Frames about a frame among which the darkest and the brightest are sought."""
 
 
@@ -38,17 +40,18 @@ class Blocks:
     @classmethod
     def of(cls, seen: Brightness, signal: Signal) -> Blocks:
         """Up to 6 x 6 blocks of the video's cells."""
-        reached = signal.reached
-        rows, columns = (np.flatnonzero(reached.any(axis=axis)) for axis in (1, 0))
-        level, place = [], []
+        rows, columns = (np.flatnonzero(signal.reached.any(axis=axis)) for axis in (1, 0))
+        cells = []
         for some_rows in np.array_split(rows, _BLOCKS):
             for some_columns in np.array_split(columns, _BLOCKS):
-                y, x = np.nonzero(reached[np.ix_(some_rows, some_columns)])
-                if len(x):
-                    y, x = some_rows[y], some_columns[x]
-                    level.append(seen.cells[:, y, x].mean(axis=1) / signal.gains)
-                    place.append([(x.mean() + 0.5) / reached.shape[1], (y.mean() + 0.5) / reached.shape[0]])
-        return cls(np.stack(level, axis=1).astype(np.float64), np.array(place))
+                y, x = np.nonzero(signal.reached[np.ix_(some_rows, some_columns)])
+                cells.append((some_rows[y], some_columns[x]))
+        least = _SMALL * np.median([len(y) for y, _ in cells if len(y)])
+        cells = [(y, x) for y, x in cells if len(y) >= max(least, 1)]
+        level = np.stack([seen.cells[:, y, x].mean(axis=1) / signal.gains for y, x in cells], axis=1)
+        height, width = signal.reached.shape
+        place = [[(x.mean() + 0.5) / width, (y.mean() + 0.5) / height] for y, x in cells]
+        return cls(level.astype(np.float64), np.array(place))
 
     def local_extremes(self, period_frames: float) -> tuple[Floats, Floats]:
         """The darkest and the brightest (frames, blocks) about each frame: a first guess of unlit and lit."""
@@ -57,9 +60,15 @@ class Blocks:
         return np.asarray(low), np.asarray(maximum_filter1d(self.level, 2 * reach + 1, axis=0))
 
     def between(self, frames: NDArray[np.intp]) -> Floats:
-        """Levels (frames of the video, blocks) interpolated between some frames (count,)."""
-        every = np.arange(len(self.level))
-        return np.stack([np.interp(every, frames, block[frames]) for block in self.level.T], axis=1)
+        """Levels (frames of the video, blocks) interpolated between some frames (count,), three at least.
+
+        One of these frames counts nothing for itself: its level is that between the ones before and after it.
+        """
+        every, known = np.arange(len(self.level)), self.level[frames]
+        levels = np.stack([np.interp(every, frames, block) for block in known.T], axis=1)
+        way = ((frames[1:-1] - frames[:-2]) / (frames[2:] - frames[:-2]))[:, None]
+        levels[frames[1:-1]] = known[:-2] * (1 - way) + known[2:] * way
+        return levels
 
 
 @dataclass(frozen=True, eq=False)

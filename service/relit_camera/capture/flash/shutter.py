@@ -8,6 +8,7 @@ tell readout and exposure; that flashes come at nearly regular times tells the r
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -33,6 +34,9 @@ _SHARE_NOISE = 0.04
 _UNSTEADY_S = (0.0001, 0.001, 0.005)
 """How much the clock of a flash may stray from one to the next: of a steady one, an app's, and one by hand. What is
 more counts in proportion, not squared: a flash that jitters is followed where frames tell of it."""
+_USUAL_EXPOSURE = 0.5
+"""As a share of the frame interval. A flash in step with the frames tells only how exposure and readout compare: then
+this decides, and else it counts for no more than one block of one frame."""
 _ITERATIONS = 60
 _ABOUT_AS_WELL = 1.25
 
@@ -49,42 +53,81 @@ def fit_shutter(seen: Brightness, signal: Signal, edges: Edges, frequency_hz: fl
     Returns:
         The edges on the clock of the picture's first row (or column), and the shutter.
     """
-    period_frames = 1 / frequency_hz / seen.interval_s
-    clock = _clock_rows(edges.times_s, edges.rising, frequency_hz)
-    some = slice(0, _TRIAL_EDGES)
-    trial_clock = _clock_rows(edges.times_s[some], edges.rising[some], frequency_hz)
-    trials: list[list[tuple[float, _Fit, Floats]]] = [[] for _ in _UNSTEADY_S]
-    blocks = Blocks.of(seen, signal)
-    extremes = blocks.local_extremes(period_frames)
+    film = _Film(seen.times_s, Blocks.of(seen, signal), edges, frequency_hz)
+    beginning = film.beginning(_TRIAL_EDGES)
+    trials = []
     for by_columns in (False, True):
-        shares = LitShares.of(blocks, by_columns, seen.times_s, edges, *extremes)
-        starts = _starts(shares.only(some), seen.interval_s)
-        for unsteady_s, found in zip(_UNSTEADY_S, trials, strict=True):
-            whole = _Fit(seen, blocks, edges, clock, unsteady_s, shares)
-            trial = replace(whole, edges=edges.only(some), clock=trial_clock, shares=shares.only(some))
-            solved = [trial.solve(start) for start in starts]
-            found += [(trial.cost(parameters), whole, parameters[:2]) for parameters in solved]
-    fits = [_with_whole_frames(*min(found, key=lambda each: each[0])[1:]) for found in trials]
+        starts = _starts(beginning.first_shares(by_columns), seen.interval_s)
+        for unsteady_s in _UNSTEADY_S:
+            fit = _Fit(beginning, beginning.first_shares(by_columns), unsteady_s)
+            best = min((fit.solve(start) for start in starts), key=fit.cost)
+            fit, best = _between_whole_frames(fit, best)
+            trials.append((unsteady_s, fit.cost(best), by_columns, best[:2]))
     # The steadiest flash that explains the frames about as well as one that comes at any time.
-    enough = _ABOUT_AS_WELL * min(fit.cost(parameters) for fit, parameters in fits)
-    fit, parameters = next((fit, parameters) for fit, parameters in fits if fit.cost(parameters) <= enough)
-    return fit.refined(parameters), fit.shutter(parameters)
+    enough = _ABOUT_AS_WELL * min(cost for _, cost, *_ in trials)
+    unsteady_s, _, by_columns, shutter = min((each for each in trials if each[1] <= enough), key=lambda each: each[:2])
+    fit = _Fit(film, film.first_shares(by_columns), unsteady_s)
+    offsets = _best_offsets(fit.shares, shutter[0], shutter[1], _offset_grid(seen.interval_s))
+    fit, best = _between_whole_frames(fit, fit.solve(np.concatenate([shutter, offsets])))
+    return fit.refined(best), fit.shutter(best)
 
 
-def _with_whole_frames(fit: _Fit, shutter: Floats) -> tuple[_Fit, Floats]:
-    """The fit of all edges from a shutter (2,) on, shares measured between frames that are found to be whole."""
-    offsets = _best_offsets(fit.shares, shutter[0], shutter[1], _offset_grid(fit.seen.interval_s))
-    parameters = fit.solve(np.concatenate([shutter, offsets]))
-    times_s = fit.seen.times_s
+def _between_whole_frames(fit: _Fit, parameters: Floats) -> tuple[_Fit, Floats]:
+    """The same fit, shares measured between frames that it finds to be lit wholly and not at all."""
+    film = fit.film
     for _ in range(_ROUNDS):
-        lit = schedule_of(fit.refined(parameters)).lit_shares(times_s, fit.shutter(parameters))
+        lit = schedule_of(fit.refined(parameters)).lit_shares(film.times_s, fit.shutter(parameters))
         whole, dark = np.flatnonzero(lit.min(axis=1) >= WHOLE), np.flatnonzero(lit.max(axis=1) <= 1 - WHOLE)
-        if len(whole) < 2 or len(dark) < 2:
+        if len(whole) < 3 or len(dark) < 3:
             break
-        levels = fit.blocks.between(dark), fit.blocks.between(whole)
-        fit = replace(fit, shares=LitShares.of(fit.blocks, fit.shares.by_columns, times_s, fit.edges, *levels))
+        fit = replace(fit, shares=film.shares(fit.shares.by_columns, dark, whole))
         parameters = fit.solve(parameters)
     return fit, parameters
+
+
+@dataclass(frozen=True, eq=False)
+class _Film:
+    """What the shutter is fitted to.
+
+    Attributes:
+        times_s: (frames,).
+        blocks: brightness of the frames.
+        edges: first guesses.
+        frequency_hz: of the flash, about.
+    """
+
+    times_s: Floats
+    blocks: Blocks
+    edges: Edges
+    frequency_hz: float
+
+    @property
+    def interval_s(self) -> float:
+        """The usual time from frame to frame."""
+        return float(np.median(np.diff(self.times_s)))
+
+    @cached_property
+    def clock(self) -> csr_array:
+        """Rows (sums, edges) whose sums of edge times vanish for a steady light."""
+        return _clock_rows(self.edges.times_s, self.edges.rising, self.frequency_hz)
+
+    def beginning(self, edges: int) -> _Film:
+        """The part with the first so many edges."""
+        if len(self.edges.times_s) <= edges:
+            return self
+        end = int(self.edges.frame[edges]) + 1
+        blocks = replace(self.blocks, level=self.blocks.level[:end])
+        return _Film(self.times_s[:end], blocks, self.edges.only(slice(0, edges)), self.frequency_hz)
+
+    def first_shares(self, by_columns: bool) -> LitShares:
+        """Lit shares between the darkest and the brightest about each frame."""
+        levels = self.blocks.local_extremes(1 / self.frequency_hz / self.interval_s)
+        return LitShares.of(self.blocks, by_columns, self.times_s, self.edges, *levels)
+
+    def shares(self, by_columns: bool, dark: NDArray[np.intp], whole: NDArray[np.intp]) -> LitShares:
+        """Lit shares between dark and wholly lit frames."""
+        levels = self.blocks.between(dark), self.blocks.between(whole)
+        return LitShares.of(self.blocks, by_columns, self.times_s, self.edges, *levels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,24 +135,18 @@ class _Fit:
     """Exposure, readout and each edge's offset from its first guess, by robust least squares of shares and clock.
 
     Attributes:
-        seen: the video, whose frame interval bounds exposure and readout.
-        blocks: its brightness.
-        edges: first guesses.
-        clock: rows whose sums of edge times vanish for a steady light.
-        unsteady_s: how much those sums may differ from 0.
+        film: what it is fitted to.
         shares: measured about the edges.
+        unsteady_s: how much the film's clock may stray.
     """
 
-    seen: Brightness
-    blocks: Blocks
-    edges: Edges
-    clock: csr_array
-    unsteady_s: float
+    film: _Film
     shares: LitShares
+    unsteady_s: float
 
     def refined(self, parameters: Floats) -> Edges:
         """The edges that these parameters mean."""
-        return replace(self.edges, times_s=self.edges.times_s + parameters[2:])
+        return replace(self.film.edges, times_s=self.film.edges.times_s + parameters[2:])
 
     def shutter(self, parameters: Floats) -> Shutter:
         """The shutter that they mean."""
@@ -120,7 +157,7 @@ class _Fit:
 
         scipy's `least_squares` would need an iterative solver for these sparse systems, at twenty times the time.
         """
-        limit_s = self.seen.interval_s
+        limit_s = self.film.interval_s
         least, most = np.array([1e-3, -1.2 * limit_s]), np.array([limit_s, 1.2 * limit_s])
         damping, cost = 1e-3, np.inf
         candidate = parameters.copy()
@@ -148,13 +185,15 @@ class _Fit:
         return _robust(self._share_errors(parameters))
 
     def _residuals(self, parameters: Floats) -> Floats:
-        strays = self.clock @ (self.edges.times_s + parameters[2:])
-        return np.concatenate([self._share_errors(parameters), strays / self.unsteady_s])
+        strays = self.film.clock @ (self.film.edges.times_s + parameters[2:])
+        usual = np.log(parameters[:1] / (_USUAL_EXPOSURE * self.film.interval_s))
+        return np.concatenate([self._share_errors(parameters), strays / self.unsteady_s, usual])
 
     def _jacobian(self, parameters: Floats) -> csr_array:
         of_shares = self.shares.jacobian(parameters[0], parameters[1], parameters[2:]) * (-1 / _SHARE_NOISE)
-        of_clock = hstack([csr_array((self.clock.shape[0], 2)), self.clock / self.unsteady_s])
-        return csr_array(vstack([of_shares, of_clock]))
+        of_clock = hstack([csr_array((self.film.clock.shape[0], 2)), self.film.clock / self.unsteady_s])
+        of_usual = csr_array(([1 / parameters[0]], ([0], [0])), shape=(1, len(parameters)))
+        return csr_array(vstack([of_shares, of_clock, of_usual]))
 
     def _share_errors(self, parameters: Floats) -> Floats:
         error = self.shares.share - self.shares.expected(parameters[0], parameters[1], parameters[2:])

@@ -18,8 +18,11 @@ FLOOR = 1e-4
 
 _RESPONDS = 0.5
 """Share of the strongest response, in logarithms, from which a cell counts as reached by the flash."""
-_UNREACHED = 0.1
-"""A cell that goes less than this share along with the flash is not reached by it: it goes with the automatics."""
+_UNREACHED, _LEAST_FOLLOWING = 0.1, 5
+"""A cell goes along with the automatics alone if it follows the flash by at most so much more than the least following
+ones (percentile) do. Automatics follow the flash too, mostly against it."""
+_NOT_REACHED_AT_ALL = 0.35
+"""If even those follow the flash by this share, it reaches everything."""
 _VISIBLE = 0.003
 _MIN_UNREACHED = 0.04
 """Share of all cells that must be unreached, so that they can stand for the automatics."""
@@ -63,9 +66,11 @@ def flash_signal(seen: Brightness, frequency_hz: float, reached: NDArray[np.bool
     common = np.log(level_of(seen, reached) + FLOOR)
     common = common[lag:] - common[:-lag]
     follows = np.tensordot(common, change, axes=1) / max(float(common @ common), 1e-12)
-    unreached = (np.abs(follows) < _UNREACHED) & (seen.cells.mean(axis=0) > _VISIBLE)
+    visible = seen.cells.mean(axis=0) > _VISIBLE
+    least = float(np.percentile(follows[visible], _LEAST_FOLLOWING)) if visible.any() else 1.0
+    unreached = visible & (follows < least + _UNREACHED)
     gains = np.ones(len(logarithm))
-    if unreached.mean() >= _MIN_UNREACHED:
+    if least < _NOT_REACHED_AT_ALL and unreached.mean() >= _MIN_UNREACHED:
         still = logarithm[:, unreached]
         gains = np.exp(np.median(still - still.mean(axis=0), axis=1))
     return Signal(level_of(seen, reached) / gains, reached, gains)
