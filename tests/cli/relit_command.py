@@ -20,9 +20,9 @@ from relit_camera.bench.sample_subject import sample_subject
 from relit_camera.cli.main import run
 from relit_camera.face.track_file import TrackRecorder
 from relit_camera.space.images import Frame
-from relit_camera.stream.video_writer import VideoWriter
 from relit_camera.subject.file import write_subject
 from relit_camera.subject.subject import Subject
+from relit_camera.video.writer import VideoWriter
 
 COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'relit'; from relit_camera.cli.main import run; run()"]
 CLIP_SIZE, CLIP_FPS = (128, 96), 20.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from relit_camera.reflectance.method import method_names
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.writer import VideoWriter
 from tests.cli.relit_command import Answer, call, files
 from tests.evaluate.ball import cap, grid, lambert
 from tests.evaluate.capture_documents import documents

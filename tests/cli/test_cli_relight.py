@@ -19,7 +19,7 @@ from relit_camera.space.images import Mask
 from relit_camera.space.picture_files import read_display, read_linear, read_mask, write_display, write_linear
 from relit_camera.space.quality import psnr
 from relit_camera.space.rotation import rotation_from_angles
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 from tests.cli.relit_command import Answer, Material, call
 from tests.replay.materials import subject_file
 from tests.synthetic import render_sphere, sphere_samples, sphere_surface, write_lights

@@ -11,7 +11,7 @@ import pytest
 
 from relit_camera.cli.main import GROUPS
 from relit_camera.space.picture_files import read_display
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 from tests.cli.relit_command import CLIP_FPS, CLIP_SIZE, Answer, Material, call, files, finish
 from tests.synthetic import sphere_samples, write_lights
 

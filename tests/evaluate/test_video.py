@@ -16,7 +16,7 @@ from relit_camera.evaluate.motion import Motion
 from relit_camera.evaluate.video import compare_videos
 from relit_camera.evaluate.video_page import VideoReport, video_json, video_page, video_text
 from relit_camera.space.colour import linear_from_uint8, uint8_from_linear
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.writer import VideoWriter
 from tests.evaluate.outline import Outline
 
 SIZE = 64

@@ -18,8 +18,8 @@ from relit_camera.space.images import DisplayImage, Frame
 from relit_camera.stream.pipeline import Pipeline
 from relit_camera.stream.replay import ReplayedFrame, replay
 from relit_camera.stream.scene import Scene
-from relit_camera.stream.video import VideoReader
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.reader import VideoReader
+from relit_camera.video.writer import VideoWriter
 from tests.stream.small_camera import SteadyTracker, small_subject
 
 COUNT, FPS = 12, 12.5

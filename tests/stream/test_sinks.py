@@ -16,7 +16,7 @@ from relit_camera.stream.sinks.factory import open_sink
 from relit_camera.stream.sinks.file import FileSink
 from relit_camera.stream.sinks.null import NullSink
 from relit_camera.stream.sources.pattern import draw_pattern, read_number
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 from tests.stream.fake_devices import FakeTree
 
 SIZE = (320, 180)

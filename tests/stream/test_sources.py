@@ -14,8 +14,8 @@ from relit_camera.stream.sources.factory import open_source
 from relit_camera.stream.sources.pattern import draw_pattern, pattern_source, read_number
 from relit_camera.stream.sources.playback import Playback
 from relit_camera.stream.sources.webcam import WebcamSource
-from relit_camera.stream.video import VideoReader
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.reader import VideoReader
+from relit_camera.video.writer import VideoWriter
 from tests.stream.fake_devices import FakeCapture, FakeTree
 from tests.stream.small_camera import wait_until
 

@@ -18,7 +18,7 @@ from relit_camera.errors import LightsError
 from relit_camera.light.store import EnvironmentStore
 from relit_camera.space.quality import psnr
 from relit_camera.space.rotation import Angles
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 from relit_studio.capture.field_person import FieldPerson
 from relit_studio.capture.head_motion import REST, HeadMotion, Motion
 from relit_studio.capture.mannequin_person import MannequinPerson, phone_camera

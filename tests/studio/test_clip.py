@@ -13,7 +13,7 @@ from relit_camera.face.recorded import RecordedTracker
 from relit_camera.face.schemes import landmark_scheme
 from relit_camera.face.trackers import TrackerOptions
 from relit_camera.space.rotation import angles_from_rotation
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.clip import render_clip, true_state
 from relit_studio.mannequin.lights import room

@@ -12,7 +12,7 @@ import pytest
 
 from relit_camera.space.colour import linear_from_uint8
 from relit_camera.space.display import linear_from_display
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 from relit_studio.camera import Camera
 from relit_studio.drive.clip import write_clip
 from relit_studio.drive.performances.away import AWAY

@@ -12,7 +12,7 @@ from relit_camera.light.builtin.catalogue import builtin_environment
 from relit_camera.light.exposure import display_scale
 from relit_camera.space.directions import texel_directions
 from relit_camera.space.display import linear_from_display
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 from relit_studio.mannequin.__main__ import main
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.clip import CLIP_SIZE, render_clip

@@ -47,7 +47,7 @@ def replay(
     from relit_camera.stream.assembly import make_pipeline, make_tracker
     from relit_camera.stream.director import Director
     from relit_camera.stream.replay import replay as run_replay
-    from relit_camera.stream.video import probe
+    from relit_camera.video.reader import probe
 
     if contact_sheet and contact_sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"{contact_sheet} is neither .png nor .jpg", param_hint="--contact-sheet")

@@ -24,7 +24,7 @@ def track(
     from relit_camera.errors import VideoError
     from relit_camera.face.track_file import TrackRecorder
     from relit_camera.stream.assembly import make_tracker
-    from relit_camera.stream.video import VideoReader
+    from relit_camera.video.reader import VideoReader
 
     share_cores()
     opened = make_tracker(settings_of(context, tracker={"name": tracker}))

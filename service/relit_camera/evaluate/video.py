@@ -18,7 +18,7 @@ from relit_camera.evaluate.motion import second_difference_rms
 from relit_camera.space.colour import luminance
 from relit_camera.space.display import linear_from_display
 from relit_camera.space.images import DisplayImage, LinearImage
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 
 SHADING_BLUR = 0.04
 """Sigma of the blur, as a share of the picture's width, after which light is compared and features hardly are."""

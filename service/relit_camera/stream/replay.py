@@ -15,8 +15,8 @@ from relit_camera.face.state import FaceStatus
 from relit_camera.space.images import DisplayImage
 from relit_camera.stream.pipeline import Pipeline
 from relit_camera.stream.scene import Scene
-from relit_camera.stream.video import VideoReader
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.reader import VideoReader
+from relit_camera.video.writer import VideoWriter
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from relit_camera.files import atomic_path, storage_error
 from relit_camera.space.images import DisplayImage, check_image
-from relit_camera.stream.video_writer import rational_rate
+from relit_camera.video.writer import rational_rate
 
 
 class LosslessWriter:

@@ -11,7 +11,7 @@ from relit_camera.compose.sheet import contact_sheet
 from relit_camera.files import make_folder, write_atomic
 from relit_camera.space.images import DisplayImage
 from relit_camera.space.picture_files import write_display
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.writer import VideoWriter
 from relit_studio.capture.frame_store import Done, FrameStore
 from relit_studio.capture.lossless import LosslessWriter
 from relit_studio.capture.phone import Phone, Stages

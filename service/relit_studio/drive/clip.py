@@ -14,7 +14,7 @@ import numpy as np
 from relit_camera.face.track_file import TrackRecorder
 from relit_camera.files import write_atomic
 from relit_camera.space.images import DisplayImage, Frame, LinearImage, Mask
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.writer import VideoWriter
 from relit_studio.assets.manifest import manifest
 from relit_studio.cycles.exr import read_rgba
 from relit_studio.drive.performance import FPS

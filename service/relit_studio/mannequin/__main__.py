@@ -30,7 +30,7 @@ from relit_camera.files import make_folder, write_atomic
 from relit_camera.light.builtin.catalogue import BUILTIN_NAMES, builtin_environment
 from relit_camera.space.images import DisplayImage
 from relit_camera.space.picture_files import read_display, write_display
-from relit_camera.stream.video import VideoReader
+from relit_camera.video.reader import VideoReader
 from relit_studio.mannequin.clip import CLIP_SIZE, write_clip
 from relit_studio.mannequin.field import write_field
 from relit_studio.mannequin.lights import room

@@ -16,7 +16,7 @@ from relit_camera.light.maps import LightMap
 from relit_camera.light.sphere import extend, positions
 from relit_camera.space.colour import uint8_from_linear
 from relit_camera.space.images import Frame, LinearImage
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.writer import VideoWriter
 from relit_studio.mannequin.camera import DISTANCE_CM, VIEW_CM, Camera
 from relit_studio.mannequin.figure import Posture
 from relit_studio.mannequin.lights import lights_from_map

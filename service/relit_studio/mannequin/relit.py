@@ -9,7 +9,7 @@ import numpy as np
 from relit_camera.light.exposure import display_scale
 from relit_camera.light.maps import LightMap
 from relit_camera.space.display import display_from_linear
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.writer import VideoWriter
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.clip import CLIP_LIGHTS, CLIP_SIZE
 from relit_studio.mannequin.lights import lights_from_map

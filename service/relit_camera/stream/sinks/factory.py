@@ -11,7 +11,7 @@ from relit_camera.stream.sinks.base import Sink
 from relit_camera.stream.sinks.camera import CameraSink
 from relit_camera.stream.sinks.file import FileSink
 from relit_camera.stream.sinks.null import NullSink
-from relit_camera.stream.video_writer import VIDEO_SUFFIXES
+from relit_camera.video.writer import VIDEO_SUFFIXES
 
 
 def open_sink(settings: OutputSettings, tree: DeviceTree = SYSTEM) -> Sink:

@@ -8,7 +8,7 @@ from pathlib import Path
 from relit_camera.errors import StorageError
 from relit_camera.space.images import DisplayImage
 from relit_camera.stream.sinks.base import SinkInfo
-from relit_camera.stream.video_writer import VideoWriter
+from relit_camera.video.writer import VideoWriter
 
 
 class FileSink:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from relit_camera.stream.sources.base import Source, SourceInfo
 from relit_camera.stream.sources.playback import Playback, Timed
-from relit_camera.stream.video import VideoReader, probe
+from relit_camera.video.reader import VideoReader, probe
 
 
 def file_source(path: Path) -> Source:

@@ -15,7 +15,7 @@ from av.video.reformatter import ColorRange, VideoReformatter
 from relit_camera.errors import ImageError, StorageError, VideoError
 from relit_camera.files import atomic_path, storage_error
 from relit_camera.space.images import DisplayImage, check_image
-from relit_camera.stream.decoding import ACCURATE, BT709, MAX_SIDE, MIN_SIDE
+from relit_camera.video.decoding import ACCURATE, BT709, MAX_SIDE, MIN_SIDE
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov"})
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from relit_camera.errors import ImageError, StorageError, VideoError
-from relit_camera.stream.video import VideoInfo, VideoReader, probe
-from relit_camera.stream.video_writer import VideoWriter, rational_rate
+from relit_camera.video.reader import VideoInfo, VideoReader, probe
+from relit_camera.video.writer import VideoWriter, rational_rate
 
 COLOURS = np.array(
     [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255], [0, 0, 0], [200, 30, 60], [90, 140, 200], [127, 127, 127]],
@@ -395,7 +395,7 @@ def test_a_full_disk_is_one_clear_error(tmp_path, limit):
         import numpy as np
         from pathlib import Path
         from relit_camera.errors import StorageError
-        from relit_camera.stream.video_writer import VideoWriter
+        from relit_camera.video.writer import VideoWriter
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
         rng = np.random.default_rng(0)

@@ -1,7 +1,8 @@
-"""What `video.VideoReader` asks of FFmpeg's libraries: opening, refusing, turning upright, converting colours."""
+"""What the readers ask of FFmpeg's libraries: opening, refusing, turning upright, converting colours, scaling."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -9,10 +10,10 @@ from typing import Any
 import av
 import numpy as np
 from av.video.reformatter import ColorRange, Interpolation, VideoReformatter
+from numpy.typing import NDArray
 
 from relit_camera.errors import VideoError
-from relit_camera.space.images import DisplayImage
-from relit_camera.stream.truncation import ends_too_early
+from relit_camera.video.truncation import ends_too_early
 
 MIN_SIDE, MAX_SIDE = 16, 8192
 MAX_FPS = 240
@@ -24,6 +25,7 @@ BT709, BT601 = 1, 5
 SWSCALE_MATRICES = {1: BT709, 4: 4, 5: BT601, 6: BT601, 7: 7, 9: 9, 10: 9}
 """The scaler's matrix of each matrix code point of ITU-T H.273."""
 
+SWS_AREA = 0x20
 SWS_FULL_CHROMA = 0x2000
 SWS_ACCURATE_ROUNDING = 0x40000
 ACCURATE = Interpolation.BILINEAR.value | SWS_FULL_CHROMA | SWS_ACCURATE_ROUNDING
@@ -64,27 +66,80 @@ def frame_rate(stream: Any) -> float:
     return float(next((rate for rate in rates if rate and 0 < rate <= MAX_FPS), 30))
 
 
-class UprightRgb:
-    """Converts decoded pictures to uint8 RGB (height, width, 3), as they are meant to be seen."""
+@dataclass(frozen=True)
+class Turn:
+    """The quarter turns and mirrorings of a display matrix: sides change places first, then come the mirrorings."""
 
-    def __init__(self, accurate: bool) -> None:
+    transposed: bool = False
+    flip_x: bool = False
+    flip_y: bool = False
+
+    def size(self, width: int, height: int) -> tuple[int, int]:
+        """Width and height of the upright picture."""
+        return (height, width) if self.transposed else (width, height)
+
+    def upright(self, image: NDArray) -> NDArray:
+        """A view of a stored picture (height, width, 3) as it is meant to be seen."""
+        turned = image.transpose(1, 0, 2) if self.transposed else image
+        return turned[:: -1 if self.flip_y else 1, :: -1 if self.flip_x else 1]
+
+
+def turn_of(picture: Any) -> Turn:
+    """The turn that a decoded picture asks for (ISO/IEC 14496-12, 6.2.2): quarter turns and mirrorings, no others.
+
+    Ask once a file: PyAV's answer and the picture hold one another until Python's garbage collector comes by.
+    """
+    display_matrix = picture.side_data.get("DISPLAYMATRIX")
+    if display_matrix is None:
+        return Turn()
+    a, b, _, c, d = np.frombuffer(display_matrix, np.int32)[:5].astype(int)
+    if abs(a) < abs(b):  # x' = c·y and y' = b·x
+        return Turn(True, bool(c < 0), bool(b < 0))
+    return Turn(False, bool(a < 0), bool(d < 0))
+
+
+class RgbConverter:
+    """Converts decoded pictures to RGB code values (height, width, 3), uint8 or uint16; `white_code` is their 1."""
+
+    def __init__(self, *, accurate: bool = True, deep: bool = False, longer_side: int | None = None) -> None:
+        """Set up.
+
+        Args:
+            accurate: convert to within half a code value; otherwise faster, about one code value too dark.
+            deep: give uint16, which keeps what 10 bits tell.
+            longer_side: scale down (by area, in code values) so that the longer side has so many pixels.
+        """
         self._reformatter = VideoReformatter()
         self._interpolation = ACCURATE if accurate else None
-        self._display_matrix: Any = None
-        self._first = True
+        self._format = "rgb48le" if deep else "rgb24"
+        self._longer_side = longer_side
 
-    def __call__(self, picture: Any) -> DisplayImage:
-        """Return the picture's pixels in an array of its own, not writable."""
-        if self._first:
-            # Asked once: PyAV's answer and the picture hold one another until Python's garbage collector comes by.
-            self._first, self._display_matrix = False, picture.side_data.get("DISPLAYMATRIX")
+    def __call__(self, picture: Any) -> NDArray:
+        """The picture's pixels in an array of its own."""
+        width, height = picture.width, picture.height
+        interpolation = self._interpolation
+        if self._longer_side is not None and self._longer_side < max(width, height):
+            scale = self._longer_side / max(width, height)
+            width, height = max(1, round(width * scale)), max(1, round(height * scale))
+            interpolation = SWS_AREA | SWS_FULL_CHROMA | SWS_ACCURATE_ROUNDING
         rgb = self._reformatter.reformat(
-            picture, format="rgb24", dst_colorspace=None, interpolation=self._interpolation, **_encoding(picture)
+            picture,
+            width=width,
+            height=height,
+            format=self._format,
+            dst_colorspace=None,
+            interpolation=interpolation,
+            **_encoding(picture),
         )
-        pixels = np.asarray(rgb.to_ndarray(), dtype=np.uint8)
-        image = np.ascontiguousarray(_turn_upright(pixels, self._display_matrix))
-        image.setflags(write=False)
-        return image
+        return np.asarray(rgb.to_ndarray())
+
+
+def white_code(picture: Any, deep: bool) -> int:
+    """The code that `RgbConverter` gives for the white of a decoded picture."""
+    if not deep:
+        return 255
+    # FFmpeg's scaler makes 16 bits of luma and chroma by appending eight to the 8-bit code.
+    return 65535 if picture.format.is_rgb else 255 << 8
 
 
 def _video_stream(container: Any, path: Path) -> Any:
@@ -130,15 +185,3 @@ def _encoding(picture: Any) -> dict[str, Any]:
         "src_colorspace": SWSCALE_MATRICES.get(picture.colorspace, usual),
         "src_color_range": ColorRange.JPEG if full else ColorRange.MPEG,
     }
-
-
-def _turn_upright(image: DisplayImage, display_matrix: Any) -> DisplayImage:
-    """Apply a display matrix (ISO/IEC 14496-12, 6.2.2) of quarter turns and mirrorings; others are left out."""
-    if display_matrix is None:
-        return image
-    a, b, _, c, d = np.frombuffer(display_matrix, np.int32)[:5].astype(int)
-    if abs(a) < abs(b):  # x' = c·y and y' = b·x: the sides change places
-        image, flip_x, flip_y = image.transpose(1, 0, 2), c < 0, b < 0
-    else:
-        flip_x, flip_y = a < 0, d < 0
-    return image[:: -1 if flip_y else 1, :: -1 if flip_x else 1]

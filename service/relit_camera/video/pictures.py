@@ -1,18 +1,18 @@
-"""Reading video files through FFmpeg's libraries (PyAV), one frame in memory at a time."""
+"""The decoded pictures of a video file, with their times: what every reader of video files iterates over."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Generic, Self, TypeVar
 
 import av
 
 from relit_camera.errors import VideoError
-from relit_camera.space.images import Frame
-from relit_camera.stream.decoding import UprightRgb, frame_rate, open_stream
+from relit_camera.video.decoding import Turn, frame_rate, open_stream, turn_of
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -34,60 +34,52 @@ class VideoInfo:
     duration_s: float
 
 
-def probe(path: Path) -> VideoInfo:
-    """Size, rate and length of a video file, from its header and first frame.
-
-    Raises:
-        VideoError: as `VideoReader`.
-    """
-    with VideoReader(path) as video:
-        return video.info
-
-
-class VideoReader:
-    """The frames of a video file (MP4, MOV, MKV, WebM, GIF, AVI …) in order of presentation, upright. Iterate once.
-
-    Frames are uint8 sRGB RGB, not writable; `time_s` is the presentation time from the first frame and grows strictly,
-    also where the rate varies. A rotation or mirroring flag is applied. Colours are converted by the matrix and range
-    that the file names; where it names no matrix, BT.709 is taken for HD and BT.601 for less, as players do.
+class PictureReader(Generic[Made]):
+    """What is made of a video file's pictures, in order of presentation, one in memory at a time. Iterate once.
 
     Attributes:
         info: what the header says.
-
-    Raises:
-        VideoError: on opening if the file is missing, empty, cut off, no video, HDR, or of an absurd size; while
-            iterating if the size changes, or, after all frames that can be read, if there were damaged ones.
     """
 
-    def __init__(self, path: Path, *, accurate: bool = True, threads: int = 1) -> None:
+    def __init__(self, path: Path, threads: int) -> None:
         """Open a file.
 
         Args:
-            path: the file.
-            accurate: convert colours to within half a code value; otherwise faster, about one code value too dark.
+            path: the file (MP4, MOV, MKV, WebM, GIF, AVI …).
             threads: of the decoder.
+
+        Raises:
+            VideoError: the file is missing, empty, cut off, no video, HDR, or of an absurd size.
         """
         self._path = Path(path)
         self._container, self._stream = open_stream(self._path)
         self._stream.codec_context.thread_count = threads
-        self._upright_rgb = UprightRgb(accurate)
         self._damaged = 0
-        self._frames = self._decode()
+        self._turn = Turn()
+        self._made = self._decode()
         try:
-            self._first = next(self._frames, None)
+            self._first = next(self._made, None)
             if self._first is None:
                 raise VideoError(f"{self._path} holds no frame that can be decoded", "record or convert it again")
-            self.info = _info(self._container, self._stream, self._first.size)
+            self.info = _info(self._container, self._stream, self._turn)
         except BaseException:
             self._container.close()
             raise
 
-    def __iter__(self) -> Iterator[Frame]:
-        """All frames, once."""
+    def _make(self, picture: Any, index: int, time_s: float) -> Made:
+        """What is given for a decoded picture, the index-th, at `time_s` from the first."""
+        raise NotImplementedError
+
+    def __iter__(self) -> Iterator[Made]:
+        """All frames, once.
+
+        Raises:
+            VideoError: the size changes; or, after all frames that can be read, there were damaged ones.
+        """
         first, self._first = self._first, None
         if first is not None:
             yield first
-        yield from self._frames
+        yield from self._made
 
     def __enter__(self) -> Self:
         return self
@@ -97,13 +89,13 @@ class VideoReader:
 
     def close(self) -> None:
         """Close the file; iteration ends."""
-        self._frames.close()
+        self._made.close()
         self._container.close()
 
-    def _decode(self) -> Generator[Frame]:
+    def _decode(self) -> Generator[Made]:
         interval = 1 / frame_rate(self._stream)
         index, start, last_s = 0, None, -interval
-        size: tuple[int, int] | None = None
+        stored: tuple[int, int] | None = None
         for picture in self._pictures():
             seconds = None if picture.pts is None else float(picture.pts * picture.time_base)
             if start is None:
@@ -111,12 +103,14 @@ class VideoReader:
             time_s = last_s if seconds is None else seconds - start
             if time_s <= last_s:
                 time_s = last_s + interval
-            frame = Frame(self._upright_rgb(picture), index, time.monotonic(), time_s)
-            if size is not None and frame.size != size:
-                sizes = f"from {size[0]}x{size[1]} to {frame.size[0]}x{frame.size[1]}"
+            size = (picture.width, picture.height)
+            if stored is None:
+                self._turn = turn_of(picture)
+            elif stored != size:
+                sizes = f"from {stored[0]}x{stored[1]} to {size[0]}x{size[1]}"
                 raise VideoError(f"{self._path} changes {sizes} at frame {index}", "cut or convert it to one size")
-            yield frame
-            index, last_s, size = index + 1, time_s, frame.size
+            yield self._make(picture, index, time_s)
+            index, last_s, stored = index + 1, time_s, size
         if self._damaged:
             raise VideoError(
                 f"{self._path} is damaged: {index} frames could be read, {self._damaged} not, or only in part",
@@ -148,7 +142,7 @@ def _decoded(packet: Any) -> list[Any] | None:
         return None
 
 
-def _info(container: Any, stream: Any, size: tuple[int, int]) -> VideoInfo:
+def _info(container: Any, stream: Any, turn: Turn) -> VideoInfo:
     fps = frame_rate(stream)
     frames = stream.frames or None
     if stream.duration:
@@ -159,4 +153,4 @@ def _info(container: Any, stream: Any, size: tuple[int, int]) -> VideoInfo:
         duration_s = frames / fps if frames else 0.0
     if frames is None and duration_s:
         frames = round(duration_s * fps)
-    return VideoInfo(*size, fps, frames, duration_s)
+    return VideoInfo(*turn.size(stream.width, stream.height), fps, frames, duration_s)
