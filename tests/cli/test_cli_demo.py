@@ -17,7 +17,7 @@ from relit_camera.cli.demo import opens_in_browser
 from relit_camera.demo import bundle
 from relit_camera.face.track_file import read_track
 from relit_camera.subject.file import read_subject
-from relit_camera.video.pictures import VideoReader, probe
+from relit_camera.video.reader import VideoReader, probe
 from tests.cli.relit_command import call, start
 
 START_S = 60.0
