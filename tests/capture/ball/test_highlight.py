@@ -66,6 +66,16 @@ def test_rays_of_a_glint_do_not_draw_it_away() -> None:
     assert np.hypot(found.x - 160.5, found.y - 110.5) < 1.0
 
 
+def test_a_highlight_on_a_mirrored_white_window_is_not_measured() -> None:
+    dark = np.full((240, 300, 3), 0.05, np.float32)
+    dark[80:115, 120:160] = 1.0
+    bright = dark.copy()
+    cv2.circle(bright, (160, 100), 6, (1.0, 1.0, 1.0), -1)  # half of it on the window
+    found = find_highlight(bright, DistantView(Outline(150, 120, 60)), dark)
+    assert isinstance(found, NoHighlight)
+    assert "another lamp, or of a bright window" in found.reason
+
+
 def test_hidden() -> None:
     found = find_highlight(SCENE.photograph(seed=3), VIEW, SCENE.photograph(seed=4))
     assert isinstance(found, NoHighlight)

@@ -26,6 +26,9 @@ _CORE = 0.5
 """Rays of a glint that are thinner than this share of its thickest place are cut off."""
 _LARGEST = 0.08
 """Share of the ball's picture: no lamp's mirror image is larger."""
+_WHITE = 0.8
+_RIM = 0.2
+"""Share of the highlight's rim that may lie on white: with more, its middle is not known."""
 _SMALLEST = 0.1
 """Share of the other frames' highlights: a smaller one is a mirror image of a mirror image."""
 
@@ -117,6 +120,8 @@ def brightest_place(
         return NoHighlight(f"{area / inside.sum():.0%} of the ball is as bright as the highlight")
     if area < _SMALLEST * typical_area_px:
         return NoHighlight(f"the brightest place has {area} pixels, in other frames {typical_area_px:.0f}")
+    if room is not None and _cut_short(blob, room):
+        return NoHighlight("the lamp's mirror image lies on that of another lamp, or of a bright window")
     y, x = np.nonzero(_core(blob))
     normals = view.normals(x + box[1].start + 0.5, y + box[0].start + 0.5)
     seen = np.isfinite(normals[:, 0])
@@ -141,6 +146,12 @@ def _matched(light: Plane, room: Plane, inside: NDArray[np.bool_]) -> Plane:
     usable = inside & (room > 0.01) & (room < 0.9) & (light < 0.9)
     gain = float(np.median(light[usable] / room[usable])) if usable.sum() > 50 else 1.0
     return room * np.float32(np.clip(gain, 0.5, 2.0))
+
+
+def _cut_short(blob: NDArray[np.bool_], room: Plane) -> bool:
+    """Whether a good part of a blob's rim is where the camera sees nothing but white anyway."""
+    rim = cv2.dilate(blob.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool) & ~blob
+    return bool(np.count_nonzero(rim & (room > _WHITE)) > _RIM * np.count_nonzero(rim))
 
 
 def _brightest(weights: Plane) -> NDArray[np.bool_]:
