@@ -28,7 +28,7 @@ def terms() -> NDArray[np.float32]:
 def test_amounts_are_found_again(terms: NDArray[np.float32]) -> None:
     amounts = np.random.default_rng(5).uniform(0.05, 0.5, (PIXELS, TERMS, 3)).astype(np.float32)
     values = (terms.transpose(1, 0, 2) @ amounts).transpose(1, 0, 2)
-    found = fit_appearance(terms, values)
+    found = fit_appearance(terms, values, 1.0)
     fitted = (terms.transpose(1, 0, 2) @ found).transpose(1, 0, 2)
     assert np.sqrt(np.mean((fitted - values) ** 2)) < 0.01
     # What tells terms apart is little for some pixels; the amounts as a whole are right.
@@ -37,7 +37,7 @@ def test_amounts_are_found_again(terms: NDArray[np.float32]) -> None:
 
 def test_no_amount_is_negative_though_the_pictures_ask_for_it(terms: NDArray[np.float32]) -> None:
     values = np.repeat((0.5 - terms[..., :1]).clip(0), 3, axis=2)
-    found = fit_appearance(terms, values)
+    found = fit_appearance(terms, values, 1.0)
     assert found.min() >= 0
 
 
@@ -49,7 +49,7 @@ def test_a_few_pictures_that_are_wrong_do_not_count(terms: NDArray[np.float32]) 
     wrong[::12] = 1.5
 
     def error(seen: NDArray[np.float32]) -> float:
-        fitted = (terms.transpose(1, 0, 2) @ fit_appearance(terms, seen)).transpose(1, 0, 2)
+        fitted = (terms.transpose(1, 0, 2) @ fit_appearance(terms, seen, 1.0)).transpose(1, 0, 2)
         return float(np.sqrt(np.mean((fitted - values) ** 2)))
 
     assert error(values) < 0.005

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from relit_camera.errors import LightsError
 from relit_camera.reflectance.barycentric import SphericalBarycentric
 from relit_camera.reflectance.black_ring import region_share
-from relit_camera.reflectance.blend import Blend
-from relit_camera.reflectance.gaussian_process import GaussianProcess, Kernel
+from relit_camera.reflectance.blend import Blend, choose_share
+from relit_camera.reflectance.gaussian_process import Kernel
 from relit_camera.reflectance.method import DEFAULT_METHOD, Method, factored_field, open_method
 from relit_camera.reflectance.model import CANDIDATES, Model, choose_kernel, residual_weights
+from relit_camera.reflectance.rbf import RadialBasis
 from relit_camera.reflectance.samples import Samples
 from relit_camera.reflectance.thesis import Thesis
 from relit_camera.space.directions import direction_from_degrees
@@ -97,13 +98,19 @@ def test_beyond_the_sampled_region_the_blend_is_the_model_and_goes_on() -> None:
     assert np.sqrt(np.mean((found - truth) ** 2)) < 0.25 * np.sqrt(np.mean(truth**2))
 
 
-def test_inside_the_region_the_blend_is_the_weighted_mean_of_its_parts(samples: Samples) -> None:
+def test_inside_the_region_the_blend_is_the_mean_of_its_parts(samples: Samples) -> None:
     pixels = inside(samples)[:50]
-    known = replace(samples, known_geometry=samples.geometry)
-    gaussian = GaussianProcess().build(known)
-    parts = [field.at(BETWEEN, pixels) for field in (Model().build(known), Thesis().build(known), gaussian)]
-    expected = parts[0] / 2 + parts[1] / 4 + np.maximum(parts[2], 0) / 4
-    np.testing.assert_allclose(Blend().build(known).at(BETWEEN, pixels), expected, atol=1e-5)
+    field = Blend().build(samples)
+    assert 0 < field.share < 1
+    smooth = np.maximum(RadialBasis().build(samples).at(BETWEEN, pixels), 0)
+    expected = field.share * Model().build(samples).at(BETWEEN, pixels) + (1 - field.share) * smooth
+    np.testing.assert_allclose(field.at(BETWEEN, pixels), expected, atol=1e-5)
+
+
+def test_the_model_has_the_larger_share_where_the_shape_tells_the_shadows() -> None:
+    bare, hidden = (choose_share(Model().build(make(CAPTURED, SIZE))) for make in (lambert, shadowed))
+    assert bare > hidden
+    assert bare > 0.7
 
 
 def test_the_kernel_is_one_of_the_candidates_and_noisier_pictures_get_a_smoother_one() -> None:

@@ -121,7 +121,9 @@ def align_to(picture: LinearImage, predicted: LinearImage, matte: Mask) -> tuple
         matte: (height, width) where the person is.
 
     Returns:
-        The transform, none where it would lead far away; and the least-squares factor inside the matte after it.
+        The transform, none where it would lead far away; and the factor that makes up for the strobe, after it: the
+        median over lit pixels, as `align_samples` finds it. Least squares would take shadows in the wrong place for a
+        weak strobe.
     """
     scale = min(1.0, _LARGEST_SIDE / max(matte.shape))
     here, there = luminance(_resized(picture, scale)), luminance(_resized(predicted, scale))
@@ -132,9 +134,7 @@ def align_to(picture: LinearImage, predicted: LinearImage, matte: Mask) -> tuple
     transform = template.align(visible_detail(here, shade), Rigid()).scaled(1 / scale)
     if np.hypot(transform.x, transform.y) > _FARTHEST * max(matte.shape):
         transform = Rigid()
-    moved = apply_alignment(picture, transform)[matte > 0.5].astype(np.float64)
-    energy = float(np.square(moved).sum())
-    return transform, float((moved * predicted[matte > 0.5]).sum() / energy) if energy else 1.0
+    return transform, _gain(luminance(apply_alignment(picture, transform)), luminance(predicted), matte, np.inf)
 
 
 def apply_alignment(picture: Floats, transform: Rigid, gain: float = 1.0) -> Floats:
@@ -157,13 +157,18 @@ def _without_drift(transforms: list[Rigid], directions: NDArray[np.float64]) -> 
 def _gains(light: Floats, predicted: Floats, directions: NDArray[np.float64], matte: Mask) -> NDArray[np.float64]:
     """Factors (lights,) from pictures (lights, height, width) to what is predicted; 1 where that tells too little."""
     saturated = _SATURATED * float(light.max())
+    before = directions[:, 2] > 0
     gains = np.ones(len(light))
-    for index in np.flatnonzero(directions[:, 2] > 0):
-        seen, expected = light[index][matte > 0.5], predicted[index][matte > 0.5]
-        lit = (expected > _LIT * np.percentile(expected, 98)) & (seen > _LEAST_SEEN * expected) & (seen < saturated)
-        if lit.sum() >= _LEAST_LIT:
-            gains[index] = np.exp(np.median(np.log(expected[lit] / seen[lit])))
-    return np.asarray(gains / np.median(gains[directions[:, 2] > 0])) if (directions[:, 2] > 0).any() else gains
+    for index in np.flatnonzero(before):
+        gains[index] = _gain(light[index], predicted[index], matte, saturated)
+    return np.asarray(gains / np.median(gains[before])) if before.any() else gains
+
+
+def _gain(light: Floats, predicted: Floats, matte: Mask, saturated: float) -> float:
+    """The median factor from a picture (height, width) to what is predicted, where light falls; 1 if hardly any."""
+    seen, expected = light[matte > 0.5], predicted[matte > 0.5]
+    lit = (expected > _LIT * np.percentile(expected, 98)) & (seen > _LEAST_SEEN * expected) & (seen < saturated)
+    return float(np.exp(np.median(np.log(expected[lit] / seen[lit])))) if lit.sum() >= _LEAST_LIT else 1.0
 
 
 def _resized(picture: Floats, scale: float) -> Floats:

@@ -157,7 +157,7 @@ def olat(
     out: Out = None,
     as_json: AsJson = False,
     gamma: GammaText = "srgb",
-    within_deg: Within = None,
+    within_deg: Within = 75.0,
     method: Methods = None,
 ) -> None:
     """Leave captured lights out and predict their pictures from the others."""

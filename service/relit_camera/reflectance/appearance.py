@@ -25,7 +25,7 @@ PENUMBRA = 0.06
 ROUNDS = 3
 """Of reweighting."""
 TOLERANCE, FLOOR = 0.16, 0.02
-"""A picture that is off by this share of the pixel's bright values, and this much, counts half."""
+"""A picture that is off by this share of the pixel's bright values, and this share of what is bright, counts half."""
 SWEEPS = 30
 """Of coordinate descent."""
 RIDGE = 1e-3
@@ -51,34 +51,39 @@ def appearance_terms(cosines: Floats, half_cosines: Floats, margins: Floats) -> 
     return terms
 
 
+def half_directions(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Halfway (count, 3) between unit vectors (count, 3) toward lights and the one toward the camera."""
+    halves = directions + np.array([0.0, 0.0, 1.0])
+    # A light straight behind the person has none; it is hidden anyway.
+    return np.asarray(halves / np.maximum(np.linalg.norm(halves, axis=1, keepdims=True), 1e-6))
+
+
 def distant_terms(geometry: Geometry, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
     """The terms (count, pixels, TERMS) of distant lights (count, 3) at row-major pixels (some,) of a shape."""
-    halves = directions + np.array([0.0, 0.0, 1.0])
-    # A light straight behind the person has no halfway; it is hidden anyway.
-    halves /= np.maximum(np.linalg.norm(halves, axis=1, keepdims=True), 1e-6)
     return appearance_terms(
         geometry.cosines(directions, pixels).T,
-        geometry.cosines(halves, pixels).T,
+        geometry.cosines(half_directions(directions), pixels).T,
         geometry.horizon.margins(directions, pixels).T,
     )
 
 
-def fit_appearance(terms: Floats, values: Floats) -> Floats:
+def fit_appearance(terms: Floats, values: Floats, bright: float) -> Floats:
     """How much of each term: non-negative least squares, iteratively reweighted against what no term explains.
 
     Args:
         terms: (lights, pixels, TERMS).
-        values: (lights, pixels, 3) linear.
+        values: (lights, pixels, channels) linear.
+        bright: what counts as bright in all the pictures: one value.
 
     Returns:
-        (pixels, TERMS, 3) float32.
+        (pixels, TERMS, channels) float32.
     """
     brightness = values.mean(axis=2)
-    tolerance = TOLERANCE * np.percentile(brightness, 90, axis=0) + FLOOR
+    tolerance = TOLERANCE * np.percentile(brightness, 90, axis=0) + FLOOR * bright + 1e-9
     weights = np.ones_like(brightness)
     by_pixel = np.ascontiguousarray(terms.transpose(1, 0, 2))
     seen = np.ascontiguousarray(values.transpose(1, 0, 2))
-    amounts = np.zeros((values.shape[1], TERMS, 3), np.float32)
+    amounts = np.zeros((values.shape[1], TERMS, values.shape[2]), np.float32)
     for _ in range(ROUNDS):
         weighed = (by_pixel * weights.T[..., None]).transpose(0, 2, 1)
         amounts = _non_negative(weighed @ by_pixel, weighed @ seen)
@@ -92,7 +97,7 @@ def _non_negative(products: Floats, projections: Floats) -> Floats:
 
     Args:
         products: (pixels, terms, terms) of terms with terms.
-        projections: (pixels, terms, 3) of terms with values.
+        projections: (pixels, terms, channels) of terms with values.
     """
     count = products.shape[1]
     ridge = RIDGE * np.trace(products, axis1=1, axis2=2) / count + 1e-12

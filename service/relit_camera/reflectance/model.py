@@ -41,16 +41,9 @@ class Model:
     def build(self, samples: Samples) -> ModelField:
         """The field; see `Method.build`. It rests on `samples.geometry`."""
         region_share(samples.directions, samples.directions[:1])
-        lights = len(samples.directions)
-        pictures = samples.pictures.reshape(lights, -1, 3)
         inside = np.flatnonzero(samples.matte.ravel() > 0)
-        amounts = np.zeros((pictures.shape[1], TERMS, 3), np.float32)
-        for start in range(0, len(inside), BLOCK):
-            pixels = inside[start : start + BLOCK]
-            terms = distant_terms(samples.geometry, samples.directions, pixels)
-            amounts[pixels] = fit_appearance(terms, pictures[:, pixels])
         judges = inside[:: max(1, len(inside) // JUDGES)]
-        return ModelField(samples, amounts, choose_kernel(samples, judges))
+        return ModelField(samples, _fit(samples, inside), choose_kernel(samples, judges))
 
 
 @dataclass(frozen=True)
@@ -85,6 +78,14 @@ class ModelField:
     def _texel_weights(self) -> Floats:
         return residual_weights(self.kernel, self.samples.directions, texel_vectors())
 
+    def fitted_to(self, samples: Samples, pixels: NDArray[np.intp]) -> ModelField:
+        """The same model of other samples of this person, fitted at some row-major pixels only."""
+        return ModelField(samples, _fit(samples, pixels), self.kernel)
+
+    def appearance_at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+        """R as `at`, without the residual."""
+        return _modelled(self.samples, self.amounts, directions, pixels)
+
     def _answer(self, directions: NDArray[np.float64], weights: Floats, pixels: NDArray[np.intp]) -> Floats:
         result = np.empty((len(directions), len(pixels), 3), np.float32)
         for start in range(0, len(pixels), BLOCK):
@@ -94,6 +95,25 @@ class ModelField:
             # The terms are not negative, and no light takes light away.
             result[:, start : start + BLOCK] = np.maximum(found, 0)
         return result
+
+
+def _fit(samples: Samples, pixels: NDArray[np.intp]) -> Floats:
+    """Amounts of all pixels (height · width, TERMS, 3), 0 but at the given ones."""
+    pictures = samples.pictures.reshape(len(samples.directions), -1, 3)
+    amounts = np.zeros((pictures.shape[1], TERMS, 3), np.float32)
+    bright = _bright(samples)
+    for start in range(0, len(pixels), BLOCK):
+        block = pixels[start : start + BLOCK]
+        terms = distant_terms(samples.geometry, samples.directions, block)
+        amounts[block] = fit_appearance(terms, pictures[:, block], bright)
+    return amounts
+
+
+def _bright(samples: Samples) -> float:
+    """The 99th percentile of the person's values."""
+    inside = np.flatnonzero(samples.matte.ravel() > 0.5)
+    some = inside[:: max(1, len(inside) // JUDGES)]
+    return float(np.percentile(samples.pictures.reshape(len(samples.directions), -1, 3)[:, some], 99))
 
 
 def _modelled(samples: Samples, amounts: Floats, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
@@ -136,7 +156,7 @@ def choose_kernel(samples: Samples, pixels: NDArray[np.intp]) -> Kernel:
     errors = np.zeros(len(CANDIDATES))
     for fold in range(FOLDS):
         left_out = np.arange(lights) % FOLDS == fold
-        amounts = fit_appearance(terms[~left_out], values[~left_out])
+        amounts = fit_appearance(terms[~left_out], values[~left_out], _bright(samples))
         off = values - (terms.transpose(1, 0, 2) @ amounts).transpose(1, 0, 2)
         known, asked = samples.directions[~left_out], samples.directions[left_out]
         for index, kernel in enumerate(CANDIDATES):
