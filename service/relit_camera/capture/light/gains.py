@@ -32,6 +32,7 @@ _FEWEST = 0.02
 """Share of all cells that must be unreached."""
 _STEADY = 2.5
 """Cells that fit the common gains so many times worse than usual are left out: something moves there."""
+_MOST_LEFT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,19 +44,25 @@ class FrameGains:
         spread: how far the cells of one frame differ about its gain (robust standard deviation of logarithms, median
             over the frames): near the noise's where one gain a channel is all that was done.
         share: of all cells that tell them; 0 where the flash reaches everything.
-        rows, columns: of the grid.
-        unreached: (rows, columns) which cells those are.
+        left_as_is, left: share of the room's light that is left, either sign, where a frame without the flash is taken
+            from one with it, with the gains as they were and made equal.
     """
 
     rgb: Floats
     spread: float
     share: float
-    unreached: NDArray[np.bool_]
+    left_as_is: float
+    left: float
 
     @property
     def source(self) -> str:
         """Where they are from, for people."""
         return "what the flash does not reach" if self.share else "dark frames, and time between them"
+
+    @property
+    def room_can_go(self) -> bool:
+        """Whether taking the room's light off leaves less than half of it."""
+        return self.left < _MOST_LEFT
 
 
 def cells_of(frame: LinearImage) -> NDArray[np.float16]:
@@ -86,12 +93,16 @@ def find_gains(
     unreached = _unreached(flat, times_s, bright, flash, visible)
     share = float(unreached.mean())
     if share >= _FEWEST:
-        logs, spread = _common(flat[:, unreached])
+        telling = flat[:, unreached]
+        logs, spread = _common(telling)
     else:
-        share, unreached = 0.0, np.zeros_like(unreached)
-        logs, spread = _by_time(flat[:, visible], times_s, bright)
+        share, telling = 0.0, flat[:, visible]
+        logs, spread = _by_time(telling, times_s, bright)
     logs -= logs[bright].mean(axis=0)
-    return FrameGains(np.exp(logs), spread, share, unreached.reshape(rows, columns))
+    gains = np.exp(logs)
+    judged = np.flatnonzero(bright if share else ~bright)
+    left_as_is, left = (_left(telling, each, judged, np.flatnonzero(~bright)) for each in (np.ones_like(gains), gains))
+    return FrameGains(gains, spread, share, left_as_is, left)
 
 
 def _unreached(
@@ -135,3 +146,16 @@ def _by_time(cells: NDArray[np.float16], times_s: Floats, bright: NDArray[np.boo
     known, spread = _common(cells[~bright])
     logs = np.stack([np.interp(times_s, times_s[~bright], channel) for channel in known.T], axis=1)
     return logs, spread
+
+
+def _left(cells: NDArray[np.float16], gains: Floats, judged: Indices, dark: Indices) -> float:
+    """Share of the room's light in cells (frames, cells, 3) that is left if the next dark frame's is taken off (median)."""
+    if cells.shape[1] == 0:
+        return 1.0
+    shares = []
+    for index in judged:
+        others = dark[dark != index]
+        other = others[np.abs(others - index).argmin()]
+        light, room = (cells[each].astype(np.float32) / gains[each] for each in (index, other))
+        shares.append(np.median(np.abs(light - room).sum(axis=1) / np.maximum(room.sum(axis=1), _FLOOR)))
+    return float(np.median(shares))

@@ -30,7 +30,7 @@ class OneLight:
     Attributes:
         index: (count,) of the frames, growing.
         pictures: (count, size, size, 3) float16 linear RGB; a little noise below 0 is left in them.
-        room: (size, size, 3) float32, the mean of the room's light that was taken off; 0 where it was not.
+        room: (size, size, 3) float32, the room's light, mean over the frames.
     """
 
     index: Indices
@@ -47,6 +47,7 @@ def read_one_light(
     bright: Indices,
     dark: Indices,
     *,
+    subtract: bool = True,
     threads: int = 1,
     progress: Callable[[int], None] = lambda frames: None,
 ) -> OneLight:
@@ -59,7 +60,8 @@ def read_one_light(
         transforms: of these frames, to the reference.
         gains: (3,) of these frames, linear RGB.
         bright: growing indices of those to make pictures of.
-        dark: of those that show the room alone; nothing is taken off where there are none.
+        dark: of those that show the room alone.
+        subtract: whether the room's light is taken off.
         threads: of the decoder.
         progress: called with the number of frames read.
 
@@ -68,7 +70,7 @@ def read_one_light(
     """
     pictures = np.empty((len(bright), square.size, square.size, 3), np.float16)
     room_sum, place = np.zeros((square.size, square.size, 3)), {int(each): n for n, each in enumerate(bright)}
-    between = _Between(pictures, room_sum)
+    between = _Between(pictures, room_sum, subtract)
     with LinearReader(path, gamma, only=frozenset(bright.tolist()) | frozenset(dark.tolist()), threads=threads) as film:
         for frame in film:
             cut = square.cut(frame.image, transforms[frame.index]) / gains[frame.index].astype(np.float32)
@@ -92,8 +94,8 @@ class _Room:
 class _Between:
     """Bright frames that wait for the dark ones after them."""
 
-    def __init__(self, pictures: NDArray[np.float16], room_sum: NDArray[np.float64]) -> None:
-        self._pictures, self._room_sum = pictures, room_sum
+    def __init__(self, pictures: NDArray[np.float16], room_sum: NDArray[np.float64], subtract: bool) -> None:
+        self._pictures, self._room_sum, self._subtract = pictures, room_sum, subtract
         self._before: _Room | None = None
         self._dark: list[_Room] = []
         self._waiting: list[tuple[int, float, LinearImage]] = []
@@ -120,8 +122,7 @@ class _Between:
             room = _at(time_s, self._before, after)
             if room is not None:
                 self._room_sum += room
-                picture = picture - room
-            self._pictures[place] = picture
+            self._pictures[place] = picture - room if self._subtract and room is not None else picture
         self._before = after or self._before
         self._waiting, self._dark = [], []
 

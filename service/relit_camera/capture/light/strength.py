@@ -37,14 +37,12 @@ class Strengths:
     Attributes:
         strength: (lights,) relative to the median.
         surface: the person's, in the small pictures' pixels.
-        misfit_as_is, misfit: relative error of the law of the cosine on lit skin (median), with the strengths found,
-            the lamp taken as far away, and as near as it is.
+        misfit: (lights,) relative error of the law of the cosine on lit skin (median).
     """
 
     strength: Floats
     surface: Surface
-    misfit_as_is: float
-    misfit: float
+    misfit: Floats
 
 
 def find_strengths(
@@ -62,7 +60,6 @@ def find_strengths(
     directions = lamps_cm / np.linalg.norm(lamps_cm, axis=1, keepdims=True)
     strength = np.ones(len(pictures))
     corrected = pictures
-    surface, misfits = None, []
     for _ in range(_ROUNDS):
         shading = photometric_stereo(corrected, directions, matte)
         normals = complete_normals(shading.normals, shading.confidence, matte)
@@ -70,14 +67,28 @@ def find_strengths(
         surface = Surface(normals, _points(depth, head, pixels_per_cm))
         albedo = luminance(shading.albedo)
         sure = (shading.confidence > _SURE) & (matte > 0.9)
-        found = [_strength(picture, surface, lamp, albedo, sure) for picture, lamp in zip(pictures, lamps_cm, strict=True)]
-        strength = np.array([each for each, _ in found])
-        strength /= np.median(strength)
-        misfits.append(float(np.median([error for _, error in found])))
+        found = np.array([_strength(p, surface, lamp, albedo, sure) for p, lamp in zip(pictures, lamps_cm, strict=True)])
+        strength = _without_half_the_trend(found[:, 0], directions)
         corrected = np.stack(
-            [p * (to_distant(surface, lamp) / np.float32(s))[..., None] for p, lamp, s in zip(pictures, lamps_cm, strength, strict=True)]
+            [
+                picture * (to_distant(surface, lamp) / np.float32(each))[..., None]
+                for picture, lamp, each in zip(pictures, lamps_cm, strength, strict=True)
+            ]
         )
-    return Strengths(strength, surface, misfits[0], misfits[-1])
+    return Strengths(strength, surface, found[:, 1])
+
+
+def _without_half_the_trend(strength: Floats, directions: Floats) -> Floats:
+    """Strengths (lights,), median 1, with half of what goes with the direction (lights, 3) alone.
+
+    A hand may hold the lamp nearer on one side; skin that obeys the law of the cosine only nearly looks the same. Either
+    makes a tenth of a difference: half is what to expect of each.
+    """
+    logs = np.log(np.maximum(strength, 1e-6))
+    terms = np.concatenate([directions, np.ones((len(directions), 1))], axis=1)
+    trend = terms @ np.linalg.lstsq(terms, logs, rcond=None)[0]
+    left = logs - (trend - trend.mean()) / 2
+    return np.exp(left - np.median(left))
 
 
 def _points(depth: NDArray[np.float32], head: tuple[float, float], pixels_per_cm: float) -> NDArray[np.float32]:
