@@ -54,7 +54,7 @@ class Findings:
         seen, told = self.seen, []
         if seen.ball.evidence is not None and seen.ball.evidence < _DOUBTFUL_BALL:
             told.append(
-                f"only {seen.ball.evidence:.0%} of the ball's outline shows, directions may be some degrees off: film it "
+                f"only {seen.ball.evidence:.0%} of the ball's outline shows, directions may be degrees off: film it "
                 "before something plain, or give its circle with --ball X,Y,RADIUS"
             )
         told += [
@@ -133,7 +133,12 @@ class Findings:
     def _frame(self, index: int) -> dict[str, Any]:
         seen = self.seen
         frame, motion = seen.flashes.frames[index], seen.motion.transforms[index]
-        told: dict[str, Any] = {"index": index, "time_s": frame.time_s, "kind": frame.kind.value, "reason": frame.reason}
+        told: dict[str, Any] = {
+            "index": index,
+            "time_s": frame.time_s,
+            "kind": frame.kind.value,
+            "reason": frame.reason,
+        }
         if index in seen.motion.lost:
             rejected = frame.kind is Kind.BRIGHT
             return told | {"kind": Kind.REJECTED.value if rejected else told["kind"], "reason": "the face is not found"}

@@ -33,7 +33,7 @@ def merged(pictures: NDArray[np.float32], weights: NDArray[np.float64]) -> NDArr
     The weighted mean; of three or more, values count less the farther they are from the median (Huber's way).
     """
     if len(pictures) == 1:
-        return pictures[0]
+        return np.asarray(pictures[0])
     counted = weights.astype(np.float32)[:, None, None, None]
     if len(pictures) > 2:
         away = np.abs(pictures - np.median(pictures, axis=0)).mean(axis=3, keepdims=True)

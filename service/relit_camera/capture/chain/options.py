@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from relit_camera.capture.ball.outline import Outline
+from relit_camera.capture.face_circle import Circle
 from relit_camera.space.colour import Gamma
 
 DEFAULT_SIZE = 384
@@ -24,6 +25,7 @@ class CaptureOptions:
         size: pixels a side of the subject; fewer where the video shows fewer.
         focal_px: the camera's focal length in pixels of the upright video, where it is known.
         ball: the mirror ball's outline in those pixels, where it is known.
+        face: its circle, brow to chin, where it is known.
         ball_diameter_cm: its size, where it is known.
         light_distance_cm: from the lamp to the head.
         subtract_room: whether the room's light is taken off; None where it helps.
@@ -35,6 +37,7 @@ class CaptureOptions:
     size: int = DEFAULT_SIZE
     focal_px: float | None = None
     ball: Outline | None = None
+    face: Circle | None = None
     ball_diameter_cm: float | None = None
     light_distance_cm: float = LIGHT_DISTANCE_CM
     subtract_room: bool | None = None

@@ -81,9 +81,7 @@ def build_samples(
     good = np.flatnonzero(strengths.misfit <= _UNLIKE * np.median(strengths.misfit))
     refuse_one_sided(lamps.directions[good], len(seen.highlights))
     groups = [good[group] for group in group_lights(lamps.directions[good])]
-    pictures = np.stack(
-        [_merged(lights, lamps, strengths, group, matte, options.near_field) for group in groups]
-    )
+    pictures = np.stack([_merged(lights, lamps, strengths, group, matte, options.near_field) for group in groups])
     directions = np.stack([lamps.directions[group].mean(axis=0) for group in groups])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     findings = Findings(video.name, options, seen, lamps, square, subtract, strengths, good, len(groups))
@@ -97,15 +95,13 @@ def _matte(lights: OneLight, square: HeadSquare, ball: Outline) -> Mask:
     matte = flash_matte(lights.pictures, lights.room, nobody)
     if matte.mean() < _LEAST_PERSON:
         raise CaptureError(
-            f"the flash lights {matte.mean():.1%} of the picture about the face: the person cannot be told from the room",
+            f"the flash lights {matte.mean():.1%} of what is about the face: the person cannot be told from the room",
             "make the room darker, or hold the lamp nearer, about a metre from the face",
         )
     return matte
 
 
-def _strengths(
-    lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, head: tuple[float, float]
-) -> Strengths:
+def _strengths(lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, head: tuple[float, float]) -> Strengths:
     """The flashes' strengths, by small pictures."""
     side = min(_SMALL, square.size)
     small = np.stack(

@@ -91,7 +91,7 @@ def survey(video: Path, options: CaptureOptions, progress: Progress) -> Survey:
     flashes = find_flashes(seen)
     progress("Looking for the mirror ball", 0, None)
     ball, sample = _ball(video, seen.size, flashes, options)
-    face = locate_face(seen, flashes)
+    face = LocatedFace(options.face, "user") if options.face else locate_face(seen, flashes)
     motion = stabilise(
         video,
         flashes,
@@ -99,9 +99,7 @@ def survey(video: Path, options: CaptureOptions, progress: Progress) -> Survey:
         threads=options.threads,
         progress=lambda done: progress("Following the face", done, total),
     )
-    bright, dark = (
-        np.setdiff1d(flashes.indices(kind), list(motion.lost)) for kind in (Kind.BRIGHT, Kind.DARK)
-    )
+    bright, dark = (np.setdiff1d(flashes.indices(kind), list(motion.lost)) for kind in (Kind.BRIGHT, Kind.DARK))
     frames = np.union1d(bright, dark)
     film, sightings, cells, stills = BallFilm(ball.outline, seen.size), [], [], []
     ball_watch = BallWatch(sample, ball.outline)
@@ -138,7 +136,9 @@ def _ball(
 ) -> tuple[FoundBall, SceneSample]:
     """The ball, in as many dark frames as bright ones, spread over the video."""
     half = MAX_FRAMES // 2
-    picked = [indices[:: max(1, -(-len(indices) // half))] for indices in map(flashes.indices, (Kind.BRIGHT, Kind.DARK))]
+    picked = [
+        indices[:: max(1, -(-len(indices) // half))] for indices in map(flashes.indices, (Kind.BRIGHT, Kind.DARK))
+    ]
     only = frozenset(np.concatenate(picked).tolist())
     with LinearReader(video, options.gamma, only=only, threads=options.threads) as reader:
         sample = sample_scene(frame.image for frame in reader)

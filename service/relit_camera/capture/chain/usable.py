@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.capture.ball.highlight import Highlight, NoHighlight
+from relit_camera.capture.ball.highlight import NoHighlight
 from relit_camera.capture.ball.watch import outline_in
 from relit_camera.capture.chain.options import CaptureOptions
 from relit_camera.capture.chain.survey import Survey
@@ -56,7 +56,7 @@ class Lamps:
     @property
     def directions(self) -> Floats:
         """Unit vectors (count, 3) from the head's middle."""
-        return self.lamps_cm / np.linalg.norm(self.lamps_cm, axis=1, keepdims=True)
+        return np.asarray(self.lamps_cm / np.linalg.norm(self.lamps_cm, axis=1, keepdims=True))
 
 
 def find_lamps(seen: Survey, options: CaptureOptions) -> Lamps:
@@ -82,10 +82,10 @@ def find_lamps(seen: Survey, options: CaptureOptions) -> Lamps:
         usable.append((index, near.position_cm(highlight.normal), near.ball_cm))
     if not usable:
         raise _too_few(0, len(seen.highlights))
-    index, lamp, ball = (np.array(column) for column in zip(*usable, strict=True))
+    frames, lamp, ball = (np.array(column) for column in zip(*usable, strict=True))
     to_ball = lamp - ball
     lamps = Lamps(
-        index,
+        frames,
         lamp - place.head_cm,
         to_ball / np.linalg.norm(to_ball, axis=1, keepdims=True),
         place,
@@ -111,7 +111,7 @@ def refuse_enhanced(spread: float) -> None:
     """
     if spread > _ENHANCED:
         raise CaptureError(
-            f"the camera changes parts of the picture by themselves: the room's brightness differs by {spread:.0%} within frames",
+            f"the camera changes parts of the picture by themselves, by {spread:.0%} where only the room shows",
             "turn off HDR, night mode, beauty and other enhancements, or film with an app that locks the exposure",
         )
 
@@ -155,5 +155,5 @@ def distinct(directions: Floats) -> int:
 def _too_few(count: int, bright: int) -> CaptureError:
     return CaptureError(
         f"{count} usable directions of light in {bright} bright frames, {MIN_DIRECTIONS} are needed",
-        "film for half a minute or more, the lamp moving all the time, the ball unhidden and not before a bright window",
+        "film half a minute or more, the lamp moving all the time, the ball unhidden and no bright window in it",
     )

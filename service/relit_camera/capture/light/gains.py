@@ -70,7 +70,7 @@ def cells_of(frame: LinearImage) -> NDArray[np.float16]:
     height, width = frame.shape[:2]
     scale = min(1.0, _SIDE / max(height, width))
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
-    return cv2.resize(frame, size, interpolation=cv2.INTER_AREA).astype(np.float16)
+    return np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), np.float16)
 
 
 def find_gains(
@@ -149,7 +149,7 @@ def _by_time(cells: NDArray[np.float16], times_s: Floats, bright: NDArray[np.boo
 
 
 def _left(cells: NDArray[np.float16], gains: Floats, judged: Indices, dark: Indices) -> float:
-    """Share of the room's light in cells (frames, cells, 3) that is left if the next dark frame's is taken off (median)."""
+    """Share of the room's light in cells (frames, cells, 3) left if the nearest dark frame's is taken off (median)."""
     if cells.shape[1] == 0:
         return 1.0
     shares = []

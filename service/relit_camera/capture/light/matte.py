@@ -26,9 +26,7 @@ _FULL = 0.8
 """Share of the ratio just inside from which a pixel is the person's wholly."""
 
 
-def flash_matte(
-    pictures: NDArray[np.floating], room: LinearImage, nobody: NDArray[np.bool_] | None = None
-) -> Mask:
+def flash_matte(pictures: NDArray[np.floating], room: LinearImage, nobody: NDArray[np.bool_] | None = None) -> Mask:
     """The person's alpha (height, width), float32 0..1: the largest thing that the flash reaches.
 
     Args:

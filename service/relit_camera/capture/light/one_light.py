@@ -73,7 +73,8 @@ def read_one_light(
     between = _Between(pictures, room_sum, subtract)
     with LinearReader(path, gamma, only=frozenset(bright.tolist()) | frozenset(dark.tolist()), threads=threads) as film:
         for frame in film:
-            cut = square.cut(frame.image, transforms[frame.index]) / gains[frame.index].astype(np.float32)
+            gain: NDArray[np.float32] = gains[frame.index].astype(np.float32)
+            cut = np.asarray(square.cut(frame.image, transforms[frame.index]) / gain, np.float32)
             if frame.index in place:
                 between.add_bright(place[frame.index], frame.time_s, cut)
             else:

@@ -1,8 +1,8 @@
 """How much light each flash gave, told by the person themself, together with their rough shape.
 
-A hand holds the lamp now nearer, now farther, and does not always point it at the face. What a face of this shape would
-show under each light, beside what it shows, tells the flash's strength; and the shape follows from all the pictures once
-their strengths are known. Both are found in turn, from small pictures.
+A hand holds the lamp now nearer, now farther, and does not always point it at the face. What a face of this shape
+would show under each light, beside what it shows, tells the flash's strength; and the shape follows from all the
+pictures once their strengths are known. Both are found in turn, from small pictures.
 """
 
 from __future__ import annotations
@@ -67,7 +67,9 @@ def find_strengths(
         surface = Surface(normals, _points(depth, head, pixels_per_cm))
         albedo = luminance(shading.albedo)
         sure = (shading.confidence > _SURE) & (matte > 0.9)
-        found = np.array([_strength(p, surface, lamp, albedo, sure) for p, lamp in zip(pictures, lamps_cm, strict=True)])
+        found = np.array(
+            [_strength(p, surface, lamp, albedo, sure) for p, lamp in zip(pictures, lamps_cm, strict=True)]
+        )
         strength = _without_half_the_trend(found[:, 0], directions)
         corrected = np.stack(
             [
@@ -81,14 +83,14 @@ def find_strengths(
 def _without_half_the_trend(strength: Floats, directions: Floats) -> Floats:
     """Strengths (lights,), median 1, with half of what goes with the direction (lights, 3) alone.
 
-    A hand may hold the lamp nearer on one side; skin that obeys the law of the cosine only nearly looks the same. Either
-    makes a tenth of a difference: half is what to expect of each.
+    A hand may hold the lamp nearer on one side; skin that obeys the law of the cosine only nearly looks the same.
+    Either makes a tenth of a difference: half is what to expect of each.
     """
     logs = np.log(np.maximum(strength, 1e-6))
     terms = np.concatenate([directions, np.ones((len(directions), 1))], axis=1)
     trend = terms @ np.linalg.lstsq(terms, logs, rcond=None)[0]
     left = logs - (trend - trend.mean()) / 2
-    return np.exp(left - np.median(left))
+    return np.asarray(np.exp(left - np.median(left)))
 
 
 def _points(depth: NDArray[np.float32], head: tuple[float, float], pixels_per_cm: float) -> NDArray[np.float32]:
