@@ -64,7 +64,7 @@ class Film:
 
     def strength(self, index: int) -> float:
         """Light at the head, that at the usual distance being 1."""
-        return float(np.exp(0.25 * np.sin(index / 4.3)))
+        return float(np.exp(0.25 * np.sin(index / 2.3)))
 
     def gain(self, index: int) -> np.ndarray:
         """What the camera multiplies the frame by (3,)."""

@@ -76,9 +76,7 @@ def test_the_reference_stays_where_it_is(video, flashes):
 def test_a_face_that_goes_away(tmp_path):
     moves = [Move(0, max(0, 4 * (index - 40)), 0) for index in range(120)]
     path = film_moving(tmp_path / "clip.mp4", moves)
-    with pytest.raises(
-        CaptureError, match=r"in \d+ of \d+ dark frames only; it is first lost at 2\.\d s; sit"
-    ):
+    with pytest.raises(CaptureError, match=r"in \d+ of \d+ dark frames only; it is first lost at 2\.\d s; sit"):
         stabilise(path, find_flashes(watch(path)), CIRCLE)
 
 

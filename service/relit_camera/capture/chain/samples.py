@@ -24,7 +24,7 @@ from relit_camera.errors import CaptureError
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.images import Mask
 
-_SMALL = 128
+_SMALL = 96
 """Pixels a side of the pictures in which strengths and shape are found."""
 _BALL_REACH = 1.15
 """Radii about the ball in which nobody is."""

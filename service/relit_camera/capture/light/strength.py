@@ -22,7 +22,7 @@ from relit_camera.space.images import Mask
 Floats = NDArray[np.float64]
 Pictures = NDArray[np.float32]
 
-_ROUNDS = 3
+_ROUNDS = 5
 _FACING, _LIT, _SURE = 0.35, 0.3, 0.5
 """Pixels count whose cosine, share of the expected light, and confidence of the normal are no less."""
 _FEWEST = 30
