@@ -45,7 +45,7 @@ def test_lamps_gains_and_motion_are_those_of_the_film(built: CaptureResult) -> N
 
 def test_samples_are_pictures_under_distant_lights(built: CaptureResult) -> None:
     film, samples, square = Film(), built.samples, built.findings.square
-    normals, _, person = film.surface
+    normals = film.surface[0]
     reflectance = film.reflectance.astype(np.float32)
     x, y = film.shift(built.findings.seen.motion.reference)
     back = np.array([[1, 0, x], [0, 1, y]])

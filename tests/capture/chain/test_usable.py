@@ -38,7 +38,7 @@ def test_too_little_light_is_refused(directions: np.ndarray, told: str, cure: st
 
 def test_a_camera_that_improves_pictures_is_refused() -> None:
     refuse_enhanced(0.03)
-    with pytest.raises(CaptureError, match="changes parts of the picture by themselves, by 20%.*turn off HDR"):
+    with pytest.raises(CaptureError, match=r"changes parts of the picture by themselves, by 20%.*turn off HDR"):
         refuse_enhanced(0.2)
 
 
