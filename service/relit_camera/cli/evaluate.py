@@ -238,3 +238,27 @@ def capture(
         if report_file:
             report_file.write_text(capture_page(errors, f"Capture {report.stem}"), encoding="utf-8")
     typer.echo(json.dumps(capture_json(errors), indent=1) if as_json else capture_text(errors))
+
+
+@app.command()
+def stabilisation(
+    video: Annotated[Path, typer.Argument(help="Rendered capture video.")],
+    truth: Annotated[Path, typer.Option(help="Its truth.json.")],
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compare ways to follow the face through a rendered capture with its true motion (thesis 4.2)."""
+    import json
+
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.evaluate.stabilisation import compare_stabilisation
+    from relit_camera.evaluate.stabilisation_page import stabilisation_json, stabilisation_page, stabilisation_text
+
+    with _report_file(out) as report_file, progress_bar() as progress:
+        task = progress.add_task("Stabilising", total=None)
+        report = compare_stabilisation(
+            video, truth, lambda what, frames: progress.update(task, description=what, completed=frames)
+        )
+        if report_file:
+            report_file.write_text(stabilisation_page(report, f"Stabilisation of {video.name}"), encoding="utf-8")
+    typer.echo(json.dumps(stabilisation_json(report), indent=1) if as_json else stabilisation_text(report))

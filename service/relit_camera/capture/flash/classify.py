@@ -22,7 +22,7 @@ from relit_camera.capture.flash.signal import Signal, flash_signal, level_of, re
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_SURE_S, _SURE_SHARE = 0.0004, 0.25
+_SURE_S, _SURE_SHARE = 0.0005, 0.25
 """So exactly are the edges of a steady flash known, and by this share of its straying less those of another: a frame
 that near to one is not called whole."""
 

@@ -17,7 +17,9 @@ from relit_camera.capture.stabilise.rigid import Rigid, warp
 Picture = NDArray[np.float32]
 
 _ITERATIONS = 12
-_ENOUGH_PX = 0.003
+_ENOUGH_PX = 0.01
+_SAMPLED = 7
+"""Every so many-th pixel tells the errors' spread."""
 _OUTLIER = 3.0
 """In standard deviations: from here a pixel's weight falls below one half."""
 
@@ -61,7 +63,8 @@ class Template:
         for _ in range(_ITERATIONS):
             difference = warp(picture, transform.matrix(size), size) - self._picture
             error = difference[self._inside].astype(np.float64)
-            scale = _OUTLIER * 1.4826 * float(np.median(np.abs(error - np.median(error)))) + 1e-9
+            some = error[::_SAMPLED]
+            scale = _OUTLIER * 1.4826 * float(np.median(np.abs(some - np.median(some)))) + 1e-9
             weighted = self._jacobian * (self._weights / (1 + (error / scale) ** 2))[:, None]
             normal = self._jacobian.T @ weighted
             step = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(len(normal)), weighted.T @ error)

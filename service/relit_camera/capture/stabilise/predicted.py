@@ -54,7 +54,7 @@ def align_pictures(
     scale = min(1.0, _LARGEST_SIDE / max(height, width))
     size = (round(width * scale), round(height * scale))
     small = np.stack([cv2.resize(picture, size, interpolation=cv2.INTER_AREA) for picture in pictures])
-    inside = _without_border(cv2.resize(weights, size, interpolation=cv2.INTER_AREA))
+    inside = without_border(cv2.resize(weights, size, interpolation=cv2.INTER_AREA))
     transforms = [each.scaled(scale) for each in start] if start else [Rigid()] * count
     groups = np.arange(count) if groups is None else groups
     for done in range(rounds):
@@ -74,8 +74,8 @@ def _one_round(
         like, shares = _prediction(coarse, index, groups)
         predicted = np.tensordot(shares, moved[like], axes=1).astype(np.float32)
         shade = _SHADE * float(moved[index].mean()) + 1e-9
-        template = Template(_visible(predicted, shade), weights, same_light=False)
-        aligned.append(template.align(_visible(picture, shade), start[index]))
+        template = Template(visible_detail(predicted, shade), weights, same_light=False)
+        aligned.append(template.align(visible_detail(picture, shade), start[index]))
         moved[index] = np.maximum(move_picture(picture, aligned[index]), 0)
     # Only how they lie to each other is told: on average they stay where they were.
     rows = rows_of(aligned)
@@ -107,15 +107,15 @@ def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Floats:
     )
 
 
-def _visible(light: NDArray[np.float32], shade: float) -> NDArray[np.float32]:
-    """Detail of linear light as the eye weighs it: of the root, neither too fine nor too broad."""
+def visible_detail(light: NDArray[np.float32], shade: float) -> NDArray[np.float32]:
+    """Detail of linear light (height, width) as the eye weighs it: of the root, neither too fine nor too broad."""
     root = np.sqrt(np.maximum(light, 0) + np.float32(shade))
     mean = cv2.blur(root, 2 * [round(_BROAD * max(light.shape))])
     return np.asarray(smooth(root, _FINE_PX) - mean, np.float32)
 
 
-def _without_border(weights: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Weights, 0 along the border, over which pictures move."""
+def without_border(weights: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Weights (height, width), 0 along the border, over which pictures move."""
     border = max(2, round(_BORDER * max(weights.shape)))
     inner = np.zeros_like(weights)
     inner[border:-border, border:-border] = weights[border:-border, border:-border]
