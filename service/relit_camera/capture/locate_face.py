@@ -39,7 +39,7 @@ class LocatedFace:
     """
 
     circle: Circle
-    by: Literal["detector", "flash"]
+    by: Literal["detector", "flash", "user"]
 
 
 def locate_face(seen: Brightness, flashes: Flashes, detector: FaceDetector | None = None) -> LocatedFace:
