@@ -154,6 +154,8 @@ def _tilt(logs: Floats, seen: NDArray[np.float32], direction: Floats) -> Floats:
     solution: Floats = np.zeros(3)
     for _ in range(_TILT_ROUNDS):
         weighted = terms * weights[:, None]
-        solution = np.linalg.solve(terms.T @ weighted + ridge + 1e-9 * np.eye(3), weighted.T @ logs)
+        solution = np.asarray(
+            np.linalg.solve(terms.T @ weighted + ridge + 1e-9 * np.eye(3), weighted.T @ logs), np.float64
+        )
         weights = np.asarray(1 / (1 + ((logs - terms @ solution) / _MISFIT) ** 2))
     return np.asarray(solution[:2] @ across)
