@@ -108,7 +108,9 @@ class Film:
         way = lamp - points
         squared = np.sum(way**2, axis=-1)
         cosine = np.maximum(np.sum(normals * way, axis=-1), 0) / np.sqrt(squared)
-        return self.reflectance * (cosine * self.distance_cm**2 / squared)[..., None]
+        # Half as much light 45 degrees off the way to the head.
+        beam = np.maximum(way @ unit(lamp), 0) ** 2 / squared
+        return self.reflectance * (cosine * beam * self.distance_cm**2 / squared)[..., None]
 
     @cached_property
     def _mirror(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -81,7 +81,7 @@ def build_samples(
     good = np.flatnonzero(strengths.misfit <= _UNLIKE * np.median(strengths.misfit))
     refuse_one_sided(lamps.directions[good], len(seen.highlights))
     groups = [good[group] for group in group_lights(lamps.directions[good])]
-    pictures = np.stack([_merged(lights, lamps, strengths, group, matte, options.near_field) for group in groups])
+    pictures = np.stack([_merged(lights, strengths, group, matte, options.near_field) for group in groups])
     directions = np.stack([lamps.directions[group].mean(axis=0) for group in groups])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     findings = Findings(video.name, options, seen, lamps, square, subtract, strengths, good, len(groups))
@@ -119,13 +119,13 @@ def _strengths(lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, 
 
 
 def _merged(
-    lights: OneLight, lamps: Lamps, strengths: Strengths, group: NDArray[np.intp], matte: Mask, near_field: bool
+    lights: OneLight, strengths: Strengths, group: NDArray[np.intp], matte: Mask, near_field: bool
 ) -> NDArray[np.float32]:
     """One picture (size, size, 3) of a group's, each as under a distant flash of the usual strength; black outside."""
     surface = strengths.surface.resized((matte.shape[1], matte.shape[0]))
     pictures = []
     for each in group:
-        factor = to_distant(surface, lamps.lamps_cm[each]) if near_field else np.ones_like(matte)
+        factor = to_distant(surface, strengths.lamps[each]) if near_field else np.ones_like(matte)
         scale = (factor * (matte > 0) / np.float32(strengths.strength[each]))[..., None]
         pictures.append(lights.pictures[each].astype(np.float32) * scale)
     # A weak flash's picture, made as bright as others, has more noise.

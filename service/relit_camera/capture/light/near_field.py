@@ -14,7 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
+Floats64 = NDArray[np.float64]
 
+BEAM_EXPONENT = 2.0
+"""A lamp's intensity falls as this power of the cosine off its axis: half at 45 degrees, as phones' torches have it."""
 _GRAZING = 0.15
 """Added to both cosines whose ratio is taken: at the shadow's edge the law of the cosine says nothing of skin."""
 _LEAST, _MOST = 0.5, 2.0
@@ -40,27 +43,43 @@ class Surface:
         return Surface(normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-6), points)
 
 
-def light_at(surface: Surface, lamp_cm: NDArray[np.float64]) -> tuple[Floats, Floats]:
+@dataclass(frozen=True, eq=False)
+class Lamp:
+    """A lamp, seen from the head's middle, camera axes.
+
+    Attributes:
+        place_cm: (3,) where it is.
+        tilt: (3,) across the way to it: how its light grows from place to place beside the head, as a logarithm by
+            radian seen from the lamp; it is not 0 where the lamp points beside the head.
+    """
+
+    place_cm: Floats64
+    tilt: Floats64
+
+    @property
+    def direction(self) -> Floats64:
+        """Unit vector (3,) toward it."""
+        return np.asarray(self.place_cm / np.linalg.norm(self.place_cm))
+
+
+def light_at(surface: Surface, lamp: Lamp) -> tuple[Floats, Floats]:
     """Unit vectors (height, width, 3) toward a lamp, and the light there (height, width) relative to the head's middle.
 
-    Args:
-        surface: the person's.
-        lamp_cm: (3,) from the head's middle.
+    By the inverse square, the beam about the way to the head, and the tilt.
     """
-    way = lamp_cm.astype(np.float32) - surface.points_cm
+    way = lamp.place_cm.astype(np.float32) - surface.points_cm
     squared = np.einsum("hwc,hwc->hw", way, way)
-    return way / np.sqrt(squared)[..., None], np.float32(lamp_cm @ lamp_cm) / squared
+    toward = way / np.sqrt(squared)[..., None]
+    off_axis = np.maximum(toward @ lamp.direction.astype(np.float32), 0)
+    distance = float(np.linalg.norm(lamp.place_cm))
+    beside = np.exp(surface.points_cm @ (lamp.tilt / distance).astype(np.float32))
+    return toward, np.float32(distance**2) / squared * off_axis**BEAM_EXPONENT * beside
 
 
-def to_distant(surface: Surface, lamp_cm: NDArray[np.float64]) -> Floats:
-    """Factor (height, width) that takes a picture under a near lamp to one far away, seen from the head's middle alike.
-
-    Args:
-        surface: the person's.
-        lamp_cm: (3,) from the head's middle.
-    """
-    toward, light = light_at(surface, lamp_cm)
+def to_distant(surface: Surface, lamp: Lamp) -> Floats:
+    """Factor (height, width) from a picture under a near lamp to one far away, alike seen from the head's middle."""
+    toward, light = light_at(surface, lamp)
     near = np.einsum("hwc,hwc->hw", surface.normals, toward)
-    far = surface.normals @ (lamp_cm / np.linalg.norm(lamp_cm)).astype(np.float32)
+    far = surface.normals @ lamp.direction.astype(np.float32)
     cosines = (np.maximum(far, 0) + np.float32(_GRAZING)) / (np.maximum(near, 0) + np.float32(_GRAZING))
     return np.asarray(np.clip(cosines / light, _LEAST, _MOST), np.float32)

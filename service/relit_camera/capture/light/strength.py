@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.capture.light.near_field import Surface, light_at, to_distant
+from relit_camera.capture.light.near_field import Lamp, Surface, light_at, to_distant
 from relit_camera.geometry.completion import complete_normals
 from relit_camera.geometry.depth import integrate_normals
 from relit_camera.geometry.photometric_stereo import photometric_stereo
@@ -26,6 +26,11 @@ _ROUNDS = 5
 _FACING, _LIT, _SURE = 0.35, 0.3, 0.5
 """Pixels count whose cosine, share of the expected light, and confidence of the normal are no less."""
 _FEWEST = 30
+_MISFIT, _ALIKE = 0.1, 50
+"""Error of the law of the cosine (logarithm), and how many pixels have about the same."""
+_USUAL_TILT = 0.25
+"""Of a lamp that points 7 degrees beside the head."""
+_TILT_ROUNDS = 5
 _FACE = 0.25
 """Half the side of the square about the picture's middle whose mean depth is the head's, as a share of the picture."""
 
@@ -36,11 +41,13 @@ class Strengths:
 
     Attributes:
         strength: (lights,) relative to the median.
+        lamps: where they were, and how they pointed.
         surface: the person's, in the small pictures' pixels.
         misfit: (lights,) relative error of the law of the cosine on lit skin (median).
     """
 
     strength: Floats
+    lamps: list[Lamp]
     surface: Surface
     misfit: Floats
 
@@ -57,7 +64,8 @@ def find_strengths(
         head: the head's middle in the pictures.
         pixels_per_cm: of these pictures.
     """
-    directions = lamps_cm / np.linalg.norm(lamps_cm, axis=1, keepdims=True)
+    lamps = [Lamp(place, np.zeros(3)) for place in lamps_cm]
+    directions = np.stack([lamp.direction for lamp in lamps])
     strength = np.ones(len(pictures))
     corrected = pictures
     for _ in range(_ROUNDS):
@@ -67,17 +75,16 @@ def find_strengths(
         surface = Surface(normals, _points(depth, head, pixels_per_cm))
         albedo = luminance(shading.albedo)
         sure = (shading.confidence > _SURE) & (matte > 0.9)
-        found = np.array(
-            [_strength(p, surface, lamp, albedo, sure) for p, lamp in zip(pictures, lamps_cm, strict=True)]
-        )
-        strength = _without_half_the_trend(found[:, 0], directions)
+        found = [_flash(picture, surface, lamp, albedo, sure) for picture, lamp in zip(pictures, lamps, strict=True)]
+        strength = _without_half_the_trend(np.array([each.strength for each in found]), directions)
+        lamps = [each.lamp for each in found]
         corrected = np.stack(
             [
                 picture * (to_distant(surface, lamp) / np.float32(each))[..., None]
-                for picture, lamp, each in zip(pictures, lamps_cm, strength, strict=True)
+                for picture, lamp, each in zip(pictures, lamps, strength, strict=True)
             ]
         )
-    return Strengths(strength, surface, found[:, 1])
+    return Strengths(strength, lamps, surface, np.array([each.misfit for each in found]))
 
 
 def _without_half_the_trend(strength: Floats, directions: Floats) -> Floats:
@@ -107,11 +114,19 @@ def _points(depth: NDArray[np.float32], head: tuple[float, float], pixels_per_cm
     return np.stack([*np.broadcast_arrays(x[None, :], y[:, None]), z], axis=-1).astype(np.float32)
 
 
-def _strength(
-    picture: Pictures, surface: Surface, lamp_cm: Floats, albedo: NDArray[np.float32], sure: NDArray[np.bool_]
-) -> tuple[float, float]:
-    """Of one flash, and how far pixels are from it, relative (median)."""
-    toward, light = light_at(surface, lamp_cm)
+@dataclass(frozen=True, eq=False)
+class _Flash:
+    strength: float
+    lamp: Lamp
+    misfit: float
+
+
+def _flash(
+    picture: Pictures, surface: Surface, lamp: Lamp, albedo: NDArray[np.float32], sure: NDArray[np.bool_]
+) -> _Flash:
+    """One flash's strength and tilt, by the pixels that it lights, and how far these are from them (median)."""
+    lamp = Lamp(lamp.place_cm, np.zeros(3))
+    toward, light = light_at(surface, lamp)
     cosine = np.einsum("hwc,hwc->hw", surface.normals, toward)
     expected = albedo * np.maximum(cosine, 0) * light
     counted = sure & (cosine > _FACING) & (expected > 0)
@@ -119,5 +134,28 @@ def _strength(
         counted = sure & (cosine > 0) & (expected > 0)
     ratio = luminance(picture)[counted] / expected[counted]
     lit = ratio > _LIT * np.median(ratio)
-    strength = float(np.median(ratio[lit]))
-    return strength, float(np.median(np.abs(ratio[lit] / strength - 1)))
+    logs = np.log(ratio[lit].astype(np.float64))
+    tilt = _tilt(logs, surface.points_cm[counted][lit] / np.linalg.norm(lamp.place_cm), lamp.direction)
+    left = logs - surface.points_cm[counted][lit] @ tilt / np.linalg.norm(lamp.place_cm)
+    middle = float(np.median(left))
+    return _Flash(float(np.exp(middle)), Lamp(lamp.place_cm, tilt), float(np.median(np.abs(left - middle))))
+
+
+def _tilt(logs: Floats, seen: NDArray[np.float32], direction: Floats) -> Floats:
+    """How light (count,), logarithms, grows with the place (count, 3), radians from the lamp: (3,) across its way.
+
+    Least squares, what does not fit counting less, drawn toward none as far as few pixels tell it.
+    """
+    across = np.linalg.svd(direction[None])[2][1:]
+    terms = np.concatenate([seen @ across.T, np.ones((len(seen), 1))], axis=1)
+    # Errors of neighbouring pixels are alike: so many count as one.
+    ridge = np.diag([(_MISFIT / _USUAL_TILT) ** 2 * _ALIKE] * 2 + [0.0])
+    weights: Floats = np.ones(len(logs))
+    solution: Floats = np.zeros(3)
+    for _ in range(_TILT_ROUNDS):
+        weighted = terms * weights[:, None]
+        solution = np.asarray(
+            np.linalg.solve(terms.T @ weighted + ridge + 1e-9 * np.eye(3), weighted.T @ logs), np.float64
+        )
+        weights = np.asarray(1 / (1 + ((logs - terms @ solution) / _MISFIT) ** 2))
+    return np.asarray(solution[:2] @ across)
