@@ -42,14 +42,22 @@ def import_lights(
         samples = import_samples(
             lights, curve, lambda done, total: progress.update(reading, completed=done, total=total)
         )
-        progress.add_task("Building the field", total=None)
+        building = progress.add_task("Building the field", total=None)
         points = read_landmarks(landmarks or lights.parent / "landmarks.json", required=landmarks is not None)
-        subject = build_subject(samples, method, lights.name, curve, points or None)
+        subject = build_subject(
+            samples,
+            method,
+            lights.name,
+            curve,
+            points or None,
+            progress=lambda done, total: progress.update(building, completed=done, total=total),
+        )
     write_subject(out, subject)
     meta = subject.metadata
     typer.echo(
         f"{out}: {meta.width}x{meta.height}, {meta.lights} lights, {meta.components} components, "
-        f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better"
+        f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better, "
+        f"{100 * (meta.bytes_share or 0):.1f} % of the dense field"
     )
 
 

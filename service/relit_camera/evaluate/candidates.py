@@ -117,7 +117,6 @@ def subject_candidate(name: str, subject: Subject, inside: NDArray[np.intp]) -> 
         NotFoundError: the method that built it is not installed.
     """
     method = open_method(subject.metadata.method)
-    basis = subject.basis.reshape(3, subject.metadata.components, -1)
 
     def answer(directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
         if isinstance(method, LinearMethod):
@@ -125,8 +124,7 @@ def subject_candidate(name: str, subject: Subject, inside: NDArray[np.intp]) -> 
             amounts = subject.light_coefficients @ weights
         else:
             amounts = (map_lookup(directions) @ subject.coefficients.T).T
-        used = basis[:, :, pixels].astype(np.float32)
-        return np.ascontiguousarray(np.einsum("kn,ckp->npc", amounts, used, optimize=True), dtype=np.float32)
+        return subject.basis.at(np.asarray(amounts, np.float32), pixels)
 
     return Candidate(name, inside, answer)
 

@@ -25,6 +25,4 @@ def relight_direction(subject: Subject, direction: NDArray[np.float64]) -> Linea
         raise InputError(f"method '{subject.metadata.method}' answers light maps only", "use --environment")
     weights = method.weights(subject.light_directions.astype(np.float64), direction[None, :])
     amounts = subject.light_coefficients @ weights[:, 0]
-    basis = subject.basis.reshape(3, len(amounts), -1).astype(np.float32)
-    planes = np.asarray(np.einsum("k,ckp->pc", amounts, basis), dtype=np.float32)
-    return planes.reshape(subject.metadata.height, subject.metadata.width, 3)
+    return np.asarray(subject.pictures(amounts[:, None])[0])
