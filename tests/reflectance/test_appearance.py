@@ -22,7 +22,8 @@ def terms() -> NDArray[np.float32]:
     halves = directions + [0, 0, 1]
     halves /= np.linalg.norm(halves, axis=1, keepdims=True)
     margins = random.uniform(-0.5, 1.5, (len(directions), PIXELS))
-    return appearance_terms(*(np.float32(part) for part in (directions @ normals.T, halves @ normals.T, margins)))
+    known = (directions @ normals.T, halves @ normals.T, margins, directions[:, 2:])
+    return appearance_terms(*(np.float32(part) for part in known))
 
 
 def test_amounts_are_found_again(terms: NDArray[np.float32]) -> None:
@@ -57,12 +58,27 @@ def test_a_few_pictures_that_are_wrong_do_not_count(terms: NDArray[np.float32]) 
     assert error(wrong) < 0.03
 
 
+def one(cosine: float, half: float, margin: float, toward_camera: float) -> NDArray[np.float32]:
+    """The terms (TERMS,) of one light at one pixel."""
+    return appearance_terms(*(np.full((1, 1), value, np.float32) for value in (cosine, half, margin, toward_camera)))[
+        0, 0
+    ]
+
+
 def test_what_stands_below_the_horizon_is_dark_but_for_the_light_of_the_surroundings() -> None:
-    level = np.full((1, 1), 0.9, np.float32)
-    above, below = (appearance_terms(level, level, np.full((1, 1), margin, np.float32))[0, 0] for margin in (0.5, -0.5))
-    np.testing.assert_allclose(above[:4], [0.9, 14 / 15 * 14 / 15, 0.9**12, 0.9**60], rtol=1e-3)
-    np.testing.assert_allclose(below[:4], 0, atol=1e-3)
-    assert below[4] == above[4]
+    above, below = one(0.9, 0.9, 0.5, 1.0), one(0.9, 0.9, -0.5, 1.0)
+    np.testing.assert_allclose(above, [0.9, (14 / 15) ** 2, 0.9**13, 0.9**61, 1], rtol=1e-3)
+    np.testing.assert_allclose(below, [0, 0, 0, 0, 1], atol=1e-3)
+
+
+def test_highlights_grow_toward_light_from_behind_and_the_surroundings_go_dark() -> None:
+    front, side, behind = (one(0.3, 1.0, 1.0, toward) for toward in (1.0, 0.0, -0.8))
+    assert front[2] < side[2] < behind[2]
+    # Fresnel's factor of index 1.5 at 45 degrees is 1.05, by Schlick 1.052; the rest is geometry.
+    assert side[2] / front[2] == pytest.approx(2 * 1.052, rel=0.01)
+    assert front[4] == pytest.approx(1)
+    assert side[4] == pytest.approx(1 / np.pi)
+    assert one(0.3, 1.0, 1.0, -1.0)[4] == pytest.approx(0, abs=1e-6)
 
 
 def test_a_light_straight_behind_is_no_number_that_is_not_one() -> None:

@@ -39,7 +39,7 @@ def predict_pictures(
     for start in range(0, len(inside), _BLOCK):
         block = inside[start : start + _BLOCK]
         cosines = toward @ normals[block].T
-        terms = appearance_terms(cosines, half @ normals[block].T, np.full_like(cosines, _OPEN))
+        terms = appearance_terms(cosines, half @ normals[block].T, np.full_like(cosines, _OPEN), toward[:, 2:])
         amounts = fit_appearance(terms, values[:, block, None], bright)
         predicted[:, block] = (terms.transpose(1, 0, 2) @ amounts)[..., 0].T
     return predicted.reshape(lights, height, width)

@@ -1,7 +1,9 @@
 """How a pixel looks under one light, by its normal and its horizon: a few terms, fitted to the pixel's own pictures.
 
 Diffuse, wrapped diffuse and two highlights, all behind the horizon, and what is left in the dark: light that comes
-from other places of the person and the room. No amount is negative, so a fit that has little to go by stays sane.
+from other parts of the person. Each is a law that goes on where no light was captured: highlights grow toward grazing
+light from behind, as on every real surface, and light from the surroundings ends where none of them that can be seen
+is lit. No amount is negative, so a fit that has little to go by stays sane.
 """
 
 from __future__ import annotations
@@ -18,8 +20,10 @@ WRAP = 0.5
 """How far past the terminator wrapped light reaches, as a cosine: light that travels below the skin."""
 GLOSS, SHINE = 12.0, 60.0
 """Blinn's exponents: of skin's sheen, of what is wet or oily."""
-ONSET = 0.1
-"""Cosine over which highlights set in at grazing light."""
+MIRROR = 0.04
+"""Reflectance of skin, hair and cloth seen straight on (refractive index 1.5)."""
+GRAZING = 0.3
+"""Cosine of half the angle from light to camera below which highlights grow no more: rougher than a model is sure of."""
 PENUMBRA = 0.06
 """Radians of margin over the horizon in which visibility grows from a quarter to three: what horizons are off by."""
 ROUNDS = 3
@@ -31,23 +35,31 @@ SWEEPS = 30
 RIDGE = 1e-3
 
 
-def appearance_terms(cosines: Floats, half_cosines: Floats, margins: Floats) -> Floats:
+def appearance_terms(cosines: Floats, half_cosines: Floats, margins: Floats, toward_camera: Floats) -> Floats:
     """The terms (count, pixels, TERMS) of lights at pixels.
+
+    Highlights are Blinn's lobes (1977) with Schlick's Fresnel factor (1994) and the geometry of Kelemen and
+    Szirmay-Kalos (2001); light of the surroundings has the phase function of a white Lambertian ball.
 
     Args:
         cosines: (count, pixels) of normal and light.
-        half_cosines: (count, pixels) of normal and the direction halfway from light to camera (Blinn 1977).
+        half_cosines: (count, pixels) of normal and the direction halfway from light to camera.
         margins: (count, pixels) radians of the light above the pixel's horizon.
+        toward_camera: (count, 1) or (count, pixels) cosine of light and camera.
     """
     visible = 1 / (1 + np.exp(np.clip(margins / -PENUMBRA, -30, 30)))
-    highlight = visible * np.clip(cosines / ONSET, 0, 1)
+    lit = visible * np.maximum(cosines, 0)
+    half_way = np.sqrt(np.clip((1 + toward_camera) / 2, 0, 1))
+    fresnel = 1 + (1 / MIRROR - 1) * (1 - half_way) ** 5
+    highlight = lit * fresnel / np.maximum(half_way, GRAZING) ** 2
     halves = np.maximum(half_cosines, 0)
+    angle = np.arccos(np.clip(toward_camera, -1, 1))
     terms = np.empty((*cosines.shape, TERMS), np.float32)
-    terms[..., 0] = visible * np.maximum(cosines, 0)
+    terms[..., 0] = lit
     terms[..., 1] = visible * np.maximum((cosines + WRAP) / (1 + WRAP), 0) ** 2
     terms[..., 2] = highlight * halves**GLOSS
     terms[..., 3] = highlight * halves**SHINE
-    terms[..., 4] = 1
+    terms[..., 4] = (np.sin(angle) + (np.pi - angle) * np.cos(angle)) / np.pi
     return terms
 
 
@@ -64,6 +76,7 @@ def distant_terms(geometry: Geometry, directions: NDArray[np.float64], pixels: N
         geometry.cosines(directions, pixels).T,
         geometry.cosines(half_directions(directions), pixels).T,
         geometry.horizon.margins(directions, pixels).T,
+        directions[:, 2:].astype(np.float32),
     )
 
 
