@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.capture.chain.merge import group_lights, merged
+from relit_camera.capture.chain.merge import group_lights, merged, spread_evenly
 from relit_camera.capture.chain.usable import distinct, known_area, refuse_enhanced, refuse_one_sided
 from relit_camera.errors import CaptureError
 from relit_camera.space.directions import direction_from_degrees, fibonacci_directions
@@ -70,3 +70,12 @@ def test_near_duplicates_are_merged_and_a_bad_one_hardly_counts() -> None:
     assert np.abs(found - truth).max() < 0.035
     weighed = merged(np.stack([truth, truth + 1]).astype(np.float32), np.array([3.0, 1.0]))
     np.testing.assert_allclose(weighed, truth + 0.25, atol=1e-5)
+
+
+def test_of_a_long_films_lights_some_from_everywhere_are_kept() -> None:
+    directions = np.concatenate([spread(50, 40, 300), direction_from_degrees(np.linspace(60, 61, 500), 0.0)])
+    kept = spread_evenly(directions, 150)
+    assert len(kept) <= 150
+    assert np.all(np.diff(kept) > 0)
+    assert np.degrees(np.arccos(np.clip((directions @ directions[kept].T).max(axis=1), -1, 1))).max() < 12
+    np.testing.assert_array_equal(spread_evenly(directions[:90], 150), np.arange(90))

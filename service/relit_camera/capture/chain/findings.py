@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,9 +32,10 @@ class Findings:
         options: what was asked for.
         seen: what the video shows.
         lamps: where the lamp was in the usable frames.
+        kept: growing indices of those frames that were read as pictures: of a long film's not all are needed.
         square: what was cut out.
         room_taken_off: whether the room's light was.
-        strengths: of the usable frames' flashes.
+        strengths: of the kept frames' flashes.
         good: (some,) which of those were used.
         lights: pictures left after those under nearly the same light were merged.
     """
@@ -42,6 +44,7 @@ class Findings:
     options: CaptureOptions
     seen: Survey
     lamps: Lamps
+    kept: NDArray[np.intp]
     square: HeadSquare
     room_taken_off: bool
     strengths: Strengths
@@ -152,19 +155,25 @@ class Findings:
             told |= {
                 "direction": _numbers(self.lamps.directions[place]),
                 "at_ball": _numbers(self.lamps.at_ball[place]),
-                "strength": float(self.strengths.strength[place]),
             }
-            if place not in self.good:
+        if index in self._kept:
+            kept = self._kept[index]
+            told["strength"] = float(self.strengths.strength[kept])
+            if kept not in self.good:
                 told |= {"kind": Kind.REJECTED.value, "reason": _UNLIKE_REASON}
         return told
 
-    @property
+    @cached_property
     def _gain(self) -> dict[int, NDArray[np.float64]]:
         return dict(zip(self.seen.frames.tolist(), self.seen.gains.rgb, strict=True))
 
-    @property
+    @cached_property
     def _place(self) -> dict[int, int]:
         return {int(index): place for place, index in enumerate(self.lamps.index)}
+
+    @cached_property
+    def _kept(self) -> dict[int, int]:
+        return {int(index): place for place, index in enumerate(self.kept)}
 
 
 def _numbers(vector: NDArray) -> list[float]:

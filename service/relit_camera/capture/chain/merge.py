@@ -10,6 +10,8 @@ MOST_LIGHTS = 160
 SAME_DEG = 1.5
 """Pictures under lights that are no farther apart are merged; farther ones too, where there are too many."""
 
+_A_GROUP = 3
+"""Pictures that are kept of a group."""
 _AGREE = 0.08
 """Difference to the median, of white, at which a pixel's value counts half."""
 
@@ -25,6 +27,15 @@ def group_lights(directions: NDArray[np.float64], most: int = MOST_LIGHTS) -> li
     limit = max(2 * np.sin(np.radians(SAME_DEG) / 2), _limit(tree[:, 2], most))
     labels = fcluster(tree, limit, "distance")
     return [np.flatnonzero(labels == label) for label in np.unique(labels)]
+
+
+def spread_evenly(directions: NDArray[np.float64], most: int) -> NDArray[np.intp]:
+    """At most so many unit vectors (count, 3), as growing indices: those are left out that many others are near to."""
+    if len(directions) <= most:
+        return np.arange(len(directions))
+    groups = group_lights(directions, most // _A_GROUP)
+    chosen = [group[np.unique(np.linspace(0, len(group) - 1, _A_GROUP).round().astype(int))] for group in groups]
+    return np.sort(np.concatenate(chosen))
 
 
 def merged(pictures: NDArray[np.float32], weights: NDArray[np.float64]) -> NDArray[np.float32]:

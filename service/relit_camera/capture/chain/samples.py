@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.capture.ball.outline import Outline
 from relit_camera.capture.chain.findings import Findings
-from relit_camera.capture.chain.merge import group_lights, merged
+from relit_camera.capture.chain.merge import group_lights, merged, spread_evenly
 from relit_camera.capture.chain.options import CaptureOptions, Progress, no_progress
 from relit_camera.capture.chain.survey import survey
 from relit_camera.capture.chain.usable import Lamps, find_lamps, refuse_one_sided
@@ -24,6 +24,8 @@ from relit_camera.errors import CaptureError
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.images import Mask
 
+_MOST_FRAMES = 600
+"""Bright frames that are kept in memory, 1 GB at 512 x 512: a minute's."""
 _SMALL = 96
 """Pixels a side of the pictures in which strengths and shape are found."""
 _BALL_REACH = 1.15
@@ -59,7 +61,8 @@ def build_samples(
     """
     options = options or CaptureOptions()
     seen = survey(video, options, progress)
-    lamps = find_lamps(seen, options)
+    found = find_lamps(seen, options)
+    lamps = found.only(spread_evenly(found.directions, _MOST_FRAMES))
     square = head_square(seen.motion.circle, seen.size, options.size)
     subtract = seen.gains.room_can_go if options.subtract_room is None else options.subtract_room
     total = len(seen.flashes.frames)
@@ -84,7 +87,7 @@ def build_samples(
     pictures = np.stack([_merged(lights, strengths, group, matte, options.near_field) for group in groups])
     directions = np.stack([lamps.directions[group].mean(axis=0) for group in groups])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    findings = Findings(video.name, options, seen, lamps, square, subtract, strengths, good, len(groups))
+    findings = Findings(video.name, options, seen, found, lamps.index, square, subtract, strengths, good, len(groups))
     return CaptureResult(Samples(pictures, directions, matte), findings)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,10 @@ class Lamps:
     def directions(self) -> Floats:
         """Unit vectors (count, 3) from the head's middle."""
         return np.asarray(self.lamps_cm / np.linalg.norm(self.lamps_cm, axis=1, keepdims=True))
+
+    def only(self, chosen: Indices) -> Lamps:
+        """Those of some of the frames (some,), given by their place in `index`."""
+        return replace(self, index=self.index[chosen], lamps_cm=self.lamps_cm[chosen], at_ball=self.at_ball[chosen])
 
 
 def find_lamps(seen: Survey, options: CaptureOptions) -> Lamps:
