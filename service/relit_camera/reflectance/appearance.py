@@ -23,7 +23,7 @@ GLOSS, SHINE = 12.0, 60.0
 MIRROR = 0.04
 """Reflectance of skin, hair and cloth seen straight on (refractive index 1.5)."""
 GRAZING = 0.3
-"""Cosine of half the angle from light to camera below which highlights grow no more: rougher than a model is sure of."""
+"""Cosine of half the angle from light to camera below which highlights grow no more: no model is sure there."""
 PENUMBRA = 0.06
 """Radians of margin over the horizon in which visibility grows from a quarter to three: what horizons are off by."""
 ROUNDS = 3
