@@ -156,3 +156,13 @@ def _lamp(direction: np.ndarray) -> np.ndarray:
     lobe = np.exp((cosine - 1) / (1 - np.cos(np.radians(4.0))))
     lobe /= (lobe * texel_solid_angles()).sum()
     return np.repeat(lobe[..., None], 3, axis=2).astype(np.float32)
+
+
+def test_a_subject_of_texels_returns_captured_frames_too_and_nearly_the_field_between_them() -> None:
+    """The blend decides pixel by pixel, so its file holds texels, not weights of captured lights."""
+    samples = sphere_samples(90, 32)
+    subject = build_subject(samples, "blend", "sphere", landmarks={"none": np.zeros((1, 2), np.float32)})
+    for index in (3, 40, 77):
+        assert psnr(relight_direction(subject, samples.directions[index]), samples.pictures[index], samples.matte) > 40
+    between = direction_from_degrees(33, 21)
+    assert psnr(relight_direction(subject, between), render_sphere(between, 32), samples.matte) > 25
