@@ -24,6 +24,8 @@ MIRROR = 0.04
 """Reflectance of skin, hair and cloth seen straight on (refractive index 1.5)."""
 GRAZING = 0.3
 """Cosine of half the angle from light to camera below which highlights grow no more: no model is sure there."""
+ONSET = 0.1
+"""Cosine over which a pixel that turns to the light becomes a lit one."""
 PENUMBRA = 0.06
 """Radians of margin over the horizon in which visibility grows from a quarter to three: what horizons are off by."""
 ROUNDS = 3
@@ -47,7 +49,7 @@ def appearance_terms(cosines: Floats, half_cosines: Floats, margins: Floats, tow
         margins: (count, pixels) radians of the light above the pixel's horizon.
         toward_camera: (count, 1) or (count, pixels) cosine of light and camera.
     """
-    visible = 1 / (1 + np.exp(np.clip(margins / -PENUMBRA, -30, 30)))
+    visible = _visible(margins)
     lit = visible * np.maximum(cosines, 0)
     half_way = np.sqrt(np.clip((1 + toward_camera) / 2, 0, 1))
     fresnel = 1 + (1 / MIRROR - 1) * (1 - half_way) ** 5
@@ -78,6 +80,16 @@ def distant_terms(geometry: Geometry, directions: NDArray[np.float64], pixels: N
         geometry.horizon.margins(directions, pixels).T,
         directions[:, 2:].astype(np.float32),
     )
+
+
+def lit_shares(geometry: Geometry, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+    """How far distant lights (count, 3) reach row-major pixels (some,) directly: (count, some), 0 in shadow, 1 lit."""
+    facing = np.clip(geometry.cosines(directions, pixels).T / ONSET, 0, 1)
+    return np.asarray(_visible(geometry.horizon.margins(directions, pixels).T) * facing)
+
+
+def _visible(margins: Floats) -> Floats:
+    return np.asarray(1 / (1 + np.exp(np.clip(margins / -PENUMBRA, -30, 30))), np.float32)
 
 
 def fit_appearance(terms: Floats, values: Floats, bright: float) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from relit_camera.reflectance.appearance import TERMS, distant_terms, fit_appearance
+from relit_camera.reflectance.appearance import TERMS, distant_terms, fit_appearance, lit_shares
 from relit_camera.reflectance.black_ring import region_share
 from relit_camera.reflectance.gaussian_process import Kernel
 from relit_camera.reflectance.samples import Samples
@@ -23,6 +23,8 @@ JUDGES = 4096
 """Pixels by which the residual's kernel is chosen."""
 FOLDS = 5
 NEAR_REACH = float(np.radians(4.0))
+MAKE_UP = 2.0
+"""With fewer captured lights on a pixel's own side of the shadow than half by weight, less of the residual is known."""
 MEASUREMENT = 0.01
 """Variance of the pictures' own noise."""
 CANDIDATES = [
@@ -91,10 +93,31 @@ class ModelField:
         for start in range(0, len(pixels), BLOCK):
             block = pixels[start : start + BLOCK]
             found = _modelled(self.samples, self.amounts, directions, block)
-            found += np.tensordot(weights.T, residual(self.samples, self.amounts, block), 1)
+            found += self._residual(directions, weights, block)
             # The terms are not negative, and no light takes light away.
             result[:, start : start + BLOCK] = np.maximum(found, 0)
         return result
+
+    def _residual(self, directions: NDArray[np.float64], weights: Floats, pixels: NDArray[np.intp]) -> Floats:
+        """The residual (count, pixels, 3) that the captured lights foretell: lit ones for lit pixels, others for dark.
+
+        What the model is wrong by in the light says nothing of the shadow, and the other way round.
+        """
+        known, shape = self.samples.directions, self.samples.geometry
+        left = residual(self.samples, self.amounts, pixels)
+        lit, asked = (lit_shares(shape, each, pixels)[..., None] for each in (known, directions))
+        in_light, in_shadow = (_foretold(weights, share, left) for share in (lit, 1 - lit))
+        return np.asarray(asked * in_light + (1 - asked) * in_shadow)
+
+
+def _foretold(weights: Floats, share: Floats, left: Floats) -> Floats:
+    """Residuals (count, pixels, 3) by weights (lights, count); captured ones (lights, pixels, 3) count by their share.
+
+    The weights' sum over those that count is made up to the sum of all, within MAKE_UP.
+    """
+    counted = np.tensordot(weights.T, share, 1)
+    factor = np.clip(weights.sum(axis=0)[:, None, None] / np.maximum(counted, 1e-3), 0, MAKE_UP)
+    return np.asarray(np.tensordot(weights.T, share * left, 1) * factor)
 
 
 def _fit(samples: Samples, pixels: NDArray[np.intp]) -> Floats:
