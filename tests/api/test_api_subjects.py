@@ -10,6 +10,7 @@ import pytest
 
 from relit_camera.subject.field import TEXELS
 from relit_camera.subject.file import write_subject
+from relit_camera.subject.local_basis import whole_basis
 from relit_camera.subject.subject import Subject, SubjectMetadata
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera
@@ -26,6 +27,7 @@ def stored(camera: FakeCamera) -> Path:
 
 def small_subject() -> Subject:
     neutral = np.full((24, 16, 3), 90, np.uint8)
+    matte = np.ones((24, 16), np.float32)
     return Subject(
         metadata=SubjectMetadata(
             width=16,
@@ -38,11 +40,11 @@ def small_subject() -> Subject:
             created_by="test",
             created_at="2026-01-01",
         ),
-        basis=np.ones((3, 1, 24, 16), np.float16),
+        basis=whole_basis(np.ones((3, 1, 24, 16), np.float16), matte),
         coefficients=np.ones((1, TEXELS), np.float32),
         light_directions=np.array([[0, 0, 1], [1, 0, 0]], np.float32),
         light_coefficients=np.ones((1, 2), np.float32),
-        matte=np.ones((24, 16), np.float32),
+        matte=matte,
         neutral=neutral,
     )
 

@@ -72,4 +72,4 @@ def film(scene: Blinking) -> tuple[Brightness, np.ndarray]:
     gain = np.exp(scene.hunting * np.sin(2.1 * times) - 0.05 * shares.mean(axis=1) * (scene.hunting > 0))
     noise = rng.normal(0, 0.0006, (frames, ROWS, COLUMNS))
     cells = np.maximum((ambient + flash) * gain[:, None, None] + noise, 0)
-    return Brightness(cells.astype(np.float32), times, (540, 720)), shares
+    return Brightness(cells.astype(np.float32), times, (540, 720), np.zeros((32, 24, 3), np.uint8)), shares

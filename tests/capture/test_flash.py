@@ -3,12 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from relit_camera.capture.face_circle import Circle
 from relit_camera.capture.flash.brightness import Brightness, watch
 from relit_camera.capture.flash.classify import find_flashes
 from relit_camera.capture.flash.frequency import find_beat
 from relit_camera.capture.flash.kind import Kind
 from relit_camera.capture.flash.thesis import thesis_kinds
-from relit_camera.errors import VideoError
+from relit_camera.errors import CaptureError, VideoError
 from relit_camera.video.writer import VideoWriter
 from tests.capture.blinking import LIT_COLUMNS, LIT_ROWS, Blinking, film
 
@@ -108,7 +109,7 @@ def test_only_the_circle_counts_where_the_face_is_known():
     cells = seen.cells.copy()
     cells[:, :6, 18:] += 0.8 * (np.sin(2 * np.pi * 2.3 * seen.times_s) > 0)[:, None, None]  # a blinking advertisement
     seen = replace(seen, cells=cells)
-    flashes = find_flashes(seen, circle=(270, 400, 150))
+    flashes = find_flashes(seen, circle=Circle(270, 400, 150))
     assert flashes.schedule.frequency_hz == pytest.approx(5.07, rel=0.01)
 
 
@@ -131,32 +132,32 @@ def constant(seen: Brightness, level) -> Brightness:
 
 def test_without_a_flash():
     seen, _ = film(ORDINARY)
-    with pytest.raises(VideoError, match=r"no flash found: the brightness stays within \d+%; let a light blink"):
+    with pytest.raises(CaptureError, match=r"no flash found: the brightness stays within \d+%; let a light blink"):
         find_flashes(constant(seen, np.ones(240)))
 
 
 def test_a_light_that_is_on_all_the_time():
     seen, _ = film(ORDINARY)
     level = 1.5 + np.sin(2 * np.pi * 0.3 * seen.times_s)
-    with pytest.raises(VideoError, match="nothing blinks; the light must not be on all the time"):
+    with pytest.raises(CaptureError, match="nothing blinks; the light must not be on all the time"):
         find_flashes(constant(seen, level))
 
 
 def test_a_light_that_is_waved():
     seen, _ = film(ORDINARY)
     level = 1.5 + np.sin(2 * np.pi * 1.3 * seen.times_s)
-    with pytest.raises(VideoError, match="nothing blinks"):
+    with pytest.raises(CaptureError, match="nothing blinks"):
         find_flashes(constant(seen, level))
 
 
 @pytest.mark.parametrize("scene", [Blinking(fps=24, hz=8, exposure_s=1 / 25), Blinking(fps=30, hz=12)])
 def test_a_flash_too_fast_for_the_frames(scene):
-    with pytest.raises(VideoError, match=r"too fast for \d+ frames a second.*let it blink at most [45] times"):
+    with pytest.raises(CaptureError, match=r"too fast for \d+ frames a second.*let it blink at most [45] times"):
         find_flashes(film(scene)[0])
 
 
 def test_too_few_flashes():
-    with pytest.raises(VideoError, match=r"only \d flashes found; record half a minute"):
+    with pytest.raises(CaptureError, match=r"only \d flashes found; record half a minute"):
         find_flashes(film(Blinking(seconds=1.2))[0])
 
 

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from relit_camera.capture.build import build_subject
 from relit_camera.errors import NotFoundError
-from relit_camera.evaluate.candidates import RING, map_lookup, method_candidates, subject_candidate
+from relit_camera.evaluate.candidates import RING, method_candidates, subject_candidate
 from relit_camera.reflectance import method as methods
 from relit_camera.reflectance.barycentric import SphericalBarycentric
 from relit_camera.reflectance.samples import Samples
+from relit_camera.relight.direction import map_lookup
 from relit_camera.space.directions import direction_from_spherical
 from relit_camera.subject.field import FactoredField
 from tests.evaluate.ball import SIZE, cap, grid, lambert, shadowed

@@ -93,6 +93,6 @@ def test_directions_without_extent_are_refused(directions: np.ndarray) -> None:
 def test_methods_are_found_by_name() -> None:
     thesis = {"planar", "barycentric", "visibility", "visibility-sharp", "adaptation", "thesis"}
     assert thesis | {"nearest", "ptm", "sh3", "rbf", "gp"} <= set(method_names())
-    assert open_method("default") == SphericalBarycentric()
+    assert open_method("barycentric") == SphericalBarycentric()
     with pytest.raises(NotFoundError, match="there are: default"):
         open_method("magic")

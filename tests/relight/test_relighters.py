@@ -15,7 +15,9 @@ from relit_camera.relight.relighter import open_relighter
 from relit_camera.space.directions import direction_from_degrees, texel_directions, texel_solid_angles
 from relit_camera.space.quality import psnr
 from relit_camera.space.rotation import rotation_from_angles
+from relit_camera.subject.local_basis import whole_basis
 from relit_camera.subject.subject import Subject
+from tests.subject.by_hand import rows_by_hand
 from tests.synthetic import render_sphere, sphere_samples, sphere_surface
 
 ALL = ["dense", "basis", "onnx-basis", "onnx-dense"]
@@ -36,7 +38,7 @@ def coloured_light() -> np.ndarray:
 
 @pytest.mark.parametrize("name", ALL)
 def test_agrees_with_the_field_summed_by_hand(sphere: Subject, coloured_light: np.ndarray, name: str) -> None:
-    field = np.einsum("ckhw,kl->hwlc", sphere.basis.astype(np.float64), sphere.coefficients)
+    field = _field_by_hand(sphere)
     weighted = (coloured_light * texel_solid_angles()[..., None]).reshape(-1, 3)
     expected = np.einsum("hwlc,lc->hwc", field, weighted).astype(np.float32)
     picture = open_relighter(name, sphere).relight(coloured_light)
@@ -52,7 +54,7 @@ def test_a_lit_sphere_reads_its_irradiance(sphere: Subject, name: str) -> None:
 
 
 def test_white_light_gives_the_sum_picture(sphere: Subject) -> None:
-    field = np.einsum("ckhw,kl->hwlc", sphere.basis.astype(np.float64), sphere.coefficients)
+    field = _field_by_hand(sphere)
     summed = (field * texel_solid_angles().ravel()[:, None]).sum(axis=2).astype(np.float32)
     assert psnr(open_relighter("basis", sphere).relight(np.ones((32, 64, 3), np.float32)), summed, sphere.matte) > 90
 
@@ -115,18 +117,28 @@ def test_light_from_the_picture_right_lights_its_right_half(sphere: Subject) -> 
 def test_pixels_outside_the_matte_are_black(sphere: Subject, coloured_light: np.ndarray, name: str) -> None:
     """Also where the capture saw something there: here the same as in the middle of the sphere."""
     outside = ~sphere_surface(32)[1]
-    basis = sphere.basis.copy()
-    basis[:, :, outside] = basis[:, :, 16, 16, None]
-    picture = open_relighter(name, replace(sphere, basis=basis)).relight(coloured_light)
-    assert np.abs(picture[outside]).max() == 0
-    np.testing.assert_allclose(
-        picture[~outside], open_relighter("basis", sphere).relight(coloured_light)[~outside], rtol=1e-4, atol=1e-4
+    pictures = sphere.pictures(np.eye(sphere.metadata.components, dtype=np.float32)).transpose(3, 0, 1, 2)
+    scale = np.abs(pictures).max(axis=(0, 2, 3))
+    pictures = (pictures / scale[:, None, None]).astype(np.float16)
+    pictures[:, :, outside] = pictures[:, :, 16, 16, None]
+    whole = replace(
+        sphere, basis=whole_basis(pictures, sphere.matte), coefficients=sphere.coefficients * scale[:, None]
     )
+    picture = open_relighter(name, whole).relight(coloured_light)
+    assert np.abs(picture[outside]).max() == 0
+    assert psnr(picture, open_relighter("basis", sphere).relight(coloured_light), sphere.matte) > 55
 
 
 def test_an_unknown_relighter_lists_those_there_are(sphere: Subject) -> None:
     with pytest.raises(NotFoundError, match="basis"):
         open_relighter("magic", sphere)
+
+
+def _field_by_hand(subject: Subject) -> np.ndarray:
+    """R (height, width, 2048, 3) float64."""
+    width, height = subject.size
+    field = rows_by_hand(subject.basis, width * height) @ subject.coefficients
+    return field.transpose(0, 2, 1).reshape(height, width, -1, 3)
 
 
 def _turn(yaw: float, pitch: float, roll: float) -> np.ndarray:
@@ -144,3 +156,13 @@ def _lamp(direction: np.ndarray) -> np.ndarray:
     lobe = np.exp((cosine - 1) / (1 - np.cos(np.radians(4.0))))
     lobe /= (lobe * texel_solid_angles()).sum()
     return np.repeat(lobe[..., None], 3, axis=2).astype(np.float32)
+
+
+def test_a_subject_of_texels_returns_captured_frames_too_and_nearly_the_field_between_them() -> None:
+    """The blend decides pixel by pixel, so its file holds texels, not weights of captured lights."""
+    samples = sphere_samples(90, 32)
+    subject = build_subject(samples, "blend", "sphere", landmarks={"none": np.zeros((1, 2), np.float32)})
+    for index in (3, 40, 77):
+        assert psnr(relight_direction(subject, samples.directions[index]), samples.pictures[index], samples.matte) > 40
+    between = direction_from_degrees(33, 21)
+    assert psnr(relight_direction(subject, between), render_sphere(between, 32), samples.matte) > 25

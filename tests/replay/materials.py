@@ -98,6 +98,8 @@ def find(place: str, folder: Path, part: str) -> Path:
 def subject_file(lights: Path, gamma: str = "srgb") -> Path:
     """The subject file of one-light pictures, as `relit capture import` makes it; a .relit file is given as it is.
 
+    Interpolated, which is quick, is black where nothing was captured and has a white sum that is known.
+
     Raises:
         RelitError: the pictures cannot be imported.
     """
@@ -106,5 +108,5 @@ def subject_file(lights: Path, gamma: str = "srgb") -> Path:
     curve = parse_gamma(gamma)
     known = read_landmarks(lights.parent / "landmarks.json", required=False)
     path = Path(_scratch.name) / f"{lights.parent.name}-{lights.stem}-{gamma}{SUFFIX}"
-    write_subject(path, build_subject(import_samples(lights, curve), "default", lights.name, curve, known or None))
+    write_subject(path, build_subject(import_samples(lights, curve), "barycentric", lights.name, curve, known or None))
     return path

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
 from relit_camera.capture.build import build_subject
+from relit_camera.demo import bundle
 from relit_camera.errors import NotFoundError, StorageError, SubjectError
-from relit_camera.subject.compress import compress
-from relit_camera.subject.field import FactoredField
 from relit_camera.subject.file import HEADER_KEY, read_subject, write_subject
+from relit_camera.subject.pack import decode_basis
 from relit_camera.subject.store import SubjectStore
 from relit_camera.subject.subject import Subject
 from tests.synthetic import sphere_samples
@@ -36,14 +37,26 @@ def path(subject: Subject, tmp_path: Path) -> Path:
 def test_what_is_written_is_read(subject: Subject, path: Path) -> None:
     read = read_subject(path)
     assert read.metadata == subject.metadata
-    for name in ("basis", "coefficients", "light_directions", "light_coefficients", "matte", "neutral"):
+    for name in ("pixels", "first", "values", "scales", "mixes"):
+        np.testing.assert_array_equal(getattr(read.basis, name), getattr(subject.basis, name))
+    for name in (
+        "normals",
+        "albedo",
+        "depth",
+        "horizons",
+        "coefficients",
+        "light_directions",
+        "light_coefficients",
+        "matte",
+        "neutral",
+    ):
         np.testing.assert_array_equal(getattr(read, name), getattr(subject, name))
     np.testing.assert_array_equal(read.landmarks["mesh478"], subject.landmarks["mesh478"])
 
 
 def test_what_is_read_stays_in_the_file(path: Path) -> None:
     read = read_subject(path)
-    for array in (read.basis, read.coefficients, read.landmarks["mesh478"]):
+    for array in (read.basis.values, read.basis.mixes, read.coefficients, read.landmarks["mesh478"]):
         assert not array.flags.writeable
         owner: object = array
         while isinstance(owner, np.ndarray):
@@ -68,11 +81,25 @@ def test_another_version_is_one_clear_error(path: Path) -> None:
     [
         {"coefficients": np.full((3, 2048), np.nan, np.float32)},
         {"matte": np.zeros((3, 3), np.float32)},
-        {"basis": np.zeros((3, 1, 16, 16), np.float32)},
+        {"basis.values": np.zeros((3, 3, 128), np.float32)},
+        {"basis.values": np.zeros((3, 3, 128), np.int8)},
+        {"basis.pixels": np.full((2, 128), 256, np.int32)},
+        {"normals": np.zeros((16, 16, 2), np.float16)},
+        {"horizons": np.zeros((8, 16, 32), np.uint8)},
         {"neutral": np.zeros((16, 16, 3), np.int64)},
         {"landmarks.mesh478": np.zeros((5, 3), np.float32)},
     ],
-    ids=["nan", "shape", "dtype", "foreign dtype", "landmarks"],
+    ids=[
+        "nan",
+        "shape",
+        "dtype",
+        "fewer values",
+        "pixels beyond",
+        "normals",
+        "horizons",
+        "foreign dtype",
+        "landmarks",
+    ],
 )
 def test_wrong_tensors_are_refused(path: Path, change: dict[str, np.ndarray]) -> None:
     _rewrite(path, change)
@@ -118,17 +145,28 @@ def test_the_store_names_what_is_near(path: Path, tmp_path: Path) -> None:
     assert store.names() == []
 
 
-def test_compression_takes_no_more_than_the_error_asks() -> None:
-    """A field of true rank 5 in 40 lights needs five pictures."""
-    rng = np.random.default_rng(1)
-    hidden = rng.random((5, 12, 10, 3), dtype=np.float32)
-    mix = rng.random((40, 5), dtype=np.float32)
-    pictures = np.tensordot(mix, hidden, axes=(1, 0))
-    weights = rng.random((40, 2048), dtype=np.float32) / 40
-    field = FactoredField(pictures, np.tile([0.0, 0.0, 1.0], (40, 1)), lambda texels: weights)
-    compressed = compress(field, np.ones((12, 10), np.float32))
-    assert compressed.basis.shape[1] == 5
-    assert compressed.psnr_db >= 50
-    restored = np.einsum("ckhw,kl->lhwc", compressed.basis.astype(np.float32), compressed.coefficients)
-    expected = np.einsum("nhwc,nl->lhwc", pictures, weights)
-    np.testing.assert_allclose(restored, expected, atol=2e-3 * expected.max())
+def test_a_file_of_version_1_is_read(subject: Subject, path: Path) -> None:
+    """As it was: one set of principal pictures for all pixels."""
+    meta = subject.metadata
+    pictures = subject.pictures(np.eye(meta.components, dtype=np.float32)).transpose(3, 0, 1, 2).astype(np.float16)
+    tensors = {name: tensor for name, tensor in load_file(path).items() if not name.startswith("basis.")}
+    old = json.loads(meta.model_dump_json(exclude={"texel_psnr_db", "map_psnr_db", "bytes_share"}))
+    header = {HEADER_KEY: json.dumps({**old, "format_version": 1})}
+    save_file({**tensors, "basis": np.ascontiguousarray(pictures)}, path, header)
+    read = read_subject(path)
+    assert read.metadata.bytes_share is None
+    light = subject.light_coefficients[:, [7]]
+    np.testing.assert_allclose(read.pictures(light), subject.pictures(light), atol=2e-3)
+
+
+def test_the_demonstration_is_read_as_it_was_shipped() -> None:
+    """Format version 1, its principal pictures as WebP: what it showed before, it shows."""
+    read = read_subject(bundle.SUBJECT)
+    assert read.metadata.format_version == 1
+    with safe_open(bundle.SUBJECT, framework="numpy") as file:
+        encoded = file.get_tensor("basis_webp")
+    height, width = read.matte.shape
+    pictures = decode_basis(encoded, (3, read.metadata.components, height, width)).astype(np.float32)
+    light = read.coefficients[:, 1000]
+    expected = np.einsum("ckhw,k->hwc", pictures, light) * (read.matte[..., None] > 0)
+    np.testing.assert_allclose(read.pictures(light[:, None])[0], expected, atol=1e-4)

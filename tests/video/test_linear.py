@@ -6,6 +6,7 @@ import pytest
 from relit_camera.errors import VideoError
 from relit_camera.space.colour import linear_from_uint8, srgb_decode
 from relit_camera.video.linear import LinearReader
+from relit_camera.video.luma import LumaReader
 from relit_camera.video.reader import VideoReader
 from relit_camera.video.writer import VideoWriter
 
@@ -99,3 +100,33 @@ def test_a_turned_video_is_small_and_upright(tmp_path):
 def test_what_is_no_video_is_refused(tmp_path):
     with pytest.raises(VideoError, match="no video"):
         LinearReader(tmp_path / "nowhere.mp4")
+
+
+def test_frames_that_nobody_wants_are_not_made(tmp_path):
+    path = tmp_path / "clip.mp4"
+    with VideoWriter(path, (64, 48), 25, crf=4) as video:
+        for index in range(9):
+            video.write(np.full((48, 64, 3), 20 * index, np.uint8))
+    with LinearReader(path, "linear", only={3, 7}) as video:
+        frames = list(video)
+    assert [frame.index for frame in frames] == [3, 7]
+    assert [frame.time_s for frame in frames] == pytest.approx([0.12, 0.28], abs=1e-3)
+    assert frames[1].image.mean() == pytest.approx(140 / 255, abs=0.01)
+
+
+@pytest.mark.parametrize("bits", [8, 10])
+def test_luma_alone(tmp_path, bits):
+    path = tmp_path / "clip.mkv"
+    if bits == 10:
+        luma = np.clip(np.arange(1024).reshape(16, 64), 64, 940).astype(np.uint16)
+        lossless(path, [luma, np.full_like(luma, 512), np.full_like(luma, 512)], "yuv444p10le")
+        expected = (luma - 64.0) / 876
+    else:
+        grey = np.kron(np.arange(0, 256, 16, dtype=np.uint8).reshape(4, 4), np.ones((16, 16), np.uint8))
+        with VideoWriter(path, (64, 64), 30, crf=0) as video:
+            video.write(np.repeat(grey[..., None], 3, axis=2))
+        expected = grey / 255
+    with LumaReader(path) as video:
+        (frame,) = video
+    assert frame.image.dtype == np.float32
+    assert np.abs(frame.image - expected).max() < (0.005 if bits == 10 else 0.012)

@@ -39,7 +39,11 @@ def sample_subject(width: int = 150, height: int = 200) -> Subject:
         pictures[index] = albedo * (facing + 0.02) + gloss
     matte = np.ones((height, width), dtype=np.float32)
     return build_subject(
-        Samples(pictures, directions, matte), "barycentric", "generated", landmarks={SCHEME: _mean_face(width, height)}
+        Samples(pictures, directions, matte),
+        "barycentric",
+        "generated",
+        landmarks={SCHEME: _mean_face(width, height)},
+        with_geometry=False,
     )
 
 

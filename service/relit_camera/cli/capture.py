@@ -42,12 +42,107 @@ def import_lights(
         samples = import_samples(
             lights, curve, lambda done, total: progress.update(reading, completed=done, total=total)
         )
-        progress.add_task("Building the field", total=None)
+        building = progress.add_task("Building the field", total=None)
         points = read_landmarks(landmarks or lights.parent / "landmarks.json", required=landmarks is not None)
-        subject = build_subject(samples, method, lights.name, curve, points or None)
+        subject = build_subject(
+            samples,
+            method,
+            lights.name,
+            curve,
+            points or None,
+            progress=lambda done, total: progress.update(building, completed=done, total=total),
+        )
     write_subject(out, subject)
     meta = subject.metadata
     typer.echo(
         f"{out}: {meta.width}x{meta.height}, {meta.lights} lights, {meta.components} components, "
+        f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better, "
+        f"{100 * (meta.bytes_share or 0):.1f} % of the dense field"
+    )
+
+
+@app.command("build")
+def build(
+    video: Annotated[
+        Path, typer.Argument(help="A film of you, a mirror ball and a blinking lamp: see docs/capture.md.")
+    ],
+    out: Annotated[Path, typer.Option(help="The subject file to write (.relit).")],
+    report: Annotated[Path | None, typer.Option(help="JSON of all that was found on the way.")] = None,
+    focal_px: Annotated[
+        float | None, typer.Option(help="The camera's focal length in pixels of the upright video, where it is known.")
+    ] = None,
+    ball: Annotated[
+        str | None, typer.Option(help="X,Y,RADIUS of the mirror ball in those pixels; it is found by itself.")
+    ] = None,
+    face: Annotated[
+        str | None, typer.Option(help="X,Y,RADIUS of the face, brow to chin; it is found by itself.")
+    ] = None,
+    ball_diameter_cm: Annotated[
+        float | None,
+        typer.Option(help="The ball's diameter; without, it is taken to be as far away as the head.", min=1),
+    ] = None,
+    light_distance_cm: Annotated[float, typer.Option(help="From the lamp to the head.", min=20, max=1000)] = 100.0,
+    size: Annotated[
+        int, typer.Option(help="Pixels a side, fewer where the video shows fewer.", min=64, max=2048)
+    ] = 384,
+    method: Annotated[str, typer.Option(help="Reflectance method.")] = "default",
+    gamma: Annotated[str, typer.Option(help="Curve of the video: srgb, linear, or an exponent.")] = "srgb",
+    subtract_room: Annotated[
+        bool | None,
+        typer.Option("--subtract-room/--keep-room", help="Take the room's light off; by itself, where that helps."),
+    ] = None,
+    threads: Annotated[int, typer.Option(help="Of the decoder.", min=1)] = 2,
+) -> None:
+    """Build a subject from a film of a person, a mirror ball beside them and a blinking lamp that goes around."""
+    import json
+    from contextlib import nullcontext
+
+    from relit_camera.capture.ball.outline import Outline
+    from relit_camera.capture.build import build_subject
+    from relit_camera.capture.chain.options import CaptureOptions
+    from relit_camera.capture.chain.samples import build_samples
+    from relit_camera.capture.face_circle import Circle
+    from relit_camera.cli.progress import progress_bar, stages
+    from relit_camera.files import atomic_path
+    from relit_camera.reflectance.method import open_method
+    from relit_camera.space.colour import parse_gamma
+    from relit_camera.subject.file import write_subject
+
+    options = CaptureOptions(
+        gamma=parse_gamma(gamma),
+        size=size,
+        focal_px=focal_px,
+        ball=Outline(*_circle(ball, "--ball")) if ball else None,
+        face=Circle(*_circle(face, "--face")) if face else None,
+        ball_diameter_cm=ball_diameter_cm,
+        light_distance_cm=light_distance_cm,
+        subtract_room=subtract_room,
+        threads=threads,
+    )
+    open_method(method)
+    # Opened before the work, so that what cannot be written is said at once; both appear at its end or not at all.
+    with atomic_path(out) as subject_file, atomic_path(report) if report else nullcontext() as report_file:
+        with progress_bar() as progress:
+            tell = stages(progress)
+            found = build_samples(video, options, tell)
+            tell("Building the field", 0, None)
+            subject = build_subject(found.samples, method, video.name, options.gamma)
+        write_subject(subject_file, subject)
+        if report_file:
+            report_file.write_text(json.dumps(found.findings.report(), indent=1), encoding="utf-8")
+    for warning in found.findings.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    meta = subject.metadata
+    typer.echo(
+        f"{out}: {meta.width}x{meta.height}, {meta.lights} lights of {len(found.findings.good)} flashes' frames, "
         f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better"
     )
+
+
+def _circle(text: str, option: str) -> tuple[float, float, float]:
+    from relit_camera.cli.parse import numbers
+
+    x, y, radius = numbers(text, 3, option)
+    if not radius > 0:
+        raise typer.BadParameter(f"a radius of {radius:g} pixels", param_hint=option)
+    return x, y, radius

@@ -53,6 +53,12 @@ def field(
     pixel: Annotated[
         list[str] | None, typer.Option(help="NAME=X,Y: whose reflectance map is shown; five if none is given.")
     ] = None,
+    film_report: Annotated[
+        Path | None, typer.Option(help="Of a subject built from a film: report of `relit capture build`.")
+    ] = None,
+    film_truth: Annotated[
+        Path | None, typer.Option(help="truth.json of that film; --truth is the field filmed.")
+    ] = None,
 ) -> None:
     """Compare a reflectance field with pictures that were really taken under each light (thesis 7)."""
     import json
@@ -65,24 +71,30 @@ def field(
     from relit_camera.evaluate.candidates import method_candidates, subject_candidate
     from relit_camera.evaluate.field import evaluate_field
     from relit_camera.evaluate.field_page import field_json, field_page, field_text
+    from relit_camera.evaluate.filmed import as_filmed, in_unit_of
     from relit_camera.evaluate.points import face_spots, parse_spot
-    from relit_camera.evaluate.truth import Truth, chosen_lights
+    from relit_camera.evaluate.truth import Truth, chosen_lights, sampled_region
     from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
     from relit_camera.light.store import EnvironmentStore
     from relit_camera.subject.store import SubjectStore
 
+    if (film_report is None) != (film_truth is None):
+        raise typer.BadParameter("give both --film-report and --film-truth, or neither")
     with _report_file(out) as report_file:
         storage = settings_of(context).storage
         store = EnvironmentStore(storage.environments)
         environments = {each.name: each.light_map for each in map(store.resolve, environment or BUILTIN_NAMES)}
         true_lights = _lights_file(truth)
         known = Truth(_samples(true_lights, gamma))
+        if film_report and film_truth:
+            known = Truth(as_filmed(known.samples, film_report, film_truth))
         matte = known.samples.matte
         if pixel:
             spots = [parse_spot(text, matte) for text in pixel]
         else:
             frontal = known.samples.pictures[known.directions[:, 2].argmax()]
-            points = read_landmarks(true_lights.parent / "landmarks.json", required=False)
+            # Landmarks beside the truth are in its own pixels, not in those that a film's subject was cut to.
+            points = None if film_report else read_landmarks(true_lights.parent / "landmarks.json", required=False)
             spots = face_spots(points or find_landmarks(neutral_picture(frontal, matte)), matte)
         lights = _lights_file(Path(subject_or_lights))
         samples: Samples | None = None
@@ -99,6 +111,9 @@ def field(
             _check_size(lights, subject.matte, matte)
             directions = subject.light_directions.astype(float)
             candidates = [subject_candidate(name, subject, known.inside)]
+            if film_report:
+                region = sampled_region(directions, known.directions).nonzero()[0]
+                candidates = [in_unit_of(candidate, known, region)[0] for candidate in candidates]
         with progress_bar() as progress:
             task = progress.add_task("Comparing", total=None)
             advance = partial(_advance, progress, task)
@@ -157,7 +172,7 @@ def olat(
     out: Out = None,
     as_json: AsJson = False,
     gamma: GammaText = "srgb",
-    within_deg: Within = None,
+    within_deg: Within = 75.0,
     method: Methods = None,
 ) -> None:
     """Leave captured lights out and predict their pictures from the others."""
@@ -238,3 +253,27 @@ def capture(
         if report_file:
             report_file.write_text(capture_page(errors, f"Capture {report.stem}"), encoding="utf-8")
     typer.echo(json.dumps(capture_json(errors), indent=1) if as_json else capture_text(errors))
+
+
+@app.command()
+def stabilisation(
+    video: Annotated[Path, typer.Argument(help="Rendered capture video.")],
+    truth: Annotated[Path, typer.Option(help="Its truth.json.")],
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Compare ways to follow the face through a rendered capture with its true motion (thesis 4.2)."""
+    import json
+
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.evaluate.stabilisation import compare_stabilisation
+    from relit_camera.evaluate.stabilisation_page import stabilisation_json, stabilisation_page, stabilisation_text
+
+    with _report_file(out) as report_file, progress_bar() as progress:
+        task = progress.add_task("Stabilising", total=None)
+        report = compare_stabilisation(
+            video, truth, lambda what, frames: progress.update(task, description=what, completed=frames)
+        )
+        if report_file:
+            report_file.write_text(stabilisation_page(report, f"Stabilisation of {video.name}"), encoding="utf-8")
+    typer.echo(json.dumps(stabilisation_json(report), indent=1) if as_json else stabilisation_text(report))

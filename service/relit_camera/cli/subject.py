@@ -10,6 +10,9 @@ import typer
 
 app = typer.Typer(no_args_is_help=True)
 
+GEOMETRY = ("normals", "albedo", "depth", "horizons")
+"""Parts of a subject that tell the person's shape."""
+
 
 @app.callback()
 def group() -> None:
@@ -29,7 +32,8 @@ def info(
     name, opened = SubjectStore(settings_of(context).storage.subjects).resolve(subject)
     shown = {"name": name, **opened.metadata.model_dump(mode="json")}
     shown["landmarks"] = {scheme: len(points) for scheme, points in opened.landmarks.items()}
-    shown["bytes"] = sum(a.nbytes for a in (opened.basis, opened.coefficients, opened.light_coefficients))
+    shown["geometry"] = [name for name in GEOMETRY if getattr(opened, name) is not None]
+    shown["bytes"] = opened.basis.nbytes + opened.coefficients.nbytes + opened.light_coefficients.nbytes
     if as_json:
         typer.echo(json.dumps(shown, indent=2))
         return

@@ -8,12 +8,11 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from relit_camera.reflectance.black_ring import with_black_ring
-from relit_camera.reflectance.method import LinearMethod, Method, method_names, open_method
+from relit_camera.reflectance.method import Method, method_names, open_method
 from relit_camera.reflectance.samples import Samples
-from relit_camera.space.directions import MAP_HEIGHT, MAP_WIDTH, map_position_from_direction
+from relit_camera.relight.direction import light_amounts, map_lookup
 from relit_camera.subject.field import ExactField, ReflectanceField
 from relit_camera.subject.subject import Subject
 
@@ -117,32 +116,8 @@ def subject_candidate(name: str, subject: Subject, inside: NDArray[np.intp]) -> 
         NotFoundError: the method that built it is not installed.
     """
     method = open_method(subject.metadata.method)
-    basis = subject.basis.reshape(3, subject.metadata.components, -1)
 
     def answer(directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
-        if isinstance(method, LinearMethod):
-            weights = method.weights(subject.light_directions.astype(np.float64), directions)
-            amounts = subject.light_coefficients @ weights
-        else:
-            amounts = (map_lookup(directions) @ subject.coefficients.T).T
-        used = basis[:, :, pixels].astype(np.float32)
-        return np.ascontiguousarray(np.einsum("kn,ckp->npc", amounts, used, optimize=True), dtype=np.float32)
+        return subject.basis.at(light_amounts(subject, method, directions), pixels)
 
     return Candidate(name, inside, answer)
-
-
-def map_lookup(directions: NDArray[np.float64]) -> csr_array:
-    """Bilinear interpolation on the 64 × 32 map as a matrix (count, 2048); at a texel's centre, that texel alone."""
-    row, column = map_position_from_direction(directions)
-    row = np.clip(row, 0, MAP_HEIGHT - 1)
-    # A centre's position may come out a rounding error short of its integer.
-    top, left = np.floor(row + 1e-9).astype(int), np.floor(column + 1e-9).astype(int)
-    down, right = np.maximum(row - top, 0), np.maximum(column - left, 0)
-    entries = []
-    for row_step, row_share in ((0, 1 - down), (1, down)):
-        for column_step, column_share in ((0, 1 - right), (1, right)):
-            texel = np.minimum(top + row_step, MAP_HEIGHT - 1) * MAP_WIDTH + (left + column_step) % MAP_WIDTH
-            entries.append((row_share * column_share, texel))
-    values, texels = (np.concatenate(part) for part in zip(*entries, strict=True))
-    rows = np.tile(np.arange(len(directions)), len(entries))
-    return csr_array((values, (rows, texels)), shape=(len(directions), MAP_HEIGHT * MAP_WIDTH))

@@ -18,7 +18,7 @@ def holdout_json(results: Sequence[HoldOut]) -> dict[str, object]:
     lists: dict[str, dict[str, object]] = {}
     for each in results:
         scores = {s.method: {k: v for k, v in asdict(s).items() if k != "method"} for s in each.scores}
-        counts = {"lights": each.lights, "left_out": len(each.left_out)}
+        counts = {"lights": each.lights, "left_out": len(each.left_out), "rejected": len(each.rejected)}
         lists.setdefault(each.name, {})[f"every_{each.every}"] = {**counts, "methods": scores}
     return {"lists": lists, "mean_peak_255_db": _means(results)}
 
@@ -26,9 +26,10 @@ def holdout_json(results: Sequence[HoldOut]) -> dict[str, object]:
 def holdout_text(results: Sequence[HoldOut]) -> str:
     """A table for each list and share left out: a row a method."""
     width = max(len(score.method) for each in results for score in each.scores)
-    lines = ["PSNR in linear light, peak 255, dB: gain fitted (raw)"]
+    lines = ["PSNR in linear light, peak 255, dB: aligned (as captured)"]
     for each in results:
         lines.append(f"{each.name}, every {each.every}: {len(each.left_out)} of {each.lights} lights left out")
+        lines += [f"  picture {index} rejected, {reason}" for index, reason in each.rejected.items()]
         lines += [
             f"  {s.method:<{width}}  {s.peak_255_db:6.2f}  ({s.raw_peak_255_db:.2f})  SSIM {s.ssim:.4f}"
             for s in each.scores
@@ -52,16 +53,18 @@ def _blocks(results: Sequence[HoldOut]) -> Iterator[str]:
     yield table(
         ["method", *(f"every {every} left out" for every in everys)],
         rows,
-        "Mean PSNR in dB over all lists, in linear light with 255 as peak (larger is better). Flashes vary in "
-        "strength: each left-out picture is multiplied by one gain, the same for all methods.",
+        "Mean PSNR in dB over all lists, in linear light with 255 as peak (larger is better). People move and flashes "
+        "vary in strength: the pictures are aligned, and each one left out is moved and multiplied by one gain, the "
+        "same for all methods.",
     )
     for each in results:
         yield heading(f"{each.name}: every {each.every} left out")
         yield table(
-            ["method", "PSNR, dB", "without gain", "bright parts as peak", "SSIM"],
+            ["method", "PSNR, dB", "as captured", "bright parts as peak", "SSIM"],
             [[s.method, s.peak_255_db, s.raw_peak_255_db, s.psnr_db, f"{s.ssim:.4f}"] for s in each.scores],
             f"{len(each.left_out)} of {each.lights} lights are predicted from the others. PSNR with the peak at 255, "
-            "with and without each picture's gain; PSNR with the peak at the truth's 99.5th percentile; SSIM of luma.",
+            "of aligned pictures and of pictures as they are; PSNR with the peak at the truth's 99.5th percentile; "
+            "SSIM of luma.",
         )
         yield _hardest(each)
 
@@ -83,7 +86,7 @@ def _hardest(result: HoldOut) -> str:
 
 
 def _means(results: Sequence[HoldOut]) -> dict[str, dict[str, float]]:
-    """Method → every_N → mean over the lists of the gain-fitted PSNR at peak 255; best first."""
+    """Method → every_N → mean over the lists of the PSNR of aligned pictures at peak 255; best first."""
     collected: dict[str, dict[str, list[float]]] = {}
     for each in results:
         for score in each.scores:

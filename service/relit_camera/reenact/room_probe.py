@@ -8,11 +8,13 @@ face, robustly, a few times a second. Between fits the camera's exposure is foll
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
+from scipy.sparse import csr_array
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
@@ -156,15 +158,23 @@ def _skin_triangles(face: SourceFace) -> NDArray[np.intp]:
 
 
 def _sample_basis(subject: Subject, points: Points) -> NDArray[np.float32]:
-    """The principal pictures at `points` (count, 2): (3, count, components), softened as the live samples are."""
-    x, y = (points[:, i].astype(np.float32)[None] - 0.5 for i in range(2))
+    """The subject's rows at `points` (count, 2): (3, count, components), softened as the live samples are."""
+    width, height = subject.size
     reach = _softening(points)
-    samples = np.empty((3, len(points), subject.metadata.components), dtype=np.float32)
-    for channel in range(3):
-        for index in range(subject.metadata.components):
-            soft = cv2.blur(subject.basis[channel, index].astype(np.float32), (reach, reach))
-            samples[channel, :, index] = cv2.remap(soft, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
-    return samples
+    # What a box filter and then bilinear interpolation would read there, borders repeated.
+    offsets = np.arange(reach) - reach // 2
+    base = np.floor(points - 0.5)
+    share = points - 0.5 - base
+    rows, columns, weights = [], [], []
+    for across, up in product((0, 1), repeat=2):
+        corner = np.abs(1 - across - share[:, 0]) * np.abs(1 - up - share[:, 1]) / reach**2
+        for x, y in product(offsets + across, offsets + up):
+            column = np.clip(base[:, 0] + x, 0, width - 1)
+            columns.append((np.clip(base[:, 1] + y, 0, height - 1) * width + column).astype(int))
+            rows.append(np.arange(len(points)))
+            weights.append(corner)
+    entries = np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))
+    return subject.basis.rows(csr_array(entries, shape=(len(points), width * height)))
 
 
 def _sample_frame(image: DisplayImage, points: Points) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

@@ -13,7 +13,7 @@ from relit_camera.errors import NotFoundError
 from relit_camera.reflectance.samples import Samples
 from relit_camera.subject.field import FactoredField, ReflectanceField
 
-DEFAULT_METHOD = "barycentric"
+DEFAULT_METHOD = "blend"
 GROUP = "relit_camera.methods"
 
 

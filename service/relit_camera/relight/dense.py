@@ -6,10 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.light.maps import LightMap
-from relit_camera.relight.relighter import masked_basis, weighted_light
+from relit_camera.relight.relighter import weighted_light
 from relit_camera.space.images import LinearImage
 from relit_camera.subject.field import TEXELS
 from relit_camera.subject.subject import Subject
+
+BLOCK = 4096
+"""Pixels restored at once: 100 MB."""
 
 
 class DenseRelighter:
@@ -32,8 +35,9 @@ class DenseRelighter:
 
 def dense_matrix(subject: Subject) -> NDArray[np.float32]:
     """R as (3, pixels, 2048) float32, 0 where the matte is."""
-    basis = masked_basis(subject)
-    matrix = np.empty((3, basis.shape[2], TEXELS), dtype=np.float32)
-    for channel in range(3):
-        np.matmul(basis[channel].T, subject.coefficients, out=matrix[channel])
+    total = subject.matte.size
+    matrix = np.empty((3, total, TEXELS), dtype=np.float32)
+    for start in range(0, total, BLOCK):
+        pixels = np.arange(start, min(start + BLOCK, total))
+        matrix[:, pixels] = subject.basis.at(subject.coefficients, pixels).transpose(2, 1, 0)
     return matrix

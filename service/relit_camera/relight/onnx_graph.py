@@ -5,41 +5,83 @@ On a GPU provider they stay in GPU memory and only the light map and the picture
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.light.maps import LightMap
 from relit_camera.models.session import SessionOptions, open_session
 from relit_camera.relight.dense import dense_matrix
-from relit_camera.relight.relighter import masked_basis, weighted_light
+from relit_camera.relight.rank_groups import rank_groups
+from relit_camera.relight.relighter import weighted_light
 from relit_camera.space.images import LinearImage
+from relit_camera.subject.field import TEXELS
 from relit_camera.subject.subject import Subject
+
+if TYPE_CHECKING:
+    from onnx import NodeProto
 
 OPSET = 17
 IR_VERSION = 9
 
 
-def product_graph(factors: dict[str, NDArray[np.float32]], rows: int) -> bytes:
-    """A serialised ONNX model: `light` (3, rows, 1) multiplied from the left by each factor in turn → `picture`.
+def dense_graph(matrix: NDArray[np.float32]) -> bytes:
+    """A serialised ONNX model: a matrix (3, pixels, 2048) times `light` (3, 2048, 1) → `picture` (3, pixels, 1)."""
+    from onnx import helper
 
-    Args:
-        factors: name → (3, n, m) or (n, m) float32, in the order in which they are applied.
-        rows: rows of the light vector.
-    """
+    node = helper.make_node("MatMul", ["matrix", "light"], ["picture"], name="multiply")
+    return _serialised([node], {"matrix": matrix}, matrix.shape[1])
+
+
+def basis_graph(subject: Subject) -> bytes:
+    """A serialised ONNX model: `light` (3, 2048, 1) → `picture` (3, pixels, 1), the products of `BasisRelighter`."""
+    from onnx import helper
+
+    groups = rank_groups(subject.basis)
+    mixes = np.concatenate([group.mixes.reshape(-1, subject.basis.components) for group in groups])
+    constants: dict[str, NDArray] = {"coefficients": subject.coefficients, "mixes": mixes}
+    nodes = [
+        helper.make_node("MatMul", ["coefficients", "light"], ["shared"]),
+        helper.make_node("MatMul", ["mixes", "shared"], ["local"]),
+        helper.make_node("Split", ["local", "ranks"], [f"local_{i}" for i in range(len(groups))], axis=1),
+    ]
+    for i, group in enumerate(groups):
+        clusters, _, rank, _ = group.values.shape
+        constants[f"values_{i}"] = group.values.transpose(1, 0, 2, 3)
+        constants[f"shape_{i}"] = np.array([3, clusters, 1, rank], np.int64)
+        nodes += [
+            helper.make_node("Reshape", [f"local_{i}", f"shape_{i}"], [f"amounts_{i}"]),
+            helper.make_node("MatMul", [f"amounts_{i}", f"values_{i}"], [f"mixed_{i}"]),
+            helper.make_node("Reshape", [f"mixed_{i}", "as_column"], [f"column_{i}"]),
+        ]
+    places = np.concatenate([group.pixels.ravel() for group in groups])
+    # Pixels of no cluster take what stands behind all places.
+    place_of_pixel = np.full(subject.matte.size, len(places), np.int64)
+    place_of_pixel[places] = np.arange(len(places))
+    constants |= {
+        "ranks": np.array([group.values.shape[0] * group.values.shape[2] for group in groups], np.int64),
+        "as_column": np.array([3, -1, 1], np.int64),
+        "nothing": np.zeros((3, 1, 1), np.float32),
+        "place_of_pixel": place_of_pixel,
+    }
+    columns = [f"column_{i}" for i in range(len(groups))]
+    nodes += [
+        helper.make_node("Concat", [*columns, "nothing"], ["places"], axis=1),
+        helper.make_node("Gather", ["places", "place_of_pixel"], ["picture"], axis=1),
+    ]
+    return _serialised(nodes, constants, subject.matte.size)
+
+
+def _serialised(nodes: list[NodeProto], constants: dict[str, NDArray], pixels: int) -> bytes:
     from onnx import TensorProto, helper, numpy_helper
 
-    nodes, current = [], "light"
-    for name in factors:
-        result = "picture" if name == list(factors)[-1] else f"after_{name}"
-        nodes.append(helper.make_node("MatMul", [name, current], [result], name=f"multiply_{name}"))
-        current = result
-    pixels = list(factors.values())[-1].shape[-2]
     graph = helper.make_graph(
         nodes,
         "relight",
-        [helper.make_tensor_value_info("light", TensorProto.FLOAT, [3, rows, 1])],
+        [helper.make_tensor_value_info("light", TensorProto.FLOAT, [3, TEXELS, 1])],
         [helper.make_tensor_value_info("picture", TensorProto.FLOAT, [3, pixels, 1])],
-        [numpy_helper.from_array(np.ascontiguousarray(value), name) for name, value in factors.items()],
+        [numpy_helper.from_array(np.ascontiguousarray(value), name) for name, value in constants.items()],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     serialised: bytes = model.SerializeToString()
@@ -47,9 +89,8 @@ def product_graph(factors: dict[str, NDArray[np.float32]], rows: int) -> bytes:
 
 
 class _OnnxRelighter:
-    def __init__(self, subject: Subject, name: str, factors: dict[str, NDArray[np.float32]], options: SessionOptions):
-        rows = next(iter(factors.values())).shape[-1]
-        self.session = open_session(product_graph(factors, rows), name, options)
+    def __init__(self, subject: Subject, name: str, graph: bytes, options: SessionOptions | None) -> None:
+        self.session = open_session(graph, name, options or SessionOptions())
         self._shape = (subject.metadata.height, subject.metadata.width)
 
     def relight(self, light_map: LightMap) -> LinearImage:
@@ -60,15 +101,14 @@ class _OnnxRelighter:
 
 
 class OnnxBasisRelighter(_OnnxRelighter):
-    """The basis as a graph of two products.
+    """The bases as a graph: in each group of clusters of equal rank one product.
 
     Raises:
         DeviceError: a strict provider is not to be had.
     """
 
     def __init__(self, subject: Subject, options: SessionOptions | None = None) -> None:
-        factors = {"coefficients": subject.coefficients, "basis": masked_basis(subject).transpose(0, 2, 1)}
-        super().__init__(subject, "relight-basis", factors, options or SessionOptions())
+        super().__init__(subject, "relight-basis", basis_graph(subject), options)
 
 
 class OnnxDenseRelighter(_OnnxRelighter):
@@ -79,4 +119,4 @@ class OnnxDenseRelighter(_OnnxRelighter):
     """
 
     def __init__(self, subject: Subject, options: SessionOptions | None = None) -> None:
-        super().__init__(subject, "relight-dense", {"matrix": dense_matrix(subject)}, options or SessionOptions())
+        super().__init__(subject, "relight-dense", dense_graph(dense_matrix(subject)), options)

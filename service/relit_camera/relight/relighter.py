@@ -35,13 +35,6 @@ def weighted_light(light_map: LightMap) -> NDArray[np.float32]:
     return np.ascontiguousarray((light_map * omega[..., None]).reshape(TEXELS, 3))
 
 
-def masked_basis(subject: Subject) -> NDArray[np.float32]:
-    """The subject's basis as a float32 copy (3, components, pixels), black where the matte is 0."""
-    basis = subject.basis.astype(np.float32).reshape(3, subject.metadata.components, -1)
-    basis[..., subject.matte.ravel() == 0] = 0
-    return basis
-
-
 def open_relighter(name: str, subject: Subject) -> Relighter:
     """A relighter of that name for `subject`.
 

@@ -1,110 +1,200 @@
-"""A factored field as a few principal pictures, as many as the error asks for."""
+"""Any reflectance field in few numbers: local bases, as large as the error asks for.
+
+Every column of the field, a texel of the light map or a captured light, is divided by the error that is allowed in it.
+A cluster of pixels keeps the components that explain more than a threshold; the threshold is found on a sample of
+clusters, so that the worst column is within what is allowed.
+"""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
-from relit_camera.space.quality import psnr
-from relit_camera.subject.field import FactoredField
+from relit_camera.space.images import Mask
+from relit_camera.subject.cluster import Cluster, Components
+from relit_camera.subject.field import TEXELS, ReflectanceField
+from relit_camera.subject.local_basis import LocalBasis
+from relit_camera.subject.reached import Reached, dense_bytes, worst_light_db, worst_map_db
+from relit_camera.subject.shared_basis import share
+from relit_camera.subject.target import Target
+from relit_camera.subject.tiles import FieldRows, counted_places, tiles
 
-TARGET_DB = 50.0
-"""Every captured light comes back at least this well: 10 dB above what a person sees in a call."""
+Values = NDArray[np.float32]
 
-BATCH = 32
-"""Lights restored at once when the error is measured: bounds the memory."""
+SAMPLE = 64
+"""Clusters on which peaks and threshold are found."""
+OF_CLUSTERS, OF_SHARED = 0.55, 0.35
+"""Shares of the error for the clusters' components and for the shared basis; the rest is for what the sample misses."""
+THRESHOLDS = (1e-2, 1e6)
+STEPS = 10
+"""Bisections between them, to 2 %."""
+MAX_WORKERS = 4
 
 
 @dataclass(frozen=True)
 class CompressedField:
-    """R[p, c, l] = Σ_k basis[c, k, p] · coefficients[k, l].
+    """R[p, c, l] = Σ_g row[p, c, g] · coefficients[g, l], with the rows of `basis`.
 
     Attributes:
-        basis: (3, components, height, width) float16.
+        basis: the rows.
         coefficients: (components, 2048) float32.
         light_coefficients: (components, lights) float32: the captured frames in this basis.
-        psnr_db: worst over the captured lights, after rounding to float16.
+        reached: how well.
     """
 
-    basis: NDArray[np.float16]
-    coefficients: NDArray[np.float32]
-    light_coefficients: NDArray[np.float32]
-    psnr_db: float
+    basis: LocalBasis
+    coefficients: Values
+    light_coefficients: Values
+    reached: Reached
 
 
-def compress(field: FactoredField, matte: NDArray[np.float32], target_db: float = TARGET_DB) -> CompressedField:
-    """The fewest principal pictures that return every captured light at `target_db` or better inside the matte.
-
-    Every light is scaled to the same energy before the principal directions are taken, so that a dim light from
-    behind comes back as well, for its own brightness, as a bright one from the front. Lights too dark to have a peak
-    of their own are judged by a tenth of the field's. With all components kept the field is exact but for float16.
-    """
-    lights, height, width, _ = field.pictures.shape
-    samples = field.pictures.reshape(lights, -1)
-    gram = (samples @ samples.T).astype(np.float64)
-    energy = np.diag(gram)
-    importance = 1 / np.sqrt(np.maximum(energy, 1e-4 * energy.max()))
-    weighted_gram = gram * np.outer(importance, importance)
-    eigenvalues, vectors = np.linalg.eigh(weighted_gram)
-    order = np.argsort(eigenvalues)[::-1]
-    vectors = vectors[:, order]
-    peak = float(np.percentile(field.pictures, 99.5))
-
-    low, high, best = 1, lights, None
-    while low <= high:
-        rank = (low + high) // 2
-        candidate = _project(field, vectors[:, :rank], importance, matte, peak, (height, width))
-        if candidate.psnr_db >= target_db:
-            best, high = candidate, rank - 1
-        else:
-            low = rank + 1
-    return best if best is not None else _project(field, vectors, importance, matte, peak, (height, width))
-
-
-def _project(
-    field: FactoredField,
-    vectors: NDArray[np.float64],
-    importance: NDArray[np.float64],
-    matte: NDArray[np.float32],
-    peak: float,
-    size: tuple[int, int],
+def compress(
+    field: ReflectanceField,
+    captured: Values,
+    matte: Mask,
+    target: Target | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> CompressedField:
-    lights, rank = vectors.shape
-    # picture_n · importance_n ≈ Σ_k component_k · vectors[n, k], component_k = Σ_n vectors[n, k] importance_n picture_n
-    analysis = (vectors * importance[:, None]).T.astype(np.float32)
-    components = (analysis @ field.pictures.reshape(lights, -1)).reshape(rank, *size, 3)
-    scale = np.abs(components).reshape(rank, -1).max(axis=1) + 1e-20
-    # Each picture fills float16's exact range; its scale goes into the coefficients.
-    basis = (components / scale[:, None, None, None]).transpose(3, 0, 1, 2).astype(np.float16)
-    light_coefficients = ((vectors / importance[:, None]).T * scale[:, None]).astype(np.float32)
-    return CompressedField(
-        basis=np.ascontiguousarray(basis),
-        coefficients=light_coefficients @ field.weights,
-        light_coefficients=light_coefficients,
-        psnr_db=worst_light_db(basis, light_coefficients, field.pictures, matte, peak),
-    )
+    """As few numbers as return every texel and every captured light as well as asked.
 
+    The field is read once, tile by tile, and a sample of it before.
 
-def worst_light_db(
-    basis: NDArray[np.float16],
-    light_coefficients: NDArray[np.float32],
-    captured: NDArray[np.float32],
-    matte: NDArray[np.float32],
-    peak: float,
-) -> float:
-    """PSNR in dB of the captured light (lights, height, width, 3) that comes back worst, inside the matte.
-
-    Lights too dark to have a peak of their own are judged by a tenth of the field's `peak`.
+    Args:
+        field: any.
+        captured: (lights, height, width, 3) the pictures that it was built from.
+        matte: (height, width); pixels where it is 0 become black.
+        target: what is asked.
+        progress: called with the count of tiles done and the total.
     """
-    lights, height, width, _ = captured.shape
-    rounded = basis.astype(np.float32).transpose(1, 2, 3, 0).reshape(len(light_coefficients), -1)
-    worst = np.inf
-    for start in range(0, lights, BATCH):
-        stop = min(start + BATCH, lights)
-        restored = (light_coefficients[:, start:stop].T @ rounded).reshape(-1, height, width, 3)
-        for picture, truth in zip(restored, captured[start:stop], strict=True):
-            own_peak = float(np.percentile(truth[matte > 0.5], 99.5))
-            worst = min(worst, psnr(picture, truth, matte, peak=max(own_peak, 0.1 * peak)))
-    return worst
+    target = target or Target()
+    rows, work = FieldRows(field, captured), tiles(matte)
+    inside = matte.ravel() > 0.5
+    with (
+        threadpool_limits(limits=1, user_api="blas"),
+        ThreadPoolExecutor(min(os.cpu_count() or 1, MAX_WORKERS)) as pool,
+    ):
+        allowed, threshold = _sampled(rows, np.concatenate(work), inside, target, pool)
+        press = _Press(rows, inside, allowed, threshold, target.light)
+        done: list[_Pressed] = []
+        for tile in pool.map(press, work):
+            done.append(tile)
+            progress(len(done), len(work))
+        components = [each for tile in done for each in tile.components]
+        counted = 3 * int(inside.sum())
+        shared = share(components, OF_SHARED * counted)
+    error = (np.sum([tile.error for tile in done], axis=0) + shared.error) / counted
+    truth = np.zeros((len(target.maps), len(inside), 3), np.float32)
+    for tile in done:
+        truth[:, tile.pixels] = tile.relit
+    basis = _joined(np.concatenate(work), components, shared.mixes)
+    both = shared.vectors * allowed
+    coefficients, lights = np.ascontiguousarray(both[:, :TEXELS]), np.ascontiguousarray(both[:, TEXELS:])
+    reached = Reached(
+        light_db=worst_light_db(basis, lights, captured, matte),
+        texel_db=target.texel_db - 10 * float(np.log10(max(error[:TEXELS].max(), 1e-15))),
+        map_db=worst_map_db(basis, coefficients, target.light, truth, matte),
+        bytes_share=(basis.nbytes + both.nbytes) / dense_bytes(matte),
+    )
+    return CompressedField(basis, coefficients, lights, reached)
+
+
+@dataclass(frozen=True)
+class _Pressed:
+    """A tile, compressed.
+
+    Attributes:
+        components: of each of its clusters.
+        error: sum of squares (columns,) that they leave, in units of what is allowed.
+        pixels: its pixels (some,), row-major.
+        relit: those by the field itself, under the target's maps: (maps, some, 3).
+    """
+
+    components: list[Components]
+    error: NDArray[np.float64]
+    pixels: NDArray[np.int32]
+    relit: Values
+
+
+@dataclass(frozen=True)
+class _Press:
+    rows: FieldRows
+    inside: NDArray[np.bool_]
+    allowed: Values
+    threshold: float
+    light: Values
+
+    def __call__(self, tile: NDArray[np.int32]) -> _Pressed:
+        pixels, places = np.unique(tile, return_inverse=True)
+        rows = self.rows.read(pixels)
+        relit = np.stack([self.light[:, :, c] @ rows[:, c, :TEXELS].T for c in range(3)], axis=-1)
+        rows /= self.allowed
+        components, error = [], np.zeros(len(self.allowed))
+        for cluster, chosen in zip(tile, places.reshape(tile.shape), strict=True):
+            part = _Part.of(rows[chosen], cluster, self.inside)
+            components.append(part.cluster.components(self.threshold))
+            error += part.error(components[-1])
+        return _Pressed(components, error, pixels, relit)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A cluster, and which of its rows count."""
+
+    cluster: Cluster
+    counted: NDArray[np.bool_]
+
+    @staticmethod
+    def of(rows: Values, pixels: NDArray[np.int32], inside: NDArray[np.bool_]) -> _Part:
+        """Of rows (places, 3, columns): channel by channel from here on."""
+        by_channel = rows.transpose(1, 0, 2).reshape(-1, rows.shape[2])
+        return _Part(Cluster(by_channel), np.tile(counted_places(pixels, inside), 3))
+
+    def error(self, components: Components) -> NDArray[np.float64]:
+        """Sum of squares (columns,) that the components leave of the rows that count."""
+        left = (self.cluster.rows - components.restored())[self.counted]
+        return np.asarray(np.einsum("rc,rc->c", left, left), np.float64)
+
+
+def _sampled(
+    rows: FieldRows, clusters: NDArray[np.int32], inside: NDArray[np.bool_], target: Target, pool: ThreadPoolExecutor
+) -> tuple[Values, float]:
+    """What error is allowed in each column (columns,), and the threshold that keeps to it, by a sample of clusters."""
+    parts = []
+    for cluster in clusters[:: -(-len(clusters) // SAMPLE)]:
+        pixels, places = np.unique(cluster, return_inverse=True)
+        parts.append(_Part.of(rows.read(pixels)[places], cluster, inside))
+    seen = np.concatenate([part.cluster.rows[part.counted] for part in parts])
+    allowed = target.allowed(np.percentile(seen, 99.5, axis=0))
+    count = len(seen)
+    del seen
+    for part in parts:
+        part.cluster.rows[:] /= allowed
+
+    def worst(threshold: float) -> float:
+        errors = pool.map(lambda part: part.error(part.cluster.components(threshold)), parts)
+        return float(np.sum(list(errors), axis=0).max()) / count
+
+    low, high = np.log(THRESHOLDS)
+    for _ in range(STEPS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if worst(np.exp(middle)) <= OF_CLUSTERS else (low, middle)
+    return allowed, float(np.exp(low))
+
+
+def _joined(
+    pixels: NDArray[np.int32], clusters: Sequence[Components], mixes: Sequence[NDArray[np.float16]]
+) -> LocalBasis:
+    codes = [each.codes.reshape(len(each.codes), 3, -1) for each in clusters]
+    return LocalBasis(
+        pixels=pixels,
+        first=np.cumsum([0, *map(len, codes)], dtype=np.int32),
+        values=np.concatenate(codes),
+        scales=np.concatenate([each.scales for each in clusters]),
+        mixes=np.concatenate(mixes),
+    )

@@ -15,6 +15,7 @@ from safetensors.numpy import save_file
 
 from relit_camera.errors import SubjectError
 from relit_camera.files import atomic_path
+from relit_camera.subject.local_basis import LocalBasis, whole_basis
 from relit_camera.subject.pack import decode_basis, encode_basis
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
 
@@ -23,13 +24,33 @@ HEADER_KEY = "relit_subject"
 LANDMARKS = "landmarks."
 MAX_TENSORS = 64
 MAX_BYTES = 8 << 30
-REQUIRED = ("basis", "coefficients", "light_directions", "light_coefficients", "matte", "neutral")
-OPTIONAL = ("normals", "albedo", "depth")
-SMALL_BASIS = "basis_webp"
-"""In place of `basis` in a small file: the pictures as bytes of one lossless WebP picture."""
-DTYPES = {"basis": np.float16, "neutral": np.uint8}
+REQUIRED = ("coefficients", "light_directions", "light_coefficients", "matte", "neutral")
+OPTIONAL = ("normals", "albedo", "depth", "horizons")
+BASIS = "basis."
+LOCAL = ("pixels", "first", "values", "scales", "mixes")
+"""The basis of version 2, each with `BASIS` before its name."""
+WHOLE, WHOLE_SMALL = "basis", "basis_webp"
+"""In their place in version 1: the pictures themselves (3, components, height, width), or one WebP picture of them."""
+DTYPES: dict[str, tuple[type[np.generic], ...]] = {
+    WHOLE: (np.float16,),
+    WHOLE_SMALL: (np.uint8,),
+    "neutral": (np.uint8,),
+    "normals": (np.float16, np.float32),
+    "albedo": (np.float16, np.float32),
+    "horizons": (np.uint8,),
+    BASIS + "pixels": (np.int32,),
+    BASIS + "first": (np.int32,),
+    BASIS + "values": (np.int8, np.float16),
+    BASIS + "mixes": (np.float16,),
+}
 """Every other tensor is float32."""
-STORED: dict[str, type[np.generic]] = {"F16": np.float16, "F32": np.float32, "U8": np.uint8}
+STORED: dict[str, type[np.generic]] = {
+    "F16": np.float16,
+    "F32": np.float32,
+    "U8": np.uint8,
+    "I8": np.int8,
+    "I32": np.int32,
+}
 """What safetensors calls the types that a subject may hold."""
 
 
@@ -39,21 +60,27 @@ def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
     Args:
         path: file to write.
         subject: what it holds.
-        small: keep the basis in 8 bits, a quarter of the size and less. Such a file is decoded when it is opened.
+        small: keep the principal pictures of `subject.pack.packed` as one picture of 8 bits, which is format version
+            1. Such a file is decoded when it is opened.
 
     Raises:
         StorageError: the file cannot be written.
-        InputError: `small`, and the basis is larger than a WebP picture may be.
+        InputError: `small`, and the pictures are larger than a WebP picture may be.
     """
+    meta = subject.metadata.model_copy(update={"format_version": 1 if small else FORMAT_VERSION})
     tensors: dict[str, NDArray] = {name: getattr(subject, name) for name in REQUIRED}
     tensors |= {name: getattr(subject, name) for name in OPTIONAL if getattr(subject, name) is not None}
     tensors |= {LANDMARKS + scheme: points for scheme, points in subject.landmarks.items()}
     if small:
-        tensors[SMALL_BASIS] = encode_basis(tensors.pop("basis"))
+        tensors[WHOLE_SMALL] = encode_basis(
+            subject.pictures(np.eye(meta.components, dtype=np.float32)).transpose(3, 0, 1, 2)
+        )
+    else:
+        tensors |= {BASIS + name: getattr(subject.basis, name) for name in LOCAL}
     contiguous = {name: np.ascontiguousarray(value) for name, value in tensors.items()}
     with atomic_path(path) as temporary:
         try:
-            save_file(contiguous, temporary, metadata={HEADER_KEY: subject.metadata.model_dump_json()})
+            save_file(contiguous, temporary, metadata={HEADER_KEY: meta.model_dump_json()})
         except SafetensorError as error:
             # The library hides the system's error number in its message.
             if "os error" in str(error).lower() or "I/O" in str(error):
@@ -64,7 +91,7 @@ def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
 def read_subject(path: Path) -> Subject:
     """Open a subject; its arrays are read-only views of the mapped file, which the system may drop and read again.
 
-    The basis of a small file is not: it is decoded into memory.
+    The basis of a file of version 1 is not: it is decoded into memory.
 
     Raises:
         SubjectError: missing, damaged, of another version, or with values that are not finite.
@@ -82,15 +109,23 @@ def read_subject(path: Path) -> Subject:
         tensors = _mapped(path, names)
     except (SafetensorError, OSError) as error:
         raise _damaged(path, str(error)) from error
-    if "basis" not in tensors and SMALL_BASIS in tensors:
-        tensors["basis"] = _decoded(path, tensors.pop(SMALL_BASIS), metadata)
-    _check(path, tensors)
+    _check(path, tensors, metadata.format_version)
     landmarks = {n.removeprefix(LANDMARKS): t for n, t in tensors.items() if n.startswith(LANDMARKS)}
     arrays = {name: tensors[name] for name in (*REQUIRED, *OPTIONAL) if name in tensors}
     try:
-        return Subject(metadata=metadata, landmarks=landmarks, **arrays)
-    except ValueError as error:
-        raise _damaged(path, str(error)) from error
+        return Subject(metadata=metadata, basis=_basis(tensors, metadata), landmarks=landmarks, **arrays)
+    except (ValueError, SubjectError) as error:
+        raise _damaged(path, error.what if isinstance(error, SubjectError) else str(error)) from error
+
+
+def _basis(tensors: Mapping[str, NDArray], metadata: SubjectMetadata) -> LocalBasis:
+    if metadata.format_version == FORMAT_VERSION:
+        return LocalBasis(**{name: tensors[BASIS + name] for name in LOCAL})
+    shape = (3, metadata.components, metadata.height, metadata.width)
+    pictures = tensors[WHOLE] if WHOLE in tensors else decode_basis(tensors[WHOLE_SMALL], shape)
+    if pictures.shape != shape or tensors["matte"].shape != shape[2:]:
+        raise ValueError(f"{WHOLE} has shape {pictures.shape} with a matte of {tensors['matte'].shape}, not {shape}")
+    return whole_basis(pictures, tensors["matte"])
 
 
 def _metadata(path: Path, header: Mapping[str, str]) -> SubjectMetadata:
@@ -99,9 +134,9 @@ def _metadata(path: Path, header: Mapping[str, str]) -> SubjectMetadata:
         version = raw.get("format_version")
     except (KeyError, ValueError, AttributeError) as error:
         raise _damaged(path, "it has no Relit Camera header") from error
-    if version != FORMAT_VERSION:
+    if version not in (1, FORMAT_VERSION):
         raise SubjectError(
-            f"{path} has format version {version}; this program reads version {FORMAT_VERSION}",
+            f"{path} has format version {version}; this program reads versions 1 and {FORMAT_VERSION}",
             "build the subject again, or use the program that wrote it",
         )
     try:
@@ -129,23 +164,17 @@ def _mapped(path: Path, names: list[str]) -> dict[str, NDArray]:
     return tensors
 
 
-def _decoded(path: Path, encoded: NDArray, metadata: SubjectMetadata) -> NDArray[np.float16]:
-    if encoded.dtype != np.uint8 or encoded.ndim != 1:
-        raise _damaged(path, f"'{SMALL_BASIS}' is not a row of bytes")
-    try:
-        return decode_basis(encoded, (3, metadata.components, metadata.height, metadata.width))
-    except SubjectError as error:
-        raise _damaged(path, error.what) from error
-
-
-def _check(path: Path, tensors: Mapping[str, NDArray]) -> None:
-    for name in REQUIRED:
+def _check(path: Path, tensors: Mapping[str, NDArray], version: int) -> None:
+    whole = WHOLE if WHOLE in tensors else WHOLE_SMALL
+    for name in (*REQUIRED, *((whole,) if version == 1 else (BASIS + part for part in LOCAL))):
         if name not in tensors:
             raise _damaged(path, f"it has no tensor '{name}'")
     for name, tensor in tensors.items():
-        expected = DTYPES.get(name, np.float32)
-        if tensor.dtype != expected:
-            raise _damaged(path, f"'{name}' is {tensor.dtype}, not {np.dtype(expected)}")
+        expected = DTYPES.get(name, (np.float32,))
+        if tensor.dtype not in expected:
+            raise _damaged(
+                path, f"'{name}' is {tensor.dtype}, not {' or '.join(np.dtype(each).name for each in expected)}"
+            )
         if tensor.dtype.kind == "f" and not np.isfinite(tensor).all():
             raise _damaged(path, f"'{name}' holds NaN or infinity")
 

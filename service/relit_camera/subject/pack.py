@@ -12,10 +12,13 @@ from numpy.typing import NDArray
 from relit_camera.errors import InputError, SubjectError
 from relit_camera.space.quality import psnr
 from relit_camera.space.quiet import quiet_decoders
+from relit_camera.subject.local_basis import whole_basis
 from relit_camera.subject.subject import Subject
 
 _LARGEST_WEBP = 16383
 """Pixels a side that the format allows."""
+_BATCH = 32
+"""Lights restored at once."""
 
 
 def packed(subject: Subject, components: int) -> Subject:
@@ -35,25 +38,33 @@ def packed(subject: Subject, components: int) -> Subject:
             "ask for fewer than it has",
         )
     lights = subject.light_coefficients.astype(np.float64)
-    pictures = subject.basis.transpose(1, 0, 2, 3).reshape(meta.components, -1).astype(np.float32)
-    _, vectors = np.linalg.eigh(lights.T @ (pictures @ pictures.T).astype(np.float64) @ lights)
-    vectors = vectors[:, ::-1][:, :components]
-    found = ((lights @ vectors).T.astype(np.float32) @ pictures).reshape(components, 3, meta.height, meta.width)
+    gram = subject.basis.gram()
+    _, vectors = np.linalg.eigh(lights.T @ gram @ lights)
+    mixed = lights @ vectors[:, ::-1][:, :components]
+    found = subject.pictures(mixed.astype(np.float32))
     scale = np.abs(found).reshape(components, -1).max(axis=1) + 1e-20
-    rounded = encode_basis((found / scale[:, None, None, None]).transpose(1, 0, 2, 3))
+    rounded = encode_basis((found / scale[:, None, None, None]).transpose(3, 0, 1, 2))
     basis = decode_basis(rounded, (3, components, meta.height, meta.width))
-    synthesis = vectors.T * scale[:, None]
-    # The captured lights' share in each texel; any solution serves, they differ in what no picture holds.
-    weights, *_ = np.linalg.lstsq(lights, subject.coefficients.astype(np.float64), rcond=None)
+    # Every answer's share in the pictures kept: orthogonal projection.
+    projection = np.linalg.solve(mixed.T @ gram @ mixed, mixed.T @ gram) * scale[:, None]
     small = replace(
         subject,
-        metadata=meta.model_copy(update={"components": components}),
-        basis=basis,
-        coefficients=(synthesis @ weights).astype(np.float32),
-        light_coefficients=synthesis.astype(np.float32),
+        metadata=meta.model_copy(
+            update={
+                "format_version": 1,
+                "components": components,
+                "texel_psnr_db": None,
+                "map_psnr_db": None,
+                "bytes_share": None,
+            }
+        ),
+        basis=whole_basis(basis, subject.matte),
+        coefficients=(projection @ subject.coefficients).astype(np.float32),
+        light_coefficients=(projection @ lights).astype(np.float32),
         normals=None,
         albedo=None,
         depth=None,
+        horizons=None,
     )
     worst = min(light_errors_db(small, subject))
     return replace(small, metadata=small.metadata.model_copy(update={"psnr_db": min(worst, 200.0)}))
@@ -101,7 +112,7 @@ def decode_basis(encoded: NDArray[np.uint8], shape: tuple[int, int, int, int]) -
     _, components, height, width = shape
     across, down = _grid(components)
     with quiet_decoders():
-        picture = cv2.imdecode(np.array(encoded), cv2.IMREAD_UNCHANGED) if encoded.size else None
+        picture = cv2.imdecode(np.array(encoded), cv2.IMREAD_UNCHANGED) if encoded.size and encoded.ndim == 1 else None
     if picture is None or picture.shape != (down * height, across * width, 3):
         raise SubjectError("its principal pictures cannot be decoded", "restore the file from a copy")
     coloured = cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
@@ -118,8 +129,6 @@ def _grid(components: int) -> tuple[int, int]:
 
 
 def _light_pictures(subject: Subject) -> Iterator[NDArray[np.float32]]:
-    meta = subject.metadata
-    planes = subject.basis.astype(np.float32).transpose(1, 2, 3, 0).reshape(meta.components, -1)
-    # One after another: together they are some gigabytes.
-    for amounts in subject.light_coefficients.T:
-        yield (amounts @ planes).reshape(meta.height, meta.width, 3)
+    # Some at a time: together they are some gigabytes.
+    for start in range(0, subject.metadata.lights, _BATCH):
+        yield from subject.pictures(subject.light_coefficients[:, start : start + _BATCH])

@@ -12,8 +12,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from relit_camera.space.images import DisplayImage, Mask, Points
 from relit_camera.subject.field import TEXELS
+from relit_camera.subject.local_basis import LocalBasis
 
-FORMAT_VERSION: Literal[1] = 1
+FORMAT_VERSION: Literal[2] = 2
+HORIZON_STEP = np.pi / 255
+"""A horizon's code v of 0..255 stands for the height v · this − π/2, in radians."""
 
 
 class SubjectMetadata(BaseModel):
@@ -21,7 +24,8 @@ class SubjectMetadata(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    format_version: Literal[1] = FORMAT_VERSION
+    format_version: Literal[1, 2] = FORMAT_VERSION
+    """1: one set of principal pictures for all pixels, as small subjects have it; 2: local bases."""
     width: Annotated[int, Field(ge=8, le=8192)]
     height: Annotated[int, Field(ge=8, le=8192)]
     light_map: tuple[int, int] = (64, 32)
@@ -34,6 +38,12 @@ class SubjectMetadata(BaseModel):
     """File name of what it was built from; never a full path, which would tell of the person's machine."""
     psnr_db: float
     """Worst PSNR of the compressed field over the captured lights, each against its own frame."""
+    texel_psnr_db: float | None = None
+    """Worst PSNR over the texels of a light map, each alone, against the field before compression."""
+    map_psnr_db: float | None = None
+    """The same under the built-in environments."""
+    bytes_share: float | None = None
+    """Bytes of the compressed field by those of its dense float32 matrix."""
     gamma: str = "srgb"
     display_gain: Annotated[float, Field(gt=0, le=100)] = 1.0
     """What pictures are multiplied by to be shown, where the captured frames are not in units of a white wall."""
@@ -47,33 +57,36 @@ class SubjectMetadata(BaseModel):
 class Subject:
     """A person who can be relit.
 
-    The field is R[p, c, l] = Σ_k basis[c, k, p] · coefficients[k, l].
+    The field is R[p, c, l] = Σ_g row[p, c, g] · coefficients[g, l], with the rows of `basis`.
 
     Attributes:
         metadata: the file's header.
-        basis: (3, components, height, width) float16; like all arrays memory-mapped when it comes from a file.
+        basis: the rows; like all arrays memory-mapped when it comes from a file.
         coefficients: (components, 2048) float32.
         light_directions: (lights, 3) float32 unit vectors, the captured directions.
         light_coefficients: (components, lights) float32: the captured frames in the same basis.
         matte: (height, width) float32 straight alpha.
         neutral: (height, width, 3) uint8 sRGB, the face under soft light from the front: what trackers look at.
         landmarks: points (count, 2) on `neutral` for each landmark scheme that is known.
-        normals: (height, width, 3) float32 unit vectors, or None where the method gives none.
-        albedo: (height, width, 3) float32 linear, or None.
-        depth: (height, width) float32 centimetres toward the camera, or None.
+        normals: (height, width, 3) float16 unit vectors, (0, 0, 1) outside of the matte; or None.
+        albedo: (height, width, 3) float16 linear, 0 outside; or None.
+        depth: (height, width) float32 in pixels toward the camera, mean 0, 0 outside; or None.
+        horizons: (height, width, sectors) uint8, what the rest of the surface hides (`geometry.horizon`), in steps of
+            `HORIZON_STEP`; or None.
     """
 
     metadata: SubjectMetadata
-    basis: NDArray[np.float16]
+    basis: LocalBasis
     coefficients: NDArray[np.float32]
     light_directions: NDArray[np.float32]
     light_coefficients: NDArray[np.float32]
     matte: Mask
     neutral: DisplayImage
     landmarks: Mapping[str, Points] = field(default_factory=dict)
-    normals: NDArray[np.float32] | None = None
-    albedo: NDArray[np.float32] | None = None
+    normals: NDArray[np.float16] | NDArray[np.float32] | None = None
+    albedo: NDArray[np.float16] | NDArray[np.float32] | None = None
     depth: NDArray[np.float32] | None = None
+    horizons: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         """Check every shape against the header.
@@ -84,7 +97,6 @@ class Subject:
         meta = self.metadata
         picture = (meta.height, meta.width)
         expected: dict[str, tuple[NDArray | None, tuple[int, ...]]] = {
-            "basis": (self.basis, (3, meta.components, *picture)),
             "coefficients": (self.coefficients, (meta.components, TEXELS)),
             "light_directions": (self.light_directions, (meta.lights, 3)),
             "light_coefficients": (self.light_coefficients, (meta.components, meta.lights)),
@@ -93,7 +105,12 @@ class Subject:
             "normals": (self.normals, (*picture, 3)),
             "albedo": (self.albedo, (*picture, 3)),
             "depth": (self.depth, picture),
+            "horizons": (self.horizons, (*picture, 0 if self.horizons is None else self.horizons.shape[-1])),
         }
+        if self.basis.components != meta.components:
+            raise ValueError(f"the basis has {self.basis.components} components, not {meta.components}")
+        if self.basis.pixels.max(initial=-1) >= meta.width * meta.height:
+            raise ValueError(f"the basis has pixels beyond {meta.width}x{meta.height}")
         for name, (array, shape) in expected.items():
             if array is not None and array.shape != shape:
                 raise ValueError(f"{name} has shape {array.shape}, not {shape}")
@@ -105,3 +122,8 @@ class Subject:
     def size(self) -> tuple[int, int]:
         """Width and height in pixels."""
         return self.metadata.width, self.metadata.height
+
+    def pictures(self, amounts: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The linear pictures (count, height, width, 3) of amounts (components, count) of the shared basis."""
+        meta = self.metadata
+        return self.basis.at(amounts, np.arange(meta.height * meta.width)).reshape(-1, meta.height, meta.width, 3)

@@ -79,8 +79,8 @@ class Turn:
         return (height, width) if self.transposed else (width, height)
 
     def upright(self, image: NDArray) -> NDArray:
-        """A view of a stored picture (height, width, 3) as it is meant to be seen."""
-        turned = image.transpose(1, 0, 2) if self.transposed else image
+        """A view of a stored picture (height, width, …) as it is meant to be seen."""
+        turned = image.swapaxes(0, 1) if self.transposed else image
         return turned[:: -1 if self.flip_y else 1, :: -1 if self.flip_x else 1]
 
 
@@ -98,20 +98,21 @@ def turn_of(picture: Any) -> Turn:
     return Turn(False, bool(a < 0), bool(d < 0))
 
 
-class RgbConverter:
-    """Converts decoded pictures to RGB code values (height, width, 3), uint8 or uint16; `white_code` is their 1."""
+class CodeConverter:
+    """Converts decoded pictures to code values (height, width, 3) or, of luma, (height, width), uint8 or uint16."""
 
-    def __init__(self, *, accurate: bool = True, deep: bool = False, longer_side: int | None = None) -> None:
+    def __init__(self, *, accurate: bool = True, pixels: str = "rgb24", longer_side: int | None = None) -> None:
         """Set up.
 
         Args:
             accurate: convert to within half a code value; otherwise faster, about one code value too dark.
-            deep: give uint16, which keeps what 10 bits tell.
+            pixels: FFmpeg's name of the layout to give: rgb24, rgb48le (uint16, which keeps what 10 bits tell), gray
+                or gray16le (luma alone).
             longer_side: scale down (by area, in code values) so that the longer side has so many pixels.
         """
         self._reformatter = VideoReformatter()
         self._interpolation = ACCURATE if accurate else None
-        self._format = "rgb48le" if deep else "rgb24"
+        self._format = pixels
         self._longer_side = longer_side
 
     def __call__(self, picture: Any) -> NDArray:
@@ -135,7 +136,7 @@ class RgbConverter:
 
 
 def white_code(picture: Any, deep: bool) -> int:
-    """The code that `RgbConverter` gives for the white of a decoded picture."""
+    """The RGB code that `CodeConverter` gives for the white of a decoded picture."""
     if not deep:
         return 255
     # FFmpeg's scaler makes 16 bits of luma and chroma by appending eight to the 8-bit code.

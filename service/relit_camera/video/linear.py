@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from relit_camera.space.colour import Gamma, decode
 from relit_camera.space.images import LinearImage
-from relit_camera.video.decoding import RgbConverter, white_code
+from relit_camera.video.decoding import CodeConverter, white_code
 from relit_camera.video.pictures import PictureReader
 
 
@@ -40,7 +41,15 @@ class LinearReader(PictureReader[LinearFrame]):
         VideoError: as `VideoReader`.
     """
 
-    def __init__(self, path: Path, gamma: Gamma = "srgb", *, longer_side: int | None = None, threads: int = 1) -> None:
+    def __init__(
+        self,
+        path: Path,
+        gamma: Gamma = "srgb",
+        *,
+        longer_side: int | None = None,
+        only: Collection[int] | None = None,
+        threads: int = 1,
+    ) -> None:
         """Open a file.
 
         Args:
@@ -48,17 +57,18 @@ class LinearReader(PictureReader[LinearFrame]):
             gamma: curve of its code values.
             longer_side: scale down so that the longer side has so many pixels, while colours are converted: cheap.
                 Code values are averaged, not light.
+            only: indices of the frames to give; all if None.
             threads: of the decoder.
         """
         self._gamma, self._longer_side = gamma, longer_side
-        self._convert: RgbConverter | None = None
+        self._convert: CodeConverter | None = None
         self._table: NDArray[np.float32] = np.zeros(0, np.float32)
-        super().__init__(path, threads)
+        super().__init__(path, threads, only)
 
     def _make(self, picture: Any, index: int, time_s: float) -> LinearFrame:
         if self._convert is None:
             deep = any(component.bits > 8 for component in picture.format.components)
-            self._convert = RgbConverter(deep=deep, longer_side=self._longer_side)
+            self._convert = CodeConverter(pixels="rgb48le" if deep else "rgb24", longer_side=self._longer_side)
             values = np.arange(65536 if deep else 256, dtype=np.float32) / np.float32(white_code(picture, deep))
             self._table = decode(np.minimum(values, 1), self._gamma)
         codes = np.ascontiguousarray(self._turn.upright(self._convert(picture)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Collection, Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
@@ -41,25 +41,26 @@ class PictureReader(Generic[Made]):
         info: what the header says.
     """
 
-    def __init__(self, path: Path, threads: int) -> None:
+    def __init__(self, path: Path, threads: int, only: Collection[int] | None = None) -> None:
         """Open a file.
 
         Args:
             path: the file (MP4, MOV, MKV, WebM, GIF, AVI …).
             threads: of the decoder.
+            only: indices of the pictures to make something of; all if None. The others cost their decoding alone.
 
         Raises:
             VideoError: the file is missing, empty, cut off, no video, HDR, or of an absurd size.
         """
-        self._path = Path(path)
+        self._path, self._only = Path(path), only
         self._container, self._stream = open_stream(self._path)
         self._stream.codec_context.thread_count = threads
-        self._damaged = 0
+        self._damaged = self._decoded = 0
         self._turn = Turn()
         self._made = self._decode()
         try:
             self._first = next(self._made, None)
-            if self._first is None:
+            if not self._decoded:
                 raise VideoError(f"{self._path} holds no frame that can be decoded", "record or convert it again")
             self.info = _info(self._container, self._stream, self._turn)
         except BaseException:
@@ -109,7 +110,9 @@ class PictureReader(Generic[Made]):
             elif stored != size:
                 sizes = f"from {stored[0]}x{stored[1]} to {size[0]}x{size[1]}"
                 raise VideoError(f"{self._path} changes {sizes} at frame {index}", "cut or convert it to one size")
-            yield self._make(picture, index, time_s)
+            self._decoded = index + 1
+            if self._only is None or index in self._only:
+                yield self._make(picture, index, time_s)
             index, last_s, stored = index + 1, time_s, size
         if self._damaged:
             raise VideoError(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from relit_camera.space.images import Frame
-from relit_camera.video.decoding import RgbConverter
+from relit_camera.video.decoding import CodeConverter
 from relit_camera.video.pictures import PictureReader, VideoInfo
 
 
@@ -43,7 +43,7 @@ class VideoReader(PictureReader[Frame]):
             accurate: convert colours to within half a code value; otherwise faster, about one code value too dark.
             threads: of the decoder.
         """
-        self._convert = RgbConverter(accurate=accurate)
+        self._convert = CodeConverter(accurate=accurate)
         super().__init__(path, threads)
 
     def _make(self, picture: Any, index: int, time_s: float) -> Frame:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.errors import VideoError
-from relit_camera.space.colour import Gamma, luminance
+from relit_camera.space.colour import Gamma, luminance, uint8_from_linear
+from relit_camera.space.images import DisplayImage, LinearImage
 from relit_camera.video.linear import LinearReader
 
 CELLS = 32
@@ -30,11 +31,13 @@ class Brightness:
         cells: (frames, rows, columns) float32 mean luminance, linear; the video's white is 1.
         times_s: (frames,) float64 presentation times, growing.
         size: width and height of the video's upright pictures in pixels.
+        still: small uint8 sRGB picture in which each pixel is as bright as it ever was: where the face is, it shows.
     """
 
     cells: NDArray[np.float32]
     times_s: NDArray[np.float64]
     size: tuple[int, int]
+    still: DisplayImage
 
     @property
     def interval_s(self) -> float:
@@ -57,15 +60,17 @@ def watch(
         VideoError: as `video.linear.LinearReader`, or it has fewer than eight frames.
     """
     cells, times_s = [], []
+    brightest: LinearImage | None = None
     with LinearReader(path, gamma, longer_side=CELLS * _PIXELS_A_CELL, threads=threads) as video:
         for frame in video:
+            brightest = frame.image if brightest is None else np.maximum(brightest, frame.image)
             cells.append(cells_of(luminance(frame.image)))
             times_s.append(frame.time_s)
             progress(len(times_s))
         size = (video.info.width, video.info.height)
-    if len(times_s) < MIN_FRAMES:
+    if brightest is None or len(times_s) < MIN_FRAMES:
         raise VideoError(f"{path} has {len(times_s)} frames only", "record at least ten seconds")
-    return Brightness(np.stack(cells), np.array(times_s), size)
+    return Brightness(np.stack(cells), np.array(times_s), size, uint8_from_linear(brightest))
 
 
 def cells_of(picture: NDArray[np.float32]) -> NDArray[np.float32]:

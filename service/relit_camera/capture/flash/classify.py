@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.capture.face_circle import Circle
 from relit_camera.capture.flash.brightness import Brightness
 from relit_camera.capture.flash.doubts import WEAKEST, strengths, unlike_neighbours
 from relit_camera.capture.flash.edges import find_edges
@@ -16,12 +17,12 @@ from relit_camera.capture.flash.lit_shares import Blocks
 from relit_camera.capture.flash.refusals import refuse_too_fast, refuse_too_few, refuse_unless_blinking
 from relit_camera.capture.flash.schedule import WHOLE, Schedule, Shutter, schedule_of
 from relit_camera.capture.flash.shutter import fit_shutter
-from relit_camera.capture.flash.signal import Circle, Signal, flash_signal, level_of, reached_cells
+from relit_camera.capture.flash.signal import Signal, flash_signal, level_of, reached_cells
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_SURE_S, _SURE_SHARE = 0.0002, 0.25
+_SURE_S, _SURE_SHARE = 0.0005, 0.25
 """So exactly are the edges of a steady flash known, and by this share of its straying less those of another: a frame
 that near to one is not called whole."""
 
@@ -80,11 +81,11 @@ def find_flashes(seen: Brightness, circle: Circle | None = None) -> Flashes:
 
     Args:
         seen: brightness of the whole video.
-        circle: x, y, radius of the face in pixels, where it is known.
+        circle: of the face, where it is known.
 
     Raises:
-        VideoError: nothing blinks; the light is on all the time; it blinks too fast for the frame rate; too few frames
-            are bright. The message says what to do.
+        CaptureError: nothing blinks; the light is on all the time; it blinks too fast for the frame rate; too few
+            frames are bright. The message says what to do.
     """
     reached = reached_cells(seen, circle)
     beat = find_beat(level_of(seen, reached), seen.times_s)

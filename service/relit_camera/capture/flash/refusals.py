@@ -8,7 +8,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from relit_camera.capture.flash.edges import Edges
 from relit_camera.capture.flash.frequency import Beat
-from relit_camera.errors import VideoError
+from relit_camera.errors import CaptureError
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def refuse_unless_blinking(level: Floats, interval_s: float, beat: Beat, edges: 
     """Nothing, if the level (frames,) goes up and down as a blinking light's does.
 
     Raises:
-        VideoError: it does not; the light is on all the time, or there is none.
+        CaptureError: it does not; the light is on all the time, or there is none.
     """
     window = max(3, round(1.1 / beat.frequency_hz / interval_s))
     low, high = minimum_filter1d(level, window), maximum_filter1d(level, window)
@@ -45,12 +45,12 @@ def refuse_unless_blinking(level: Floats, interval_s: float, beat: Beat, edges: 
         ratio = float(np.percentile(level, 98) / max(np.percentile(level, 2), 1e-6))
         if ratio > _CHANGING:
             what = f"no flash found: the brightness changes by a factor of {ratio:.1f}, but nothing blinks"
-            raise VideoError(what, "the light must not be on all the time: let it blink, about five times a second")
+            raise CaptureError(what, "the light must not be on all the time: let it blink, about five times a second")
         what = f"no flash found: the brightness stays within {ratio - 1:.0%}"
-        raise VideoError(what, "let a light blink about five times a second, a metre away, in a dim room")
+        raise CaptureError(what, "let a light blink about five times a second, a metre away, in a dim room")
     flashes = int(edges.rising.sum())
     if flashes < MIN_FLASHES:
-        raise VideoError(f"only {flashes} flashes found", "record half a minute or more of the blinking light")
+        raise CaptureError(f"only {flashes} flashes found", "record half a minute or more of the blinking light")
 
 
 def refuse_too_fast(frequency_hz: float, interval_s: float, whole: float) -> None:
@@ -62,21 +62,21 @@ def refuse_too_fast(frequency_hz: float, interval_s: float, whole: float) -> Non
         whole: share of the flashes that do.
 
     Raises:
-        VideoError: too few do.
+        CaptureError: too few do.
     """
     if whole < _FEW_WHOLE:
         rate = 1 / interval_s
         what = f"the light blinks {frequency_hz:.1f} times a second, too fast for {rate:.0f} frames a second"
         cure = f"let it blink at most {rate / 6:.0f} times a second, or make the room a little brighter"
-        raise VideoError(f"{what}: {whole:.0%} of the flashes light a whole frame", cure)
+        raise CaptureError(f"{what}: {whole:.0%} of the flashes light a whole frame", cure)
 
 
 def refuse_too_few(bright: int) -> None:
     """Nothing, if there are enough bright frames.
 
     Raises:
-        VideoError: there are not.
+        CaptureError: there are not.
     """
     if bright < MIN_BRIGHT:
         cure = "record half a minute or more, the light about a metre away and pointing at the face"
-        raise VideoError(f"the flash lights only {bright} frames wholly and strongly enough", cure)
+        raise CaptureError(f"the flash lights only {bright} frames wholly and strongly enough", cure)

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.capture.face_circle import Circle
 from relit_camera.capture.flash.brightness import Brightness
 
 Floats = NDArray[np.float64]
-Circle = tuple[float, float, float]
-"""x, y and radius in pixels of the upright video."""
 
 FLOOR = 1e-4
 """Brightness below this is the camera's noise."""
@@ -85,4 +84,4 @@ def _inside(circle: Circle, seen: Brightness) -> NDArray[np.bool_]:
     rows, columns = seen.cells.shape[1:]
     x = (np.arange(columns) + 0.5) * seen.size[0] / columns
     y = (np.arange(rows) + 0.5) * seen.size[1] / rows
-    return np.asarray(np.hypot(x[None, :] - circle[0], y[:, None] - circle[1]) < circle[2])
+    return np.asarray(np.hypot(x[None, :] - circle.x, y[:, None] - circle.y) < circle.radius)

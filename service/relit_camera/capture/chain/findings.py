@@ -1,0 +1,180 @@
+"""What the chain found in a video, and the report that tells it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.capture.chain.options import CaptureOptions
+from relit_camera.capture.chain.survey import Survey
+from relit_camera.capture.chain.usable import Lamps
+from relit_camera.capture.flash.kind import Kind
+from relit_camera.capture.light.head_square import HeadSquare
+from relit_camera.capture.light.strength import Strengths
+
+REPORT_VERSION = 1
+
+_DOUBTFUL_BALL = 0.6
+"""Share of the ball's outline that shows, below which its place is uncertain."""
+_UNLIKE_REASON = "its light does not fit the person's shape: the lamp was hidden, or its mirror image mistaken"
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """All that the chain found.
+
+    Attributes:
+        video: file name.
+        options: what was asked for.
+        seen: what the video shows.
+        lamps: where the lamp was in the usable frames.
+        kept: growing indices of those frames that were read as pictures: of a long film's not all are needed.
+        square: what was cut out.
+        room_taken_off: whether the room's light was.
+        strengths: of the kept frames' flashes.
+        good: (some,) which of those were used.
+        lights: pictures left after those under nearly the same light were merged.
+    """
+
+    video: str
+    options: CaptureOptions
+    seen: Survey
+    lamps: Lamps
+    kept: NDArray[np.intp]
+    square: HeadSquare
+    room_taken_off: bool
+    strengths: Strengths
+    good: NDArray[np.intp]
+    lights: int
+
+    @property
+    def warnings(self) -> list[str]:
+        """What may have made the result worse, and what to do about it."""
+        seen, told = self.seen, []
+        if seen.ball.evidence is not None and seen.ball.evidence < _DOUBTFUL_BALL:
+            told.append(
+                f"only {seen.ball.evidence:.0%} of the ball's outline shows, directions may be degrees off: film it "
+                "before something plain, or give its circle with --ball X,Y,RADIUS"
+            )
+        told += [
+            f"the ball was {each.kind} in the frames {each.first} to {each.last}: fix it in its place"
+            for each in seen.episodes
+        ]
+        if not seen.gains.share:
+            told.append(
+                "the flash reaches everything in the picture, so that the camera's automatics are known only between "
+                "flashes: film before something far away, or with exposure and white balance locked"
+            )
+        if seen.eyes_px is None:
+            told.append("no face detector is installed, the head's size is a guess: run `relit models pull`")
+        return told
+
+    def report(self) -> dict[str, Any]:
+        """The report of `relit capture build`; docs/capture.md tells what is in it."""
+        seen, ball = self.seen, self.seen.ball
+        return {
+            "version": REPORT_VERSION,
+            "video": self.video,
+            "width_px": seen.size[0],
+            "height_px": seen.size[1],
+            "focal_px": ball.focal.pixels,
+            "focal": {"source": ball.focal.source, "error": ball.focal.error},
+            "ball": {
+                "x": ball.outline.x,
+                "y": ball.outline.y,
+                "radius": ball.outline.radius,
+                "radius_cm": self.lamps.place.ball_radius_cm,
+                "evidence": ball.evidence,
+                "glints": ball.glints,
+                "episodes": [
+                    {"kind": each.kind, "first": each.first, "last": each.last, "shift_px": [each.dx, each.dy]}
+                    for each in seen.episodes
+                ],
+            },
+            "flash": {
+                "frequency_hz": seen.flashes.schedule.frequency_hz,
+                "duty": seen.flashes.schedule.duty,
+                "exposure_s": seen.flashes.shutter.exposure_s,
+                "readout_s": seen.flashes.shutter.readout_s,
+            },
+            "face": {
+                **seen.motion.circle._asdict(),
+                "found_by": seen.face.by,
+                "eyes_px": seen.eyes_px,
+                "head_cm": _numbers(self.lamps.place.head_cm),
+                "pixels_per_cm": self.lamps.place.pixels_per_cm,
+            },
+            "motion": {"reference": seen.motion.reference, "unsteady_px": seen.motion.unsteady_px},
+            "room": {
+                "taken_off": self.room_taken_off,
+                "left_as_is": seen.gains.left_as_is,
+                "left": seen.gains.left,
+                "gains_from": seen.gains.source,
+                "gains_share": seen.gains.share,
+                "gains_spread": seen.gains.spread,
+            },
+            "near_field": {
+                "corrected": self.options.near_field,
+                "light_distance_cm": self.options.light_distance_cm,
+                "misfit": float(np.median(self.strengths.misfit)),
+            },
+            "light": {"area_sr": self.lamps.area_sr, "frames": len(self.good), "lights": self.lights},
+            "square": {
+                "left": self.square.left,
+                "top": self.square.top,
+                "side": self.square.side,
+                "size": self.square.size,
+            },
+            "warnings": self.warnings,
+            "frames": [self._frame(index) for index in range(len(seen.flashes.frames))],
+        }
+
+    def _frame(self, index: int) -> dict[str, Any]:
+        seen = self.seen
+        frame, motion = seen.flashes.frames[index], seen.motion.transforms[index]
+        told: dict[str, Any] = {
+            "index": index,
+            "time_s": frame.time_s,
+            "kind": frame.kind.value,
+            "reason": frame.reason,
+        }
+        if index in seen.motion.lost:
+            rejected = frame.kind is Kind.BRIGHT
+            return told | {"kind": Kind.REJECTED.value if rejected else told["kind"], "reason": "the face is not found"}
+        told |= {"rotation_deg": motion.rotation_deg, "translation_px": [motion.x, motion.y]}
+        if index in self._gain:
+            told["gain"] = _numbers(self._gain[index])
+        if index in self.lamps.unusable:
+            return told | {"kind": Kind.REJECTED.value, "reason": self.lamps.unusable[index]}
+        if index in self._place:
+            place = self._place[index]
+            told |= {
+                "direction": _numbers(self.lamps.directions[place]),
+                "at_ball": _numbers(self.lamps.at_ball[place]),
+            }
+        if index in self._kept:
+            kept = self._kept[index]
+            told["strength"] = float(self.strengths.strength[kept])
+            if kept not in self.good:
+                told |= {"kind": Kind.REJECTED.value, "reason": _UNLIKE_REASON}
+        return told
+
+    @cached_property
+    def _gain(self) -> dict[int, NDArray[np.float64]]:
+        return dict(zip(self.seen.frames.tolist(), self.seen.gains.rgb, strict=True))
+
+    @cached_property
+    def _place(self) -> dict[int, int]:
+        return {int(index): place for place, index in enumerate(self.lamps.index)}
+
+    @cached_property
+    def _kept(self) -> dict[int, int]:
+        return {int(index): place for place, index in enumerate(self.kept)}
+
+
+def _numbers(vector: NDArray) -> list[float]:
+    return [round(float(value), 6) for value in vector]

@@ -1,0 +1,135 @@
+"""From a video of a person, a mirror ball and a blinking lamp to samples, unattended (thesis 4.3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.capture.ball.outline import Outline
+from relit_camera.capture.chain.findings import Findings
+from relit_camera.capture.chain.merge import group_lights, merged, spread_evenly
+from relit_camera.capture.chain.options import CaptureOptions, Progress, no_progress
+from relit_camera.capture.chain.survey import survey
+from relit_camera.capture.chain.usable import Lamps, find_lamps, refuse_one_sided
+from relit_camera.capture.light.head_square import HeadSquare, head_square
+from relit_camera.capture.light.matte import flash_matte
+from relit_camera.capture.light.near_field import to_distant
+from relit_camera.capture.light.one_light import OneLight, read_one_light
+from relit_camera.capture.light.strength import Strengths, find_strengths
+from relit_camera.errors import CaptureError
+from relit_camera.reflectance.samples import Samples
+from relit_camera.space.images import Mask
+
+_MOST_FRAMES = 600
+"""Bright frames that are kept in memory, 1 GB at 512 x 512: a minute's."""
+_SMALL = 96
+"""Pixels a side of the pictures in which strengths and shape are found."""
+_BALL_REACH = 1.15
+"""Radii about the ball in which nobody is."""
+_UNLIKE = 3.0
+"""Frames whose light fits the person's shape so many times worse than usual are left out."""
+_LEAST_PERSON = 0.03
+"""Share of the picture that the person takes at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class CaptureResult:
+    """What a video gave.
+
+    Attributes:
+        samples: aligned pictures of the person under one distant light each.
+        findings: on the way; the report is made of them.
+    """
+
+    samples: Samples
+    findings: Findings
+
+
+def build_samples(
+    video: Path, options: CaptureOptions | None = None, progress: Progress = no_progress
+) -> CaptureResult:
+    """Samples of a capture video. It is read five times and never held in memory.
+
+    Raises:
+        VideoError: the video cannot be read, is cut off or damaged, or shows no face.
+        CaptureError: something is missing in it; the message says what to do differently.
+        InputError: an option is impossible.
+    """
+    options = options or CaptureOptions()
+    seen = survey(video, options, progress)
+    found = find_lamps(seen, options)
+    lamps = found.only(spread_evenly(found.directions, _MOST_FRAMES))
+    square = head_square(seen.motion.circle, seen.size, options.size)
+    subtract = seen.gains.room_can_go if options.subtract_room is None else options.subtract_room
+    total = len(seen.flashes.frames)
+    lights = read_one_light(
+        video,
+        options.gamma,
+        square,
+        dict(enumerate(seen.motion.transforms)),
+        dict(zip(seen.frames.tolist(), seen.gains.rgb, strict=True)),
+        lamps.index,
+        seen.dark,
+        subtract=subtract,
+        threads=options.threads,
+        progress=lambda done: progress("Cutting out the flash's light", done, total),
+    )
+    progress("Finding the person", 0, None)
+    matte = _matte(lights, square, seen.ball.outline)
+    strengths = _strengths(lights, lamps, square, matte, (seen.motion.circle.x, seen.motion.circle.y))
+    good = np.flatnonzero(strengths.misfit <= _UNLIKE * np.median(strengths.misfit))
+    refuse_one_sided(lamps.directions[good], len(seen.highlights))
+    groups = [good[group] for group in group_lights(lamps.directions[good])]
+    pictures = np.stack([_merged(lights, strengths, group, matte, options.near_field) for group in groups])
+    directions = np.stack([lamps.directions[group].mean(axis=0) for group in groups])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    findings = Findings(video.name, options, seen, found, lamps.index, square, subtract, strengths, good, len(groups))
+    return CaptureResult(Samples(pictures, directions, matte), findings)
+
+
+def _matte(lights: OneLight, square: HeadSquare, ball: Outline) -> Mask:
+    x, y = square.place(ball.x, ball.y)
+    place = np.arange(square.size) + 0.5
+    nobody = np.hypot(place - x, place[:, None] - y) < _BALL_REACH * ball.radius * square.scale
+    matte = flash_matte(lights.pictures, lights.room, nobody)
+    if matte.mean() < _LEAST_PERSON:
+        raise CaptureError(
+            f"the flash lights {matte.mean():.1%} of what is about the face: the person cannot be told from the room",
+            "make the room darker, or hold the lamp nearer, about a metre from the face",
+        )
+    return matte
+
+
+def _strengths(lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, head: tuple[float, float]) -> Strengths:
+    """The flashes' strengths, by small pictures."""
+    side = min(_SMALL, square.size)
+    small = np.stack(
+        [cv2.resize(each.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA) for each in lights.pictures]
+    )
+    factor = side / square.size
+    x, y = square.place(*head)
+    return find_strengths(
+        np.maximum(small, 0),
+        lamps.lamps_cm,
+        cv2.resize(matte, (side, side), interpolation=cv2.INTER_AREA),
+        (x * factor, y * factor),
+        lamps.place.pixels_per_cm * square.scale * factor,
+    )
+
+
+def _merged(
+    lights: OneLight, strengths: Strengths, group: NDArray[np.intp], matte: Mask, near_field: bool
+) -> NDArray[np.float32]:
+    """One picture (size, size, 3) of a group's, each as under a distant flash of the usual strength; black outside."""
+    surface = strengths.surface.resized((matte.shape[1], matte.shape[0]))
+    pictures = []
+    for each in group:
+        factor = to_distant(surface, strengths.lamps[each]) if near_field else np.ones_like(matte)
+        scale = (factor * (matte > 0) / np.float32(strengths.strength[each]))[..., None]
+        pictures.append(lights.pictures[each].astype(np.float32) * scale)
+    # A weak flash's picture, made as bright as others, has more noise.
+    return np.maximum(merged(np.stack(pictures), strengths.strength[group] ** 2), 0)

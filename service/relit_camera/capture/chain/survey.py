@@ -1,0 +1,162 @@
+"""The passes over a video that find what its pictures show: flashes, face, ball, head motion, gains, highlights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.capture.ball.find import FoundBall, find_ball, given_ball
+from relit_camera.capture.ball.focal import Focal, given_focal, tagged_focal, typical_focal
+from relit_camera.capture.ball.focal_tag import read_focal_tag
+from relit_camera.capture.ball.highlight import Highlight, NoHighlight
+from relit_camera.capture.ball.sample import MAX_FRAMES, SceneSample, sample_scene
+from relit_camera.capture.ball.view import PinholeView
+from relit_camera.capture.ball.watch import BallWatch, Episode, episodes
+from relit_camera.capture.chain.options import CaptureOptions, Progress
+from relit_camera.capture.flash.brightness import watch
+from relit_camera.capture.flash.classify import Flashes, find_flashes
+from relit_camera.capture.flash.kind import Kind
+from relit_camera.capture.light.gains import FrameGains, cells_of, find_gains
+from relit_camera.capture.light.highlights import BallFilm
+from relit_camera.capture.light.place import eye_distance
+from relit_camera.capture.locate_face import LocatedFace, locate_face
+from relit_camera.capture.stabilise.stabilise import Stabilisation, stabilise
+from relit_camera.errors import ModelError
+from relit_camera.face.detector import FaceDetector
+from relit_camera.models.registry import model_path
+from relit_camera.space.colour import uint8_from_linear
+from relit_camera.space.images import DisplayImage
+from relit_camera.video.linear import LinearReader
+
+Indices = NDArray[np.intp]
+
+_STILLS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What a video shows.
+
+    Attributes:
+        size: width and height of its upright pictures.
+        flashes: what its frames are.
+        face: in the picture in which each pixel is as bright as it ever was.
+        eyes_px: distance of the eyes, None where no detector is installed.
+        motion: where the face went.
+        ball: the mirror ball.
+        episodes: in which it was hidden or elsewhere.
+        highlights: of the bright frames about which the face was found, by index.
+        gains: of bright and dark frames, in the order of `frames`.
+        frames: growing indices of those.
+    """
+
+    size: tuple[int, int]
+    flashes: Flashes
+    face: LocatedFace
+    eyes_px: float | None
+    motion: Stabilisation
+    ball: FoundBall
+    episodes: list[Episode]
+    highlights: Mapping[int, Highlight | NoHighlight]
+    gains: FrameGains
+    frames: Indices
+
+    @property
+    def view(self) -> PinholeView:
+        """How the camera sees the ball."""
+        return PinholeView(self.ball.outline, self.size, self.ball.focal.pixels)
+
+    @property
+    def dark(self) -> Indices:
+        """Dark frames about which the face was found."""
+        return np.setdiff1d(self.flashes.indices(Kind.DARK), list(self.motion.lost))
+
+
+def survey(video: Path, options: CaptureOptions, progress: Progress) -> Survey:
+    """Look a video over, four times.
+
+    Raises:
+        VideoError: it cannot be read, is cut off or damaged, or shows no face.
+        CaptureError: there is no flash, no mirror ball, or the face goes away; the message says what to do.
+    """
+    seen = watch(
+        video, options.gamma, threads=options.threads, progress=lambda done: progress("Looking for flashes", done, None)
+    )
+    total = len(seen.times_s)
+    flashes = find_flashes(seen)
+    progress("Looking for the mirror ball", 0, None)
+    ball, sample = _ball(video, seen.size, flashes, options)
+    face = LocatedFace(options.face, "user") if options.face else locate_face(seen, flashes)
+    motion = stabilise(
+        video,
+        flashes,
+        face.circle,
+        threads=options.threads,
+        progress=lambda done: progress("Following the face", done, total),
+    )
+    bright, dark = (np.setdiff1d(flashes.indices(kind), list(motion.lost)) for kind in (Kind.BRIGHT, Kind.DARK))
+    frames = np.union1d(bright, dark)
+    film, sightings, cells, stills = BallFilm(ball.outline, seen.size), [], [], []
+    ball_watch = BallWatch(sample, ball.outline)
+    chosen = frozenset(bright[:: max(1, len(bright) // _STILLS)].tolist())
+    is_dark = frozenset(dark.tolist())
+    with LinearReader(video, options.gamma, only=frozenset(frames.tolist()), threads=options.threads) as reader:
+        for frame in reader:
+            film.add(frame.index, frame.image)
+            cells.append(cells_of(frame.image))
+            if frame.index in is_dark:
+                sightings.append(ball_watch.see(frame.index, frame.image))
+            elif frame.index in chosen:
+                stills.append(uint8_from_linear(frame.image))
+            progress("Looking at the light", frame.index + 1, total)
+    found = episodes(sightings, ball.outline.radius)
+    view = PinholeView(ball.outline, seen.size, ball.focal.pixels)
+    flash = np.array([flashes.frames[index].flash for index in frames])
+    return Survey(
+        seen.size,
+        flashes,
+        face,
+        _eyes(stills),
+        motion,
+        ball,
+        found,
+        film.highlights(bright.tolist(), view, found),
+        find_gains(np.stack(cells), flashes.times_s[frames], np.isin(frames, bright), flash),
+        frames,
+    )
+
+
+def _ball(
+    video: Path, size: tuple[int, int], flashes: Flashes, options: CaptureOptions
+) -> tuple[FoundBall, SceneSample]:
+    """The ball, in as many dark frames as bright ones, spread over the video."""
+    half = MAX_FRAMES // 2
+    picked = [
+        indices[:: max(1, -(-len(indices) // half))] for indices in map(flashes.indices, (Kind.BRIGHT, Kind.DARK))
+    ]
+    only = frozenset(np.concatenate(picked).tolist())
+    with LinearReader(video, options.gamma, only=only, threads=options.threads) as reader:
+        sample = sample_scene(frame.image for frame in reader)
+    focal = _focal(video, size, options.focal_px)
+    find = find_ball if options.ball is None else partial(given_ball, given=options.ball)
+    return find(sample, focal=focal), sample
+
+
+def _focal(video: Path, size: tuple[int, int], given_px: float | None) -> Focal:
+    if given_px is not None:
+        return given_focal(given_px)
+    tag_mm = read_focal_tag(video)
+    return typical_focal(size) if tag_mm is None else tagged_focal(tag_mm, size)
+
+
+def _eyes(stills: list[DisplayImage]) -> float | None:
+    try:
+        detector = FaceDetector(model_path("face_detector_yunet"))
+    except ModelError:  # that it is missing, `locate_face` has said
+        return None
+    return eye_distance(stills, detector)

@@ -1,0 +1,80 @@
+"""Where head and ball stand before the camera, in centimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.capture.ball.direction import NearLight, radius_at_depth
+from relit_camera.capture.ball.outline import Outline
+from relit_camera.capture.ball.view import PinholeView
+from relit_camera.face.detector import FaceDetector
+from relit_camera.space.images import DisplayImage
+
+Vector = NDArray[np.float64]
+
+EYES_CM = 6.3
+"""Between the middles of the eyes: adults have 6.3 cm on average, give or take .36 (Dodgson 2004)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Head and ball, camera axes.
+
+    Attributes:
+        head_cm: (3,) middle of the face's surface.
+        pixels_per_cm: at the head's distance.
+        ball: how the camera sees the ball.
+        ball_radius_cm: as given, or as it is if the ball is as far from the camera as the head.
+        light_distance_cm: from the lamp to the head.
+    """
+
+    head_cm: Vector
+    pixels_per_cm: float
+    ball: PinholeView
+    ball_radius_cm: float
+    light_distance_cm: float
+
+    def near_light(self, outline: Outline) -> NearLight:
+        """The lamp as a ball with this outline tells it; where the ball was pushed, not the usual one.
+
+        Raises:
+            InputError: the lamp would be nearer to the head than the ball is.
+        """
+        view = self.ball
+        if outline != view.outline:
+            view = PinholeView(outline, view.size, view.focal_px)
+        return NearLight(view, self.ball_radius_cm, self.head_cm, self.light_distance_cm)
+
+
+def place_scene(
+    ball: PinholeView,
+    head_px: tuple[float, float],
+    eyes_px: float,
+    light_distance_cm: float,
+    ball_radius_cm: float | None = None,
+) -> Place:
+    """Place head and ball: the head by the distance of its eyes, the ball by its size, or else beside the head.
+
+    Args:
+        ball: how the camera sees it.
+        head_px: middle of the face in the picture.
+        eyes_px: distance of the eyes' middles.
+        light_distance_cm: from the lamp to the head.
+        ball_radius_cm: where it is known.
+    """
+    pixels_per_cm = eyes_px / EYES_CM
+    depth_cm = ball.focal_px / pixels_per_cm
+    x, y = (head_px[0] - ball.size[0] / 2) / pixels_per_cm, (ball.size[1] / 2 - head_px[1]) / pixels_per_cm
+    radius_cm = radius_at_depth(ball, depth_cm) if ball_radius_cm is None else ball_radius_cm
+    return Place(np.array([x, y, -depth_cm]), pixels_per_cm, ball, radius_cm, light_distance_cm)
+
+
+def eye_distance(stills: Iterable[DisplayImage], detector: FaceDetector) -> float | None:
+    """Median distance in pixels of the eyes' middles over pictures of one size, None where no face is found."""
+    found = (detector.detect(still) for still in stills)
+    distances = [float(np.linalg.norm(face.eyes[0] - face.eyes[1])) for face in found if face is not None]
+    return float(np.median(distances)) if distances else None

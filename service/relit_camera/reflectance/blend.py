@@ -1,0 +1,107 @@
+"""The default: the fitted model of each pixel and a smooth interpolation, mixed as the capture itself says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.reflectance.black_ring import boundary, region_share
+from relit_camera.reflectance.method import factored_field
+from relit_camera.reflectance.model import JUDGES, Model, ModelField
+from relit_camera.reflectance.rbf import RadialBasis
+from relit_camera.reflectance.samples import Samples
+from relit_camera.subject.field import FactoredField, texel_vectors
+
+Floats = NDArray[np.float32]
+
+FOLDS = 4
+
+
+@dataclass(frozen=True)
+class Blend:
+    """A mean of `model` and `rbf` where lights were captured; `model` alone where none were.
+
+    The model has the shadows' edges where the shape says, the splines have none. Where the shape and the directions
+    are exact the model is nearly always right; where they are not, the truth mostly lies between the two.
+    """
+
+    def build(self, samples: Samples) -> BlendField:
+        """The field; see `Method.build`. It rests on `samples.geometry`."""
+        modelled = Model().build(samples)
+        smooth = factored_field(RadialBasis(), samples)
+        return BlendField(modelled, smooth, choose_share(modelled))
+
+
+@dataclass(frozen=True)
+class BlendField:
+    """What `Blend` builds.
+
+    Attributes:
+        modelled: answers every direction.
+        smooth: black beyond the sampled region, into which it fades.
+        share: of the model inside the region; the rest is the smooth field's.
+    """
+
+    modelled: ModelField
+    smooth: FactoredField
+    share: float
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+        return self.modelled.size
+
+    def dense(self, start: int, stop: int) -> Floats:
+        """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
+        covered = self._texels_covered[None, :, None]
+        return self._mixed(self.modelled.dense(start, stop), self.smooth.dense(start, stop), covered)
+
+    def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+        """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
+        covered = region_share(self.smooth.directions, directions)[:, None, None]
+        return self._mixed(self.modelled.at(directions, pixels), self.smooth.at(directions, pixels), covered)
+
+    @cached_property
+    def _texels_covered(self) -> Floats:
+        return region_share(self.smooth.directions, texel_vectors())
+
+    def _mixed(self, modelled: Floats, smooth: Floats, covered: Floats) -> Floats:
+        """What the smooth field answers has `covered` in it as a factor already: it is its weight."""
+        rest = 1 - self.share
+        return np.asarray(
+            (self.share * modelled + rest * np.maximum(smooth, 0)) / (self.share + rest * covered + 1e-9), np.float32
+        )
+
+
+def choose_share(modelled: ModelField) -> float:
+    """The model's share that foretells best what neither part has seen: 0 to 1.
+
+    Cross-validation over the lights that others surround, by some pixels: least squares (stacking; Breiman 1996).
+    """
+    samples = modelled.samples
+    lights = len(samples.directions)
+    surrounded = np.setdiff1d(np.arange(lights), boundary(samples.directions))
+    inside = np.flatnonzero(samples.matte.ravel() > 0.5)
+    pixels = inside[:: max(1, len(inside) // JUDGES)]
+    agreement = distance = 0.0
+    for fold in range(FOLDS):
+        left_out = surrounded[fold::FOLDS]
+        if not len(left_out):
+            continue
+        kept = np.setdiff1d(np.arange(lights), left_out)
+        known = replace(
+            samples,
+            pictures=samples.pictures[kept],
+            directions=samples.directions[kept],
+            known_geometry=samples.geometry,
+        )
+        asked = samples.directions[left_out]
+        smooth = np.maximum(factored_field(RadialBasis(), known).at(asked, pixels), 0)
+        apart = modelled.fitted_to(known, pixels).at(asked, pixels) - smooth
+        truth = samples.pictures.reshape(lights, -1, 3)[left_out][:, pixels]
+        agreement += float(np.vdot(apart, truth - smooth))
+        distance += float(np.vdot(apart, apart))
+    return float(np.clip(agreement / distance, 0, 1)) if distance else 1.0

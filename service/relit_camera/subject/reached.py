@@ -1,0 +1,85 @@
+"""How well a compressed field does, against what it was made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.space.images import Mask
+from relit_camera.space.quality import psnr
+from relit_camera.subject.field import TEXELS
+from relit_camera.subject.local_basis import LocalBasis
+
+Values = NDArray[np.float32]
+
+DARK = 0.01
+"""A light whose picture is darker than this share of the brightest light's is judged by that."""
+BEST_DB = 200.0
+"""Of pictures that are equal."""
+BATCH = 32
+"""Lights restored at once: bounds the memory."""
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Figures in dB (see `space.quality.psnr`), and bytes.
+
+    Attributes:
+        light_db: of the captured light that comes back worst.
+        texel_db: of the texel, alone, that comes back worst; its peak is that of a sample of pixels.
+        map_db: of the light map, of those it was tried on, that comes back worst; None where it was tried on none.
+        bytes_share: bytes kept, by those of the dense float32 matrix of all pixels.
+    """
+
+    light_db: float
+    texel_db: float
+    map_db: float | None
+    bytes_share: float
+
+
+def dense_bytes(matte: Mask) -> int:
+    """Bytes of the matrix (pixels, 3, 2048) in float32."""
+    return matte.size * 3 * TEXELS * 4
+
+
+def worst_light_db(basis: LocalBasis, light_coefficients: Values, captured: Values, matte: Mask) -> float:
+    """PSNR in dB of the captured light (lights, height, width, 3) that comes back worst, inside the matte.
+
+    Args:
+        basis: the rows of the field.
+        light_coefficients: (components, lights).
+        captured: the truth.
+        matte: (height, width).
+    """
+    inside = np.flatnonzero(matte.ravel() > 0.5)
+    truth = captured.reshape(len(captured), -1, 3)
+    peaks = np.array([np.percentile(picture[inside], 99.5) for picture in truth])
+    peaks = np.maximum(peaks, DARK * peaks.max())
+    worst = BEST_DB
+    for start in range(0, len(truth), BATCH):
+        part = slice(start, start + BATCH)
+        restored = basis.at(light_coefficients[:, part], inside)
+        for seen, expected, peak in zip(restored, truth[part, inside], peaks[part], strict=True):
+            worst = min(worst, psnr(seen[None], expected[None], peak=float(peak)))
+    return worst
+
+
+def worst_map_db(basis: LocalBasis, coefficients: Values, light: Values, truth: Values, matte: Mask) -> float | None:
+    """PSNR in dB of the light map that comes back worst, inside the matte; None of no map.
+
+    Args:
+        basis: the rows of the field.
+        coefficients: (components, 2048).
+        light: (maps, 2048, 3) radiance times solid angle.
+        truth: (maps, height · width, 3), the dense field's pictures.
+        matte: (height, width).
+    """
+    inside = np.flatnonzero(matte.ravel() > 0.5)
+    found = []
+    for each, expected in zip(light, truth, strict=True):
+        by_channel = basis.at(coefficients @ each, inside)
+        seen = np.stack([by_channel[channel, :, channel] for channel in range(3)], axis=1)
+        found.append(min(psnr(seen[None], expected[None, inside]), BEST_DB))
+    return min(found, default=None)

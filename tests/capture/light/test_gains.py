@@ -1,0 +1,60 @@
+"""Gains of a camera that hunts, from pictures whose gains were put in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relit_camera.capture.light.gains import FrameGains, cells_of, find_gains
+
+
+def scene(*, reached: bool, uneven: float = 0.0, seed: int = 0) -> tuple[FrameGains, np.ndarray, np.ndarray]:
+    """Gains found, those put in (frames, 3), and which frames are bright."""
+    rng = np.random.default_rng(seed)
+    frames, rows, columns = 60, 24, 18
+    index = np.arange(frames)
+    bright = index % 6 < 3
+    wall = rng.uniform(0.05, 0.3, (rows, columns, 3))
+    person = np.zeros((rows, columns, 1))
+    person[8:, 5:13] = 1
+    # The automatics answer the flash too.
+    swing = 0.3 * np.sin(index / 5) - 0.2 * bright
+    gains = np.exp(swing[:, None] * [1.0, 0.8, 0.6])
+    flash = bright[:, None, None, None] * (person * 0.5 + (1 - person) * (0.15 if reached else 0.0))
+    light = (wall * 0.5 + flash * (1 + 0.3 * np.sin(index / 9))[:, None, None, None]) * gains[:, None, None, :]
+    if uneven:
+        place = rng.normal(0, uneven, (frames, rows, columns, 1))
+        light = light * np.exp(place)
+    light = light + rng.normal(0, 0.001, light.shape)
+    cells = np.maximum(light, 0).astype(np.float16)
+    return find_gains(cells, index / 30, bright, index // 6), gains, bright
+
+
+def test_gains_are_what_the_wall_tells() -> None:
+    found, gains, bright = scene(reached=False)
+    expected = gains / np.exp(np.log(gains[bright]).mean(axis=0))
+    np.testing.assert_allclose(found.rgb, expected, rtol=0.01)
+    assert found.share > 0.4
+    assert found.left < 0.03 < 0.15 < found.left_as_is
+    assert found.room_can_go
+
+
+def test_where_the_flash_reaches_everything_dark_frames_tell() -> None:
+    found, gains, bright = scene(reached=True)
+    assert found.share == 0
+    assert "dark frames" in found.source
+    error = np.log(found.rgb[~bright]) - np.log(gains[~bright])
+    assert (error - error.mean(axis=0)).std() < 0.02
+
+
+def test_what_no_gain_explains_shows_as_spread() -> None:
+    plain, enhanced = scene(reached=False)[0], scene(reached=False, uneven=0.2)[0]
+    assert plain.spread < 0.03
+    assert enhanced.spread == pytest.approx(0.2, rel=0.25)
+
+
+def test_cells_keep_the_mean_and_the_shape() -> None:
+    picture = np.random.default_rng(0).uniform(0, 1, (480, 320, 3)).astype(np.float32)
+    cells = cells_of(picture)
+    assert cells.shape == (96, 64, 3)
+    np.testing.assert_allclose(cells.mean(axis=(0, 1), dtype=float), picture.mean(axis=(0, 1)), rtol=2e-3)
