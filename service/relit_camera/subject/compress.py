@@ -7,15 +7,14 @@ clusters, so that the worst column is within what is allowed.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
+from relit_camera.cores import workers
 from relit_camera.space.images import Mask
 from relit_camera.subject.cluster import Cluster, Components
 from relit_camera.subject.field import TEXELS, ReflectanceField
@@ -34,7 +33,6 @@ OF_CLUSTERS, OF_SHARED = 0.55, 0.35
 THRESHOLDS = (1e-2, 1e6)
 STEPS = 10
 """Bisections between them, to 2 %."""
-MAX_WORKERS = 4
 
 
 @dataclass(frozen=True)
@@ -75,10 +73,7 @@ def compress(
     target = target or Target()
     rows, work = FieldRows(field, captured), tiles(matte)
     inside = matte.ravel() > 0.5
-    with (
-        threadpool_limits(limits=1, user_api="blas"),
-        ThreadPoolExecutor(min(os.cpu_count() or 1, MAX_WORKERS)) as pool,
-    ):
+    with workers() as pool:
         allowed, threshold = _sampled(rows, np.concatenate(work), inside, target, pool)
         press = _Press(rows, inside, allowed, threshold, target.light)
         done: list[_Pressed] = []
