@@ -189,14 +189,18 @@ def choose_kernel(samples: Samples, pixels: NDArray[np.intp]) -> Kernel:
     lights = len(samples.directions)
     values = _values(samples, pixels)
     terms = distant_terms(samples.geometry, samples.directions, pixels)
-    errors = np.zeros(len(CANDIDATES))
-    for fold in range(FOLDS):
+    bright = _bright(samples)
+
+    def errors_of(fold: int) -> list[float]:
+        """Of each candidate."""
         left_out = np.arange(lights) % FOLDS == fold
-        amounts = fit_appearance(terms[..., ~left_out], values[..., ~left_out], _bright(samples))
+        amounts = fit_appearance(terms[..., ~left_out], values[..., ~left_out], bright)
         off = values - amounts @ terms
         known, asked = samples.directions[~left_out], samples.directions[left_out]
         known_off, asked_off = (off[..., part].reshape(-1, part.sum()) for part in (~left_out, left_out))
-        for index, kernel in enumerate(CANDIDATES):
-            foretold = known_off @ residual_weights(kernel, known, asked)
-            errors[index] += float(np.sum((asked_off - foretold) ** 2))
+        foretold = (known_off @ residual_weights(kernel, known, asked) for kernel in CANDIDATES)
+        return [float(np.sum((asked_off - each) ** 2)) for each in foretold]
+
+    with workers() as pool:
+        errors = np.sum(list(pool.map(errors_of, range(FOLDS))), axis=0)
     return CANDIDATES[int(errors.argmin())]

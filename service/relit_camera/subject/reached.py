@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.cores import workers
 from relit_camera.space.images import Mask
 from relit_camera.space.quality import psnr
 from relit_camera.subject.field import TEXELS
@@ -57,13 +58,15 @@ def worst_light_db(basis: LocalBasis, light_coefficients: Values, captured: Valu
     truth = captured.reshape(len(captured), -1, 3)
     peaks = np.array([np.percentile(picture[inside], 99.5) for picture in truth])
     peaks = np.maximum(peaks, DARK * peaks.max())
-    worst = BEST_DB
-    for start in range(0, len(truth), BATCH):
+
+    def worst_from(start: int) -> float:
         part = slice(start, start + BATCH)
         restored = basis.at(light_coefficients[:, part], inside)
-        for seen, expected, peak in zip(restored, truth[part, inside], peaks[part], strict=True):
-            worst = min(worst, psnr(seen[None], expected[None], peak=float(peak)))
-    return worst
+        pairs = zip(restored, truth[part, inside], peaks[part], strict=True)
+        return min(psnr(seen[None], expected[None], peak=float(peak)) for seen, expected, peak in pairs)
+
+    with workers() as pool:
+        return min([BEST_DB, *pool.map(worst_from, range(0, len(truth), BATCH))])
 
 
 def worst_map_db(basis: LocalBasis, coefficients: Values, light: Values, truth: Values, matte: Mask) -> float | None:
