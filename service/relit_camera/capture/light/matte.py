@@ -49,7 +49,7 @@ def flash_ratio(pictures: NDArray[np.floating], room: LinearImage) -> NDArray[np
         rows = luminance(pictures[:, top : top + _BLOCK].astype(np.float32))
         low, high = np.percentile(rows, [_LOW, _HIGH], axis=0)
         # Noise goes both ways, light only one.
-        return np.maximum(high + np.minimum(low, 0), 0)
+        return np.asarray(np.maximum(high + np.minimum(low, 0), 0))
 
     with workers() as pool:
         added = np.concatenate(list(pool.map(added_in, range(0, len(room), _BLOCK))))
