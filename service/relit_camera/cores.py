@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import gc
 import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
 import cv2
 import numpy as np
@@ -13,6 +16,8 @@ OPENCV_THREADS = 2
 BLAS_THREADS = 1
 """OpenBLAS's threads spin while they wait: two of them gain a millisecond on an idle machine, and lose thirty when a
 call app wants the other core."""
+MOST_WORKERS = 4
+"""Each holds a block of its own in memory."""
 PICTURE_BYTES = 31 << 20
 """More than any array of a frame, and less than the 32 MB up to which glibc adapts."""
 
@@ -25,6 +30,17 @@ def share_cores() -> None:
     cv2.setNumThreads(min(os.cpu_count() or 1, OPENCV_THREADS))
     threadpool_limits(limits=BLAS_THREADS, user_api="blas")
     keep_picture_memory()
+
+
+@contextmanager
+def workers() -> Iterator[ThreadPoolExecutor]:
+    """Threads, one a core, for work on blocks of large arrays: NumPy and BLAS let go of Python's lock meanwhile.
+
+    BLAS starts no threads of its own under them.
+    """
+    count = min(os.cpu_count() or 1, MOST_WORKERS)
+    with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(count) as pool:
+        yield pool
 
 
 def keep_picture_memory() -> None:

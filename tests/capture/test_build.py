@@ -53,9 +53,9 @@ def test_the_header_says_what_was_reached(subject: Subject) -> None:
     meta = subject.metadata
     assert meta.format_version == 2
     assert meta.components == subject.basis.components
-    assert meta.psnr_db > 47
+    assert meta.psnr_db > 45
     assert meta.texel_psnr_db is not None
-    assert meta.texel_psnr_db > 44
+    assert meta.texel_psnr_db > 42
     assert meta.map_psnr_db is not None
     assert meta.map_psnr_db > 45
     assert meta.bytes_share is not None

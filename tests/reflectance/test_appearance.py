@@ -22,35 +22,35 @@ def terms() -> NDArray[np.float32]:
     halves = directions + [0, 0, 1]
     halves /= np.linalg.norm(halves, axis=1, keepdims=True)
     margins = random.uniform(-0.5, 1.5, (len(directions), PIXELS))
-    known = (directions @ normals.T, halves @ normals.T, margins, directions[:, 2:])
+    known = (normals @ directions.T, normals @ halves.T, margins.T, directions[:, 2])
     return appearance_terms(*(np.float32(part) for part in known))
 
 
 def test_amounts_are_found_again(terms: NDArray[np.float32]) -> None:
-    amounts = np.random.default_rng(5).uniform(0.05, 0.5, (PIXELS, TERMS, 3)).astype(np.float32)
-    values = (terms.transpose(1, 0, 2) @ amounts).transpose(1, 0, 2)
+    amounts = np.random.default_rng(5).uniform(0.05, 0.5, (PIXELS, 3, TERMS)).astype(np.float32)
+    values = amounts @ terms
     found = fit_appearance(terms, values, 1.0)
-    fitted = (terms.transpose(1, 0, 2) @ found).transpose(1, 0, 2)
+    fitted = found @ terms
     assert np.sqrt(np.mean((fitted - values) ** 2)) < 0.01
     # What tells terms apart is little for some pixels; the amounts as a whole are right.
     assert np.median(np.abs(found - amounts)) < 0.05
 
 
 def test_no_amount_is_negative_though_the_pictures_ask_for_it(terms: NDArray[np.float32]) -> None:
-    values = np.repeat((0.5 - terms[..., :1]).clip(0), 3, axis=2)
+    values = np.repeat((0.5 - terms[:, :1]).clip(0), 3, axis=1)
     found = fit_appearance(terms, values, 1.0)
     assert found.min() >= 0
 
 
 def test_a_few_pictures_that_are_wrong_do_not_count(terms: NDArray[np.float32]) -> None:
-    amounts = np.zeros((PIXELS, TERMS, 3), np.float32)
-    amounts[:, 0] = 0.6
-    values = (terms.transpose(1, 0, 2) @ amounts).transpose(1, 0, 2)
+    amounts = np.zeros((PIXELS, 3, TERMS), np.float32)
+    amounts[..., 0] = 0.6
+    values = amounts @ terms
     wrong = values.copy()
-    wrong[::12] = 1.5
+    wrong[..., ::12] = 1.5
 
     def error(seen: NDArray[np.float32]) -> float:
-        fitted = (terms.transpose(1, 0, 2) @ fit_appearance(terms, seen, 1.0)).transpose(1, 0, 2)
+        fitted = fit_appearance(terms, seen, 1.0) @ terms
         return float(np.sqrt(np.mean((fitted - values) ** 2)))
 
     assert error(values) < 0.005
@@ -60,9 +60,8 @@ def test_a_few_pictures_that_are_wrong_do_not_count(terms: NDArray[np.float32]) 
 
 def one(cosine: float, half: float, margin: float, toward_camera: float) -> NDArray[np.float32]:
     """The terms (TERMS,) of one light at one pixel."""
-    return appearance_terms(*(np.full((1, 1), value, np.float32) for value in (cosine, half, margin, toward_camera)))[
-        0, 0
-    ]
+    pair = (np.full((1, 1), value, np.float32) for value in (cosine, half, margin))
+    return appearance_terms(*pair, np.full(1, toward_camera, np.float32))[0, :, 0]
 
 
 def test_what_stands_below_the_horizon_is_dark_but_for_the_light_of_the_surroundings() -> None:
@@ -85,4 +84,4 @@ def test_a_light_straight_behind_is_no_number_that_is_not_one() -> None:
     samples = lambert(cap(40, 60))
     terms = distant_terms(samples.geometry, np.array([[0.0, 0.0, -1.0]]), np.arange(256))
     assert np.isfinite(terms).all()
-    np.testing.assert_allclose(terms[..., 0], 0, atol=1e-6)
+    np.testing.assert_allclose(terms[:, 0], 0, atol=1e-6)

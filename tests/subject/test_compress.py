@@ -78,7 +78,7 @@ def test_every_texel_and_light_comes_back_as_asked(
     error = np.mean((restored - dense)[inside] ** 2, axis=(0, 2))
     worst = -10 * np.log10((error / peaks**2).max())
     assert worst > TARGET.texel_db
-    # It tells what it reached; the peaks, by which that is judged, are from a sample.
+    # It tells what it reached; the peaks, by which that is judged, are those of every fourth pixel.
     assert found.reached.texel_db == pytest.approx(worst, abs=0.7)
     lights = (rows @ found.light_coefficients).transpose(2, 0, 1)
     each = [psnr(picture(a), b, samples.matte) for a, b in zip(lights, samples.pictures, strict=True)]
@@ -115,7 +115,7 @@ def test_a_field_of_low_rank_needs_no_more_components_than_it_has(samples: Sampl
     counted = Counted(SphericalBarycentric().build(samples))
     low = compress(counted, samples.pictures, samples.matte)
     assert low.basis.components <= len(samples.directions)
-    assert low.reached.texel_db > 45
+    assert low.reached.texel_db > 43
     # Never the whole at once.
     assert max(counted.asked) <= TILE_WIDTH
 

@@ -38,8 +38,8 @@ def predict_pictures(
     predicted = np.zeros((lights, height * width), np.float32)
     for start in range(0, len(inside), _BLOCK):
         block = inside[start : start + _BLOCK]
-        cosines = toward @ normals[block].T
-        terms = appearance_terms(cosines, half @ normals[block].T, np.full_like(cosines, _OPEN), toward[:, 2:])
-        amounts = fit_appearance(terms, values[:, block, None], bright)
-        predicted[:, block] = (terms.transpose(1, 0, 2) @ amounts)[..., 0].T
+        cosines = normals[block] @ toward.T
+        terms = appearance_terms(cosines, normals[block] @ half.T, np.full_like(cosines, _OPEN), toward[:, 2])
+        amounts = fit_appearance(terms, np.ascontiguousarray(values[:, block].T)[:, None], bright)
+        predicted[:, block] = (amounts @ terms)[:, 0].T
     return predicted.reshape(lights, height, width)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.cores import workers
 from relit_camera.space.colour import luminance
 from relit_camera.space.images import LinearImage, Mask
 
@@ -72,8 +73,8 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
     confidence = np.zeros(height * width, np.float32)
     lit = np.full((lights, height * width), np.nan, np.float16)
     noise = QUANTUM * float(np.percentile(luminance(flat[:, inside[:: max(1, len(inside) // 4096)]]), 99))
-    for start in range(0, len(inside), BLOCK):
-        block = inside[start : start + BLOCK]
+
+    def solve(block: NDArray[np.intp]) -> None:
         colours = flat[:, block]
         values = np.ascontiguousarray(luminance(colours).T)
         scaled, weights, error_deg = _fit(values, toward, noise)
@@ -89,6 +90,10 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
         arrived = np.clip(values / np.maximum(length * cosine, 1e-6), 0, 1)
         arrived[(cosine < OBLIQUE) | ~known[:, None]] = np.nan
         lit[:, block] = arrived.T
+
+    with workers() as pool:
+        # Asked for, so that what goes wrong is raised.
+        list(pool.map(solve, (inside[start : start + BLOCK] for start in range(0, len(inside), BLOCK))))
     return Shading(
         normals.reshape(height, width, 3),
         albedo.reshape(height, width, 3),

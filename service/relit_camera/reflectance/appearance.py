@@ -18,8 +18,6 @@ Floats = NDArray[np.float32]
 TERMS = 5
 WRAP = 0.5
 """How far past the terminator wrapped light reaches, as a cosine: light that travels below the skin."""
-GLOSS, SHINE = 12.0, 60.0
-"""Blinn's exponents: of skin's sheen, of what is wet or oily."""
 MIRROR = 0.04
 """Reflectance of skin, hair and cloth seen straight on (refractive index 1.5)."""
 GRAZING = 0.3
@@ -38,31 +36,50 @@ RIDGE = 1e-3
 
 
 def appearance_terms(cosines: Floats, half_cosines: Floats, margins: Floats, toward_camera: Floats) -> Floats:
-    """The terms (count, pixels, TERMS) of lights at pixels.
+    """The terms (pixels, TERMS, count) of pixels under lights.
 
     Highlights are Blinn's lobes (1977) with Schlick's Fresnel factor (1994) and the geometry of Kelemen and
     Szirmay-Kalos (2001); light of the surroundings has the phase function of a white Lambertian ball.
 
     Args:
-        cosines: (count, pixels) of normal and light.
-        half_cosines: (count, pixels) of normal and the direction halfway from light to camera.
-        margins: (count, pixels) radians of the light above the pixel's horizon.
-        toward_camera: (count, 1) or (count, pixels) cosine of light and camera.
+        cosines: (pixels, count) of normal and light.
+        half_cosines: (pixels, count) of normal and the direction halfway from light to camera.
+        margins: (pixels, count) radians of the light above the pixel's horizon.
+        toward_camera: (count,) cosine of light and camera.
     """
     visible = _visible(margins)
     lit = visible * np.maximum(cosines, 0)
     half_way = np.sqrt(np.clip((1 + toward_camera) / 2, 0, 1))
     fresnel = 1 + (1 / MIRROR - 1) * (1 - half_way) ** 5
-    highlight = lit * fresnel / np.maximum(half_way, GRAZING) ** 2
-    halves = np.maximum(half_cosines, 0)
+    highlight = lit * (fresnel / np.maximum(half_way, GRAZING) ** 2)
     angle = np.arccos(np.clip(toward_camera, -1, 1))
-    terms = np.empty((*cosines.shape, TERMS), np.float32)
-    terms[..., 0] = lit
-    terms[..., 1] = visible * np.maximum((cosines + WRAP) / (1 + WRAP), 0) ** 2
-    terms[..., 2] = highlight * halves**GLOSS
-    terms[..., 3] = highlight * halves**SHINE
-    terms[..., 4] = (np.sin(angle) + (np.pi - angle) * np.cos(angle)) / np.pi
+    sheen, shine = _lobes(np.maximum(half_cosines, 0))
+    terms = np.empty((len(cosines), TERMS, cosines.shape[1]), np.float32)
+    terms[:, 0] = lit
+    terms[:, 1] = visible * np.square(np.maximum((cosines + WRAP) / (1 + WRAP), 0))
+    terms[:, 2] = highlight * sheen
+    terms[:, 3] = highlight * shine
+    terms[:, 4] = (np.sin(angle) + (np.pi - angle) * np.cos(angle)) / np.pi
     return terms
+
+
+def _visible(margins: Floats) -> Floats:
+    """How much of a light is seen, 0 to 1, at margins (pixels, count) over the horizon."""
+    visible = margins / np.float32(-PENUMBRA)
+    np.minimum(visible, 30, out=visible)
+    np.exp(visible, out=visible)
+    visible += 1
+    return np.asarray(np.reciprocal(visible, out=visible))
+
+
+def _lobes(cosines: Floats) -> tuple[Floats, Floats]:
+    """Cosines to the powers 12, Blinn's exponent of skin's sheen, and 60, that of what is wet or oily.
+
+    By multiplication: a power of any exponent takes many times as long.
+    """
+    fourth = np.square(np.square(cosines))
+    sheen = fourth * np.square(fourth)
+    return sheen, sheen * np.square(np.square(sheen))
 
 
 def half_directions(directions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -73,47 +90,42 @@ def half_directions(directions: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def distant_terms(geometry: Geometry, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
-    """The terms (count, pixels, TERMS) of distant lights (count, 3) at row-major pixels (some,) of a shape."""
+    """The terms (pixels, TERMS, count) of row-major pixels (some,) of a shape under distant lights (count, 3)."""
     return appearance_terms(
-        geometry.cosines(directions, pixels).T,
-        geometry.cosines(half_directions(directions), pixels).T,
-        geometry.horizon.margins(directions, pixels).T,
-        directions[:, 2:].astype(np.float32),
+        geometry.cosines(directions, pixels),
+        geometry.cosines(half_directions(directions), pixels),
+        geometry.horizon.margins(directions, pixels),
+        directions[:, 2].astype(np.float32),
     )
 
 
 def lit_shares(geometry: Geometry, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
-    """How far distant lights (count, 3) reach row-major pixels (some,) directly: (count, some), 0 in shadow, 1 lit."""
-    facing = np.clip(geometry.cosines(directions, pixels).T / ONSET, 0, 1)
-    return np.asarray(_visible(geometry.horizon.margins(directions, pixels).T) * facing)
-
-
-def _visible(margins: Floats) -> Floats:
-    return np.asarray(1 / (1 + np.exp(np.clip(margins / -PENUMBRA, -30, 30))), np.float32)
+    """How far distant lights (count, 3) reach row-major pixels (some,) directly: (some, count), 0 in shadow, 1 lit."""
+    facing = np.clip(geometry.cosines(directions, pixels) / ONSET, 0, 1)
+    return np.asarray(_visible(geometry.horizon.margins(directions, pixels)) * facing)
 
 
 def fit_appearance(terms: Floats, values: Floats, bright: float) -> Floats:
     """How much of each term: non-negative least squares, iteratively reweighted against what no term explains.
 
     Args:
-        terms: (lights, pixels, TERMS).
-        values: (lights, pixels, channels) linear.
+        terms: (pixels, TERMS, lights).
+        values: (pixels, channels, lights) linear.
         bright: what counts as bright in all the pictures: one value.
 
     Returns:
-        (pixels, TERMS, channels) float32.
+        (pixels, channels, TERMS) float32: `amounts @ terms` are the values.
     """
-    brightness = values.mean(axis=2)
-    tolerance = TOLERANCE * np.percentile(brightness, 90, axis=0) + FLOOR * bright + 1e-9
+    brightness = values.mean(axis=1)
+    tolerance = TOLERANCE * np.percentile(brightness, 90, axis=1) + FLOOR * bright + 1e-9
+    tolerance = tolerance.astype(np.float32)[:, None]
     weights = np.ones_like(brightness)
-    by_pixel = np.ascontiguousarray(terms.transpose(1, 0, 2))
-    seen = np.ascontiguousarray(values.transpose(1, 0, 2))
-    amounts = np.zeros((values.shape[1], TERMS, values.shape[2]), np.float32)
+    amounts = np.zeros((len(values), values.shape[1], TERMS), np.float32)
     for _ in range(ROUNDS):
-        weighed = (by_pixel * weights.T[..., None]).transpose(0, 2, 1)
-        amounts = _non_negative(weighed @ by_pixel, weighed @ seen)
-        off = brightness - (by_pixel @ amounts.mean(axis=2)[..., None])[..., 0].T
-        weights = (1 / (1 + (off / tolerance) ** 2)).astype(np.float32)
+        weighed = (terms * weights[:, None]).transpose(0, 2, 1)
+        amounts = _non_negative(terms @ weighed, values @ weighed)
+        off = brightness - (amounts.mean(axis=1, keepdims=True) @ terms)[:, 0]
+        weights = 1 / (1 + np.square(off / tolerance))
     return amounts
 
 
@@ -122,14 +134,19 @@ def _non_negative(products: Floats, projections: Floats) -> Floats:
 
     Args:
         products: (pixels, terms, terms) of terms with terms.
-        projections: (pixels, terms, channels) of terms with values.
+        projections: (pixels, channels, terms) of values with terms.
+
+    Returns:
+        The amounts (pixels, channels, terms).
     """
-    count = products.shape[1]
-    ridge = RIDGE * np.trace(products, axis1=1, axis2=2) / count + 1e-12
-    products = products + ridge[:, None, None] * np.eye(count, dtype=np.float32)
+    # Pixels last, for numpy's inner loops.
+    products, projections = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (products, projections))
+    count = len(products)
+    diagonal = np.arange(count)
+    products[diagonal, diagonal] += RIDGE * np.trace(products) / count + np.float32(1e-12)
     amounts = np.zeros_like(projections)
     for _ in range(SWEEPS):
         for term in range(count):
-            rest = projections[:, term] - np.einsum("pt,ptc->pc", products[:, term], amounts)
-            amounts[:, term] = np.maximum(amounts[:, term] + rest / products[:, term, term, None], 0)
-    return amounts
+            rest = projections[:, term] - (products[term] * amounts).sum(axis=1)
+            amounts[:, term] = np.maximum(amounts[:, term] + rest / products[term, term], 0)
+    return np.ascontiguousarray(np.moveaxis(amounts, -1, 0))

@@ -56,8 +56,9 @@ class BlendField:
 
     def dense(self, start: int, stop: int) -> Floats:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
-        covered = self._texels_covered[None, :, None]
-        return self._mixed(self.modelled.dense(start, stop), self.smooth.dense(start, stop), covered)
+        return self._mixed(
+            self.modelled.dense(start, stop), self.smooth.dense(start, stop), self._texels_covered[:, None]
+        )
 
     def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
@@ -69,11 +70,15 @@ class BlendField:
         return region_share(self.smooth.directions, texel_vectors())
 
     def _mixed(self, modelled: Floats, smooth: Floats, covered: Floats) -> Floats:
-        """What the smooth field answers has `covered` in it as a factor already: it is its weight."""
+        """One field of two, which is written over the first.
+
+        What the smooth field answers has `covered` in it as a factor already: it is its weight.
+        """
         rest = 1 - self.share
-        return np.asarray(
-            (self.share * modelled + rest * np.maximum(smooth, 0)) / (self.share + rest * covered + 1e-9), np.float32
-        )
+        total = self.share + rest * covered + 1e-9
+        modelled *= self.share / total
+        modelled += np.maximum(smooth, 0) * (rest / total)
+        return modelled
 
 
 def choose_share(modelled: ModelField) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from relit_camera.cores import workers
 from relit_camera.reflectance.appearance import TERMS, distant_terms, fit_appearance, lit_shares
 from relit_camera.reflectance.black_ring import region_share
 from relit_camera.reflectance.gaussian_process import Kernel
@@ -18,7 +19,9 @@ from relit_camera.subject.field import texel_vectors
 Floats = NDArray[np.float32]
 
 BLOCK = 512
-"""Pixels fitted or answered at a time: 21 MB of terms for 2048 directions."""
+"""Pixels fitted at a time: 2 MB of terms for 200 lights."""
+PAIRS = 1 << 17
+"""Of a pixel and a direction, answered at a time: half a megabyte a term, which stays in the cache."""
 JUDGES = 4096
 """Pixels by which the residual's kernel is chosen."""
 FOLDS = 5
@@ -54,7 +57,7 @@ class ModelField:
 
     Attributes:
         samples: the captured lights.
-        amounts: (pixels, TERMS, 3) of the appearance's terms.
+        amounts: (pixels, 3, TERMS) of the appearance's terms.
         kernel: of the residual over directions.
     """
 
@@ -69,12 +72,12 @@ class ModelField:
 
     def dense(self, start: int, stop: int) -> Floats:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
-        found = self._answer(texel_vectors(), self._texel_weights, np.arange(start, stop))
-        return np.ascontiguousarray(found.transpose(1, 0, 2))
+        return self._answer(texel_vectors(), self._texel_weights, np.arange(start, stop)).transpose(0, 2, 1)
 
     def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
-        return self._answer(directions, residual_weights(self.kernel, self.samples.directions, directions), pixels)
+        weights = residual_weights(self.kernel, self.samples.directions, directions)
+        return self._answer(directions, weights, pixels).transpose(2, 0, 1)
 
     @cached_property
     def _texel_weights(self) -> Floats:
@@ -86,50 +89,62 @@ class ModelField:
 
     def appearance_at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
         """R as `at`, without the residual."""
-        return _modelled(self.samples, self.amounts, directions, pixels)
+        return _modelled(self.samples, self.amounts, directions, pixels).transpose(2, 0, 1)
 
     def _answer(self, directions: NDArray[np.float64], weights: Floats, pixels: NDArray[np.intp]) -> Floats:
-        result = np.empty((len(directions), len(pixels), 3), np.float32)
-        for start in range(0, len(pixels), BLOCK):
-            block = pixels[start : start + BLOCK]
+        """(pixels, 3, count), by weights (lights, count) of the residual."""
+        result = np.empty((len(pixels), 3, len(directions)), np.float32)
+        step = max(1, PAIRS // max(1, len(directions)))
+        for start in range(0, len(pixels), step):
+            block = pixels[start : start + step]
             found = _modelled(self.samples, self.amounts, directions, block)
             found += self._residual(directions, weights, block)
             # The terms are not negative, and no light takes light away.
-            result[:, start : start + BLOCK] = np.maximum(found, 0)
+            np.maximum(found, 0, out=result[start : start + step])
         return result
 
     def _residual(self, directions: NDArray[np.float64], weights: Floats, pixels: NDArray[np.intp]) -> Floats:
-        """The residual (count, pixels, 3) that the captured lights foretell: lit ones for lit pixels, others for dark.
+        """The residual (pixels, 3, count) that the captured lights foretell: lit ones for lit pixels, others for dark.
 
         What the model is wrong by in the light says nothing of the shadow, and the other way round.
         """
         known, shape = self.samples.directions, self.samples.geometry
         left = residual(self.samples, self.amounts, pixels)
-        lit, asked = (lit_shares(shape, each, pixels)[..., None] for each in (known, directions))
+        lit, asked = lit_shares(shape, known, pixels), lit_shares(shape, directions, pixels)[:, None]
         in_light, in_shadow = (_foretold(weights, share, left) for share in (lit, 1 - lit))
         return np.asarray(asked * in_light + (1 - asked) * in_shadow)
 
 
 def _foretold(weights: Floats, share: Floats, left: Floats) -> Floats:
-    """Residuals (count, pixels, 3) by weights (lights, count); captured ones (lights, pixels, 3) count by their share.
+    """Residuals (pixels, 3, count) by weights (lights, count); captured ones (pixels, 3, lights) count by their share.
 
     The weights' sum over those that count is made up to the sum of all, within MAKE_UP.
     """
-    counted = np.tensordot(weights.T, share, 1)
-    factor = np.clip(weights.sum(axis=0)[:, None, None] / np.maximum(counted, 1e-3), 0, MAKE_UP)
-    return np.asarray(np.tensordot(weights.T, share * left, 1) * factor)
+    counted = share @ weights
+    factor = np.clip(weights.sum(axis=0) / np.maximum(counted, 1e-3), 0, MAKE_UP)
+    foretold = (share[:, None] * left).reshape(-1, len(weights)) @ weights
+    return np.asarray(foretold.reshape(*left.shape[:2], -1) * factor[:, None])
 
 
 def _fit(samples: Samples, pixels: NDArray[np.intp]) -> Floats:
-    """Amounts of all pixels (height · width, TERMS, 3), 0 but at the given ones."""
-    pictures = samples.pictures.reshape(len(samples.directions), -1, 3)
-    amounts = np.zeros((pictures.shape[1], TERMS, 3), np.float32)
-    bright = _bright(samples)
-    for start in range(0, len(pixels), BLOCK):
-        block = pixels[start : start + BLOCK]
-        terms = distant_terms(samples.geometry, samples.directions, block)
-        amounts[block] = fit_appearance(terms, pictures[:, block], bright)
+    """Amounts of all pixels (height · width, 3, TERMS), 0 but at the given ones."""
+    geometry, bright = samples.geometry, _bright(samples)
+    amounts = np.zeros((samples.matte.size, 3, TERMS), np.float32)
+
+    def fit(block: NDArray[np.intp]) -> None:
+        terms = distant_terms(geometry, samples.directions, block)
+        amounts[block] = fit_appearance(terms, _values(samples, block), bright)
+
+    with workers() as pool:
+        # Asked for, so that what goes wrong is raised.
+        list(pool.map(fit, (pixels[start : start + BLOCK] for start in range(0, len(pixels), BLOCK))))
     return amounts
+
+
+def _values(samples: Samples, pixels: NDArray[np.intp]) -> Floats:
+    """What row-major pixels show (pixels, 3, lights)."""
+    pictures = samples.pictures.reshape(len(samples.directions), -1, 3)
+    return np.ascontiguousarray(pictures[:, pixels].transpose(1, 2, 0))
 
 
 def _bright(samples: Samples) -> float:
@@ -140,15 +155,13 @@ def _bright(samples: Samples) -> float:
 
 
 def _modelled(samples: Samples, amounts: Floats, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
-    """The appearance (count, pixels, 3) of row-major pixels under unit vectors (count, 3)."""
-    terms = distant_terms(samples.geometry, directions, pixels).transpose(1, 0, 2)
-    return np.asarray((terms @ amounts[pixels]).transpose(1, 0, 2))
+    """The appearance (pixels, 3, count) of row-major pixels under unit vectors (count, 3)."""
+    return np.asarray(amounts[pixels] @ distant_terms(samples.geometry, directions, pixels))
 
 
 def residual(samples: Samples, amounts: Floats, pixels: NDArray[np.intp]) -> Floats:
-    """What the appearance leaves of the pictures at row-major pixels: (lights, pixels, 3)."""
-    pictures = samples.pictures.reshape(len(samples.directions), -1, 3)[:, pixels]
-    return np.asarray(pictures - _modelled(samples, amounts, samples.directions, pixels))
+    """What the appearance leaves of the pictures at row-major pixels: (pixels, 3, lights)."""
+    return np.asarray(_values(samples, pixels) - _modelled(samples, amounts, samples.directions, pixels))
 
 
 def residual_weights(kernel: Kernel, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> Floats:
@@ -174,15 +187,20 @@ def choose_kernel(samples: Samples, pixels: NDArray[np.intp]) -> Kernel:
     is smaller and rougher than what it leaves of others, so leaving lights out of the residual alone misleads.
     """
     lights = len(samples.directions)
-    values = samples.pictures.reshape(lights, -1, 3)[:, pixels]
+    values = _values(samples, pixels)
     terms = distant_terms(samples.geometry, samples.directions, pixels)
-    errors = np.zeros(len(CANDIDATES))
-    for fold in range(FOLDS):
+    bright = _bright(samples)
+
+    def errors_of(fold: int) -> list[float]:
+        """Of each candidate."""
         left_out = np.arange(lights) % FOLDS == fold
-        amounts = fit_appearance(terms[~left_out], values[~left_out], _bright(samples))
-        off = values - (terms.transpose(1, 0, 2) @ amounts).transpose(1, 0, 2)
+        amounts = fit_appearance(terms[..., ~left_out], values[..., ~left_out], bright)
+        off = values - amounts @ terms
         known, asked = samples.directions[~left_out], samples.directions[left_out]
-        for index, kernel in enumerate(CANDIDATES):
-            foretold = np.tensordot(residual_weights(kernel, known, asked).T, off[~left_out], 1)
-            errors[index] += float(np.sum((off[left_out] - foretold) ** 2))
+        known_off, asked_off = (off[..., part].reshape(-1, part.sum()) for part in (~left_out, left_out))
+        foretold = (known_off @ residual_weights(kernel, known, asked) for kernel in CANDIDATES)
+        return [float(np.sum((asked_off - each) ** 2)) for each in foretold]
+
+    with workers() as pool:
+        errors = np.sum(list(pool.map(errors_of, range(FOLDS))), axis=0)
     return CANDIDATES[int(errors.argmin())]

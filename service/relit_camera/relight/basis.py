@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +29,12 @@ class BasisRelighter:
         groups = rank_groups(subject.basis)
         self._values = [group.values for group in groups]
         self._mixes = _blocks(np.concatenate([group.mixes.reshape(-1, subject.basis.components) for group in groups]))
-        self._pixels = np.concatenate([group.pixels.ravel() for group in groups])
+        pixels = np.concatenate([group.pixels for group in groups])
+        # Where each value of the picture stands among all clusters' (clusters, 3, places); what is in none is behind.
+        self._found = pixels.size * 3
+        self._source = np.full((subject.matte.size, 3), self._found, np.intp)
+        places = np.arange(self._found).reshape(len(pixels), 3, -1).transpose(0, 2, 1)
+        self._source[pixels] = places
 
     @property
     def nbytes(self) -> int:
@@ -44,18 +48,17 @@ class BasisRelighter:
     def mix(self, amounts: NDArray[np.float32]) -> LinearImage:
         """The picture of `amounts` (components, 3) of the shared basis: float32 (height, width, 3)."""
         local = np.matmul(np.ascontiguousarray(amounts.T), self._mixes).transpose(0, 2, 1).reshape(-1, 3)
-        planes = np.empty((3, len(self._pixels)), np.float32)
-        component = place = 0
+        found = np.empty(self._found + 1, np.float32)
+        found[-1] = 0
+        component = start = 0
         for values in self._values:
             clusters, _, rank, places = values.shape
             mixed = local[component : component + clusters * rank].reshape(clusters, rank, 3).transpose(0, 2, 1)
-            target = planes[:, place : place + clusters * places].reshape(3, clusters, places)
-            target[:] = np.matmul(mixed[:, :, None], values)[:, :, 0].transpose(1, 0, 2)
+            target = found[start : start + clusters * 3 * places].reshape(clusters, 3, 1, places)
+            np.matmul(mixed[:, :, None], values, out=target)
             component += clusters * rank
-            place += clusters * places
-        picture = np.zeros((*self._shape, 3), dtype=np.float32)
-        picture.reshape(-1, 3)[self._pixels] = cv2.merge(list(planes)).reshape(-1, 3)
-        return picture
+            start += target.size
+        return found.take(self._source).reshape(*self._shape, 3)
 
 
 def _blocks(mixes: NDArray[np.float32]) -> NDArray[np.float32]:

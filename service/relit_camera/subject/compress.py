@@ -7,20 +7,19 @@ clusters, so that the worst column is within what is allowed.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
+from relit_camera.cores import workers
 from relit_camera.space.images import Mask
 from relit_camera.subject.cluster import Cluster, Components
 from relit_camera.subject.field import TEXELS, ReflectanceField
 from relit_camera.subject.local_basis import LocalBasis
-from relit_camera.subject.reached import Reached, dense_bytes, worst_light_db, worst_map_db
+from relit_camera.subject.reached import Reached, dense_bytes, worst_light_db, worst_map_db, worst_texel_db
 from relit_camera.subject.shared_basis import share
 from relit_camera.subject.target import Target
 from relit_camera.subject.tiles import FieldRows, counted_places, tiles
@@ -34,7 +33,6 @@ OF_CLUSTERS, OF_SHARED = 0.55, 0.35
 THRESHOLDS = (1e-2, 1e6)
 STEPS = 10
 """Bisections between them, to 2 %."""
-MAX_WORKERS = 4
 
 
 @dataclass(frozen=True)
@@ -68,17 +66,14 @@ def compress(
     Args:
         field: any.
         captured: (lights, height, width, 3) the pictures that it was built from.
-        matte: (height, width); pixels where it is 0 become black.
+        matte: (height, width), over ½ somewhere; pixels where it is 0 become black.
         target: what is asked.
         progress: called with the count of tiles done and the total.
     """
     target = target or Target()
     rows, work = FieldRows(field, captured), tiles(matte)
     inside = matte.ravel() > 0.5
-    with (
-        threadpool_limits(limits=1, user_api="blas"),
-        ThreadPoolExecutor(min(os.cpu_count() or 1, MAX_WORKERS)) as pool,
-    ):
+    with workers() as pool:
         allowed, threshold = _sampled(rows, np.concatenate(work), inside, target, pool)
         press = _Press(rows, inside, allowed, threshold, target.light)
         done: list[_Pressed] = []
@@ -97,7 +92,7 @@ def compress(
     coefficients, lights = np.ascontiguousarray(both[:, :TEXELS]), np.ascontiguousarray(both[:, TEXELS:])
     reached = Reached(
         light_db=worst_light_db(basis, lights, captured, matte),
-        texel_db=target.texel_db - 10 * float(np.log10(max(error[:TEXELS].max(), 1e-15))),
+        texel_db=worst_texel_db(basis, coefficients, (error * allowed**2)[:TEXELS], matte),
         map_db=worst_map_db(basis, coefficients, target.light, truth, matte),
         bytes_share=(basis.nbytes + both.nbytes) / dense_bytes(matte),
     )
@@ -166,13 +161,16 @@ def _sampled(
 ) -> tuple[Values, float]:
     """What error is allowed in each column (columns,), and the threshold that keeps to it, by a sample of clusters."""
     parts = []
-    for cluster in clusters[:: -(-len(clusters) // SAMPLE)]:
+    telling = clusters[inside[clusters].any(axis=1)]
+    for cluster in telling[:: -(-len(telling) // SAMPLE)]:
         pixels, places = np.unique(cluster, return_inverse=True)
         parts.append(_Part.of(rows.read(pixels)[places], cluster, inside))
-    seen = np.concatenate([part.cluster.rows[part.counted] for part in parts])
-    allowed = target.allowed(np.percentile(seen, 99.5, axis=0))
-    count = len(seen)
-    del seen
+    halves = [np.concatenate([part.cluster.rows[part.counted] for part in parts[i::2]]) for i in range(2)]
+    # What is bright under a light from behind is a rim, which a sample may have too much of: the lower of two counts.
+    peaks = [np.percentile(half, 99.5, axis=0) for half in halves if len(half)]
+    allowed = target.allowed(np.min(peaks, axis=0))
+    count = sum(map(len, halves))
+    del halves
     for part in parts:
         part.cluster.rows[:] /= allowed
 

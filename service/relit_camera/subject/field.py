@@ -80,9 +80,9 @@ class FactoredField:
 
     def dense(self, start: int, stop: int) -> NDArray[np.float32]:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
-        lights = self.pictures.shape[0]
-        block = self.pictures.reshape(lights, -1, 3)[:, start:stop]
-        return np.asarray(np.einsum("npc,nl->plc", block, self.weights, optimize=True), dtype=np.float32)
+        block = self.pictures.reshape(len(self.pictures), -1, 3)[:, start:stop]
+        rows = block.reshape(len(block), -1).T @ self.weights
+        return np.asarray(rows.reshape(stop - start, 3, TEXELS).transpose(0, 2, 1), np.float32)
 
     def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 from relit_camera.subject.cluster import Components
 
 Values = NDArray[np.float32]
+
+BATCH = 64
+"""Clusters whose products are added up at once: one at a time, adding takes longer than multiplying."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +54,9 @@ def _principal(clusters: Sequence[Components]) -> tuple[NDArray[np.float64], NDA
         _, amounts, directions = np.linalg.svd(np.concatenate(list(weighted)).astype(np.float64), full_matrices=False)
         return amounts**2, directions.T
     gram = np.zeros((columns, columns))
-    for each in weighted:
-        gram += each.T @ each
+    for batch in iter(lambda: list(islice(weighted, BATCH)), []):
+        rows = np.concatenate(batch)
+        gram += rows.T @ rows
     energies, directions = np.linalg.eigh(gram)
     return np.maximum(energies[::-1], 0), directions[:, ::-1]
 

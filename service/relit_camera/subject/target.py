@@ -24,8 +24,8 @@ class Target:
         maps: light maps (32, 64, 3) that the result is tried on.
     """
 
-    texel_db: float = 45.0
-    light_db: float = 48.0
+    texel_db: float = 43.0
+    light_db: float = 46.0
     maps: Sequence[LightMap] = ()
 
     def allowed(self, peaks: NDArray[np.floating]) -> NDArray[np.float32]:

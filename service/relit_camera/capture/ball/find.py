@@ -33,7 +33,7 @@ class FoundBall:
 
     Attributes:
         outline: in pixels of the frames.
-        evidence: share of the outline that shows in the pictures. Below about 0.6 the outline may be off by several
+        evidence: share of the outline that shows in the pictures. Below about 0.7 the outline may be off by several
             per cent of the radius, and the light by as many degrees. None for a circle that was given.
         glints: share of the pictures in which it shows the lamp.
         focal: of the camera: what was known, improved by the outline's shape.

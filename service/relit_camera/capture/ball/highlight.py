@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.capture.ball.covered_highlight import covered_disc
 from relit_camera.capture.ball.view import BallView, Vectors
 from relit_camera.errors import CaptureError
 from relit_camera.space.images import LinearImage, check_image
@@ -69,7 +70,8 @@ def find_highlight(
     After thesis 4.3.4, with its correction: the mean, weighted with the brightness above a threshold, is of normals of
     the ball's surface and not of places in the picture, which would draw highlights at the side inward. Of several
     bright places the one that holds most light counts, without thin rays that glare or scratches draw out of it. So
-    lamps seen twice (in another mirror that the ball shows) do not count: their second image is far smaller.
+    lamps seen twice (in another mirror that the ball shows) do not count: their second image is far smaller. One that
+    lies partly on what is white anyway is taken for a disc of the usual size, where that is known and half of it shows.
 
     Args:
         frame: linear RGB (height, width, 3).
@@ -121,7 +123,8 @@ def brightest_place(
     if area < _SMALLEST * typical_area_px:
         return NoHighlight(f"the brightest place has {area} pixels, in other frames {typical_area_px:.0f}")
     if room is not None and _cut_short(blob, room):
-        return NoHighlight("the lamp's mirror image lies on that of another lamp, or of a bright window")
+        known = inside & (room < 1 - _THRESHOLD * level)
+        return _covered(view, weights > 0, known, (box[1].start, box[0].start), level, typical_area_px)
     y, x = np.nonzero(_core(blob))
     normals = view.normals(x + box[1].start + 0.5, y + box[0].start + 0.5)
     seen = np.isfinite(normals[:, 0])
@@ -131,6 +134,24 @@ def brightest_place(
     mean /= np.linalg.norm(mean)
     at = view.picture(mean)
     return Highlight(float(at[0]), float(at[1]), mean, level, area)
+
+
+def _covered(
+    view: BallView,
+    lit: NDArray[np.bool_],
+    known: NDArray[np.bool_],
+    corner: tuple[int, int],
+    level: float,
+    area_px: float,
+) -> Highlight | NoHighlight:
+    """A highlight that is seen in part only: a disc as large as those of other frames."""
+    centre = covered_disc(lit, known, area_px) if area_px > 0 else None
+    if centre is not None:
+        x, y = centre[0] + corner[0], centre[1] + corner[1]
+        normal = view.normals(np.array(x), np.array(y))
+        if np.isfinite(normal).all():
+            return Highlight(x, y, normal, level, round(area_px))
+    return NoHighlight("the lamp's mirror image lies on that of another lamp, or of a bright window")
 
 
 def _same(dark: LinearImage, frame: LinearImage) -> LinearImage:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.capture.ball.focal import TAG_ERROR
 from relit_camera.capture.chain.options import CaptureOptions
 from relit_camera.capture.chain.survey import Survey
 from relit_camera.capture.chain.usable import Lamps
@@ -18,7 +19,7 @@ from relit_camera.capture.light.strength import Strengths
 
 REPORT_VERSION = 1
 
-_DOUBTFUL_BALL = 0.6
+_DOUBTFUL_BALL = 0.7
 """Share of the ball's outline that shows, below which its place is uncertain."""
 _UNLIKE_REASON = "its light does not fit the person's shape: the lamp was hidden, or its mirror image mistaken"
 
@@ -59,6 +60,11 @@ class Findings:
             told.append(
                 f"only {seen.ball.evidence:.0%} of the ball's outline shows, directions may be degrees off: film it "
                 "before something plain, or give its circle with --ball X,Y,RADIUS"
+            )
+        if seen.ball.focal.error > TAG_ERROR:
+            told.append(
+                f"the camera's focal length is a guess, give or take {seen.ball.focal.error:.0%}, directions may be "
+                "degrees off: give it with --focal-px, or film with a phone that writes it into the film"
             )
         told += [
             f"the ball was {each.kind} in the frames {each.first} to {each.last}: fix it in its place"

@@ -20,6 +20,7 @@ from relit_camera.capture.light.matte import flash_matte
 from relit_camera.capture.light.near_field import to_distant
 from relit_camera.capture.light.one_light import OneLight, read_one_light
 from relit_camera.capture.light.strength import Strengths, find_strengths
+from relit_camera.cores import workers
 from relit_camera.errors import CaptureError
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.images import Mask
@@ -84,7 +85,10 @@ def build_samples(
     good = np.flatnonzero(strengths.misfit <= _UNLIKE * np.median(strengths.misfit))
     refuse_one_sided(lamps.directions[good], len(seen.highlights))
     groups = [good[group] for group in group_lights(lamps.directions[good])]
-    pictures = np.stack([_merged(lights, strengths, group, matte, options.near_field) for group in groups])
+    with workers() as pool:
+        pictures = np.stack(
+            list(pool.map(lambda group: _merged(lights, strengths, group, matte, options.near_field), groups))
+        )
     directions = np.stack([lamps.directions[group].mean(axis=0) for group in groups])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     findings = Findings(video.name, options, seen, found, lamps.index, square, subtract, strengths, good, len(groups))

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.cores import workers
 from relit_camera.space.colour import luminance
 from relit_camera.space.images import LinearImage, Mask
 
@@ -43,13 +44,15 @@ def flash_matte(pictures: NDArray[np.floating], room: LinearImage, nobody: NDArr
 
 def flash_ratio(pictures: NDArray[np.floating], room: LinearImage) -> NDArray[np.float32]:
     """Light of the flash over the room's (height, width), by the lights that reach a pixel best."""
-    height, width = room.shape[:2]
-    added = np.empty((height, width), np.float32)
-    for top in range(0, height, _BLOCK):
+
+    def added_in(top: int) -> NDArray[np.floating]:
         rows = luminance(pictures[:, top : top + _BLOCK].astype(np.float32))
         low, high = np.percentile(rows, [_LOW, _HIGH], axis=0)
         # Noise goes both ways, light only one.
-        added[top : top + _BLOCK] = np.maximum(high + np.minimum(low, 0), 0)
+        return np.asarray(np.maximum(high + np.minimum(low, 0), 0))
+
+    with workers() as pool:
+        added = np.concatenate(list(pool.map(added_in, range(0, len(room), _BLOCK))))
     return np.asarray(added / (np.maximum(luminance(room), 0) + np.float32(_DARKEST)), np.float32)
 
 
