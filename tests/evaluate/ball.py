@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.geometry.horizon import Horizon, horizon_of
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.directions import texel_directions
 from tests.synthetic import render_sphere, sphere_surface
 
 SIZE = 16
+WALL, WALL_HIGH = 1.6, 1.5
+"""Its x, and the z up to which it stands, in the ball's radii from the ball's middle."""
 
 
 def lambert(directions: NDArray[np.float64], size: int = SIZE) -> Samples:
@@ -23,6 +26,25 @@ def shadowed(directions: NDArray[np.float64], size: int = 48) -> Samples:
     """With the small ball's sharp shadow."""
     pictures = np.stack([render_sphere(light, size) for light in directions])
     return Samples(pictures, directions, sphere_surface(size)[1].astype(np.float32))
+
+
+def walled(directions: NDArray[np.float64], size: int = 48) -> Samples:
+    """With the sharp shadow of a wall at its right that stands before the picture's plane and is not in the picture."""
+    spots, _ = sphere_surface(size)
+    bare = lambert(directions, size)
+    right, _, toward = directions.T[..., None, None]
+    with np.errstate(divide="ignore"):
+        lit = (right <= 0) | (spots[..., 2] + (WALL - spots[..., 0]) * toward / right > WALL_HIGH)
+    return Samples(bare.pictures * lit[..., None].astype(np.float32), directions, bare.matte)
+
+
+def wall_horizon(size: int = 48, sectors: int = 32) -> Horizon:
+    """Of the wall, and of the ball itself."""
+    spots, inside = sphere_surface(size)
+    own = horizon_of(np.where(inside, spots[..., 2] * size / 2, np.nan).astype(np.float32), sectors).heights
+    right = np.maximum(np.cos(2 * np.pi * np.arange(sectors) / sectors), 1e-9)
+    wall = np.arctan(((WALL_HIGH - spots[..., 2]) / (WALL - spots[..., 0]))[..., None] * right)
+    return Horizon(np.where(right > 1e-6, np.maximum(own, wall), own).astype(np.float16))
 
 
 def grid(rows: int) -> NDArray[np.float64]:

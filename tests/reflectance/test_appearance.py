@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from relit_camera.reflectance.appearance import TERMS, appearance_terms, distant_terms, fit_appearance
+from relit_camera.reflectance.appearance import LOBES, TERMS, Gloss, appearance_terms, distant_terms, fit_appearance
 from tests.evaluate.ball import cap, lambert
 
 LIGHTS = 60
@@ -28,17 +28,38 @@ def terms() -> NDArray[np.float32]:
 
 def test_amounts_are_found_again(terms: NDArray[np.float32]) -> None:
     amounts = np.random.default_rng(5).uniform(0.05, 0.5, (PIXELS, 3, TERMS)).astype(np.float32)
+    amounts[..., LOBES] = amounts[:, :1, LOBES]
     values = amounts @ terms
-    found = fit_appearance(terms, values, 1.0)
+    found, _ = fit_appearance(terms, values, 1.0)
     fitted = found @ terms
     assert np.sqrt(np.mean((fitted - values) ** 2)) < 0.01
     # What tells terms apart is little for some pixels; the amounts as a whole are right.
     assert np.median(np.abs(found - amounts)) < 0.05
 
 
+def test_highlights_have_the_lights_colour(terms: NDArray[np.float32]) -> None:
+    amounts = np.random.default_rng(5).uniform(0.05, 0.5, (PIXELS, 3, TERMS)).astype(np.float32)
+    found, gloss = fit_appearance(terms, amounts @ terms, 1.0)
+    for channel in range(3):
+        np.testing.assert_array_equal(found[:, channel, LOBES], gloss.amounts)
+
+
+def test_where_no_light_tells_a_highlight_the_expected_one_stands(terms: NDArray[np.float32]) -> None:
+    amounts = np.zeros((PIXELS, 3, TERMS), np.float32)
+    amounts[..., 0], amounts[..., LOBES] = 0.5, 0.3
+    hidden = terms.copy()
+    hidden[:, LOBES] *= 1e-3
+    expected = Gloss(np.full((PIXELS, 2), 0.2, np.float32), np.full((PIXELS, 2), 30, np.float32))
+    told = terms[:, LOBES].max(axis=2).min(axis=1) > 0.9
+    assert told.any()
+    for seen, hoped, where in ((terms, 0.3, told), (hidden, 0.2, np.ones_like(told))):
+        _, gloss = fit_appearance(seen, amounts @ seen, 1.0, expected)
+        np.testing.assert_allclose(gloss.amounts[where], hoped, atol=0.05)
+
+
 def test_no_amount_is_negative_though_the_pictures_ask_for_it(terms: NDArray[np.float32]) -> None:
     values = np.repeat((0.5 - terms[:, :1]).clip(0), 3, axis=1)
-    found = fit_appearance(terms, values, 1.0)
+    found, _ = fit_appearance(terms, values, 1.0)
     assert found.min() >= 0
 
 
@@ -50,7 +71,7 @@ def test_a_few_pictures_that_are_wrong_do_not_count(terms: NDArray[np.float32]) 
     wrong[..., ::12] = 1.5
 
     def error(seen: NDArray[np.float32]) -> float:
-        fitted = fit_appearance(terms, seen, 1.0) @ terms
+        fitted = fit_appearance(terms, seen, 1.0)[0] @ terms
         return float(np.sqrt(np.mean((fitted - values) ** 2)))
 
     assert error(values) < 0.005
@@ -73,8 +94,8 @@ def test_what_stands_below_the_horizon_is_dark_but_for_the_light_of_the_surround
 def test_highlights_grow_toward_light_from_behind_and_the_surroundings_go_dark() -> None:
     front, side, behind = (one(0.3, 1.0, 1.0, toward) for toward in (1.0, 0.0, -0.8))
     assert front[2] < side[2] < behind[2]
-    # Fresnel's factor of index 1.5 at 45 degrees is 1.05, by Schlick 1.052; the rest is geometry.
-    assert side[2] / front[2] == pytest.approx(2 * 1.052, rel=0.01)
+    # Fresnel's factor of index 1.4 at 45 degrees is 1.07, by Schlick 1.075; the rest is geometry.
+    assert side[2] / front[2] == pytest.approx(2 * 1.075, rel=0.01)
     assert front[4] == pytest.approx(1)
     assert side[4] == pytest.approx(1 / np.pi)
     assert one(0.3, 1.0, 1.0, -1.0)[4] == pytest.approx(0, abs=1e-6)

@@ -40,6 +40,6 @@ def predict_pictures(
         block = inside[start : start + _BLOCK]
         cosines = normals[block] @ toward.T
         terms = appearance_terms(cosines, normals[block] @ half.T, np.full_like(cosines, _OPEN), toward[:, 2])
-        amounts = fit_appearance(terms, np.ascontiguousarray(values[:, block].T)[:, None], bright)
+        amounts, _ = fit_appearance(terms, np.ascontiguousarray(values[:, block].T)[:, None], bright)
         predicted[:, block] = (amounts @ terms)[:, 0].T
     return predicted.reshape(lights, height, width)

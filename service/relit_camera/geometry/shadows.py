@@ -14,6 +14,9 @@ Floats = NDArray[np.float32]
 IN_SHADOW, IN_LIGHT = 0.4, 0.6
 """Share of the predicted light below which a pixel is in shadow, and above which it is lit; between them it may be
 either: a half-shadow, or a normal that is somewhat wrong."""
+NEAREST_SHADOW = np.radians(10.0)
+"""A shadow begins at the horizon. What is dark under a light that stands farther above it is dark for another reason: a
+wrong normal, say. Taken for shadow it would hide all the light from behind that no capture has."""
 SAFETY = np.radians(2.0)
 """So far a corrected horizon is moved past the light that contradicted it."""
 BEARING_WIDTH = np.radians(25.0)
@@ -30,8 +33,8 @@ BLOCK = 1 << 14
 def calibrated(horizon: Horizon, lit: NDArray[np.float16], directions: NDArray[np.float64]) -> Horizon:
     """The horizon moved as little as makes it agree with what was lit and what was in shadow.
 
-    A light that was seen though it stands below the horizon pulls it down, one that was not seen though it stands above
-    pulls it up, each over neighbouring bearings and pixels.
+    A light that was seen though it stands below the horizon pulls it down, one that was not seen though it stands just
+    above pulls it up, each over neighbouring bearings and pixels.
 
     Args:
         horizon: by the depth.
@@ -60,7 +63,8 @@ def calibrated(horizon: Horizon, lit: NDArray[np.float16], directions: NDArray[n
 
 def _contradictions(margins: Floats, seen: NDArray[np.float16]) -> Floats:
     """How far each light (pixels, lights) asks the horizon to move, up positive; 0 where it agrees or is unknown."""
-    wrongly_dark, wrongly_lit = (seen > IN_LIGHT) & (margins < 0), (seen < IN_SHADOW) & (margins > 0)
+    wrongly_dark = (seen > IN_LIGHT) & (margins < 0)
+    wrongly_lit = (seen < IN_SHADOW) & (margins > 0) & (margins < NEAREST_SHADOW)
     return np.asarray((margins - SAFETY) * wrongly_dark + (margins + SAFETY) * wrongly_lit, np.float32)
 
 

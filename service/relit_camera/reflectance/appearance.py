@@ -8,6 +8,8 @@ is lit. No amount is negative, so a fit that has little to go by stays sane.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,10 +18,12 @@ from relit_camera.geometry.geometry import Geometry
 Floats = NDArray[np.float32]
 
 TERMS = 5
+LOBES = 2, 3
+"""Which of the terms are highlights. They have the light's own colour: one amount for all channels."""
 WRAP = 0.5
 """How far past the terminator wrapped light reaches, as a cosine: light that travels below the skin."""
-MIRROR = 0.04
-"""Reflectance of skin, hair and cloth seen straight on (refractive index 1.5)."""
+MIRROR = 0.028
+"""Reflectance of skin seen straight on (refractive index 1.4; Tuchin 2007)."""
 GRAZING = 0.3
 """Cosine of half the angle from light to camera below which highlights grow no more: no model is sure there."""
 ONSET = 0.1
@@ -105,16 +109,31 @@ def lit_shares(geometry: Geometry, directions: NDArray[np.float64], pixels: NDAr
     return np.asarray(_visible(geometry.horizon.margins(directions, pixels)) * facing)
 
 
-def fit_appearance(terms: Floats, values: Floats, bright: float) -> Floats:
+@dataclass(frozen=True)
+class Gloss:
+    """Highlights that are to be expected of pixels, or were found.
+
+    Attributes:
+        amounts: (pixels, len(LOBES)) float32.
+        told: (pixels, len(LOBES)) float32, how well the pictures tell each: the sum of weight · term² over the lights,
+            over the variance of what no term explains.
+    """
+
+    amounts: Floats
+    told: Floats
+
+
+def fit_appearance(terms: Floats, values: Floats, bright: float, expected: Gloss | None = None) -> tuple[Floats, Gloss]:
     """How much of each term: non-negative least squares, iteratively reweighted against what no term explains.
 
     Args:
         terms: (pixels, TERMS, lights).
         values: (pixels, channels, lights) linear.
         bright: what counts as bright in all the pictures: one value.
+        expected: highlights to fall back on as far as the pictures do not tell them; `told` then says how surely.
 
     Returns:
-        (pixels, channels, TERMS) float32: `amounts @ terms` are the values.
+        (pixels, channels, TERMS) float32: `amounts @ terms` are the values; and the highlights among them.
     """
     brightness = values.mean(axis=1)
     tolerance = TOLERANCE * np.percentile(brightness, 90, axis=1) + FLOOR * bright + 1e-9
@@ -123,10 +142,19 @@ def fit_appearance(terms: Floats, values: Floats, bright: float) -> Floats:
     amounts = np.zeros((len(values), values.shape[1], TERMS), np.float32)
     for _ in range(ROUNDS):
         weighed = (terms * weights[:, None]).transpose(0, 2, 1)
-        amounts = _non_negative(terms @ weighed, values @ weighed)
+        products, projections = terms @ weighed, values @ weighed
+        products += (
+            RIDGE * np.trace(products, axis1=1, axis2=2)[:, None, None] / TERMS * np.eye(TERMS, dtype=np.float32)
+        )
+        told = products[:, LOBES, LOBES] / tolerance**2
+        if expected is not None:
+            sure = expected.told * tolerance**2
+            products[:, LOBES, LOBES] += sure
+            projections[:, :, LOBES] += (sure * expected.amounts)[:, None]
+        amounts = _non_negative(products, projections)
         off = brightness - (amounts.mean(axis=1, keepdims=True) @ terms)[:, 0]
         weights = 1 / (1 + np.square(off / tolerance))
-    return amounts
+    return amounts, Gloss(amounts[:, 0, LOBES], told)
 
 
 def _non_negative(products: Floats, projections: Floats) -> Floats:
@@ -137,16 +165,14 @@ def _non_negative(products: Floats, projections: Floats) -> Floats:
         projections: (pixels, channels, terms) of values with terms.
 
     Returns:
-        The amounts (pixels, channels, terms).
+        The amounts (pixels, channels, terms), of LOBES the same in all channels.
     """
     # Pixels last, for numpy's inner loops.
     products, projections = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (products, projections))
-    count = len(products)
-    diagonal = np.arange(count)
-    products[diagonal, diagonal] += RIDGE * np.trace(products) / count + np.float32(1e-12)
     amounts = np.zeros_like(projections)
     for _ in range(SWEEPS):
-        for term in range(count):
+        for term in range(len(products)):
             rest = projections[:, term] - (products[term] * amounts).sum(axis=1)
-            amounts[:, term] = np.maximum(amounts[:, term] + rest / products[term, term], 0)
+            best = amounts[:, term] + rest / (products[term, term] + np.float32(1e-12))
+            amounts[:, term] = np.maximum(best.mean(axis=0) if term in LOBES else best, 0)
     return np.ascontiguousarray(np.moveaxis(amounts, -1, 0))

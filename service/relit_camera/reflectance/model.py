@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from relit_camera.cores import workers
-from relit_camera.reflectance.appearance import TERMS, distant_terms, fit_appearance, lit_shares
+from relit_camera.reflectance.appearance import LOBES, TERMS, Gloss, distant_terms, fit_appearance, lit_shares
 from relit_camera.reflectance.black_ring import region_share
 from relit_camera.reflectance.gaussian_process import Kernel
+from relit_camera.reflectance.gloss import expected_gloss
 from relit_camera.reflectance.samples import Samples
 from relit_camera.subject.field import texel_vectors
 
@@ -48,7 +49,8 @@ class Model:
         region_share(samples.directions, samples.directions[:1])
         inside = np.flatnonzero(samples.matte.ravel() > 0)
         judges = inside[:: max(1, len(inside) // JUDGES)]
-        return ModelField(samples, _fit(samples, inside), choose_kernel(samples, judges))
+        gloss = expected_gloss(_fit(samples, inside)[1], inside, samples.matte)
+        return ModelField(samples, _fit(samples, inside, gloss)[0], choose_kernel(samples, judges))
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class ModelField:
 
     def fitted_to(self, samples: Samples, pixels: NDArray[np.intp]) -> ModelField:
         """The same model of other samples of this person, fitted at some row-major pixels only."""
-        return ModelField(samples, _fit(samples, pixels), self.kernel)
+        return ModelField(samples, _fit(samples, pixels)[0], self.kernel)
 
     def appearance_at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
         """R as `at`, without the residual."""
@@ -126,19 +128,24 @@ def _foretold(weights: Floats, share: Floats, left: Floats) -> Floats:
     return np.asarray(foretold.reshape(*left.shape[:2], -1) * factor[:, None])
 
 
-def _fit(samples: Samples, pixels: NDArray[np.intp]) -> Floats:
-    """Amounts of all pixels (height · width, 3, TERMS), 0 but at the given ones."""
+def _fit(samples: Samples, pixels: NDArray[np.intp], expected: Gloss | None = None) -> tuple[Floats, Gloss]:
+    """Amounts of all pixels (height · width, 3, TERMS), 0 but at the given ones, and these ones' highlights."""
     geometry, bright = samples.geometry, _bright(samples)
     amounts = np.zeros((samples.matte.size, 3, TERMS), np.float32)
+    gloss = Gloss(*np.zeros((2, len(pixels), len(LOBES)), np.float32))
 
-    def fit(block: NDArray[np.intp]) -> None:
+    def fit(start: int) -> None:
+        part = slice(start, start + BLOCK)
+        block = pixels[part]
         terms = distant_terms(geometry, samples.directions, block)
-        amounts[block] = fit_appearance(terms, _values(samples, block), bright)
+        hoped = None if expected is None else Gloss(expected.amounts[part], expected.told[part])
+        amounts[block], found = fit_appearance(terms, _values(samples, block), bright, hoped)
+        gloss.amounts[part], gloss.told[part] = found.amounts, found.told
 
     with workers() as pool:
         # Asked for, so that what goes wrong is raised.
-        list(pool.map(fit, (pixels[start : start + BLOCK] for start in range(0, len(pixels), BLOCK))))
-    return amounts
+        list(pool.map(fit, range(0, len(pixels), BLOCK)))
+    return amounts, gloss
 
 
 def _values(samples: Samples, pixels: NDArray[np.intp]) -> Floats:
@@ -194,7 +201,7 @@ def choose_kernel(samples: Samples, pixels: NDArray[np.intp]) -> Kernel:
     def errors_of(fold: int) -> list[float]:
         """Of each candidate."""
         left_out = np.arange(lights) % FOLDS == fold
-        amounts = fit_appearance(terms[..., ~left_out], values[..., ~left_out], bright)
+        amounts, _ = fit_appearance(terms[..., ~left_out], values[..., ~left_out], bright)
         off = values - amounts @ terms
         known, asked = samples.directions[~left_out], samples.directions[left_out]
         known_off, asked_off = (off[..., part].reshape(-1, part.sum()) for part in (~left_out, left_out))
