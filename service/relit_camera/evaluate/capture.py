@@ -88,7 +88,7 @@ class CaptureErrors:
         direction_deg, at_ball_deg: (bright,) angle between the found and the true direction toward the light, from the
             head and from the ball; NaN where the report has none.
         rotation_deg, translation_px: (moved,), (moved, 2) what remains of the head's motion after the found transform,
-            over all frames that have one, its mean taken out: the reference frame need not be the truth's.
+            over the bright and dark frames, its mean taken out: the reference frame need not be the truth's.
         ball_px: error of the ball's x, y and radius; None where the report has no ball.
         focal_ratio: found over true focal length; None where the report has none.
     """
@@ -127,7 +127,7 @@ def compare_capture(report: Path, truth: Path) -> CaptureErrors:
         )
     pairs = [(frame, by_index[frame.index]) for frame in found.frames]
     lit = [(f, t) for f, t in pairs if f.kind == "bright" and t.flash.state == "bright"]
-    moved = [(f.rotation_deg, f.translation_px, t.head.to_rest) for f, t in pairs]
+    moved = [(f.rotation_deg, f.translation_px, t.head.to_rest) for f, t in pairs if f.kind in ("bright", "dark")]
     rotation = [r - t.rotation_deg for r, p, t in moved if r is not None and p is not None]
     shift = [np.subtract(p, t.translation_px) for r, p, t in moved if r is not None and p is not None]
     ball = found.ball
