@@ -12,8 +12,8 @@ from tests.capture.film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film
 
 GAMMA = 2.2
 FACE = (*HEAD, 9.5 * PX_PER_CM)
-BALL = (SIZE[0] / 2 + 70, SIZE[1] / 2 - 80, 30.0)
-"""Nearly: a sphere off the picture's middle is seen as an ellipse."""
+NAMED_BALL = f"{SIZE[0] / 2 + 70},{SIZE[1] / 2 - 80},30"
+"""Nearly: a sphere off the picture's middle is seen as an ellipse. It need not be looked for then."""
 GOOD = Film(frames=120)
 LIT = np.array([GOOD.lit(index) for index in range(GOOD.frames)])
 
@@ -93,11 +93,11 @@ def ball_over_exposed(codes: Codes) -> Shot:
 
 
 def lamp_of_the_phone(codes: Codes) -> Shot:
-    return Shot(Film(frames=60, azimuth=(-8, 8), elevation=(-8, 8)).codes(), {"ball": ",".join(map(str, BALL))})
+    return Shot(Film(frames=60, azimuth=(-8, 8), elevation=(-8, 8)).codes(), {"ball": NAMED_BALL})
 
 
 def lamp_on_one_side(codes: Codes) -> Shot:
-    return Shot(Film(frames=60, azimuth=(50, 66), elevation=(-8, 8)).codes(), {"ball": ",".join(map(str, BALL))})
+    return Shot(Film(frames=60, azimuth=(50, 66), elevation=(-8, 8)).codes(), {"ball": NAMED_BALL})
 
 
 def few_directions(codes: Codes) -> Shot:
@@ -105,11 +105,13 @@ def few_directions(codes: Codes) -> Shot:
 
 
 def narrow_sweep(codes: Codes) -> Shot:
-    return Shot(Film(frames=210, azimuth=(-25, 25), elevation=(-9, 9)).codes())
+    return Shot(Film(frames=210, azimuth=(-25, 25), elevation=(-9, 9)).codes(), {"ball": NAMED_BALL})
 
 
 def enhanced(codes: Codes) -> Shot:
-    return Shot(Film(frames=60, enhanced=1.5).codes(), {"ball": ",".join(map(str, BALL))})
+    """Now the left is made brighter, now the right."""
+    swing = 0.6 * np.sin(np.arange(60) / 7)[:, None] * np.linspace(-1, 1, SIZE[0])
+    return Shot(brighter(codes[:60], np.exp(swing)[:, None, :, None]), {"ball": NAMED_BALL})
 
 
 def walked_away(codes: Codes) -> Shot:
@@ -128,6 +130,21 @@ def black_about_a_small_circle(codes: Codes) -> Shot:
     """The film begins without the flash; the circle that is given holds nothing but black."""
     black = black_without_the_flash(codes).codes[int(np.argmin(LIT)) :][:60]
     return Shot(black, {"face": f"{HEAD[0]},{HEAD[1]},30"})
+
+
+def nobody(codes: Codes) -> Shot:
+    """The lamp lights a strip along the floor; nobody names the face's place."""
+    floor = codes.copy()
+    floor[:, 90:] = np.median(codes[LIT == 0][:, 90:, :60], axis=(0, 2))[:, None]
+    floor[LIT == 1, 285:] = 150
+    return Shot(floor, {"face": None})
+
+
+def cloth_over_the_ball(codes: Codes) -> Shot:
+    """Something dark hangs over a part of the ball; the camera's focal length is not known."""
+    covered = codes.copy()
+    covered[:, 79:120, 150:] = codes[:, 200:241, :90].min(axis=(0, 2), keepdims=True)
+    return Shot(covered, {"focal-px": None})
 
 
 def sun_on_the_face(codes: Codes) -> Shot:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -66,6 +67,7 @@ def build(film: Path, shot: Shot, folder: Path) -> Answer:
         (films.walked_away, "dark frames only; it is first lost at 2", "sit still"),
         (films.black_without_the_flash, "the face shows nothing that can be followed", "a little brighter"),
         (films.black_about_a_small_circle, "only 0 points of the face can be followed", "a little brighter"),
+        (films.nobody, "nothing that the flash lights looks like a head", "--face X,Y,RADIUS"),
         (films.sun_on_the_face, "the person cannot be told from the room", "make the room darker"),
     ],
     ids=lambda value: value.__name__ if callable(value) else "",
@@ -76,3 +78,36 @@ def test_a_bad_film_is_refused(
     shot = spoil(good)
     film = write_film(tmp_path / "film.mp4", shot.codes)
     build(film, shot, out).complains(told, cure)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told", "cure"),
+    [
+        (lambda film: film[: len(film) // 2], "film.mp4 is cut off", "record or copy it again"),
+        (lambda film: film[:3000] + bytes(9000) + film[12000:], "film.mp4 is damaged", "copy it again"),
+    ],
+    ids=["cut off", "damaged"],
+)
+def test_a_bad_file_is_refused(
+    spoil: Callable[[bytes], bytes], told: str, cure: str, good: np.ndarray, out: Path, tmp_path: Path
+) -> None:
+    film = write_film(tmp_path / "film.mp4", good[:60])
+    film.write_bytes(spoil(film.read_bytes()))
+    build(film, Shot(good), out).complains(told, cure)
+
+
+def test_a_film_that_is_hardly_good_enough_is_taken_with_warnings(good: np.ndarray, tmp_path: Path) -> None:
+    shot = films.cloth_over_the_ball(good)
+    answer = build(write_film(tmp_path / "film.mp4", shot.codes), shot, tmp_path)
+    assert answer.code == 0, answer
+    ball, focal = (
+        next(line for line in answer.err.splitlines() if words in line)
+        for words in ("of the ball's outline shows", "focal length is a guess")
+    )
+    assert "give its circle with --ball X,Y,RADIUS" in ball
+    assert "give it with --focal-px" in focal
+    report = json.loads((tmp_path / "me.json").read_text())
+    assert report["ball"]["evidence"] < 0.7
+    assert report["focal"]["error"] > 0.08
+    assert {ball, focal} <= {f"warning: {each}" for each in report["warnings"]}
+    assert set(contents(tmp_path)) == {"film.mp4", "me.relit", "me.json"}
