@@ -140,11 +140,11 @@ def nobody(codes: Codes) -> Shot:
     return Shot(floor, {"face": None})
 
 
-def cloth_over_the_ball(codes: Codes) -> Shot:
-    """Something dark hangs over a part of the ball; the camera's focal length is not known."""
-    covered = codes.copy()
-    covered[:, 79:120, 150:] = codes[:, 200:241, :90].min(axis=(0, 2), keepdims=True)
-    return Shot(covered, {"focal-px": None})
+def board_before_the_ball(codes: Codes) -> Shot:
+    """Its lower third is hidden; the camera's focal length is not known."""
+    hidden = codes.copy()
+    hidden[:, 79:120, 150:] = codes[:, 79:120, :90]
+    return Shot(hidden, {"focal-px": None, "method": "nearest"})
 
 
 def sun_on_the_face(codes: Codes) -> Shot:
