@@ -50,6 +50,13 @@ def brighter(codes: Codes, factor: np.ndarray | float) -> Codes:
     return np.asarray(np.clip(codes * np.asarray(factor) ** (1 / GAMMA), 0, 255).round().astype(np.uint8))
 
 
+def partly_lit(codes: Codes, share: np.ndarray) -> Codes:
+    """Of a bright frame this share (frames, rows or 1), the rest of a dark one."""
+    bright, dark = ((codes[kind][0] / 255) ** GAMMA for kind in (LIT == 1, LIT == 0))
+    light = dark + share[..., None, None] * (bright - dark)
+    return np.asarray(np.round(255 * light.clip(0, 1) ** (1 / GAMMA)).astype(np.uint8))
+
+
 def lamp_off(codes: Codes) -> Shot:
     return Shot(np.repeat(codes[LIT == 0][:1], 60, axis=0))
 
@@ -66,10 +73,13 @@ def too_short(codes: Codes) -> Shot:
 def too_fast(codes: Codes) -> Shot:
     """Twelve flashes a second, each exposing some rows only."""
     _, shares = blinking(Blinking(hz=12, seconds=3))
-    rows = shares[:, np.arange(SIZE[1]) * shares.shape[1] // SIZE[1], None, None]
-    bright, dark = (codes[kind][0].astype(np.float32) / 255 for kind in (LIT == 1, LIT == 0))
-    light = rows * bright**GAMMA + (1 - rows) * dark**GAMMA
-    return Shot(np.round(255 * light ** (1 / GAMMA)).astype(np.uint8))
+    return Shot(partly_lit(codes, shares[:, np.arange(SIZE[1]) * shares.shape[1] // SIZE[1]]))
+
+
+def mostly_weak(codes: Codes) -> Shot:
+    """The lamp mostly points elsewhere."""
+    strength = np.repeat([1, 1, 0.1, 1, 0.1, 1, 0.1, 1, 0.1, 1], 6)
+    return Shot(partly_lit(codes, (strength * np.tile([1, 0.4, 0, 0, 0, 0], 10))[:, None]))
 
 
 def no_ball(codes: Codes) -> Shot:

@@ -52,6 +52,7 @@ def build(film: Path, shot: Shot, folder: Path) -> Answer:
         (films.lamp_off, "no flash found: the brightness stays within", "let a light blink"),
         (films.lamp_on_all_the_time, "no flash found: the brightness changes by a factor", "must not be on all the"),
         (films.too_short, "flashes found", "half a minute or more"),
+        (films.mostly_weak, "frames wholly and strongly enough", "about a metre away and pointing at the face"),
         (films.too_fast, "too fast for 30 frames a second", "let it blink at most 5 times a second"),
         (films.no_ball, "no mirror ball was found", "put a shiny ball of at least"),
         (films.ball_cut_off, "is cut off by the picture's right edge", "with all of the ball in the picture"),

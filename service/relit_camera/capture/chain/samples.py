@@ -112,7 +112,7 @@ def _disc(square: HeadSquare, x: float, y: float, radius: float) -> NDArray[np.b
     """Pixels (size, size) of the square that are in a circle of the reference frame."""
     x, y = square.place(x, y)
     place = np.arange(square.size) + 0.5
-    return np.hypot(place - x, place[:, None] - y) < radius * square.scale
+    return np.asarray(np.hypot(place - x, place[:, None] - y) < radius * square.scale)
 
 
 def _strengths(lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, head: tuple[float, float]) -> Strengths:
