@@ -9,7 +9,7 @@ from relit_camera.face.detector import FaceDetector
 from relit_camera.models.registry import model_path
 from relit_camera.space.images import DisplayImage
 
-_CURE = "name its place: the face's centre and half its height in pixels"
+_CURE = "name its place, the face's centre and half its height in pixels: --face X,Y,RADIUS"
 
 
 class Circle(NamedTuple):

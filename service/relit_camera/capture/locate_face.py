@@ -80,7 +80,7 @@ def lit_head(seen: Brightness, flashes: Flashes) -> Circle:
         end += 1
     if not 3 <= widest <= 0.9 * largest.shape[1] or end - top < widest / 2:
         what = "nothing that the flash lights looks like a head"
-        raise CaptureError(what, "name the face's place: its centre and half its height in pixels")
+        raise CaptureError(what, "name the face's place, its centre and half its height in pixels: --face X,Y,RADIUS")
     columns = np.flatnonzero(largest[top:end].any(axis=0))
     width, height = seen.size[0] / largest.shape[1], seen.size[1] / largest.shape[0]
     radius = widest * width / 2

@@ -15,6 +15,7 @@ from relit_camera.capture.chain.merge import group_lights, merged, spread_evenly
 from relit_camera.capture.chain.options import CaptureOptions, Progress, no_progress
 from relit_camera.capture.chain.survey import survey
 from relit_camera.capture.chain.usable import Lamps, find_lamps, refuse_one_sided
+from relit_camera.capture.face_circle import Circle
 from relit_camera.capture.light.head_square import HeadSquare, head_square
 from relit_camera.capture.light.matte import flash_matte
 from relit_camera.capture.light.near_field import to_distant
@@ -33,8 +34,8 @@ _BALL_REACH = 1.15
 """Radii about the ball in which nobody is."""
 _UNLIKE = 3.0
 """Frames whose light fits the person's shape so many times worse than usual are left out."""
-_LEAST_PERSON = 0.03
-"""Share of the picture that the person takes at least."""
+_LEAST_FACE = 0.5
+"""Share of the face's circle that must be the person."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,7 @@ def build_samples(
         progress=lambda done: progress("Cutting out the flash's light", done, total),
     )
     progress("Finding the person", 0, None)
-    matte = _matte(lights, square, seen.ball.outline)
+    matte = _matte(lights, square, seen.ball.outline, seen.motion.circle)
     strengths = _strengths(lights, lamps, square, matte, (seen.motion.circle.x, seen.motion.circle.y))
     good = np.flatnonzero(strengths.misfit <= _UNLIKE * np.median(strengths.misfit))
     refuse_one_sided(lamps.directions[good], len(seen.highlights))
@@ -95,17 +96,23 @@ def build_samples(
     return CaptureResult(Samples(pictures, directions, matte), findings)
 
 
-def _matte(lights: OneLight, square: HeadSquare, ball: Outline) -> Mask:
-    x, y = square.place(ball.x, ball.y)
-    place = np.arange(square.size) + 0.5
-    nobody = np.hypot(place - x, place[:, None] - y) < _BALL_REACH * ball.radius * square.scale
+def _matte(lights: OneLight, square: HeadSquare, ball: Outline, face: Circle) -> Mask:
+    nobody = _disc(square, ball.x, ball.y, _BALL_REACH * ball.radius)
     matte = flash_matte(lights.pictures, lights.room, nobody)
-    if matte.mean() < _LEAST_PERSON:
+    share = matte[_disc(square, *face)].mean()
+    if share < _LEAST_FACE:
         raise CaptureError(
-            f"the flash lights {matte.mean():.1%} of what is about the face: the person cannot be told from the room",
+            f"the flash lights {share:.0%} of the face: the person cannot be told from the room",
             "make the room darker, or hold the lamp nearer, about a metre from the face",
         )
     return matte
+
+
+def _disc(square: HeadSquare, x: float, y: float, radius: float) -> NDArray[np.bool_]:
+    """Pixels (size, size) of the square that are in a circle of the reference frame."""
+    x, y = square.place(x, y)
+    place = np.arange(square.size) + 0.5
+    return np.asarray(np.hypot(place - x, place[:, None] - y) < radius * square.scale)
 
 
 def _strengths(lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, head: tuple[float, float]) -> Strengths:

@@ -48,5 +48,7 @@ def find_edges(level: Floats, times_s: Floats, frequency_hz: float) -> Edges:
     kept[:-1] &= ~(rising[:-1] & rising[1:])
     kept[1:] &= ~(~rising[1:] & ~rising[:-1])
     frame, rising = frame[kept], rising[kept]
-    share = (middle[frame] - level[frame]) / (level[frame + 1] - level[frame])
+    # Where the level stands, it is the middle that moves past it.
+    step = level[frame + 1] - level[frame]
+    share = np.divide(middle[frame] - level[frame], step, out=np.full(len(frame), 0.5), where=step != 0)
     return Edges(times_s[frame] + np.clip(share, 0, 1) * (times_s[frame + 1] - times_s[frame]), rising, frame)
