@@ -25,6 +25,7 @@ def test_light_all_over_the_front_is_enough() -> None:
     [
         (spread(12, 12), "the light comes only from beside the camera", "do not use the phone's own lamp"),
         (spread(15, 15) @ np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]]), "from one side", "move another around"),
+        (np.zeros((0, 3)), "0 usable directions of light in 90 bright frames", "half a minute"),
         (spread(60, 45, 30), "usable directions of light in 90 bright frames, 40 are needed", "half a minute"),
         (direction_from_degrees(np.linspace(-45, 45, 90), 5.0), "the light covers", "from one ear to the other"),
     ],

@@ -126,7 +126,7 @@ class Findings:
             "near_field": {
                 "corrected": self.options.near_field,
                 "light_distance_cm": self.options.light_distance_cm,
-                "misfit": float(np.median(self.strengths.misfit)),
+                "misfit": float(np.median(self.strengths.misfit[self.good])),
             },
             "light": {"area_sr": self.lamps.area_sr, "frames": len(self.good), "lights": self.lights},
             "square": {

@@ -82,7 +82,7 @@ def build_samples(
     progress("Finding the person", 0, None)
     matte = _matte(lights, square, seen.ball.outline)
     strengths = _strengths(lights, lamps, square, matte, (seen.motion.circle.x, seen.motion.circle.y))
-    good = np.flatnonzero(strengths.misfit <= _UNLIKE * np.median(strengths.misfit))
+    good = strengths.alike(_UNLIKE)
     refuse_one_sided(lamps.directions[good], len(seen.highlights))
     groups = [good[group] for group in group_lights(lamps.directions[good])]
     with workers() as pool:
