@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -73,6 +74,21 @@ def test_the_room_is_taken_off(built: CaptureResult) -> None:
     assert report["room"]["left"] < 0.02
     shaded = built.samples.pictures[built.samples.directions[:, 0].argmin()][:, 60:66]
     assert np.median(shaded[built.samples.matte[:, 60:66] > 0.99]) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("detector", "visible", "told"),
+    [
+        (False, 0.9, ["the flash reaches everything", "no face detector is installed"]),
+        (True, 0.0, ["the room is too dark", "the eyes are not found"]),
+    ],
+)
+def test_warnings_tell_what_is_amiss(built: CaptureResult, detector: bool, visible: float, told: list[str]) -> None:
+    seen = built.findings.seen
+    gains = replace(seen.gains, share=0.0, visible=visible)
+    amiss = replace(built.findings, seen=replace(seen, gains=gains, detector=detector, eyes_px=None))
+    warnings = amiss.warnings[-2:]
+    assert all(warning.startswith(start) for warning, start in zip(warnings, told, strict=True))
 
 
 def _no_ball(codes: np.ndarray) -> np.ndarray:
