@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from relit_camera.capture.chain.options import CaptureOptions
-from relit_camera.capture.chain.samples import CaptureResult, build_samples
+from relit_camera.capture.chain.samples import CaptureResult, build_samples, most_frames
 from relit_camera.capture.face_circle import Circle
-from relit_camera.errors import CaptureError, VideoError
+from relit_camera.errors import CaptureError, InputError, VideoError
 from tests.capture.ball.mirror_scene import degrees_between
 from tests.capture.film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film, write_film
 from tests.cli.relit_command import call
@@ -135,6 +135,13 @@ def test_a_bad_film_is_refused(
 def test_too_few_lights_are_refused(codes: np.ndarray, tmp_path: Path) -> None:
     with pytest.raises(CaptureError, match="usable directions of light"):
         build_samples(write_film(tmp_path / "film.mp4", codes[:75]), OPTIONS)
+
+
+def test_a_size_that_memory_cannot_hold_is_refused(tmp_path: Path) -> None:
+    assert most_frames(96) == most_frames(512) == 600
+    assert 150 <= most_frames(1024) < 160
+    with pytest.raises(InputError, match=r"1200 pixels a side.*--size of 1024 or less"):
+        build_samples(tmp_path / "film.mp4", replace(OPTIONS, size=1200))
 
 
 def test_a_cut_off_file_is_refused(codes: np.ndarray, tmp_path: Path) -> None:
