@@ -5,6 +5,7 @@ from relit_camera.capture.face_circle import Circle, find_face
 from relit_camera.capture.flash.brightness import watch
 from relit_camera.capture.flash.classify import find_flashes
 from relit_camera.capture.flash.kind import Kind
+from relit_camera.capture.stabilise import predicted
 from relit_camera.capture.stabilise.dense import align_to_mean
 from relit_camera.capture.stabilise.predicted import align_pictures
 from relit_camera.capture.stabilise.rigid import Rigid, rows_of
@@ -164,6 +165,20 @@ def test_pictures_under_different_light_are_aligned_to_predictions():
     assert shift < 0.45
     assert errors([Rigid()] * 28, moves)[1] > 0.9
     assert rounds[-1] == (6, 6)
+
+
+def test_a_picture_is_predicted_from_those_most_like_it_of_other_groups():
+    rng = np.random.default_rng(0)
+    coarse = rng.uniform(size=(40, 100)) * rng.uniform(0.5, 2, (40, 1))
+    groups = np.arange(40) // 2
+    like, shares = predicted._prediction(coarse @ coarse.T, 7, groups)
+    cosine = coarse @ coarse[7] / np.linalg.norm(coarse, axis=1) / np.linalg.norm(coarse[7])
+    others = [each for each in np.argsort(-cosine) if each not in (6, 7)]
+    assert like.tolist() == others[:16]
+    # Ridge regression as least squares with more rows.
+    ridge = np.sqrt(0.02 * (coarse[like] ** 2).sum() / 16) * np.eye(16)
+    wanted = np.linalg.lstsq(np.vstack([coarse[like].T, ridge]), np.append(coarse[7], np.zeros(16)), rcond=None)[0]
+    np.testing.assert_allclose(shares, wanted, rtol=1e-6)
 
 
 def test_the_circle_is_that_of_the_face(shared):

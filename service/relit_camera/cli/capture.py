@@ -82,9 +82,7 @@ def build(
         typer.Option(help="The ball's diameter; without, it is taken to be as far away as the head.", min=1),
     ] = None,
     light_distance_cm: Annotated[float, typer.Option(help="From the lamp to the head.", min=20, max=1000)] = 100.0,
-    size: Annotated[
-        int, typer.Option(help="Pixels a side, fewer where the video shows fewer.", min=64, max=2048)
-    ] = 384,
+    size: Annotated[int, typer.Option(help="Pixels a side, fewer where the video shows fewer.", min=64)] = 384,
     method: Annotated[str, typer.Option(help="Reflectance method.")] = "default",
     gamma: Annotated[str, typer.Option(help="Curve of the video: srgb, linear, or an exponent.")] = "srgb",
     subtract_room: Annotated[

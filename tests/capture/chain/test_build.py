@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
 
 from relit_camera.capture.chain.options import CaptureOptions
-from relit_camera.capture.chain.samples import CaptureResult, build_samples
+from relit_camera.capture.chain.samples import CaptureResult, build_samples, most_frames
 from relit_camera.capture.face_circle import Circle
+from relit_camera.errors import InputError
 from tests.capture.ball.mirror_scene import degrees_between
 from tests.capture.film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film, write_film
 
@@ -67,3 +71,25 @@ def test_the_room_is_taken_off(built: CaptureResult) -> None:
 
 def test_a_good_film_is_taken_without_warnings_but_of_the_detector(built: CaptureResult) -> None:
     assert all("no face detector is installed" in warning for warning in built.findings.warnings)
+
+
+@pytest.mark.parametrize(
+    ("detector", "visible", "told"),
+    [
+        (False, 0.9, ["the flash reaches everything", "no face detector is installed"]),
+        (True, 0.0, ["the room is too dark", "the eyes are not found"]),
+    ],
+)
+def test_warnings_tell_what_is_amiss(built: CaptureResult, detector: bool, visible: float, told: list[str]) -> None:
+    seen = built.findings.seen
+    gains = replace(seen.gains, share=0.0, visible=visible)
+    amiss = replace(built.findings, seen=replace(seen, gains=gains, detector=detector, eyes_px=None))
+    warnings = amiss.warnings[-2:]
+    assert all(warning.startswith(start) for warning, start in zip(warnings, told, strict=True))
+
+
+def test_a_size_that_memory_cannot_hold_is_refused(tmp_path: Path) -> None:
+    assert most_frames(96) == most_frames(512) == 600
+    assert 150 <= most_frames(1024) < 160
+    with pytest.raises(InputError, match=r"1200 pixels a side.*--size of 1024 or less"):
+        build_samples(tmp_path / "film.mp4", replace(OPTIONS, size=1200))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.capture.chain.merge import group_lights, merged, spread_evenly
+from relit_camera.capture.chain.merge import group_lights, merged, spread_evenly, thinned
 from relit_camera.capture.chain.usable import distinct, known_area, refuse_enhanced, refuse_one_sided
 from relit_camera.errors import CaptureError
 from relit_camera.space.directions import direction_from_degrees, fibonacci_directions
@@ -25,6 +25,7 @@ def test_light_all_over_the_front_is_enough() -> None:
     [
         (spread(12, 12), "the light comes only from beside the camera", "do not use the phone's own lamp"),
         (spread(15, 15) @ np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]]), "from one side", "move another around"),
+        (np.zeros((0, 3)), "0 usable directions of light in 90 bright frames", "half a minute"),
         (spread(60, 45, 30), "usable directions of light in 90 bright frames, 40 are needed", "half a minute"),
         (direction_from_degrees(np.linspace(-45, 45, 90), 5.0), "the light covers", "from one ear to the other"),
     ],
@@ -70,6 +71,11 @@ def test_near_duplicates_are_merged_and_a_bad_one_hardly_counts() -> None:
     assert np.abs(found - truth).max() < 0.035
     weighed = merged(np.stack([truth, truth + 1]).astype(np.float32), np.array([3.0, 1.0]))
     np.testing.assert_allclose(weighed, truth + 0.25, atol=1e-5)
+
+
+def test_of_a_large_group_some_are_merged() -> None:
+    assert thinned(np.arange(10, 110, 2)).tolist() == [10, 22, 34, 46, 58, 72, 84, 96, 108]
+    assert thinned(np.array([4, 7])).tolist() == [4, 7]
 
 
 def test_of_a_long_films_lights_some_from_everywhere_are_kept() -> None:

@@ -42,6 +42,7 @@ def test_gains_are_what_the_wall_tells() -> None:
 def test_where_the_flash_reaches_everything_dark_frames_tell() -> None:
     found, gains, bright = scene(reached=True)
     assert found.share == 0
+    assert not found.too_dim
     assert "dark frames" in found.source
     error = np.log(found.rgb[~bright]) - np.log(gains[~bright])
     assert (error - error.mean(axis=0)).std() < 0.02
@@ -58,3 +59,29 @@ def test_cells_keep_the_mean_and_the_shape() -> None:
     cells = cells_of(picture)
     assert cells.shape == (96, 64, 3)
     np.testing.assert_allclose(cells.mean(axis=(0, 1), dtype=float), picture.mean(axis=(0, 1)), rtol=2e-3)
+
+
+def before_a_wall(wall: tuple[float, float, float]) -> FrameGains:
+    """Gains of a person whom the flash lights, and a wall with that light."""
+    rng = np.random.default_rng(0)
+    index = np.arange(60)
+    bright = index % 6 < 3
+    light = np.ones((60, 24, 18, 3)) * wall * (1 + 0.02 * rng.normal(size=(60, 24, 18, 1)))
+    light[:, 8:, 5:13] += 0.1 + 0.3 * bright[:, None, None, None]
+    return find_gains(light.astype(np.float16), index / 30, bright, index // 6)
+
+
+def test_a_wall_in_warm_light_tells_gains_though_it_is_hardly_blue() -> None:
+    found = before_a_wall((0.04, 0.025, 0.013))
+    assert found.share > 0.3
+    assert not found.too_dim
+
+
+def test_a_dark_room_is_not_taken_for_one_that_the_flash_reaches() -> None:
+    rng = np.random.default_rng(0)
+    index = np.arange(60)
+    light = np.full((60, 24, 18, 3), 0.004) * rng.uniform(0.9, 1.1, (60, 24, 18, 1))
+    light[index % 6 < 3, 8:, 5:13] += 0.3
+    found = find_gains(light.astype(np.float16), index / 30, index % 6 < 3, index // 6)
+    assert found.share == 0
+    assert found.too_dim

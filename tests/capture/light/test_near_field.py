@@ -20,6 +20,11 @@ def film_pictures(film: Film, indices: range, near: bool = True) -> np.ndarray:
     return np.stack([cv2.resize(each, (SIDE, SIDE), interpolation=cv2.INTER_AREA) for each in cut])
 
 
+def film_matte(film: Film) -> np.ndarray:
+    """The person in those pictures (SIDE, SIDE)."""
+    return cv2.resize(film.surface[2][60:270, 0:210].astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+
+
 def test_light_falls_with_the_square_of_the_distance_and_off_the_axis() -> None:
     points = np.array([[[0, 0, 0], [0, 0, 10], [30, 0, 0]]], np.float32)
     surface = Surface(np.tile(np.float32([0, 0, 1]), (1, 3, 1)), points)
@@ -46,8 +51,7 @@ def test_strengths_come_back() -> None:
     film = Film(frames=60)
     indices = range(60)
     pictures = film_pictures(film, indices)
-    scale = SIDE / 210
-    matte = cv2.resize(film.surface[2][60:270, 0:210].astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+    scale, matte = SIDE / 210, film_matte(film)
     lamps = np.stack([film.lamp_cm(index) for index in indices])
     # Where the lamp is nearer, it is not known.
     known = 100 * lamps / np.linalg.norm(lamps, axis=1, keepdims=True)
@@ -57,6 +61,30 @@ def test_strengths_come_back() -> None:
     assert np.std(error) < 0.35 * np.std(truth)
     assert np.median(found.strength) == pytest.approx(1, rel=1e-3)
     assert np.median(found.misfit) < 0.05
+
+
+def test_flashes_that_light_no_skin_spoil_no_others() -> None:
+    film, spoilt = Film(frames=60), [10, 30]
+    pictures = film_pictures(film, range(60))
+    lamps = np.stack([film.lamp_cm(index) for index in range(60)])
+    pictures[10] = 0
+    lamps[30] = (0, 0, -100)
+    scale = SIDE / 210
+    found = find_strengths(pictures, lamps, film_matte(film), (105 * scale, 90 * scale), 52 / 9.5 * scale)
+    others = np.setdiff1d(range(60), spoilt)
+    assert np.all(np.isinf(found.misfit[spoilt]) & (found.strength[spoilt] == 1))
+    assert np.median(found.misfit[others]) < 0.05
+    assert np.median(found.strength[others]) == pytest.approx(1, rel=1e-3)
+    np.testing.assert_array_equal(found.alike(np.inf), others)
+
+
+def test_where_no_flash_lights_skin_none_is_alike() -> None:
+    film = Film(frames=60)
+    lamps = np.stack([film.lamp_cm(index) for index in range(0, 60, 6)])
+    dark = np.zeros((len(lamps), SIDE, SIDE, 3), np.float32)
+    found = find_strengths(dark, lamps, film_matte(film), (SIDE / 2, SIDE / 2), 2.5)
+    assert np.all(found.strength == 1)
+    assert len(found.alike(3.0)) == 0
 
 
 def test_the_direction_of_a_lamp_far_away_is_the_same_everywhere() -> None:
@@ -71,8 +99,7 @@ def test_the_direction_of_a_lamp_far_away_is_the_same_everywhere() -> None:
 def test_a_lamp_that_points_beside_the_head_is_told() -> None:
     film = Film(frames=60)
     pictures = film_pictures(film, range(60))
-    scale = SIDE / 210
-    matte = cv2.resize(film.surface[2][60:270, 0:210].astype(np.float32), (SIDE, SIDE), interpolation=cv2.INTER_AREA)
+    scale, matte = SIDE / 210, film_matte(film)
     lamps = np.stack([film.lamp_cm(index) for index in range(60)])
     # Of one flash, brighter to the right by so much a radian.
     right = (np.arange(SIDE) + 0.5 - 105 * scale) / (52 / 9.5 * scale) / 100

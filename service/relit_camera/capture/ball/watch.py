@@ -18,6 +18,8 @@ from relit_camera.space.images import LinearImage
 _ROUNDS = 12
 _SIDE_PX = 96
 """The ball's picture is looked at with so many pixels a side: that shows a shift of a hundredth of the radius."""
+REACH = 2.0
+"""Radii about the place where a ball was found, farther than which none of it is followed."""
 _AROUND = 1.5
 """Half the side of the window that is searched, in radii."""
 _DISC = 1.04

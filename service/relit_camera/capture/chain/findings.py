@@ -70,13 +70,23 @@ class Findings:
             f"the ball was {each.kind} in the frames {each.first} to {each.last}: fix it in its place"
             for each in seen.episodes
         ]
-        if not seen.gains.share:
+        if seen.gains.too_dim:
+            told.append(
+                "the room is too dark, or too bright, in nearly all of the picture, so that it does not tell what the "
+                "camera's automatics did: make some light in it, or film with exposure and white balance locked"
+            )
+        elif not seen.gains.share:
             told.append(
                 "the flash reaches everything in the picture, so that the camera's automatics are known only between "
                 "flashes: film before something far away, or with exposure and white balance locked"
             )
-        if seen.eyes_px is None:
+        if not seen.detector:
             told.append("no face detector is installed, the head's size is a guess: run `relit models pull`")
+        elif seen.eyes_px is None:
+            told.append(
+                "the eyes are not found, the head's size is a guess from the face's circle: look into the camera, and "
+                "begin with the lamp before the face; or give the face, brow to chin, with --face X,Y,RADIUS"
+            )
         return told
 
     def report(self) -> dict[str, Any]:
@@ -126,7 +136,7 @@ class Findings:
             "near_field": {
                 "corrected": self.options.near_field,
                 "light_distance_cm": self.options.light_distance_cm,
-                "misfit": float(np.median(self.strengths.misfit)),
+                "misfit": float(np.median(self.strengths.misfit[self.good])),
             },
             "light": {"area_sr": self.lamps.area_sr, "frames": len(self.good), "lights": self.lights},
             "square": {

@@ -12,6 +12,8 @@ SAME_DEG = 1.5
 
 _A_GROUP = 3
 """Pictures that are kept of a group."""
+MOST_MERGED = 9
+"""Pictures that are merged at most: as many again make hardly less noise."""
 _AGREE = 0.08
 """Difference to the median, of white, at which a pixel's value counts half."""
 
@@ -34,8 +36,14 @@ def spread_evenly(directions: NDArray[np.float64], most: int) -> NDArray[np.intp
     if len(directions) <= most:
         return np.arange(len(directions))
     groups = group_lights(directions, most // _A_GROUP)
-    chosen = [group[np.unique(np.linspace(0, len(group) - 1, _A_GROUP).round().astype(int))] for group in groups]
-    return np.sort(np.concatenate(chosen))
+    return np.sort(np.concatenate([thinned(group, _A_GROUP) for group in groups]))
+
+
+def thinned(group: NDArray[np.intp], most: int = MOST_MERGED) -> NDArray[np.intp]:
+    """At most so many of a group, spread evenly over it."""
+    if len(group) <= most:
+        return group
+    return np.asarray(group[np.linspace(0, len(group) - 1, most).round().astype(np.intp)])
 
 
 def merged(pictures: NDArray[np.float32], weights: NDArray[np.float64]) -> NDArray[np.float32]:

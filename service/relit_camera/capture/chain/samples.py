@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from relit_camera.capture.ball.outline import Outline
 from relit_camera.capture.chain.findings import Findings
-from relit_camera.capture.chain.merge import group_lights, merged, spread_evenly
+from relit_camera.capture.chain.merge import group_lights, merged, spread_evenly, thinned
 from relit_camera.capture.chain.options import CaptureOptions, Progress, no_progress
 from relit_camera.capture.chain.survey import survey
 from relit_camera.capture.chain.usable import Lamps, find_lamps, refuse_one_sided
@@ -22,12 +23,15 @@ from relit_camera.capture.light.near_field import to_distant
 from relit_camera.capture.light.one_light import OneLight, read_one_light
 from relit_camera.capture.light.strength import Strengths, find_strengths
 from relit_camera.cores import workers
-from relit_camera.errors import CaptureError
+from relit_camera.errors import CaptureError, InputError
 from relit_camera.reflectance.samples import Samples
 from relit_camera.space.images import Mask
 
-_MOST_FRAMES = 600
-"""Bright frames that are kept in memory, 1 GB at 512 x 512: a minute's."""
+_MOST_FRAMES, _FEWEST_FRAMES = 600, 150
+"""Bright frames that are kept in memory: a minute's, and fewer of larger pictures, but no fewer than these."""
+_MEMORY_BYTES = 944_000_000
+_PIXEL_BYTES = 6
+"""Of a picture: three halves of a float."""
 _SMALL = 96
 """Pixels a side of the pictures in which strengths and shape are found."""
 _BALL_REACH = 1.15
@@ -62,10 +66,11 @@ def build_samples(
         InputError: an option is impossible.
     """
     options = options or CaptureOptions()
+    _refuse_large(options.size)
     seen = survey(video, options, progress)
     found = find_lamps(seen, options)
-    lamps = found.only(spread_evenly(found.directions, _MOST_FRAMES))
     square = head_square(seen.motion.circle, seen.size, options.size)
+    lamps = found.only(spread_evenly(found.directions, most_frames(square.size)))
     subtract = seen.gains.room_can_go if options.subtract_room is None else options.subtract_room
     total = len(seen.flashes.frames)
     lights = read_one_light(
@@ -83,17 +88,29 @@ def build_samples(
     progress("Finding the person", 0, None)
     matte = _matte(lights, square, seen.ball.outline, seen.motion.circle)
     strengths = _strengths(lights, lamps, square, matte, (seen.motion.circle.x, seen.motion.circle.y))
-    good = np.flatnonzero(strengths.misfit <= _UNLIKE * np.median(strengths.misfit))
+    good = strengths.alike(_UNLIKE)
     refuse_one_sided(lamps.directions[good], len(seen.highlights))
-    groups = [good[group] for group in group_lights(lamps.directions[good])]
+    groups = [thinned(good[group]) for group in group_lights(lamps.directions[good])]
+    pictures = np.empty((len(groups), square.size, square.size, 3), np.float32)
     with workers() as pool:
-        pictures = np.stack(
-            list(pool.map(lambda group: _merged(lights, strengths, group, matte, options.near_field), groups))
-        )
+        merging = pool.map(lambda group: _merged(lights, strengths, group, matte, options.near_field), groups)
+        for place, picture in enumerate(merging):
+            pictures[place] = picture
     directions = np.stack([lamps.directions[group].mean(axis=0) for group in groups])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     findings = Findings(video.name, options, seen, found, lamps.index, square, subtract, strengths, good, len(groups))
     return CaptureResult(Samples(pictures, directions, matte), findings)
+
+
+def most_frames(size: int) -> int:
+    """How many bright frames are kept in memory as pictures with so many pixels a side."""
+    return min(_MOST_FRAMES, _MEMORY_BYTES // (_PIXEL_BYTES * size**2))
+
+
+def _refuse_large(size: int) -> None:
+    if most_frames(size) < _FEWEST_FRAMES:
+        most = math.isqrt(_MEMORY_BYTES // (_PIXEL_BYTES * _FEWEST_FRAMES))
+        raise InputError(f"{size} pixels a side are more than memory holds", f"give a --size of {most} or less")
 
 
 def _matte(lights: OneLight, square: HeadSquare, ball: Outline, face: Circle) -> Mask:

@@ -30,7 +30,6 @@ from relit_camera.errors import ModelError
 from relit_camera.face.detector import FaceDetector
 from relit_camera.models.registry import model_path
 from relit_camera.space.colour import uint8_from_linear
-from relit_camera.space.images import DisplayImage
 from relit_camera.video.linear import LinearReader
 
 Indices = NDArray[np.intp]
@@ -46,7 +45,8 @@ class Survey:
         size: width and height of its upright pictures.
         flashes: what its frames are.
         face: in the picture in which each pixel is as bright as it ever was.
-        eyes_px: distance of the eyes, None where no detector is installed.
+        detector: whether one that finds the eyes is installed.
+        eyes_px: distance of the eyes, None where they are not found.
         motion: where the face went.
         ball: the mirror ball.
         episodes: in which it was hidden or elsewhere.
@@ -58,6 +58,7 @@ class Survey:
     size: tuple[int, int]
     flashes: Flashes
     face: LocatedFace
+    detector: bool
     eyes_px: float | None
     motion: Stabilisation
     ball: FoundBall
@@ -116,12 +117,14 @@ def survey(video: Path, options: CaptureOptions, progress: Progress) -> Survey:
             progress("Looking at the light", frame.index + 1, total)
     found = episodes(sightings, ball.outline.radius)
     view = PinholeView(ball.outline, seen.size, ball.focal.pixels)
+    detector = _detector()
     flash = np.array([flashes.frames[index].flash for index in frames])
     return Survey(
         seen.size,
         flashes,
         face,
-        _eyes(stills),
+        detector is not None,
+        eye_distance(stills, detector) if detector else None,
         motion,
         ball,
         found,
@@ -154,9 +157,8 @@ def _focal(video: Path, size: tuple[int, int], given_px: float | None) -> Focal:
     return typical_focal(size) if tag_mm is None else tagged_focal(tag_mm, size)
 
 
-def _eyes(stills: list[DisplayImage]) -> float | None:
+def _detector() -> FaceDetector | None:
     try:
-        detector = FaceDetector(model_path("face_detector_yunet"))
-    except ModelError:  # that it is missing, `locate_face` has said
+        return FaceDetector(model_path("face_detector_yunet"))
+    except ModelError:  # that it is missing, the report's warnings say
         return None
-    return eye_distance(stills, detector)

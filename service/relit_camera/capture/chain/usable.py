@@ -126,6 +126,8 @@ def refuse_one_sided(directions: Floats, bright: int) -> None:
     Raises:
         CaptureError: it does not.
     """
+    if not len(directions):
+        raise _too_few(0, bright)
     middle = directions.mean(axis=0)
     middle /= np.linalg.norm(middle)
     away = np.degrees(np.arccos(np.clip(directions @ middle, -1, 1)))

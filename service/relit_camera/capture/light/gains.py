@@ -22,7 +22,7 @@ _SIDE = 96
 """Cells along the longer side of the pictures in which gains are looked for."""
 _FLOOR = 1e-4
 _VISIBLE, _CLIPPED = 0.015, 0.85
-"""Of the least and the most of a cell: darker ones are noise, brighter ones the end of the code values."""
+"""Of a cell's mean and of its most: darker ones are noise, brighter ones the end of the code values."""
 _LEAST, _ALIKE = 5.0, 0.06
 """Cells that follow the flash by no more than this (logarithm) over the least following ones (percentile) count as not
 reached by it."""
@@ -43,7 +43,9 @@ class FrameGains:
         rgb: (frames, 3) each frame's, by channel; the geometric mean over the bright ones is 1.
         spread: how far the cells of one frame differ about its gain (robust standard deviation of logarithms, median
             over the frames): near the noise's where one gain a channel is all that was done.
-        share: of all cells that tell them; 0 where the flash reaches everything.
+        share: of all cells that tell them; 0 where hardly any does.
+        visible: share of all cells that show the room, neither too dark nor too bright, without the flash: where it is
+            not small but `share` is 0, the flash reaches everything.
         left_as_is, left: share of the room's light that is left, either sign, where a frame without the flash is taken
             from one with it, with the gains as they were and made equal.
     """
@@ -51,8 +53,14 @@ class FrameGains:
     rgb: Floats
     spread: float
     share: float
+    visible: float
     left_as_is: float
     left: float
+
+    @property
+    def too_dim(self) -> bool:
+        """Whether the room shows too little, so that it is not the flash that keeps it from telling."""
+        return not self.share and self.visible < _FEWEST
 
     @property
     def source(self) -> str:
@@ -78,7 +86,8 @@ def find_gains(
 ) -> FrameGains:
     """The gains of bright and dark frames.
 
-    Where the flash reaches everything, dark frames alone tell theirs, and the bright ones' are interpolated by time.
+    Where the flash reaches everything that is seen, dark frames alone tell theirs, and the bright ones' are
+    interpolated by time.
 
     Args:
         cells: (frames, rows, columns, 3) of `cells_of`, bright and dark frames in their order.
@@ -89,7 +98,8 @@ def find_gains(
     frames, rows, columns, _ = cells.shape
     flat = cells.reshape(frames, rows * columns, 3)
     least, most = flat.min(axis=2).min(axis=0), flat.max(axis=2).max(axis=0)
-    visible = (np.median(flat, axis=0).min(axis=1) > _VISIBLE) & (least > 0) & (most < _CLIPPED)
+    visible = (np.median(flat, axis=0).mean(axis=1) > _VISIBLE) & (least > 0) & (most < _CLIPPED)
+    of_room = np.median(flat[~bright], axis=0).mean(axis=1) > _VISIBLE
     unreached = _unreached(flat, times_s, bright, flash, visible)
     share = float(unreached.mean())
     if share >= _FEWEST:
@@ -102,7 +112,7 @@ def find_gains(
     gains = np.exp(logs)
     judged = np.flatnonzero(bright if share else ~bright)
     left_as_is, left = (_left(telling, each, judged, np.flatnonzero(~bright)) for each in (np.ones_like(gains), gains))
-    return FrameGains(gains, spread, share, left_as_is, left)
+    return FrameGains(gains, spread, share, float((visible & of_room).mean()), left_as_is, left)
 
 
 def _unreached(

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.capture.ball.highlight import Highlight, NoHighlight, brightest_place
 from relit_camera.capture.ball.outline import Outline
 from relit_camera.capture.ball.view import PinholeView, Vectors
-from relit_camera.capture.ball.watch import Episode, outline_in
+from relit_camera.capture.ball.watch import REACH, Episode, outline_in
 from relit_camera.space.images import LinearImage
 
-_REACH = 1.3
-"""Half the side of what is kept about the ball, in radii."""
+_MOST_PX = 256
+"""Pixels a side of what is kept of a frame: more of a large ball do not tell the lamp's direction better."""
 
 Plane = NDArray[np.float16]
 
@@ -22,22 +23,27 @@ Plane = NDArray[np.float16]
 class BallFilm:
     """The ball's surroundings in some frames of a video: all that is kept of them for finding highlights.
 
-    Memory: 100 KB a frame where the ball's radius is 90 pixels.
+    Memory: 130 KB a frame at most.
     """
 
     def __init__(self, outline: Outline, size: tuple[int, int]) -> None:
         """Look at a ball with this outline in pictures of this size (width, height)."""
-        reach = _REACH * outline.radius
+        reach = REACH * outline.radius
         self._left, self._top = (max(0, int(middle - reach)) for middle in (outline.x, outline.y))
         self._right, self._bottom = (
             min(side, int(middle + reach) + 1) for middle, side in ((outline.x, size[0]), (outline.y, size[1]))
         )
+        width, height = self._right - self._left, self._bottom - self._top
+        scale = min(1.0, _MOST_PX / max(width, height))
+        self._size = (round(width * scale), round(height * scale))
+        self._step = (width / self._size[0], height / self._size[1])
         self._planes: dict[int, Plane] = {}
 
     def add(self, index: int, frame: LinearImage) -> None:
         """Keep what a frame, linear RGB (height, width, 3), shows there."""
         cut = frame[self._top : self._bottom, self._left : self._right]
-        self._planes[index] = cut.mean(axis=2).astype(np.float16)
+        plane = cv2.resize(cut.mean(axis=2), self._size, interpolation=cv2.INTER_AREA)
+        self._planes[index] = plane.astype(np.float16)
 
     def highlights(
         self, bright: Iterable[int], view: PinholeView, episodes: Iterable[Episode] = ()
@@ -63,29 +69,48 @@ class BallFilm:
         if outline is None:
             return NoHighlight("something is before the ball")
         here = view if outline == view.outline else PinholeView(outline, view.size, view.focal_px)
+        cut = _Cut(here, (self._left, self._top), self._step)
+        if here is not view and not _whole(cut.outline, self._size):
+            return NoHighlight("the ball is out of its place so far that not all of it is seen")
         room = None
         if len(dark):
             room = self._planes[int(dark[np.abs(dark - index).argmin()])].astype(np.float32)
         light = self._planes[index].astype(np.float32)
-        place = brightest_place(light, _Cut(here, self._left, self._top), room, typical_area_px)
+        pixel = self._step[0] * self._step[1]
+        place = brightest_place(light, cut, room, typical_area_px / pixel)
         if isinstance(place, NoHighlight):
             return place
-        return Highlight(place.x + self._left, place.y + self._top, place.normal, place.brightness, place.area_px)
+        x, y = cut.whole(place.x, place.y)
+        return Highlight(float(x), float(y), place.normal, place.brightness, round(place.area_px * pixel))
+
+
+def _whole(outline: Outline, size: tuple[int, int]) -> bool:
+    return all(
+        outline.radius <= at <= side - outline.radius for at, side in zip((outline.x, outline.y), size, strict=True)
+    )
 
 
 class _Cut:
-    """A view of the ball in pixels of a part of the picture; see `BallView`."""
+    """A view of the ball in pixels of a part of the picture, made smaller; see `BallView`."""
 
-    def __init__(self, view: PinholeView, left: int, top: int) -> None:
-        self._view, self._left, self._top = view, left, top
-        self.outline = view.outline.moved(-left, -top)
+    def __init__(self, view: PinholeView, corner: tuple[int, int], step: tuple[float, float]) -> None:
+        """Of the part with that left upper corner, so many pixels of the picture (x, y) becoming one."""
+        self._view, self._corner, self._step = view, corner, step
+        x, y = self._part(view.outline.x, view.outline.y)
+        self.outline = Outline(float(x), float(y), view.outline.radius / step[0])
+
+    def whole(self, x: NDArray | float, y: NDArray | float) -> tuple[NDArray, NDArray]:
+        """Where in the whole picture a place in the part is."""
+        return np.asarray(x) * self._step[0] + self._corner[0], np.asarray(y) * self._step[1] + self._corner[1]
+
+    def _part(self, x: NDArray | float, y: NDArray | float) -> tuple[NDArray, NDArray]:
+        return (np.asarray(x) - self._corner[0]) / self._step[0], (np.asarray(y) - self._corner[1]) / self._step[1]
 
     def normals(self, x: NDArray, y: NDArray) -> Vectors:
-        return self._view.normals(np.asarray(x) + self._left, np.asarray(y) + self._top)
+        return self._view.normals(*self.whole(x, y))
 
     def mirrored(self, normals: Vectors) -> Vectors:
         return self._view.mirrored(normals)
 
     def picture(self, normals: Vectors) -> tuple[NDArray, NDArray]:
-        x, y = self._view.picture(normals)
-        return x - self._left, y - self._top
+        return self._part(*self._view.picture(normals))

@@ -7,6 +7,7 @@ subtracted (thesis 4.3.5, whose faces came out blue for want of them).
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,9 @@ from relit_camera.space.images import LinearImage
 from relit_camera.video.linear import LinearReader
 
 Indices = NDArray[np.intp]
+
+_NEAREST = 4
+"""Dark frames, on either side of a bright one, that tell the room's light about it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,15 +102,19 @@ class _Between:
     def __init__(self, pictures: NDArray[np.float16], room_sum: NDArray[np.float64], subtract: bool) -> None:
         self._pictures, self._room_sum, self._subtract = pictures, room_sum, subtract
         self._before: _Room | None = None
-        self._dark: list[_Room] = []
+        self._dark: deque[_Room] = deque(maxlen=_NEAREST)
         self._waiting: list[tuple[int, float, LinearImage]] = []
 
     def add_dark(self, time_s: float, picture: LinearImage) -> None:
         self._dark.append(_Room(time_s, picture))
+        if len(self._dark) == _NEAREST:
+            self._settle()
 
     def add_bright(self, place: int, time_s: float, picture: LinearImage) -> None:
         if self._dark:
             self._settle()
+            self._before = self._room()
+            self._dark.clear()
         self._waiting.append((place, time_s, picture))
 
     def finish(self) -> None:
@@ -115,17 +123,22 @@ class _Between:
 
     def _settle(self) -> None:
         """The dark frames just seen end the wait of the bright ones before them."""
-        after = None
-        if self._dark:
-            time_s = float(np.mean([each.time_s for each in self._dark]))
-            after = _Room(time_s, np.mean([each.picture for each in self._dark], axis=0))
+        if not self._waiting:
+            return
+        after = self._room()
         for place, time_s, picture in self._waiting:
             room = _at(time_s, self._before, after)
             if room is not None:
                 self._room_sum += room
             self._pictures[place] = picture - room if self._subtract and room is not None else picture
-        self._before = after or self._before
-        self._waiting, self._dark = [], []
+        self._waiting = []
+
+    def _room(self) -> _Room | None:
+        """What the dark frames at hand show."""
+        if not self._dark:
+            return None
+        time_s = float(np.mean([each.time_s for each in self._dark]))
+        return _Room(time_s, np.mean([each.picture for each in self._dark], axis=0))
 
 
 def _at(time_s: float, before: _Room | None, after: _Room | None) -> LinearImage | None:

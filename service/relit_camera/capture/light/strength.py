@@ -20,12 +20,14 @@ from relit_camera.space.colour import luminance
 from relit_camera.space.images import Mask
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
 Pictures = NDArray[np.float32]
 
 _ROUNDS = 5
 _FACING, _LIT, _SURE = 0.35, 0.3, 0.5
 """Pixels count whose cosine, share of the expected light, and confidence of the normal are no less."""
 _FEWEST = 30
+"""Pixels that tell a flash's strength."""
 _MISFIT, _ALIKE = 0.1, 50
 """Error of the law of the cosine (logarithm), and how many pixels have about the same."""
 _USUAL_TILT = 0.25
@@ -43,13 +45,19 @@ class Strengths:
         strength: (lights,) relative to the median.
         lamps: where they were, and how they pointed.
         surface: the person's, in the small pictures' pixels.
-        misfit: (lights,) relative error of the law of the cosine on lit skin (median).
+        misfit: (lights,) relative error of the law of the cosine on lit skin (median); infinite, with a strength of 1,
+            where hardly any skin is lit.
     """
 
     strength: Floats
     lamps: list[Lamp]
     surface: Surface
     misfit: Floats
+
+    def alike(self, times: float) -> Indices:
+        """Places of the flashes that fit the person no more than so many times worse than usual."""
+        told = np.flatnonzero(np.isfinite(self.misfit))
+        return told[self.misfit[told] <= times * np.median(self.misfit[told])] if len(told) else told
 
 
 def find_strengths(
@@ -66,7 +74,6 @@ def find_strengths(
     """
     lamps = [Lamp(place, np.zeros(3)) for place in lamps_cm]
     directions = np.stack([lamp.direction for lamp in lamps])
-    strength = np.ones(len(pictures))
     corrected = pictures
     for _ in range(_ROUNDS):
         shading = photometric_stereo(corrected, directions, matte)
@@ -76,7 +83,13 @@ def find_strengths(
         albedo = luminance(shading.albedo)
         sure = (shading.confidence > _SURE) & (matte > 0.9)
         found = [_flash(picture, surface, lamp, albedo, sure) for picture, lamp in zip(pictures, lamps, strict=True)]
-        strength = _without_half_the_trend(np.array([each.strength for each in found]), directions)
+        misfit = np.array([each.misfit for each in found])
+        told = np.isfinite(misfit)
+        strength = np.ones(len(pictures))
+        if told.any():
+            strength[told] = _without_half_the_trend(
+                np.array([each.strength for each in found])[told], directions[told]
+            )
         lamps = [each.lamp for each in found]
         corrected = np.stack(
             [
@@ -84,7 +97,7 @@ def find_strengths(
                 for picture, lamp, each in zip(pictures, lamps, strength, strict=True)
             ]
         )
-    return Strengths(strength, lamps, surface, np.array([each.misfit for each in found]))
+    return Strengths(strength, lamps, surface, misfit)
 
 
 def _without_half_the_trend(strength: Floats, directions: Floats) -> Floats:
@@ -124,7 +137,10 @@ class _Flash:
 def _flash(
     picture: Pictures, surface: Surface, lamp: Lamp, albedo: NDArray[np.float32], sure: NDArray[np.bool_]
 ) -> _Flash:
-    """One flash's strength and tilt, by the pixels that it lights, and how far these are from them (median)."""
+    """One flash's strength and tilt, by the pixels that it lights, and how far these are from them (median).
+
+    With hardly any such pixels the strength is 1 and the misfit infinite.
+    """
     lamp = Lamp(lamp.place_cm, np.zeros(3))
     toward, light = light_at(surface, lamp)
     cosine = np.einsum("hwc,hwc->hw", surface.normals, toward)
@@ -133,7 +149,9 @@ def _flash(
     if counted.sum() < _FEWEST:
         counted = sure & (cosine > 0) & (expected > 0)
     ratio = luminance(picture)[counted] / expected[counted]
-    lit = ratio > _LIT * np.median(ratio)
+    lit = ratio > _LIT * (np.median(ratio) if ratio.size else 0)
+    if lit.sum() < _FEWEST:
+        return _Flash(1.0, lamp, np.inf)
     logs = np.log(ratio[lit].astype(np.float64))
     tilt = _tilt(logs, surface.points_cm[counted][lit] / np.linalg.norm(lamp.place_cm), lamp.direction)
     left = logs - surface.points_cm[counted][lit] @ tilt / np.linalg.norm(lamp.place_cm)

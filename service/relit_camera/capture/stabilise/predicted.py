@@ -69,9 +69,10 @@ def _one_round(
     moved = np.stack([move_picture(picture, each) for picture, each in zip(pictures, start, strict=True)])
     moved = np.maximum(moved, 0)
     coarse = _thumbnails(moved, weights)
+    gram = coarse @ coarse.T
     aligned = []
     for index, picture in enumerate(pictures):
-        like, shares = _prediction(coarse, index, groups)
+        like, shares = _prediction(gram, index, groups)
         predicted = np.tensordot(shares, moved[like], axes=1).astype(np.float32)
         shade = _SHADE * float(moved[index].mean()) + 1e-9
         template = Template(visible_detail(predicted, shade), weights, same_light=False)
@@ -82,14 +83,20 @@ def _one_round(
     return rigids_of(rows - rows.mean(axis=0) + rows_of(start).mean(axis=0))
 
 
-def _prediction(coarse: Floats, index: int, groups: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
-    """The pictures most like one, and their shares in it: ridge regression of what is coarse."""
-    direction = coarse / np.maximum(np.linalg.norm(coarse, axis=1, keepdims=True), 1e-12)
-    likeness = np.where(groups == groups[index], -np.inf, direction @ direction[index])
+def _prediction(gram: Floats, index: int, groups: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+    """The pictures most like one, and their shares in it: ridge regression of what is coarse.
+
+    Args:
+        gram: (count, count) inner products of what is coarse in the pictures.
+        index: of the one.
+        groups: (count,) of all.
+    """
+    length = np.maximum(np.sqrt(gram.diagonal()), 1e-12)
+    likeness = np.where(groups == groups[index], -np.inf, gram[index] / (length * length[index]))
     like = np.argsort(-likeness)[: min(_LIKE, int(np.isfinite(likeness).sum()))]
-    gram = coarse[like] @ coarse[like].T
-    ridge = _RIDGE * np.trace(gram) / len(like) * np.eye(len(like))
-    return like, np.linalg.solve(gram + ridge, coarse[like] @ coarse[index])
+    among = gram[np.ix_(like, like)]
+    ridge = _RIDGE * np.trace(among) / len(like) * np.eye(len(like))
+    return like, np.linalg.solve(among + ridge, gram[like, index])
 
 
 def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Floats:
