@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,7 @@ import pytest
 from relit_camera.capture.chain.options import CaptureOptions
 from relit_camera.capture.chain.samples import CaptureResult, build_samples
 from relit_camera.capture.face_circle import Circle
-from relit_camera.errors import CaptureError, VideoError
+from relit_camera.errors import CaptureError, ConfigError, VideoError
 from tests.capture.ball.mirror_scene import degrees_between
 from tests.capture.film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film, write_film
 from tests.cli.relit_command import call
@@ -114,6 +115,15 @@ def test_a_bad_film_is_refused(
         build_samples(film, OPTIONS)
     assert told in refused.value.what
     assert cure in refused.value.cure
+
+
+def test_a_face_outside_of_the_picture_is_refused_before_a_frame_is_read(codes: np.ndarray, tmp_path: Path) -> None:
+    told: list[str] = []
+    options = replace(OPTIONS, face=Circle(SIZE[0] + 5, 60, 40))
+    video = write_film(tmp_path / "film.mp4", codes[:12])
+    with pytest.raises(ConfigError, match=f"face at {SIZE[0] + 5}, 60 is outside of the picture, which is {SIZE[0]}x"):
+        build_samples(video, options, lambda stage, done, total: told.append(stage))
+    assert not told
 
 
 def test_too_few_lights_are_refused(codes: np.ndarray, tmp_path: Path) -> None:
