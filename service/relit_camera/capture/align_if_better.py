@@ -89,7 +89,7 @@ def _misfit(pictures: NDArray[np.float32], directions: NDArray[np.float64], matt
     judged, inside = directions[:, 2] > _JUDGED, matte > 0.5
     light = luminance(pictures)
     left = (light - predict_pictures(pictures, directions, matte))[judged][:, inside]
-    return float(np.linalg.norm(left) / max(np.linalg.norm(light[judged][:, inside]), 1e-9))
+    return float(np.linalg.norm(left)) / max(float(np.linalg.norm(light[judged][:, inside])), 1e-9)
 
 
 def _described(found: Alignment, directions: NDArray[np.float64]) -> str:
