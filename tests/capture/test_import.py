@@ -11,6 +11,7 @@ import pytest
 from relit_camera.capture.importing import import_samples
 from relit_camera.capture.lights_file import read_lights
 from relit_camera.errors import ImageError, LightsError
+from relit_camera.reflectance.samples import Samples
 from tests.synthetic import sphere_samples, write_lights
 
 
@@ -37,10 +38,10 @@ def test_sixteen_bits_and_spaces_in_names(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     lines = ["5"]
     for index, direction in enumerate([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, 0, 1), (0, -1, 0)]):
-        cv2.imwrite(str(tmp_path / f"a b {index}.png"), rng.integers(0, 65535, (9, 7, 3), dtype=np.uint16))
+        cv2.imwrite(str(tmp_path / f"a b {index}.png"), rng.integers(0, 65535, (9, 8, 3), dtype=np.uint16))
         lines.append(f"a b {index}.png {direction[0]} {direction[1]} {direction[2]}")
     (tmp_path / "l.lp").write_text("\r\n".join(lines))
-    assert import_samples(tmp_path / "l.lp", "linear").pictures.shape == (5, 9, 7, 3)
+    assert import_samples(tmp_path / "l.lp", "linear").pictures.shape == (5, 9, 8, 3)
 
 
 def _edit(path: Path, line: int, text: str) -> None:
@@ -76,6 +77,22 @@ def test_two_sizes_are_refused(lights: Path) -> None:
 def test_a_matte_of_another_size_is_refused(lights: Path) -> None:
     cv2.imwrite(str(lights.parent / "matte.png"), np.zeros((8, 8), np.uint8))
     with pytest.raises(LightsError, match=r"matte.png is 8x8"):
+        import_samples(lights)
+
+
+@pytest.mark.parametrize("size", [(7, 24), (24, 7)])
+def test_pictures_too_small_for_a_subject_are_refused(tmp_path: Path, size: tuple[int, int]) -> None:
+    made = sphere_samples(30, 24)
+    height, width = size
+    cut = Samples(made.pictures[:, :height, :width], made.directions, made.matte[:height, :width])
+    with pytest.raises(LightsError, match=f"000.png is {width}x{height}, a subject has 8 to 8192 pixels a side; give"):
+        import_samples(write_lights(tmp_path, cut))
+
+
+def test_pictures_that_are_black_where_the_matte_is_are_refused(lights: Path) -> None:
+    outside = 255 - cv2.imread(str(lights.parent / "matte.png"), cv2.IMREAD_GRAYSCALE)
+    cv2.imwrite(str(lights.parent / "matte.png"), outside)
+    with pytest.raises(LightsError, match=r"black where matte.png is white; .* check matte.png"):
         import_samples(lights)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from relit_camera.capture.lights_file import MIN_LIGHTS
 from relit_camera.errors import LightsError
 from relit_camera.reflectance.barycentric import SphericalBarycentric
 from relit_camera.reflectance.black_ring import region_share
@@ -123,6 +124,13 @@ def test_the_kernel_is_one_of_the_candidates_and_noisier_pictures_get_a_smoother
         return kernel.noise
 
     assert noise(0.3) > noise(0.0)
+
+
+def test_the_fewest_lights_are_fewer_than_parts_to_judge_by() -> None:
+    few = lambert(direction_from_degrees(np.array([-40, 40, 0, 0]), np.array([0, 0, 40, 10])), SIZE)
+    assert len(few.directions) == MIN_LIGHTS
+    assert choose_kernel(few, inside(few)) in CANDIDATES
+    assert np.isfinite(Blend().build(few).dense(0, SIZE)).all()
 
 
 def test_residuals_count_for_nothing_far_from_every_light_and_for_themselves_at_their_own() -> None:

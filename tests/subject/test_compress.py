@@ -131,6 +131,14 @@ def test_progress_runs_to_the_end(samples: Samples) -> None:
     assert told == [(i + 1, SIZE // TILE_HEIGHT) for i in range(SIZE // TILE_HEIGHT)]
 
 
+def test_one_cluster_is_enough() -> None:
+    few = shadowed(cap(40, 60), 8)
+    one = compress(SphericalBarycentric().build(few), few.pictures, few.matte, TARGET)
+    assert len(np.concatenate(tiles(few.matte))) == 1
+    assert one.reached.light_db > TARGET.light_db
+    assert one.reached.texel_db > TARGET.texel_db
+
+
 def test_clusters_hold_every_pixel_inside_once_and_neighbours_together() -> None:
     matte = np.zeros((50, 600), np.float32)
     matte[3:47, 100:560] = 0.3

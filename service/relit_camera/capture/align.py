@@ -38,7 +38,7 @@ _LEAST_SEEN = 0.1
 _LEAST_LIT = 100
 _FARTHEST = 0.04
 """Of the longer side: nothing that keeps still goes farther."""
-_LEAST_KEPT = 8
+LEAST_KEPT = 8
 """Fewer pictures cannot tell motion from shading."""
 
 
@@ -75,7 +75,7 @@ class Alignment:
         Raises:
             LightsError: fewer than eight are left.
         """
-        if len(self.kept) < _LEAST_KEPT:
+        if len(self.kept) < LEAST_KEPT:
             what = f"only {len(self.kept)} of {len(self.gains)} pictures fit together"
             raise LightsError(what, "give pictures of one thing that keeps still, and the directions of their lights")
         return Samples(self.pictures(samples.pictures)[self.kept], samples.directions[self.kept], samples.matte)
@@ -95,13 +95,12 @@ def align_samples(
         matte: (height, width) where the person is.
         progress: called with rounds of alignment done and their total.
     """
-    scale = min(1.0, _LARGEST_SIDE / max(matte.shape))
-    small, inside = np.stack([_resized(picture, scale) for picture in pictures]), _resized(matte, scale)
+    small, inside, scale = scaled_down(pictures, matte)
     light, count = luminance(small), len(pictures)
     rejected = unfit_pictures(light, predict_pictures(small, directions, inside), directions, inside)
     kept = np.setdiff1d(np.arange(count), list(rejected))
     transforms, gains, likeness = [Rigid()] * count, np.ones(count), np.zeros(count)
-    if len(kept) >= _LEAST_KEPT:
+    if len(kept) >= LEAST_KEPT:
         found = align_pictures(light[kept], inside, rounds=_ROUNDS, progress=progress)
         for index, each in zip(kept, _without_drift(found, directions[kept]), strict=True):
             transforms[index] = each
@@ -110,6 +109,12 @@ def align_samples(
         gains[kept] = _gains(luminance(moved), predicted, directions[kept], inside)
         likeness[kept] = likeness_of(luminance(moved), predicted, inside)
     return Alignment(tuple(each.scaled(1 / scale) for each in transforms), gains, likeness, rejected)
+
+
+def scaled_down(pictures: Floats, matte: Mask) -> tuple[Floats, Mask, float]:
+    """Pictures (lights, height, width, 3) and matte as small as they are compared, and by what factor, 1 at most."""
+    scale = min(1.0, _LARGEST_SIDE / max(matte.shape))
+    return np.stack([_resized(picture, scale) for picture in pictures]), _resized(matte, scale), scale
 
 
 def align_to(picture: LinearImage, predicted: LinearImage, matte: Mask) -> tuple[Rigid, float]:

@@ -13,6 +13,7 @@ from relit_camera.reflectance.samples import Samples
 from relit_camera.space.colour import Gamma
 from relit_camera.space.images import Mask
 from relit_camera.space.picture_files import read_linear, read_mask
+from relit_camera.subject.subject import LARGEST_SIDE, LEAST_SIDE
 
 MATTE_NAME = "matte.png"
 
@@ -28,11 +29,16 @@ def import_samples(
         progress: called with the count of pictures read and the total.
 
     Raises:
-        LightsError: the .lp is wrong, two pictures differ in size, or all are black.
+        LightsError: the .lp is wrong, two pictures differ in size, they are too small or too large for a
+            subject, or all are black where the matte is.
         ImageError: a picture cannot be read.
     """
     listed = read_lights(lights)
     first = read_linear(listed[0].path, gamma)
+    height, width = first.shape[:2]
+    if min(height, width) < LEAST_SIDE or max(height, width) > LARGEST_SIDE:
+        what = f"{listed[0].path} is {width}x{height}, a subject has {LEAST_SIDE} to {LARGEST_SIDE} pixels a side"
+        raise LightsError(what, "give pictures, and a matte, of such a size")
     pictures = np.empty((len(listed), *first.shape), dtype=np.float32)
     for index, light in enumerate(listed):
         picture = first if index == 0 else read_linear(light.path, gamma)
@@ -43,8 +49,12 @@ def import_samples(
         progress(index + 1, len(listed))
     if not pictures.any():
         raise LightsError(f"all pictures of {lights} are black", "check the capture")
+    matte = _matte(lights.parent / MATTE_NAME, first.shape[:2])
+    if not pictures[:, matte > 0.5].any():
+        what = f"all pictures of {lights} are black where {MATTE_NAME} is white"
+        raise LightsError(what, f"white must mark the person: check {MATTE_NAME}")
     directions = np.stack([light.direction for light in listed])
-    return Samples(pictures, directions, _matte(lights.parent / MATTE_NAME, first.shape[:2]))
+    return Samples(pictures, directions, matte)
 
 
 def _matte(path: Path, shape: tuple[int, ...]) -> Mask:

@@ -25,11 +25,21 @@ def import_lights(
         Path | None,
         typer.Option(help="JSON of known landmarks: {scheme: [[x, y], …]}; landmarks.json is found by itself."),
     ] = None,
+    align: Annotated[
+        bool | None,
+        typer.Option(
+            "--align/--as-is",
+            help="Undo small motions and the strobes' varying strength, leave corrupt pictures out; by itself, where "
+            "that helps.",
+        ),
+    ] = None,
 ) -> None:
-    """Build a subject from aligned pictures, each under one light whose direction is known."""
+    """Build a subject from pictures of one person who keeps still, each under one light whose direction is known."""
+    from relit_camera.capture.align_if_better import align_if_better
     from relit_camera.capture.build import build_subject
     from relit_camera.capture.importing import import_samples
     from relit_camera.capture.landmarks_file import read_landmarks
+    from relit_camera.capture.lights_file import read_lights
     from relit_camera.cli.progress import progress_bar
     from relit_camera.reflectance.method import open_method
     from relit_camera.space.colour import parse_gamma
@@ -42,10 +52,17 @@ def import_lights(
         samples = import_samples(
             lights, curve, lambda done, total: progress.update(reading, completed=done, total=total)
         )
+        aligning = progress.add_task("Aligning them", total=None)
+        aligned = align_if_better(
+            samples,
+            [light.path.name for light in read_lights(lights)],
+            align,
+            lambda done, total: progress.update(aligning, completed=done, total=total),
+        )
         building = progress.add_task("Building the field", total=None)
         points = read_landmarks(landmarks or lights.parent / "landmarks.json", required=landmarks is not None)
         subject = build_subject(
-            samples,
+            aligned.samples,
             method,
             lights.name,
             curve,
@@ -53,6 +70,8 @@ def import_lights(
             progress=lambda done, total: progress.update(building, completed=done, total=total),
         )
     write_subject(out, subject)
+    for line in aligned.told:
+        typer.echo(line)
     meta = subject.metadata
     typer.echo(
         f"{out}: {meta.width}x{meta.height}, {meta.lights} lights, {meta.components} components, "
@@ -94,6 +113,7 @@ def build(
     """Build a subject from a film of a person, a mirror ball beside them and a blinking lamp that goes around."""
     import json
     from contextlib import nullcontext
+    from functools import partial
 
     from relit_camera.capture.ball.outline import Outline
     from relit_camera.capture.build import build_subject
@@ -124,7 +144,9 @@ def build(
             tell = stages(progress)
             found = build_samples(video, options, tell)
             tell("Building the field", 0, None)
-            subject = build_subject(found.samples, method, video.name, options.gamma)
+            subject = build_subject(
+                found.samples, method, video.name, options.gamma, progress=partial(tell, "Building the field")
+            )
         write_subject(subject_file, subject)
         if report_file:
             report_file.write_text(json.dumps(found.findings.report(), indent=1), encoding="utf-8")

@@ -82,9 +82,11 @@ class BlendField:
 
 
 def choose_share(modelled: ModelField) -> float:
-    """The model's share that foretells best what neither part has seen: 0 to 1.
+    """The model's share that foretells best the lights that neither part was fitted to: 0 to 1.
 
     Cross-validation over the lights that others surround, by some pixels: least squares (stacking; Breiman 1996).
+    The model's shape and kernel are those of all lights, so those judged are not wholly unseen; and its appearance is
+    fitted without what neighbours tell of highlights, which the field's own has.
     """
     samples = modelled.samples
     lights = len(samples.directions)

@@ -188,19 +188,22 @@ def residual_weights(kernel: Kernel, directions: NDArray[np.float64], queries: N
 
 
 def choose_kernel(samples: Samples, pixels: NDArray[np.intp]) -> Kernel:
-    """The residual's kernel that foretells lights best which neither it nor the appearance has seen.
+    """The residual's kernel that foretells lights best which neither it nor the appearance was fitted to.
 
-    Cross-validation in FOLDS parts over row-major pixels. What the appearance leaves of lights that it was fitted to
-    is smaller and rougher than what it leaves of others, so leaving lights out of the residual alone misleads.
+    Cross-validation in FOLDS parts, of one light at least, over row-major pixels. What the appearance leaves of lights
+    that it was fitted to is smaller and rougher than what it leaves of others, so leaving lights out of the residual
+    alone misleads. The shape is that of all lights, so those judged are not wholly unseen; and the appearance is fitted
+    without what neighbours tell of highlights.
     """
     lights = len(samples.directions)
+    folds = min(FOLDS, lights)
     values = _values(samples, pixels)
     terms = distant_terms(samples.geometry, samples.directions, pixels)
     bright = _bright(samples)
 
     def errors_of(fold: int) -> list[float]:
         """Of each candidate."""
-        left_out = np.arange(lights) % FOLDS == fold
+        left_out = np.arange(lights) % folds == fold
         amounts, _ = fit_appearance(terms[..., ~left_out], values[..., ~left_out], bright)
         off = values - amounts @ terms
         known, asked = samples.directions[~left_out], samples.directions[left_out]
@@ -209,5 +212,5 @@ def choose_kernel(samples: Samples, pixels: NDArray[np.intp]) -> Kernel:
         return [float(np.sum((asked_off - each) ** 2)) for each in foretold]
 
     with workers() as pool:
-        errors = np.sum(list(pool.map(errors_of, range(FOLDS))), axis=0)
+        errors = np.sum(list(pool.map(errors_of, range(folds))), axis=0)
     return CANDIDATES[int(errors.argmin())]

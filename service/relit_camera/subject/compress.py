@@ -165,9 +165,12 @@ def _sampled(
     for cluster in telling[:: -(-len(telling) // SAMPLE)]:
         pixels, places = np.unique(cluster, return_inverse=True)
         parts.append(_Part.of(rows.read(pixels)[places], cluster, inside))
-    halves = [np.concatenate([part.cluster.rows[part.counted] for part in parts[i::2]]) for i in range(2)]
+    # Of one cluster there is one half.
+    halves = [
+        np.concatenate([part.cluster.rows[part.counted] for part in half]) for half in (parts[::2], parts[1::2]) if half
+    ]
     # What is bright under a light from behind is a rim, which a sample may have too much of: the lower of two counts.
-    peaks = [np.percentile(half, 99.5, axis=0) for half in halves if len(half)]
+    peaks = [np.percentile(half, 99.5, axis=0) for half in halves]
     allowed = target.allowed(np.min(peaks, axis=0))
     count = sum(map(len, halves))
     del halves

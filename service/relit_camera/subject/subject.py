@@ -15,6 +15,8 @@ from relit_camera.subject.field import TEXELS
 from relit_camera.subject.local_basis import LocalBasis
 
 FORMAT_VERSION: Literal[2] = 2
+LEAST_SIDE, LARGEST_SIDE = 8, 8192
+"""Of the picture, in pixels."""
 HORIZON_STEP = np.pi / 255
 """A horizon's code v of 0..255 stands for the height v · this − π/2, in radians."""
 
@@ -26,8 +28,8 @@ class SubjectMetadata(BaseModel):
 
     format_version: Literal[1, 2] = FORMAT_VERSION
     """1: one set of principal pictures for all pixels, as small subjects have it; 2: local bases."""
-    width: Annotated[int, Field(ge=8, le=8192)]
-    height: Annotated[int, Field(ge=8, le=8192)]
+    width: Annotated[int, Field(ge=LEAST_SIDE, le=LARGEST_SIDE)]
+    height: Annotated[int, Field(ge=LEAST_SIDE, le=LARGEST_SIDE)]
     light_map: tuple[int, int] = (64, 32)
     """Width and height of the light maps that it answers to."""
     method: str

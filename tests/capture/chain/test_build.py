@@ -12,7 +12,7 @@ import pytest
 from relit_camera.capture.chain.options import CaptureOptions
 from relit_camera.capture.chain.samples import CaptureResult, build_samples, most_frames
 from relit_camera.capture.face_circle import Circle
-from relit_camera.errors import InputError
+from relit_camera.errors import ConfigError, InputError
 from tests.capture.ball.mirror_scene import degrees_between
 from tests.capture.film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film, write_film
 
@@ -93,3 +93,12 @@ def test_a_size_that_memory_cannot_hold_is_refused(tmp_path: Path) -> None:
     assert 150 <= most_frames(1024) < 160
     with pytest.raises(InputError, match=r"1200 pixels a side.*--size of 1024 or less"):
         build_samples(tmp_path / "film.mp4", replace(OPTIONS, size=1200))
+
+
+def test_a_face_outside_of_the_picture_is_refused_before_a_frame_is_read(codes: np.ndarray, tmp_path: Path) -> None:
+    told: list[str] = []
+    options = replace(OPTIONS, face=Circle(SIZE[0] + 5, 60, 40))
+    video = write_film(tmp_path / "film.mp4", codes[:12])
+    with pytest.raises(ConfigError, match=f"face at {SIZE[0] + 5}, 60 is outside of the picture, which is {SIZE[0]}x"):
+        build_samples(video, options, lambda stage, done, total: told.append(stage))
+    assert not told

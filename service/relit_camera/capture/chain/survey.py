@@ -18,6 +18,7 @@ from relit_camera.capture.ball.sample import MAX_FRAMES, SceneSample, sample_sce
 from relit_camera.capture.ball.view import PinholeView
 from relit_camera.capture.ball.watch import BallWatch, Episode, episodes
 from relit_camera.capture.chain.options import CaptureOptions, Progress
+from relit_camera.capture.face_circle import Circle
 from relit_camera.capture.flash.brightness import watch
 from relit_camera.capture.flash.classify import Flashes, find_flashes
 from relit_camera.capture.flash.kind import Kind
@@ -26,7 +27,7 @@ from relit_camera.capture.light.highlights import BallFilm
 from relit_camera.capture.light.place import eye_distance
 from relit_camera.capture.locate_face import LocatedFace, locate_face
 from relit_camera.capture.stabilise.stabilise import Stabilisation, stabilise
-from relit_camera.errors import ModelError
+from relit_camera.errors import ConfigError, ModelError
 from relit_camera.face.detector import FaceDetector
 from relit_camera.models.registry import model_path
 from relit_camera.space.colour import uint8_from_linear
@@ -83,8 +84,11 @@ def survey(video: Path, options: CaptureOptions, progress: Progress) -> Survey:
 
     Raises:
         VideoError: it cannot be read, is cut off or damaged, or shows no face.
+        ConfigError: the given face is outside of the picture.
         CaptureError: there is no flash, no mirror ball, or the face goes away; the message says what to do.
     """
+    if options.face:
+        _refuse_outside(options.face, video)
     seen = watch(
         video, options.gamma, threads=options.threads, progress=lambda done: progress("Looking for flashes", done, None)
     )
@@ -132,6 +136,15 @@ def survey(video: Path, options: CaptureOptions, progress: Progress) -> Survey:
         find_gains(np.stack(cells), flashes.times_s[frames], np.isin(frames, bright), flash),
         frames,
     )
+
+
+def _refuse_outside(face: Circle, video: Path) -> None:
+    """Refuse a face whose middle is not in the video's picture, before a frame is read."""
+    with LinearReader(video) as reader:
+        width, height = reader.info.width, reader.info.height
+    if not (0 <= face.x < width and 0 <= face.y < height):
+        what = f"the face at {face.x:g}, {face.y:g} is outside of the picture, which is {width}x{height}"
+        raise ConfigError(what, "give --face in pixels of the upright film, or leave it out")
 
 
 def _ball(

@@ -12,7 +12,7 @@ from relit_camera.capture.ball.highlight import NoHighlight
 from relit_camera.capture.ball.watch import outline_in
 from relit_camera.capture.chain.options import CaptureOptions
 from relit_camera.capture.chain.survey import Survey
-from relit_camera.capture.light.place import Place, place_scene
+from relit_camera.capture.light.place import EYES_CM, Place, place_scene
 from relit_camera.errors import CaptureError
 from relit_camera.space.directions import texel_directions, texel_solid_angles
 
@@ -72,7 +72,7 @@ def find_lamps(seen: Survey, options: CaptureOptions) -> Lamps:
     """
     refuse_enhanced(seen.gains.spread)
     circle = seen.motion.circle
-    eyes_px = seen.eyes_px or circle.radius / _FACE_RADIUS_CM * 6.3
+    eyes_px = seen.eyes_px or circle.radius / _FACE_RADIUS_CM * EYES_CM
     radius_cm = None if options.ball_diameter_cm is None else options.ball_diameter_cm / 2
     place = place_scene(seen.view, (circle.x, circle.y), eyes_px, options.light_distance_cm, radius_cm)
     usable: list[tuple[int, Floats, Floats]] = []

@@ -56,7 +56,12 @@ class Template:
         self._picture = picture
 
     def align(self, picture: Picture, start: Rigid) -> Rigid:
-        """The transform about the picture's centre, near `start`, that takes a picture to the template."""
+        """The transform about the picture's centre, near `start`, that takes a picture to the template.
+
+        It is `start` where the template shows nothing that could move.
+        """
+        if not self._jacobian.any():
+            return start
         transform = start
         size = (picture.shape[1], picture.shape[0])
         reach = max(size) / 2
