@@ -95,10 +95,10 @@ def test_a_size_that_memory_cannot_hold_is_refused(tmp_path: Path) -> None:
         build_samples(tmp_path / "film.mp4", replace(OPTIONS, size=1200))
 
 
-def test_a_face_outside_of_the_picture_is_refused_before_a_frame_is_read(codes: np.ndarray, tmp_path: Path) -> None:
+def test_a_face_outside_of_the_picture_is_refused_before_a_frame_is_read(tmp_path: Path) -> None:
     told: list[str] = []
     options = replace(OPTIONS, face=Circle(SIZE[0] + 5, 60, 40))
-    video = write_film(tmp_path / "film.mp4", codes[:12])
+    video = write_film(tmp_path / "film.mp4", np.zeros((12, *SIZE[::-1], 3), np.uint8))
     with pytest.raises(ConfigError, match=f"face at {SIZE[0] + 5}, 60 is outside of the picture, which is {SIZE[0]}x"):
         build_samples(video, options, lambda stage, done, total: told.append(stage))
     assert not told
