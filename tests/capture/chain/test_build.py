@@ -21,7 +21,9 @@ OPTIONS = CaptureOptions(gamma=2.2, size=96, focal_px=FOCAL_PX, face=Circle(*HEA
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory: pytest.TempPathFactory) -> CaptureResult:
-    return build_samples(write_film(tmp_path_factory.mktemp("film") / "film.mp4", Film().codes()), OPTIONS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RELIT_MODELS_DIR", str(tmp_path_factory.mktemp("models")))
+        return build_samples(write_film(tmp_path_factory.mktemp("film") / "film.mp4", Film().codes()), OPTIONS)
 
 
 def test_lamps_gains_and_motion_are_those_of_the_film(built: CaptureResult) -> None:
@@ -59,6 +61,11 @@ def test_samples_are_pictures_under_distant_lights(built: CaptureResult) -> None
     assert np.median(errors) < 0.06
     assert np.abs(samples.matte.mean() - 0.5) < 0.2
     assert samples.pictures[:, samples.matte == 0].max() == 0
+
+
+def test_the_report_tells_what_the_lamps_nearness_is_worth(built: CaptureResult) -> None:
+    near = built.findings.report()["near_field"]
+    assert 0 < near["misfit"] < near["misfit_if_far"]
 
 
 def test_the_room_is_taken_off(built: CaptureResult) -> None:

@@ -37,6 +37,7 @@ class Findings:
         square: what was cut out.
         room_taken_off: whether the room's light was.
         strengths: of the kept frames' flashes.
+        misfit_if_far: how far skin would be from the law of the cosine if the lamp were far away.
         good: (some,) which of those were used.
         lights: pictures left after those under nearly the same light were merged.
     """
@@ -49,6 +50,7 @@ class Findings:
     square: HeadSquare
     room_taken_off: bool
     strengths: Strengths
+    misfit_if_far: float
     good: NDArray[np.intp]
     lights: int
 
@@ -137,6 +139,7 @@ class Findings:
                 "corrected": self.options.near_field,
                 "light_distance_cm": self.options.light_distance_cm,
                 "misfit": float(np.median(self.strengths.misfit[self.good])),
+                "misfit_if_far": self.misfit_if_far,
             },
             "light": {"area_sr": self.lamps.area_sr, "frames": len(self.good), "lights": self.lights},
             "square": {

@@ -38,6 +38,8 @@ _BALL_REACH = 1.15
 """Radii about the ball in which nobody is."""
 _UNLIKE = 3.0
 """Frames whose light fits the person's shape so many times worse than usual are left out."""
+_FAR = 1e3
+"""Times as far as it was, a lamp is as good as infinitely far away."""
 _LEAST_FACE = 0.5
 """Share of the face's circle that must be the person."""
 
@@ -87,7 +89,8 @@ def build_samples(
     )
     progress("Finding the person", 0, None)
     matte = _matte(lights, square, seen.ball.outline, seen.motion.circle)
-    strengths = _strengths(lights, lamps, square, matte, (seen.motion.circle.x, seen.motion.circle.y))
+    strengths = _strengths(lights, lamps, square, matte, seen.motion.circle)
+    if_far = _strengths(lights, lamps, square, matte, seen.motion.circle, times_as_far=_FAR).usual_misfit
     good = strengths.alike(_UNLIKE)
     refuse_one_sided(lamps.directions[good], len(seen.highlights))
     groups = [thinned(good[group]) for group in group_lights(lamps.directions[good])]
@@ -98,7 +101,9 @@ def build_samples(
             pictures[place] = picture
     directions = np.stack([lamps.directions[group].mean(axis=0) for group in groups])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    findings = Findings(video.name, options, seen, found, lamps.index, square, subtract, strengths, good, len(groups))
+    findings = Findings(
+        video.name, options, seen, found, lamps.index, square, subtract, strengths, if_far, good, len(groups)
+    )
     return CaptureResult(Samples(pictures, directions, matte), findings)
 
 
@@ -132,17 +137,19 @@ def _disc(square: HeadSquare, x: float, y: float, radius: float) -> NDArray[np.b
     return np.asarray(np.hypot(place - x, place[:, None] - y) < radius * square.scale)
 
 
-def _strengths(lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, head: tuple[float, float]) -> Strengths:
-    """The flashes' strengths, by small pictures."""
+def _strengths(
+    lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, face: Circle, times_as_far: float = 1.0
+) -> Strengths:
+    """The flashes' strengths, by small pictures, if the lamps were so many times as far away."""
     side = min(_SMALL, square.size)
     small = np.stack(
         [cv2.resize(each.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA) for each in lights.pictures]
     )
     factor = side / square.size
-    x, y = square.place(*head)
+    x, y = square.place(face.x, face.y)
     return find_strengths(
         np.maximum(small, 0),
-        lamps.lamps_cm,
+        lamps.lamps_cm * times_as_far,
         cv2.resize(matte, (side, side), interpolation=cv2.INTER_AREA),
         (x * factor, y * factor),
         lamps.place.pixels_per_cm * square.scale * factor,

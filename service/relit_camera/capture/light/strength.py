@@ -54,10 +54,16 @@ class Strengths:
     surface: Surface
     misfit: Floats
 
+    @property
+    def usual_misfit(self) -> float:
+        """Median of the misfit where there is one; NaN if nowhere."""
+        told = np.isfinite(self.misfit)
+        return float(np.median(self.misfit[told])) if told.any() else np.nan
+
     def alike(self, times: float) -> Indices:
         """Places of the flashes that fit the person no more than so many times worse than usual."""
         told = np.flatnonzero(np.isfinite(self.misfit))
-        return told[self.misfit[told] <= times * np.median(self.misfit[told])] if len(told) else told
+        return told[self.misfit[told] <= times * self.usual_misfit]
 
 
 def find_strengths(
