@@ -89,8 +89,7 @@ def build_samples(
     )
     progress("Finding the person", 0, None)
     matte = _matte(lights, square, seen.ball.outline, seen.motion.circle)
-    strengths = _strengths(lights, lamps, square, matte, seen.motion.circle)
-    if_far = _strengths(lights, lamps, square, matte, seen.motion.circle, times_as_far=_FAR).usual_misfit
+    strengths, misfit_if_far = _strengths(lights, lamps, square, matte, seen.motion.circle)
     good = strengths.alike(_UNLIKE)
     refuse_one_sided(lamps.directions[good], len(seen.highlights))
     groups = [thinned(good[group]) for group in group_lights(lamps.directions[good])]
@@ -102,7 +101,7 @@ def build_samples(
     directions = np.stack([lamps.directions[group].mean(axis=0) for group in groups])
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     findings = Findings(
-        video.name, options, seen, found, lamps.index, square, subtract, strengths, if_far, good, len(groups)
+        video.name, options, seen, found, lamps.index, square, subtract, strengths, misfit_if_far, good, len(groups)
     )
     return CaptureResult(Samples(pictures, directions, matte), findings)
 
@@ -138,22 +137,27 @@ def _disc(square: HeadSquare, x: float, y: float, radius: float) -> NDArray[np.b
 
 
 def _strengths(
-    lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, face: Circle, times_as_far: float = 1.0
-) -> Strengths:
-    """The flashes' strengths, by small pictures, if the lamps were so many times as far away."""
+    lights: OneLight, lamps: Lamps, square: HeadSquare, matte: Mask, face: Circle
+) -> tuple[Strengths, float]:
+    """The flashes' strengths, by small pictures; and how badly these would fit if the lamps were far away."""
     side = min(_SMALL, square.size)
     small = np.stack(
         [cv2.resize(each.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA) for each in lights.pictures]
     )
+    small, inside = np.maximum(small, 0), cv2.resize(matte, (side, side), interpolation=cv2.INTER_AREA)
     factor = side / square.size
     x, y = square.place(face.x, face.y)
-    return find_strengths(
-        np.maximum(small, 0),
-        lamps.lamps_cm * times_as_far,
-        cv2.resize(matte, (side, side), interpolation=cv2.INTER_AREA),
-        (x * factor, y * factor),
-        lamps.place.pixels_per_cm * square.scale * factor,
+    near, far = (
+        find_strengths(
+            small,
+            lamps.lamps_cm * times,
+            inside,
+            (x * factor, y * factor),
+            lamps.place.pixels_per_cm * square.scale * factor,
+        )
+        for times in (1.0, _FAR)
     )
+    return near, far.usual_misfit
 
 
 def _merged(
