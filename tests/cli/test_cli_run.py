@@ -7,7 +7,7 @@ import socket
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -29,9 +29,10 @@ def arguments(material: Material, *more: object) -> list[object]:
 
 @contextmanager
 def running(
-    material: Material, folder: Path, *more: object, full_at: int | None = None
+    material: Material, folder: Path, *more: object, full_at: int | None = None, config: Path | None = None
 ) -> Iterator[tuple[subprocess.Popen[str], httpx.Client]]:
-    process = start(*arguments(material, *more), folder=folder, full_at=full_at)
+    first = ("--config", config) if config else ()
+    process = start(*first, *arguments(material, *more), folder=folder, full_at=full_at)
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
@@ -162,3 +163,39 @@ def test_missing_subject_model_and_track(material: Material, tmp_path: Path, mon
         (("--sink", "picture.gif"), ("picture.gif", ".mp4")),
     ):
         call(*arguments(material, *changed)).complains(*words)
+
+
+def test_the_configuration_is_edited_while_it_runs(material: Material, tmp_path: Path) -> None:
+    config = tmp_path / "mine.yaml"
+    config.write_text("look: {lighting: {environment: studio}}\n", encoding="utf-8")
+
+    def told(process_http: httpx.Client) -> str:
+        return " ".join(f"{each['what']}: {each['why']}" for each in process_http.get("status").json()["degraded"])
+
+    def wait(condition: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + START_S
+        while not condition():
+            assert time.monotonic() < deadline, told(http)
+            time.sleep(0.1)
+
+    with running(material, tmp_path, config=config) as (process, http):
+        assert http.put("background", json={"kind": "color", "color": "#102030"}).status_code == 200
+        for wrong, why in (
+            ("look: {lighting: {environment", "line 1"),
+            ("look: {lighting: {environment: nowhere}}", "nowhere"),
+            ("look: {lighting: {exposure_ev: lots}}", "look.lighting.exposure_ev"),
+            ("colour: red", "colour"),
+            ("\0\xff", "mine.yaml"),
+        ):
+            config.write_text(wrong, encoding="latin-1")
+            wait(lambda why=why: why in told(http))  # type: ignore[misc]
+            assert http.get("lighting").json()["environment"] == "studio"  # kept as it was
+        config.unlink()
+        wait(lambda: "no configuration file" in told(http))
+        config.write_text("look: {lighting: {environment: sunset}}\noutput: {fps: 25}\n", encoding="utf-8")
+        wait(lambda: http.get("lighting").json()["environment"] == "sunset")
+        assert "output counts from the next start" in told(http)
+        assert http.get("background").json()["color"] == "#102030"  # what was not edited stays as it was set
+        config.write_text("look: {lighting: {environment: party}}\n", encoding="utf-8")
+        wait(lambda: http.get("lighting").json()["environment"] == "party" and told(http) == "")
+        assert process.poll() is None

@@ -155,6 +155,46 @@ def test_an_accelerator_that_fails_to_run_degrades(monkeypatch: pytest.MonkeyPat
     assert (opened.provider, opened.why) == ("cpu", "cuda: CUDA out of memory")
 
 
+class FailsLater:
+    """A runtime on an accelerator that works until its driver is reset."""
+
+    def __init__(self, real: onnxruntime.InferenceSession) -> None:
+        self.real, self.broken = real, False
+
+    def run(self, *arguments: object) -> object:
+        if self.broken:
+            raise RuntimeError("CUDA failure 719: unspecified launch failure")
+        return self.real.run(*arguments)
+
+
+def test_an_accelerator_that_fails_on_the_way_is_left_for_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend_cuda(monkeypatch, {"cuda": 2})
+    opened = open_session(graph_bytes(), "small", SessionOptions("cuda"))
+    opened._runtime = runtime = FailsLater(opened._runtime)  # type: ignore[assignment]
+    image = np.ones((1, 3), np.float32)
+    assert opened.run({"image": image})["total"].tolist() == [[9, 13, 17]]
+    with pytest.raises(ModelError, match="it takes image"):
+        opened.run({"image": image[0]})
+    assert opened.provider == "cuda"  # wrong feeds are not the accelerator's fault
+    runtime.broken = True
+    assert opened.run({"image": image})["total"].tolist() == [[9, 13, 17]]
+    assert opened.provider == "cpu"
+    assert "719" in opened.why
+    report = next(each for each in session_report() if each.name == "small")
+    assert "restart the camera" in report.cure
+    assert opened.run({"image": image})["total"].tolist() == [[9, 13, 17]]
+
+
+def test_strict_does_not_go_on_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend_cuda(monkeypatch, {"cuda": 2})
+    opened = open_session(graph_bytes(), "small", SessionOptions("cuda", strict=True))
+    opened._runtime = runtime = FailsLater(opened._runtime)  # type: ignore[assignment]
+    runtime.broken = True
+    with pytest.raises(ModelError, match="719"):
+        opened.run({"image": np.ones((1, 3), np.float32)})
+    assert opened.provider == "cuda"
+
+
 def test_an_unknown_provider_is_a_setting_at_fault() -> None:
     with pytest.raises(ConfigError, match=r"unknown provider 'cudaa'; use auto, .*cuda"):
         open_session(graph_bytes(), "small", SessionOptions("cudaa"))

@@ -17,7 +17,7 @@ from relit_camera.api.server import serve
 from relit_camera.bench.live import NoddingTracker
 from relit_camera.bench.sample_subject import sample_subject
 from relit_camera.config.look import Lighting, Look
-from relit_camera.config.settings import OutputSettings, RelitSettings, ServerSettings, StorageSettings
+from relit_camera.config.settings import Fallback, OutputSettings, RelitSettings, ServerSettings, StorageSettings
 from relit_camera.face.state import FaceState, Tracker
 from relit_camera.space.images import DisplayImage, Frame
 from relit_camera.stream.daemon import Daemon
@@ -117,18 +117,21 @@ def running_camera(
     tracker: Tracker | None = None,
     subject: Subject | None = None,
     look: Look | None = None,
+    sink: RememberingSink | None = None,
+    new_tracker: Callable[[], Tracker] | None = None,
+    fallback: Fallback = Fallback.PLACEHOLDER,
 ) -> Iterator[Camera]:
     """Run a camera with its API on a real port; `folder` is for what it stores."""
     settings = RelitSettings(
-        output=OutputSettings(sink="null", width=SIZE[0], height=SIZE[1], fps=FPS),
+        output=OutputSettings(sink="null", width=SIZE[0], height=SIZE[1], fps=FPS, fallback=fallback),
         server=ServerSettings(port=0),
         storage=StorageSettings(data_dir=folder),
     )
     director = Director(settings.storage)
     director.set_look(look or Look(lighting=Lighting(transition_s=0)))
     director.show_subject("small", subject or small_subject())
-    sink = RememberingSink()
-    daemon = Daemon(settings, director, source or memory_source(), sink, tracker or SteadyTracker())
+    sink = sink or RememberingSink()
+    daemon = Daemon(settings, director, source or memory_source(), sink, tracker or SteadyTracker(), new_tracker)
     daemon.start()
     try:
         with (

@@ -17,6 +17,7 @@ from relit_camera.face.state import LOST, FaceState
 from relit_camera.models.registry import FOLDER_VARIABLE
 from relit_camera.space.images import Frame
 from relit_camera.stream import daemon as daemon_module
+from relit_camera.stream import line as line_module
 from relit_camera.stream.placeholder import placeholder
 from relit_camera.stream.sources.base import SourceState
 from tests.stream.small_camera import (
@@ -125,7 +126,7 @@ class FailingTracker(SteadyTracker):
 
 
 def test_a_frame_that_raises_does_not_stop_publishing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(daemon_module, "RETRY_S", 0.1)
+    monkeypatch.setattr(line_module, "RETRY_S", 0.1)
     tracker = FailingTracker()
     with running_camera(tmp_path, tracker=tracker) as camera:
         camera.sink.wait_for(3)
@@ -252,7 +253,7 @@ def test_ratio_falls_back_with_a_word_where_the_face_is_not_the_subjects(tmp_pat
 
 def test_a_missing_matte_model_is_told_and_pictures_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "no-models"))
-    monkeypatch.setattr(daemon_module, "RETRY_S", 0.1)
+    monkeypatch.setattr(line_module, "RETRY_S", 0.1)
     with running_camera(tmp_path, look=Look(mode=Mode.RATIO)) as camera:
         camera.sink.wait_for(3)
         camera.put("background", kind="blur")
@@ -273,4 +274,6 @@ def test_stop_ends_every_thread(tmp_path: Path) -> None:
         assert camera.daemon.stopping()
         assert camera.daemon.status().state == "stopping"
         camera.daemon.stop()
-    wait_until(lambda: not {t for t in set(threading.enumerate()) - before if t.name in {"worker", "publisher", "api"}})
+    wait_until(
+        lambda: not {t for t in set(threading.enumerate()) - before if t.name in {"worker", "line", "publisher", "api"}}
+    )

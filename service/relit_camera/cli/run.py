@@ -23,13 +23,17 @@ def run(
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of the output.")] = None,
 ) -> None:
     """Run the camera until it is told to stop (Ctrl-C or SIGTERM)."""
+    from functools import partial
+
     from relit_camera.cli.parse import mode as parse_mode
     from relit_camera.cli.parse import size as parse_size
     from relit_camera.cli.serving import run_camera
     from relit_camera.cli.settings import settings_of
+    from relit_camera.config.load import config_path
 
     width, height = parse_size(size) if size else (None, None)
-    settings = settings_of(
+    load = partial(
+        settings_of,
         context,
         source={"source": source},
         output={"sink": sink, "width": width, "height": height},
@@ -38,4 +42,5 @@ def run(
         tracker={"name": tracker},
         server={"host": host, "port": port},
     )
-    run_camera(settings, environment)
+    path = config_path((context.find_root().obj or {}).get("config"))
+    run_camera(load(), environment, reload=(path, load) if path else None)

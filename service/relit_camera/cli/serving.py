@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import math
+import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from functools import partial
+from pathlib import Path
 
 import typer
 
 from relit_camera.api.app import create_app
 from relit_camera.api.server import listen, serve
+from relit_camera.config.look import Look
 from relit_camera.config.settings import OutputSettings, RelitSettings
+from relit_camera.config.watch import watch_config
 from relit_camera.cores import leave_to_stay, share_cores
+from relit_camera.errors import ConfigError
 from relit_camera.stream.assembly import make_tracker
 from relit_camera.stream.daemon import Daemon
 from relit_camera.stream.director import Director
 from relit_camera.stream.sinks.base import Sink
 from relit_camera.stream.sinks.factory import open_sink
 from relit_camera.stream.sources.factory import open_source
+
+log = logging.getLogger(__name__)
 
 Beside = Callable[[Daemon, str], AbstractContextManager[None]]
 """What else goes on while the camera runs, given the camera and the panel's address."""
@@ -33,6 +43,7 @@ def run_camera(
     beside: Beside | None = None,
     seconds: float | None = None,
     sink_for: Callable[[OutputSettings], Sink] = open_sink,
+    reload: tuple[Path, Callable[[], RelitSettings]] | None = None,
 ) -> None:
     """Run the camera until SIGTERM or SIGINT, then end within 3 s.
 
@@ -44,6 +55,7 @@ def run_camera(
         beside: entered when the panel can be reached, left when the camera is about to end.
         seconds: end by itself after so long.
         sink_for: opens what the settings name.
+        reload: the configuration file, which is watched, and what reads it anew.
 
     Raises:
         RelitError: the port is in use, a file, device or model is missing …
@@ -65,7 +77,8 @@ def run_camera(
         cleanup.callback(source.close)
         sink = sink_for(settings.output)
         cleanup.callback(sink.close)
-        daemon = Daemon(settings, director, source, sink, tracker)
+        daemon = Daemon(settings, director, source, sink, tracker, partial(make_tracker, settings))
+        cleanup.callback(_leave_what_hangs, daemon)
         cleanup.callback(daemon.stop)
         daemon.start()
         server = serve(create_app(daemon, settings), settings.server, listener=listener)
@@ -74,7 +87,39 @@ def run_camera(
         typer.echo(f"Relit Camera runs; the panel is at {server.address.url}")
         if beside is not None:
             cleanup.enter_context(beside(daemon, server.address.url))
+        if reload is not None:
+            path, load = reload
+            apply, tell = partial(_apply, director, settings), partial(daemon.tell, "configuration")
+            cleanup.enter_context(watch_config(path, settings, load, apply, tell))
         ends_at = time.monotonic() + (math.inf if seconds is None else seconds)
         while not stop.is_set() and (left := ends_at - time.monotonic()) > 0:
             stop.wait(min(left, 0.5))
         daemon.begin_stop()
+
+
+def _apply(
+    director: Director, started: RelitSettings, before: RelitSettings, after: RelitSettings
+) -> ConfigError | None:
+    """Show what was changed in the configuration's look and subject; returns what counts from the next start only.
+
+    Raises:
+        RelitError: something of it is not there.
+    """
+    parts = {name: getattr(after.look, name) for name in Look.model_fields}
+    changed = {name: part for name, part in parts.items() if part != getattr(before.look, name)}
+    if changed:
+        director.update_look(lambda look: look.model_copy(update=changed))
+    if after.subject != before.subject:
+        director.set_subject(after.subject)
+    fixed = [name for name in RelitSettings.model_fields if name not in ("look", "subject")]
+    later = [name for name in fixed if getattr(after, name) != getattr(started, name)]
+    return ConfigError(f"what changed of {', '.join(later)} counts from the next start", "restart") if later else None
+
+
+def _leave_what_hangs(daemon: Daemon) -> None:
+    """End the process at once if a driver or a network still hangs: the interpreter would wait for its thread."""
+    if daemon.left_behind:
+        log.warning("something did not end in time and is left behind")
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(0)

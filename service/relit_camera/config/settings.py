@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -25,6 +26,14 @@ class SourceSettings(Settings):
     fps: Annotated[float, Field(ge=1, le=240)] = 30.0
 
 
+class Fallback(StrEnum):
+    """What is shown where not even the still can be relit."""
+
+    PLACEHOLDER = "placeholder"
+    LIVE = "live"
+    """The webcam's picture as it is: yourself and your room."""
+
+
 class OutputSettings(Settings):
     """Where relit pictures go."""
 
@@ -38,6 +47,9 @@ class OutputSettings(Settings):
     fps: Annotated[float, Field(ge=1, le=120)] = 30.0
     placeholder: Path | None = None
     """Picture shown while there is nothing else to show; ours if not given."""
+    fallback: Fallback = Fallback.PLACEHOLDER
+    """While pictures cannot be made the still is shown, relit; and where that cannot be either, this: `placeholder`, or
+    `live`, the webcam's picture as it is, room and all."""
 
     @field_validator("sink", mode="before")
     @classmethod

@@ -6,10 +6,11 @@ is proven: most of the graph's nodes were placed on it and a warm-up ran there. 
 
 from __future__ import annotations
 
+import logging
 import threading
 import weakref
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,8 @@ from relit_camera.models.runtime import (
 
 if TYPE_CHECKING:
     import onnxruntime
+
+log = logging.getLogger(__name__)
 
 _LOG_FATAL = 4
 """The severity to log from. What ONNX Runtime would print below it reaches us as an exception or in the placement."""
@@ -74,14 +77,20 @@ class SessionReport:
     warm_up_ms: float | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Session:
-    """An open model, with its inputs and outputs by name. `run` may be called from several threads."""
+    """An open model, with its inputs and outputs by name. `run` may be called from several threads.
+
+    Where an accelerator fails on the way (its driver is reset, its memory is gone) the model goes on on the CPU from
+    then on, and the report says why.
+    """
 
     report: SessionReport
     inputs: Mapping[str, TensorSpec]
     outputs: Mapping[str, TensorSpec]
     _runtime: onnxruntime.InferenceSession
+    _on_cpu: Callable[[str], Session] | None = None
+    _change: threading.Lock = field(default_factory=threading.Lock)
 
     @property
     def name(self) -> str:
@@ -110,11 +119,29 @@ class Session:
             ModelError: an input is missing, has another shape or dtype, or the model fails on it.
         """
         try:
-            values = self._runtime.run(list(self.outputs), feeds)
+            return self._run(feeds)
         except runtime_errors() as error:
-            takes = ", ".join(f"{name} {spec}" for name, spec in self.inputs.items())
-            raise ModelError(f"model {self.name} failed: {reason(error)}", f"it takes {takes}") from error
+            failures: tuple[type[Exception], ...] = (*runtime_errors(), ModelError)
+            try:
+                return self._run_on_cpu(feeds, reason(error))
+            except failures:
+                takes = ", ".join(f"{name} {spec}" for name, spec in self.inputs.items())
+                raise ModelError(f"model {self.name} failed: {reason(error)}", f"it takes {takes}") from error
+
+    def _run(self, feeds: Mapping[str, NDArray]) -> dict[str, NDArray]:
+        values = self._runtime.run(list(self.outputs), feeds)
         return dict(zip(self.outputs, values, strict=True))
+
+    def _run_on_cpu(self, feeds: Mapping[str, NDArray], why: str) -> dict[str, NDArray]:
+        """Run on the CPU, and if that succeeds, stay there: then it was the accelerator that failed, not the feeds."""
+        with self._change:
+            if self._on_cpu is not None:
+                other = self._on_cpu(why)
+                result = other._run(feeds)
+                log.warning("model %s goes on on the CPU: %s failed: %s", self.name, self.provider, why)
+                self.report, self._runtime, self._on_cpu = other.report, other._runtime, None
+                return result
+        return self._run(feeds)  # it is on the CPU by now, or always was
 
 
 _open_sessions: weakref.WeakSet[Session] = weakref.WeakSet()
@@ -145,6 +172,10 @@ def open_session(model: Path | bytes, name: str, options: SessionOptions | None 
     wanted = providers.choose_provider(options.provider)
     try:
         session = _open_proven(model, name, wanted, options)
+        if wanted != providers.CPU and not options.strict:
+            session._on_cpu = lambda why: _open(
+                model, name, providers.CPU, options, f"{wanted} failed: {why}", "restart the camera to try it again"
+            )
     except _NotProvenError as error:
         cure = providers.cure_for(wanted)
         if options.strict:

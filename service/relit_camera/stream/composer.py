@@ -32,8 +32,7 @@ class Composer:
 
         `now` is the frame's time in seconds, for fading from one background to the next.
         """
-        background = self._backdrop.still(_wanted(scene), now)
-        return over(display_from_linear(straight(moved.picture, moved.alpha)), moved.alpha, background, moved.at)
+        return still_before(self._backdrop, moved, scene, now)
 
     def live(self, picture: LinearImage, frame: Frame, scene: Scene) -> DisplayImage:
         """The relit live picture (output size, linear, display exposure) before its background, uint8 sRGB.
@@ -50,6 +49,12 @@ class Composer:
             alpha = self._matte.matte(frame)
         background = self._backdrop.live(_wanted(scene), LiveRoom(shown, alpha), frame.time_s)
         return over(foreground_colours(shown, alpha), alpha, np.ascontiguousarray(background))
+
+
+def still_before(backdrop: Backdrop, moved: Moved, scene: Scene, now: float) -> DisplayImage:
+    """A moved still before the scene's background at `now` seconds: uint8 sRGB of the backdrop's size."""
+    background = backdrop.still(_wanted(scene), now)
+    return over(display_from_linear(straight(moved.picture, moved.alpha)), moved.alpha, background, moved.at)
 
 
 def _wanted(scene: Scene) -> Wanted:

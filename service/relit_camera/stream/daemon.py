@@ -1,7 +1,7 @@
-"""The running camera: source → worker → publisher → sink, under the director's scene.
+"""The running camera: source → worker → line → publisher → sink, under the director's scene.
 
-Whatever fails, pictures keep coming: the worker notes the trouble and goes on, and the publisher shows the last picture
-or the placeholder.
+Whatever fails or hangs, pictures keep coming: while the line gives none the worker makes stand-ins, and while the
+worker gives none the publisher shows the last picture or the placeholder.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from relit_camera import __version__
 from relit_camera.config.settings import RelitSettings
@@ -21,11 +22,13 @@ from relit_camera.space.images import DisplayImage, Frame
 from relit_camera.stream.assembly import make_pipeline
 from relit_camera.stream.director import Director
 from relit_camera.stream.events import EventHub
-from relit_camera.stream.pipeline import Finish, Finished
+from relit_camera.stream.line import LineKeeper
+from relit_camera.stream.pipeline import Finished
 from relit_camera.stream.placeholder import placeholder
 from relit_camera.stream.publisher import PublishedPicture, Publisher
 from relit_camera.stream.sinks.base import Sink
 from relit_camera.stream.sources.base import Source, SourceState
+from relit_camera.stream.stand_in import StandIn
 from relit_camera.stream.status import CameraState, CameraStatus, Degradation, Rates, TrackerStatus
 from relit_camera.stream.timing import RateMeter
 
@@ -35,7 +38,7 @@ READ_TIMEOUT_S = 0.2
 STALE_AFTER_S = 3.0
 """Without a new picture for this long the placeholder is shown."""
 RETRY_S = 1.0
-"""Pause after a frame that could not be processed."""
+"""Pause after a failure of the source."""
 STOP_S = 2.0
 """What has not ended by then, a device or a network that hangs, is left behind."""
 
@@ -44,9 +47,23 @@ class Daemon:
     """Implements `stream.control.CameraControl`. Owns source and sink: `stop` closes them."""
 
     def __init__(
-        self, settings: RelitSettings, director: Director, source: Source, sink: Sink, tracker: Tracker
+        self,
+        settings: RelitSettings,
+        director: Director,
+        source: Source,
+        sink: Sink,
+        tracker: Tracker,
+        new_tracker: Callable[[], Tracker] | None = None,
     ) -> None:
         """Set up; `start` begins.
+
+        Args:
+            settings: of this run.
+            director: holds the scene.
+            source: of live pictures.
+            sink: takes finished ones.
+            tracker: follows the face.
+            new_tracker: makes another like it, in place of one that hangs; the same again if not given.
 
         Raises:
             ImageError: the placeholder picture cannot be read.
@@ -55,15 +72,23 @@ class Daemon:
         self.events = EventHub()
         self._source, self._sink, self._tracker = source, sink, tracker
         size = (settings.output.width, settings.output.height)
-        self._pipeline = make_pipeline(settings, tracker, size)
+        self._lines = LineKeeper(
+            make_pipeline(settings, tracker, size),
+            lambda: make_pipeline(settings, new_tracker() if new_tracker else tracker, size),
+            lambda: self.director.scene,
+            self._done,
+            partial(self.tell, "picture"),
+        )
         self._publisher = Publisher(
             sink,
             settings.output.fps,
             placeholder(size, "starting", settings.output.placeholder),
             stale_after_s=STALE_AFTER_S,
-            on_sink_error=self._sink_changed,
+            on_sink_error=partial(self.tell, "sink"),
         )
         self._waiting_picture = placeholder(size, "waiting for the camera", settings.output.placeholder)
+        trouble = placeholder(size, "the picture has failed: see the panel", settings.output.placeholder)
+        self._stand_in = StandIn(size, settings.output.fallback, trouble)
         self._troubles: dict[str, Degradation] = {}
         self._face = FaceStatus.LOST
         self._camera_rate, self._pipeline_rate = RateMeter(), RateMeter()
@@ -73,11 +98,8 @@ class Daemon:
         self._stopping = threading.Event()
         self._stop_by = 0.0
         self._ending: list[threading.Thread] = []
-        # No daemon thread: one that is inside OpenCV when the interpreter ends would abort the process.
-        self._worker = threading.Thread(target=self._run, name="worker")
-        self._finisher = ThreadPoolExecutor(1, "finisher")
-        self._finishing: Future[None] = Future()
-        self._finishing.set_result(None)
+        self._worker = threading.Thread(target=self._run, name="worker", daemon=True)
+        self.left_behind = False
 
     def start(self) -> None:
         """Begin to read, relight and publish."""
@@ -91,18 +113,26 @@ class Daemon:
         self._stopping.set()
         self._set_state(CameraState.STOPPING)
         self._stop_by = time.monotonic() + STOP_S
+        self._lines.close()
         for end in (self._publisher.stop, self._source.close):
             thread = threading.Thread(target=end, daemon=True)
             thread.start()
             self._ending.append(thread)
 
     def stop(self) -> None:
-        """End all threads and free the devices, within `STOP_S` of `begin_stop`. Harmless when repeated."""
+        """End all threads and free the devices, within `STOP_S` of `begin_stop`. Harmless when repeated.
+
+        What hangs is left behind, and `left_behind` is true: a thread that is inside OpenCV or a driver when the
+        interpreter ends would abort or hold up the process.
+        """
         self.begin_stop()
         for thread in (self._worker, *self._ending):
             if thread.ident is not None:
                 thread.join(max(0.0, self._stop_by - time.monotonic()))
-        self._sink.close()
+        alive = [thread.name for thread in (self._worker, *self._ending) if thread.is_alive()]
+        self.left_behind = bool(alive) or not self._lines.ended(self._stop_by) or self._publisher.stuck
+        if not self._publisher.stuck:  # else closing would wait for the driver that writing waits for
+            self._sink.close()
 
     def stopping(self) -> bool:
         """Whether the camera is shutting down."""
@@ -111,7 +141,8 @@ class Daemon:
     def status(self) -> CameraStatus:
         """What is going on."""
         scene, source, sink = self.director.scene, self._source.describe(), self._sink.describe()
-        troubles = [*self._troubles.values(), *self._pipeline.troubles]
+        pipeline = self._lines.pipeline
+        troubles = [*self._troubles.values(), *pipeline.troubles]
         counts, sessions = self._publisher.counts, session_report()
         troubles += [Degradation(f"model {s.name} runs on {s.provider}", s.why, s.cure) for s in sessions if s.why]
         return CameraStatus(
@@ -123,8 +154,8 @@ class Daemon:
             tracker=TrackerStatus(self._tracker.name, str(self._face)),
             fps=Rates(self._camera_rate.rate(), self._pipeline_rate.rate(), self._publisher.fps),
             latency_ms=self._publisher.latency_ms,
-            stage_ms=self._pipeline.timer.percentiles(),
-            frames=replace(counts, dropped=counts.dropped + self._passed_over),
+            stage_ms=pipeline.timer.percentiles(),
+            frames=replace(counts, dropped=counts.dropped + self._passed_over + self._lines.dropped),
             providers={s.name: s.provider for s in sessions},
             degraded=troubles,
             version=__version__,
@@ -138,8 +169,15 @@ class Daemon:
 
     def reset_neutral_pose(self) -> None:
         """Take the present head pose as neutral."""
-        self._pipeline.reset_neutral()
+        self._lines.pipeline.reset_neutral()
         self.events.publish("neutral-pose")
+
+    def tell(self, what: str, error: Exception | None) -> None:
+        """Let the status and the events say that something fails, or with None that it works again."""
+        if error is None:
+            self._recovered(what)
+        else:
+            self._failed(what, error)
 
     def _run(self) -> None:
         while not self._stopping.is_set():
@@ -148,31 +186,22 @@ class Daemon:
             if frame is None:
                 continue
             self._count(frame)
-            if self.director.scene.frozen:
-                continue
-            try:
-                finish = self._pipeline.begin(frame, lambda: self.director.scene)
-            except Exception as error:  # nothing that one frame does may end the camera
-                self._spoiled(error)
-                continue
-            wait([self._finishing])  # one frame is finished while the next is begun, no more
-            self._finishing = self._finisher.submit(self._finish, frame, finish)
-        self._finisher.shutdown()
+            if not self.director.scene.frozen and not self._lines.offer(frame):
+                self._show_stand_in(frame)
 
-    def _finish(self, frame: Frame, finish: Finish) -> None:
-        try:
-            finished = finish()
-        except Exception as error:
-            self._spoiled(error)
-            return
-        self._recovered("picture")
+    def _show_stand_in(self, frame: Frame) -> None:
+        image = self._stand_in.picture(frame, self.director.scene)
+        self._publish(image, frame)
+        if "picture" in self._troubles:
+            self._set_state(CameraState.STANDING_IN)
+
+    def _done(self, frame: Frame, finished: Finished) -> None:
         self._pipeline_rate.tick()
-        self._publisher.pictures.put(PublishedPicture(finished.image, frame.captured_at, frame.index))
+        self._publish(finished.image, frame)
         self._follow(finished)
 
-    def _spoiled(self, error: Exception) -> None:
-        self._failed("picture", error)
-        self._stopping.wait(RETRY_S)
+    def _publish(self, image: DisplayImage, frame: Frame) -> None:
+        self._publisher.pictures.put(PublishedPicture(image, frame.captured_at, frame.index))
 
     def _read(self) -> Frame | None:
         try:
@@ -230,9 +259,3 @@ class Daemon:
     def _recovered(self, what: str) -> None:
         if self._troubles.pop(what, None) is not None:
             self.events.publish("recovered", what=what)
-
-    def _sink_changed(self, error: Exception | None) -> None:
-        if error is None:
-            self._recovered("sink")
-        else:
-            self._failed("sink", error)

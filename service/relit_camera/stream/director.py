@@ -37,7 +37,7 @@ class Director:
 
     def __init__(self, storage: StorageSettings) -> None:
         self.environments = EnvironmentStore(storage.environments)
-        self.subjects = SubjectStore(storage.subjects)
+        self.subjects = SubjectStore(storage.subjects, held=True)
         self.backgrounds = BackgroundStore(storage.backgrounds)
         self._change = threading.Lock()
         self._guests: dict[str, Environment] = {}

@@ -104,6 +104,11 @@ class Publisher:
         return not self._thread.is_alive()
 
     @property
+    def stuck(self) -> bool:
+        """Whether the thread has not ended after `stop`: it waits for the sink."""
+        return self._stopping.is_set() and self._thread.is_alive()
+
+    @property
     def counts(self) -> FrameCounts:
         """Pictures written, those of them that were written before, and those passed over for newer ones."""
         return FrameCounts(self._published, self._newest.dropped + self._overtaken, self._repeated)

@@ -16,6 +16,8 @@ class CameraState(StrEnum):
     """The source gives pictures, but no face is tracked: the subject eases to neutral."""
     WAITING = "waiting"
     """The source gives no pictures: the placeholder is shown."""
+    STANDING_IN = "standing-in"
+    """Pictures fail or hang: the relit still is shown, or what `output.fallback` says, until they come again."""
     FROZEN = "frozen"
     STOPPING = "stopping"
 

@@ -49,14 +49,23 @@ class StageTimer:
         self._length = length
         self._windows: dict[str, DurationWindow] = {}
         self._lap: dict[str, float] = {}
+        self._running: list[str] = []
         self._lock = threading.Lock()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Time the body of a with-statement; a body that raises is not counted."""
         start = time.perf_counter()
-        yield
+        self._running.append(name)
+        try:
+            yield
+        finally:
+            self._running.remove(name)
         self.add(name, time.perf_counter() - start)
+
+    def running(self) -> list[str]:
+        """The stages that have begun and not ended, in the order they began."""
+        return list(self._running)
 
     def add(self, name: str, seconds: float) -> None:
         """Count a duration that was measured elsewhere."""

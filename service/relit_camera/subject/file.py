@@ -88,10 +88,15 @@ def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
             raise
 
 
-def read_subject(path: Path) -> Subject:
+def read_subject(path: Path, held: bool = False) -> Subject:
     """Open a subject; its arrays are read-only views of the mapped file, which the system may drop and read again.
 
     The basis of a file of version 1 is not: it is decoded into memory.
+
+    Args:
+        path: the file.
+        held: read it into memory instead. What runs for long needs that: where somebody cuts a mapped file short, the
+            system ends the process that looks at it.
 
     Raises:
         SubjectError: missing, damaged, of another version, or with values that are not finite.
@@ -106,7 +111,7 @@ def read_subject(path: Path) -> Subject:
             names = list(file.keys())
             if len(names) > MAX_TENSORS:
                 raise _damaged(path, f"it holds {len(names)} tensors")
-        tensors = _mapped(path, names)
+        tensors = _views(path, names, held)
     except (SafetensorError, OSError) as error:
         raise _damaged(path, str(error)) from error
     _check(path, tensors, metadata.format_version)
@@ -146,20 +151,21 @@ def _metadata(path: Path, header: Mapping[str, str]) -> SubjectMetadata:
         raise _damaged(path, f"header field {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
 
 
-def _mapped(path: Path, names: list[str]) -> dict[str, NDArray]:
-    """The tensors of a file that `safe_open` found sound; its own `get_tensor` would copy them into memory.
+def _views(path: Path, names: list[str], held: bool) -> dict[str, NDArray]:
+    """The tensors of a file that `safe_open` found sound; its own `get_tensor` would copy each.
 
     Layout (github.com/huggingface/safetensors): the header's length as 8 bytes, the header as JSON, the tensors.
     """
-    mapped = np.asarray(np.memmap(path, np.uint8, mode="r"))
-    start = 8 + int.from_bytes(mapped[:8].tobytes(), "little")
-    header = json.loads(mapped[8:start].tobytes())
+    content = np.fromfile(path, np.uint8) if held else np.asarray(np.memmap(path, np.uint8, mode="r"))
+    content.flags.writeable = False
+    start = 8 + int.from_bytes(content[:8].tobytes(), "little")
+    header = json.loads(content[8:start].tobytes())
     tensors = {}
     for name in names:
         kind, (first, last) = header[name]["dtype"], header[name]["data_offsets"]
         if kind not in STORED:
             raise _damaged(path, f"'{name}' is {kind}, which no tensor of a subject is")
-        stored = mapped[start + first : start + last]
+        stored = content[start + first : start + last]
         tensors[name] = stored.view(STORED[kind]).reshape(header[name]["shape"])
     return tensors
 

@@ -13,8 +13,10 @@ from relit_camera.subject.subject import Subject
 class SubjectStore:
     """A folder of .relit files; a subject's name is its file's stem."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, held: bool = False) -> None:
+        """`held`: subjects are read into memory, not mapped (see `read_subject`)."""
         self.folder = folder
+        self._held = held
 
     def names(self) -> list[str]:
         """Stored names in alphabetical order."""
@@ -40,7 +42,7 @@ class SubjectStore:
             NotFoundError: none of that name.
             SubjectError: its file is damaged.
         """
-        return read_subject(self.path(name))
+        return read_subject(self.path(name), self._held)
 
     def resolve(self, name_or_path: str) -> tuple[str, Subject]:
         """A stored name first, else a path. Returns the name to show and the subject.
@@ -54,7 +56,7 @@ class SubjectStore:
         path = Path(name_or_path)
         if not path.exists():
             self.path(name_or_path)
-        return path.stem, read_subject(path)
+        return path.stem, read_subject(path, self._held)
 
     def remove(self, name: str) -> None:
         """Delete a stored subject.

@@ -16,6 +16,7 @@ const STATES = {
   starting: "Starting…",
   live: "Live",
   searching: "Looking for your face",
+  "standing-in": "Showing a still: see below",
   waiting: "Waiting for the camera",
   frozen: "Frozen",
   stopping: "Stopping…",

@@ -12,7 +12,7 @@ from typing import Protocol
 import cv2
 import numpy as np
 
-from relit_camera.errors import DeviceError
+from relit_camera.errors import DeviceError, RelitError
 from relit_camera.space.images import DisplayImage, Frame
 from relit_camera.stream.devices import OWN_LABEL, SYSTEM, DeviceTree, find_webcam
 from relit_camera.stream.sources.base import SourceInfo, SourceState
@@ -96,15 +96,25 @@ class WebcamSource(ThreadedSource):
         failures = 0
         while not self._stopping.is_set():
             self._machine.move(SourceState.OPENING)
-            capture = self._open()
-            if capture is not None:
-                failures = 0 if self._pump(capture, start) else failures
-                capture.release()
+            failures = 0 if self._try(start) else failures
             if self._stopping.is_set():
                 return
             self._machine.move(SourceState.RECONNECTING)
             self._stopping.wait(BACK_OFF_S[min(failures, len(BACK_OFF_S) - 1)])
             failures += 1
+
+    def _try(self, start: float) -> bool:
+        """Open the camera and publish its frames while they come. Returns whether any came."""
+        capture = self._open()
+        if capture is None:
+            return False
+        try:
+            return self._pump(capture, start)
+        except (RelitError, cv2.error) as error:  # what a driver gives may be no picture at all; the next may be one
+            self._reason = f"{self._webcam.name} gives what is no picture: {error}"
+            return False
+        finally:
+            capture.release()
 
     def _open(self) -> Capture | None:
         """Open the camera, or give None with the reason noted. It may come back under another node."""

@@ -1,0 +1,85 @@
+"""Notices that the configuration file was edited while the camera runs."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from relit_camera.config.settings import RelitSettings
+from relit_camera.errors import RelitError
+
+log = logging.getLogger(__name__)
+
+LOOK_EVERY_S = 1.0
+
+Load = Callable[[], RelitSettings]
+Apply = Callable[[RelitSettings, RelitSettings], RelitError | None]
+
+
+@contextmanager
+def watch_config(
+    path: Path, settings: RelitSettings, load: Load, apply: Apply, tell: Callable[[Exception | None], None]
+) -> Iterator[None]:
+    """Look at the file once a second within the with-statement, in a thread of its own.
+
+    What cannot be used leaves everything as it was: it is told, and the file is waited for to change again.
+
+    Args:
+        path: of the configuration file.
+        settings: as they are.
+        load: reads them anew, as they were read at the start; raises RelitError.
+        apply: takes the settings before and after; returns what a person should know, and raises RelitError where
+            they cannot be used.
+        tell: gets what is wrong or should be known, and None once there is no more of that.
+    """
+    stopping = threading.Event()
+    thread = threading.Thread(target=_watch, args=(path, settings, load, apply, tell, stopping), name="config")
+    thread.start()
+    try:
+        yield
+    finally:
+        stopping.set()
+        thread.join()
+
+
+def _watch(
+    path: Path,
+    settings: RelitSettings,
+    load: Load,
+    apply: Apply,
+    tell: Callable[[Exception | None], None],
+    stopping: threading.Event,
+) -> None:
+    seen = _version(path)
+    told = False
+    while not stopping.wait(LOOK_EVERY_S):
+        version = _version(path)
+        if version == seen:
+            continue
+        seen = version
+        note: Exception | None = None
+        try:
+            after = load()
+            note = apply(settings, after)
+            settings = after
+        except RelitError as error:
+            note = error
+        except Exception as error:  # a fault of ours must not end the watch
+            note = error
+        if note is not None:
+            log.warning("%s was edited: %s", path, note)
+        if note is not None or told:
+            tell(note)
+        told = note is not None
+
+
+def _version(path: Path) -> tuple[int, int, int] | None:
+    """What is another after every edit, in place or by another file; None while there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino

@@ -1,0 +1,194 @@
+"""Tracker, reenactor, relighting or a provider raise or hang: something is shown all the same, and it recovers."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from relit_camera.config.settings import Fallback
+from relit_camera.errors import TrackError
+from relit_camera.face.follow import FaceMotion
+from relit_camera.face.state import FaceState
+from relit_camera.models.session import Session
+from relit_camera.reenact.first_order import FirstOrderReenactor
+from relit_camera.reenact.reenactor import Move
+from relit_camera.relight.basis import BasisRelighter
+from relit_camera.space.images import Frame, LinearImage
+from relit_camera.stream import line as line_module
+from relit_camera.stream.placeholder import placeholder
+from tests.faults.watched import Survived, watched_camera
+from tests.stream.small_camera import SIZE, SteadyTracker, difference, grey, wait_until
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What takes seconds in life takes tenths here."""
+    monkeypatch.setattr(line_module, "RETRY_S", 0.1)
+    monkeypatch.setattr(line_module, "STUCK_S", 0.4)
+    monkeypatch.setattr(line_module, "GIVE_UP_S", 1.0)
+
+
+class FaultyTracker(SteadyTracker):
+    """Raises or hangs when told to."""
+
+    def __init__(self) -> None:
+        self.error: Exception | None = None
+        self.release = threading.Event()
+        self.release.set()
+        self.hanging = 0
+
+    def track(self, frame: Frame) -> FaceState:
+        if self.error is not None:
+            raise self.error
+        if not self.release.is_set():
+            self.hanging += 1
+            self.release.wait(60)
+            self.hanging -= 1
+        return super().track(frame)
+
+
+@pytest.fixture
+def tracker() -> Iterator[FaultyTracker]:
+    made = FaultyTracker()
+    yield made
+    made.release.set()
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("a bug"), TrackError("a track that ends")])
+def test_a_tracker_that_raises(tracker: FaultyTracker, error: Exception, tmp_path: Path, survived: Survived) -> None:
+    with watched_camera(tmp_path, tracker=tracker) as watched:
+        live = watched.sink.new[-1]
+        tracker.error = error
+        watched.told(str(error))
+        watched.state("standing-in")
+        watched.goes_on(20)
+        # The still, at rest: the subject is where it was, lit as it was.
+        assert difference(watched.sink.new[-1], live) < 6
+        lit = watched.sink.new[-1]
+        watched.camera.put("lighting", environment=None, lamps=[{"azimuth_deg": 90}], transition_s=0)
+        wait_until(lambda: difference(watched.sink.new[-1], lit) > 5)  # the light still follows
+        tracker.error = None
+        watched.recovers()
+        survived(f"tracker raises {type(error).__name__}", watched)
+
+
+def test_a_tracker_that_hangs_for_a_while(tracker: FaultyTracker, tmp_path: Path, survived: Survived) -> None:
+    with watched_camera(tmp_path, tracker=tracker) as watched:
+        tracker.release.clear()
+        watched.told("in: track")
+        watched.goes_on(10)
+        tracker.release.set()
+        watched.recovers()
+        survived("tracker hangs for a while", watched)
+
+
+def test_a_tracker_that_hangs_for_ever_is_replaced(tracker: FaultyTracker, tmp_path: Path, survived: Survived) -> None:
+    with watched_camera(tmp_path, tracker=tracker, new_tracker=SteadyTracker) as watched:
+        tracker.release.clear()
+        watched.told("in: track")
+        watched.state("standing-in")
+        watched.recovers()
+        assert tracker.hanging == 1  # it still does
+        survived("tracker hangs for ever", watched)
+
+
+def test_trackers_that_all_hang_leave_the_still(tracker: FaultyTracker, tmp_path: Path, survived: Survived) -> None:
+    with watched_camera(tmp_path, tracker=tracker) as watched:
+        tracker.release.clear()
+        wait_until(lambda: tracker.hanging == line_module.MOST_LEFT_BEHIND, 60)
+        time.sleep(2)
+        assert tracker.hanging == line_module.MOST_LEFT_BEHIND  # and no more
+        assert watched.camera.status()["state"] == "standing-in"
+        tracker.release.set()
+        watched.recovers()
+        survived("every new tracker hangs", watched)
+
+
+def test_it_stops_in_time_while_a_tracker_hangs(tracker: FaultyTracker, tmp_path: Path) -> None:
+    with watched_camera(tmp_path, tracker=tracker) as watched:
+        tracker.release.clear()
+        watched.told("in: track")
+        began = time.monotonic()
+        watched.camera.daemon.stop()
+        assert time.monotonic() - began < 3
+        assert watched.camera.daemon.left_behind
+
+
+@pytest.mark.parametrize("half", ["follow", "move"])
+@pytest.mark.parametrize("how", ["raises", "hangs"])
+def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, monkeypatch: pytest.MonkeyPatch) -> None:
+    healthy = FirstOrderReenactor.follow
+    fault = threading.Event()
+    released = threading.Event()
+
+    def fail() -> None:
+        if fault.is_set():
+            if how == "raises":
+                raise FloatingPointError("a bug in the warp")
+            released.wait(60)
+
+    def follow(self: FirstOrderReenactor, motion: FaceMotion, frame: Frame) -> Move:
+        if half == "follow":
+            fail()
+        move = healthy(self, motion, frame)
+
+        def faulty(relit: LinearImage):  # type: ignore[no-untyped-def]
+            fail()
+            return move(relit)
+
+        return faulty if half == "move" else move
+
+    monkeypatch.setattr(FirstOrderReenactor, "follow", follow)
+    with watched_camera(tmp_path) as watched:
+        fault.set()
+        watched.told("a bug in the warp" if how == "raises" else f"in: {half}")
+        watched.state("standing-in")
+        watched.goes_on(20)
+        fault.clear()
+        released.set()
+        watched.recovers()
+        survived(f"reenactor {how} ({half})", watched)
+
+
+@pytest.mark.parametrize("fallback", list(Fallback))
+def test_not_even_the_still_can_be_relit(
+    fallback: Fallback, tmp_path: Path, survived: Survived, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with watched_camera(tmp_path, fallback=fallback) as watched:
+
+        def fail(self: BasisRelighter, light: object) -> LinearImage:
+            raise MemoryError("no memory for a picture")
+
+        with monkeypatch.context() as broken:
+            broken.setattr(BasisRelighter, "relight", fail)
+            watched.camera.put("lighting", environment="sunset", transition_s=0)
+            watched.told("no memory for a picture")
+            shown = grey() if fallback is Fallback.LIVE else placeholder(SIZE, "the picture has failed: see the panel")
+            wait_until(lambda: difference(watched.sink.new[-1], shown) == 0)
+            watched.goes_on(20)
+        watched.recovers()
+        survived(f"relighting raises, output.fallback is {fallback}", watched)
+
+
+def test_a_provider_that_fails_on_the_way(tmp_path: Path, survived: Survived, monkeypatch: pytest.MonkeyPatch) -> None:
+    healthy = Session._run
+    fault = threading.Event()
+
+    def run(self: Session, feeds: object) -> dict[str, np.ndarray]:
+        if fault.is_set():
+            raise RuntimeError("CUDA failure 719: unspecified launch failure")
+        return healthy(self, feeds)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Session, "_run", run)
+    with watched_camera(tmp_path) as watched:
+        fault.set()
+        watched.told("719")
+        watched.goes_on(20)
+        fault.clear()
+        watched.recovers()
+        survived("the network's provider fails", watched)

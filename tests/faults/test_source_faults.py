@@ -1,0 +1,142 @@
+"""The webcam goes, comes back elsewhere, stalls, or gives what is no picture of the right kind."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from relit_camera.space.images import DisplayImage
+from relit_camera.stream.placeholder import placeholder
+from relit_camera.stream.sources import webcam
+from relit_camera.stream.sources.webcam import WebcamSource
+from tests.faults.watched import Survived, Watched, watched_camera
+from tests.stream.fake_devices import FakeCapture, FakeTree
+from tests.stream.small_camera import SIZE, difference, wait_until
+
+STALL_S = float(os.environ.get("FAULT_STALL_S", "6"))
+"""The table of docs/reliability.md is made with 30."""
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What takes seconds in life takes tenths here."""
+    monkeypatch.setattr(webcam, "FIRST_FRAME_S", 0.5)
+    monkeypatch.setattr(webcam, "BACK_OFF_S", (0.1, 0.2))
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> FakeTree:
+    made = FakeTree(tmp_path / "root")
+    made.add_webcam(0, "HD Webcam", by_id="usb-Maker_HD_Webcam-video-index0")
+    return made
+
+
+class Cameras:
+    """What the webcam's driver does; every opening makes a capture of the present kind."""
+
+    def __init__(self) -> None:
+        self.make: Callable[[], FakeCapture] = lambda: FakeCapture(interval_s=1 / 30)
+        self.opened: list[FakeCapture] = []
+        self.nodes: list[str] = []
+
+    def __call__(self, node: str, size: tuple[int, int], fps: float) -> FakeCapture:
+        self.nodes.append(node)
+        self.opened.append(self.make())
+        return self.opened[-1]
+
+
+def watched_webcam(tmp_path: Path, tree: FakeTree, cameras: Cameras):  # type: ignore[no-untyped-def]
+    source = WebcamSource("webcam", SIZE, 30, tree=tree, open_capture=cameras, patience_s=0.5)
+    return watched_camera(tmp_path / "data", source=source)
+
+
+def waiting(watched: Watched) -> None:
+    """Wait until the placeholder says so."""
+    picture = placeholder(SIZE, "waiting for the camera")
+    wait_until(lambda: difference(watched.sink.new[-1], picture) == 0, 30)
+
+
+def test_unplugged_and_back_under_another_number(tmp_path: Path, tree: FakeTree, survived: Survived) -> None:
+    cameras = Cameras()
+    with watched_webcam(tmp_path, tree, cameras) as watched:
+        tree.remove(0)
+        cameras.opened[-1].mode = "silent"
+        watched.told("unplugged")
+        waiting(watched)
+        tree.add_webcam(3, "HD Webcam", by_id="usb-Maker_HD_Webcam-video-index0")
+        watched.recovers()
+        assert cameras.nodes[-1].endswith("video3")
+        survived("webcam unplugged, back under another number", watched)
+
+
+@pytest.mark.parametrize("mode", ["silent", "stuck"])
+def test_a_stall(mode: str, tmp_path: Path, tree: FakeTree, survived: Survived) -> None:
+    cameras = Cameras()
+    with watched_webcam(tmp_path, tree, cameras) as watched:
+        stalled = cameras.opened[-1]
+        stalled.mode = mode
+        cameras.make = lambda: FakeCapture(mode="silent")  # opening it again does not help
+        waiting(watched)
+        assert watched.camera.troubles() != ""
+        time.sleep(STALL_S)
+        cameras.make = lambda: FakeCapture(interval_s=1 / 30)
+        stalled.unstick.set()
+        watched.recovers()
+        what = "gives nothing" if mode == "silent" else "does not answer"
+        survived(f"webcam {what} for {STALL_S:g} s", watched)
+
+
+class Odd(FakeCapture):
+    """Gives pictures of a list, over and over."""
+
+    def __init__(self, pictures: list[DisplayImage]) -> None:
+        super().__init__(interval_s=1 / 30)
+        self.pictures = itertools.cycle(pictures)
+
+    def read(self) -> tuple[bool, np.ndarray | None]:
+        time.sleep(self.interval_s)
+        return True, next(self.pictures)
+
+
+def _noise(*shape: int) -> DisplayImage:
+    return np.random.default_rng(1).integers(0, 256, shape, np.uint8)
+
+
+def _torn() -> DisplayImage:
+    picture = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    picture[SIZE[1] // 2 :] = _noise(SIZE[1] // 2, SIZE[0], 3)
+    return picture
+
+
+ODD = {
+    "torn pictures": [_torn()],
+    "black pictures": [np.zeros((SIZE[1], SIZE[0], 3), np.uint8)],
+    "pictures of changing size": [_noise(48, 64, 3), _noise(720, 1280, 3), _noise(97, 33, 3)],
+    "pictures of one pixel": [_noise(1, 1, 3)],
+    "grey pictures": [_noise(SIZE[1], SIZE[0])],
+    "pictures without pixels": [np.zeros((0, 0, 3), np.uint8)],
+    "pictures with four channels": [_noise(SIZE[1], SIZE[0], 4)],
+    "pictures of 16 bits": [_noise(SIZE[1], SIZE[0], 3).astype(np.uint16)],
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_pictures(name: str, tmp_path: Path, tree: FakeTree, survived: Survived) -> None:
+    cameras = Cameras()
+    with watched_webcam(tmp_path, tree, cameras) as watched:
+        odd = Odd(ODD[name])
+        cameras.make = lambda: odd
+        cameras.opened[-1].mode = "silent"  # so that it is opened again
+        wait_until(lambda: cameras.opened[-1] is odd, 30)
+        time.sleep(0.5)
+        watched.goes_on(10)
+        cameras.make = lambda: FakeCapture(interval_s=1 / 30)
+        odd.opened, odd.pictures = False, itertools.repeat(np.zeros((0, 0, 3), np.uint8))
+        watched.recovers()
+        survived(f"webcam gives {name}", watched)

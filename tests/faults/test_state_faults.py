@@ -1,0 +1,125 @@
+"""Files that the camera uses are spoilt, the clock jumps, the sink fails or hangs."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from relit_camera.errors import DeviceError
+from relit_camera.space.images import DisplayImage
+from relit_camera.subject.file import write_subject
+from tests.faults.watched import Survived, TimedSink, watched_camera
+from tests.stream.small_camera import SteadyTracker, difference, running_camera, small_subject, wait_until
+
+
+def overwritten(path: Path) -> None:
+    path.write_bytes(b"garbage" * 1000)
+
+
+def cut_short(path: Path) -> None:
+    with path.open("r+b") as file:
+        file.truncate(100)
+
+
+def replaced(path: Path) -> None:
+    other = path.with_suffix(".new")
+    other.write_bytes(b"\\0" * 5000)
+    other.replace(path)
+
+
+def deleted(path: Path) -> None:
+    path.unlink()
+
+
+@pytest.mark.parametrize("spoil", [overwritten, cut_short, replaced, deleted], ids=lambda f: f.__name__)
+def test_a_subject_file_is_spoilt_while_in_use(
+    spoil: Callable[[Path], None], tmp_path: Path, survived: Survived
+) -> None:
+    file = tmp_path / "me.relit"
+    write_subject(file, small_subject())
+    with watched_camera(tmp_path / "data") as watched:
+        watched.camera.director.set_subject(str(file))
+        watched.goes_on(20)
+        watched.begin()
+        spoil(file)
+        before = watched.sink.new[-1]
+        # Every picture of the field is asked for again under another light.
+        for azimuth in (-90, 90):
+            watched.camera.put("lighting", environment=None, lamps=[{"azimuth_deg": azimuth}], transition_s=0)
+            watched.goes_on(10)
+        assert difference(watched.sink.new[-1], before) > 2
+        assert watched.still_told_nothing()
+        survived(f"subject file {spoil.__name__.replace('_', ' ')} while in use", watched)
+
+
+@pytest.mark.parametrize("jump_s", [-7200.0, 86400.0 * 365])
+def test_the_clock_jumps(jump_s: float, tmp_path: Path, survived: Survived, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = time.time
+    with watched_camera(tmp_path) as watched:
+        monkeypatch.setattr(time, "time", lambda: real() + jump_s)
+        time.sleep(0.5)
+        watched.goes_on(20)
+        assert watched.still_told_nothing()
+        assert 0 < watched.camera.daemon.status().latency_ms.p95 < 5000
+        survived(f"the clock jumps by {jump_s / 3600:+.0f} h", watched)
+
+
+class FaultySink(TimedSink):
+    """Raises or hangs when told to; counts only what it took."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.error: Exception | None = None
+        self.release = threading.Event()
+        self.release.set()
+
+    def write(self, image: DisplayImage) -> None:
+        if self.error is not None:
+            raise self.error
+        self.release.wait(60)
+        super().write(image)
+
+
+def test_the_virtual_camera_is_gone_for_a_while(tmp_path: Path) -> None:
+    sink = FaultySink()
+    with running_camera(tmp_path, sink=sink) as camera:
+        sink.wait_for(3)
+        sink.error = DeviceError("the virtual camera is gone", "load the module")
+        wait_until(lambda: "load the module" in camera.troubles())
+        sink.error = None
+        count = sink.count
+        wait_until(lambda: sink.count > count + 5 and camera.troubles() == "")
+
+
+def test_it_stops_in_time_while_the_driver_hangs(tmp_path: Path) -> None:
+    sink = FaultySink()
+    with running_camera(tmp_path, sink=sink) as camera:
+        sink.wait_for(3)
+        sink.release.clear()
+        time.sleep(0.2)
+        began = time.monotonic()
+        camera.daemon.stop()
+        assert time.monotonic() - began < 3
+        assert camera.daemon.left_behind
+        sink.release.set()
+
+
+def test_a_tracker_made_anew_may_fail_too(tmp_path: Path, survived: Survived) -> None:
+    """Its model was deleted meanwhile: the still goes on, and says why."""
+    from relit_camera.errors import ModelError
+
+    class Broken(SteadyTracker):
+        def track(self, frame: object) -> object:  # type: ignore[override]
+            raise ZeroDivisionError("a bug")
+
+    def renew() -> SteadyTracker:
+        raise ModelError("the face model is missing", "run `relit models pull`")
+
+    with running_camera(tmp_path, sink=TimedSink(), tracker=Broken(), new_tracker=renew) as camera:
+        wait_until(lambda: "relit models pull" in camera.troubles(), 40)
+        assert np.ptp(camera.sink.new[-1]) > 0
