@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 
@@ -92,7 +93,8 @@ class CheckpointFolder:
 
     def write(self, found: Checkpoint) -> None:
         """Keep what was found. Where that cannot be done it is told: the build goes on, but could not be resumed."""
-        tensors, report = {name: getattr(found.samples, name) for name in _TENSORS}, json.dumps(found.report)
+        tensors = {name: np.ascontiguousarray(getattr(found.samples, name)) for name in _TENSORS}
+        report = json.dumps(found.report)
         header = {"made_of": self._made_of, "report": report, "checksum": str(_checksum(tensors, report))}
         try:
             make_folder(self.folder, private=True)
