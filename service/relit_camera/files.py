@@ -55,14 +55,16 @@ def write_atomic(target: Path, data: bytes | str) -> None:
         temporary.write_bytes(data.encode() if isinstance(data, str) else data)
 
 
-def make_folder(folder: Path) -> None:
-    """Create a folder and those above it, where they are missing.
+def make_folder(folder: Path, private: bool = False) -> None:
+    """Create a folder and those above it, where they are missing; a private one only its owner may enter.
 
     Raises:
         StorageError: it cannot be created.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700 if private else 0o777)
+        if private:  # also if it was there
+            folder.chmod(0o700)
     except OSError as error:
         raise storage_error(folder, error) from error
 

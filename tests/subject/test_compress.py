@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from relit_camera.light.builtin.catalogue import builtin_environment
+from relit_camera.light.maps import LightMap, resample
+from relit_camera.light.panorama import read_panorama
 from relit_camera.reflectance.barycentric import SphericalBarycentric
 from relit_camera.reflectance.samples import Samples
 from relit_camera.reflectance.visibility import SharpVisibility
@@ -86,15 +89,30 @@ def test_every_texel_and_light_comes_back_as_asked(
     assert found.reached.light_db == pytest.approx(min(each), abs=0.1)
 
 
-def test_the_worst_map_is_told(samples: Samples, dense: NDArray[np.float32], found: CompressedField) -> None:
-    weighted = (MAP * texel_solid_angles()[..., None]).reshape(TEXELS, 3)
+def psnr_under(light_map: LightMap, samples: Samples, dense: NDArray[np.float32], found: CompressedField) -> float:
+    weighted = (light_map * texel_solid_angles()[..., None]).reshape(TEXELS, 3)
     restored = np.einsum(
         "pcg,gl,lc->pc", rows_by_hand(found.basis, SIZE**2), found.coefficients, weighted, optimize=True
     )
     expected = np.einsum("plc,lc->pc", dense, weighted, optimize=True)
-    reached = psnr(picture(restored), picture(expected), samples.matte)
+    return psnr(picture(restored), picture(expected), samples.matte)
+
+
+def test_the_worst_map_is_told(samples: Samples, dense: NDArray[np.float32], found: CompressedField) -> None:
+    reached = psnr_under(MAP, samples, dense, found)
     assert found.reached.map_db == pytest.approx(reached, abs=0.1)
     assert reached > 45
+
+
+def test_real_places_that_it_was_not_tried_on_come_back(
+    shared: Path, samples: Samples, dense: NDArray[np.float32], found: CompressedField
+) -> None:
+    """Suns, soft boxes, a single bright pixel."""
+    files = sorted((shared / "light").glob("*.hdr"))
+    assert files
+    maps = {file.stem: resample(read_panorama(file).radiance) for file in files}
+    reached = {name: psnr_under(light_map, samples, dense, found) for name, light_map in maps.items()}
+    assert min(reached.values()) > 45, reached
 
 
 def test_it_is_small_and_black_outside(samples: Samples, found: CompressedField) -> None:

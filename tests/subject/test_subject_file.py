@@ -125,7 +125,7 @@ def test_a_full_disk_leaves_nothing(subject: Subject, tmp_path: Path, monkeypatc
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("relit_camera.subject.file.save_file", full)
+    monkeypatch.setattr("relit_camera.subject.tensor_file.save_file", full)
     with pytest.raises(StorageError, match="free some space"):
         write_subject(tmp_path / "s.relit", subject)
     assert list(tmp_path.iterdir()) == []

@@ -108,7 +108,17 @@ def build(
         bool | None,
         typer.Option("--subtract-room/--keep-room", help="Take the room's light off; by itself, where that helps."),
     ] = None,
+    near_lamp: Annotated[
+        bool,
+        typer.Option(
+            "--near-lamp/--far-lamp",
+            help="Correct each pixel for the lamp's nearness; or leave that out, as for a lamp far away.",
+        ),
+    ] = True,
     threads: Annotated[int, typer.Option(help="Of the decoder.", min=1)] = 2,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Start over, also where a build that was broken off could go on.")
+    ] = False,
 ) -> None:
     """Build a subject from a film of a person, a mirror ball beside them and a blinking lamp that goes around."""
     import json
@@ -117,6 +127,7 @@ def build(
 
     from relit_camera.capture.ball.outline import Outline
     from relit_camera.capture.build import build_subject
+    from relit_camera.capture.chain.checkpoint import Checkpoint, CheckpointFolder, origin
     from relit_camera.capture.chain.options import CaptureOptions
     from relit_camera.capture.chain.samples import build_samples
     from relit_camera.capture.face_circle import Circle
@@ -135,26 +146,38 @@ def build(
         ball_diameter_cm=ball_diameter_cm,
         light_distance_cm=light_distance_cm,
         subtract_room=subtract_room,
+        near_field=near_lamp,
         threads=threads,
     )
     open_method(method)
+    kept = CheckpointFolder(out, origin(video, options), partial(typer.echo, err=True))
     # Opened before the work, so that what cannot be written is said at once; both appear at its end or not at all.
-    with atomic_path(out) as subject_file, atomic_path(report) if report else nullcontext() as report_file:
+    with (
+        kept.until_done(),
+        atomic_path(out) as subject_file,
+        atomic_path(report) if report else nullcontext() as report_file,
+    ):
+        if fresh:
+            kept.remove()
+        found = kept.read()
         with progress_bar() as progress:
             tell = stages(progress)
-            found = build_samples(video, options, tell)
+            if found is None:
+                film = build_samples(video, options, tell)
+                found = Checkpoint(film.samples, film.findings.report())
+                kept.write(found)
             tell("Building the field", 0, None)
             subject = build_subject(
                 found.samples, method, video.name, options.gamma, progress=partial(tell, "Building the field")
             )
         write_subject(subject_file, subject)
         if report_file:
-            report_file.write_text(json.dumps(found.findings.report(), indent=1), encoding="utf-8")
-    for warning in found.findings.warnings:
+            report_file.write_text(json.dumps(found.report, indent=1), encoding="utf-8")
+    for warning in found.report["warnings"]:
         typer.echo(f"warning: {warning}", err=True)
-    meta = subject.metadata
+    meta, flashes = subject.metadata, found.report["light"]["frames"]
     typer.echo(
-        f"{out}: {meta.width}x{meta.height}, {meta.lights} lights of {len(found.findings.good)} flashes' frames, "
+        f"{out}: {meta.width}x{meta.height}, {meta.lights} lights of {flashes} flashes' frames, "
         f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better"
     )
 
