@@ -1,4 +1,7 @@
-"""`python -m tests.soak --seconds 600`: memory and latency of `relit run` over time. Run by hand, not in CI."""
+"""`python -m tests.soak --seconds 1800`: memory, files, threads and latency of `relit run`. Run by hand, not in CI.
+
+Somebody looks at the preview all the time, and opens it anew twice a minute.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import json
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,6 +29,9 @@ WARM_UP_S = 60.0
 """Not judged: this long, or the first fifth of a shorter run."""
 GROWTH_MIB = 20.0
 """Resident memory at the end may be above that after the warm-up by this much."""
+MORE_FILES, MORE_THREADS = 4, 2
+"""So many more may be open, or at work, in the last third than in the first, by the median."""
+VIEW_S = 30.0
 DRIFT_MS = 3.0
 """The median latency of the last third may be above that of the first by this much."""
 END_S = 3.0
@@ -38,12 +45,29 @@ class Sample:
         time_s: since it was ready.
         rss_mib: resident memory of its process.
         p50_ms, p95_ms: latency of the last 300 frames, from a frame's arrival to the end of writing its picture.
+        files: open file descriptors of its process.
+        threads: of its process.
     """
 
     time_s: float
     rss_mib: float
     p50_ms: float
     p95_ms: float
+    files: int
+    threads: int
+
+
+def view(address: str, stopping: threading.Event) -> None:
+    """Look at the preview until `stopping`, and open it anew every `VIEW_S`."""
+    while not stopping.is_set():
+        until = time.monotonic() + VIEW_S
+        try:
+            with httpx.stream("GET", f"{address}api/v1/preview.mjpg", timeout=30) as answer:
+                for _ in answer.iter_raw():
+                    if stopping.is_set() or time.monotonic() > until:
+                        break
+        except httpx.HTTPError:
+            stopping.wait(1)
 
 
 def watch(process: subprocess.Popen[str], seconds: float) -> list[Sample]:
@@ -57,6 +81,21 @@ def watch(process: subprocess.Popen[str], seconds: float) -> list[Sample]:
     address = ready.split()[-1]
     watched, began, samples = psutil.Process(process.pid), time.monotonic(), list[Sample]()
     interval_s = max(LEAST_INTERVAL_S, seconds / SAMPLES)
+    stopping = threading.Event()
+    viewer = threading.Thread(target=view, args=(address, stopping))
+    viewer.start()
+    try:
+        sample_until(address, seconds, began, interval_s, watched, samples)
+    finally:
+        stopping.set()
+        viewer.join()
+    return samples
+
+
+def sample_until(
+    address: str, seconds: float, began: float, interval_s: float, watched: psutil.Process, samples: list[Sample]
+) -> None:
+    """Add a sample every `interval_s` until `seconds` after `began`, or until the camera no longer answers."""
     with httpx.Client(base_url=address, timeout=30) as http:
         while (passed_s := time.monotonic() - began) + interval_s <= seconds + 0.5:
             time.sleep(interval_s - passed_s % interval_s)
@@ -67,10 +106,16 @@ def watch(process: subprocess.Popen[str], seconds: float) -> list[Sample]:
                 break
             latency, troubles = status["latency_ms"], "; ".join(trouble["what"] for trouble in status["degraded"])
             samples.append(
-                Sample(time.monotonic() - began, watched.memory_info().rss / 2**20, latency["p50"], latency["p95"])
+                Sample(
+                    time.monotonic() - began,
+                    watched.memory_info().rss / 2**20,
+                    latency["p50"],
+                    latency["p95"],
+                    watched.num_fds(),
+                    watched.num_threads(),
+                )
             )
             print(f"{samples[-1]}  fps {status['fps']}  troubles: {troubles or 'none'}", file=sys.stderr, flush=True)
-    return samples
 
 
 def stop(process: subprocess.Popen[str]) -> int | None:
@@ -97,6 +142,12 @@ def report(samples: Sequence[Sample], seconds: float, exit_code: int | None) -> 
     wrong = []
     if (grown := rss_mib["end"] - rss_mib["start"]) > GROWTH_MIB:
         wrong.append(f"memory grew by {grown:.1f} MiB, allowed are {GROWTH_MIB:g}")
+    counts = {}
+    for name, most in (("files", MORE_FILES), ("threads", MORE_THREADS)):
+        first, last = (round(median(getattr(s, name) for s in part)) for part in (judged[:third], judged[-third:]))
+        counts[name] = {"first_third": first, "last_third": last}
+        if last - first > most:
+            wrong.append(f"{name} grew by {last - first}, allowed are {most}")
     if last_ms - first_ms > DRIFT_MS:
         wrong.append(f"the median latency grew by {last_ms - first_ms:.1f} ms, allowed are {DRIFT_MS:g}")
     if exit_code != 0:
@@ -107,6 +158,7 @@ def report(samples: Sequence[Sample], seconds: float, exit_code: int | None) -> 
     return {
         "seconds": seconds,
         "rss_mib": rss_mib,
+        **counts,
         "latency_p50_ms": {"first_third": round(first_ms, 2), "last_third": round(last_ms, 2)},
         "minutes": [
             {

@@ -11,9 +11,18 @@ from tests.soak import Sample, report
 SECONDS = 600.0
 
 
-def run(rss_mib: Callable[[float], float], p50_ms: Callable[[float], float], until_s: float = SECONDS) -> list[Sample]:
+def run(
+    rss_mib: Callable[[float], float],
+    p50_ms: Callable[[float], float],
+    until_s: float = SECONDS,
+    files: Callable[[float], float] = lambda _: 40,
+    threads: Callable[[float], float] = lambda _: 20,
+) -> list[Sample]:
     times = range(10, int(until_s) + 1, 10)
-    return [Sample(time_s, rss_mib(time_s), p50_ms(time_s), 2 * p50_ms(time_s)) for time_s in times]
+    return [
+        Sample(time_s, rss_mib(time_s), p50_ms(time_s), 2 * p50_ms(time_s), int(files(time_s)), int(threads(time_s)))
+        for time_s in times
+    ]
 
 
 def flat(value: float) -> Callable[[float], float]:
@@ -41,12 +50,14 @@ def test_a_steady_run_is_right() -> None:
     [
         (run(growing(300, 3), flat(30)), 0, ["memory grew by 26"]),
         (run(flat(300), growing(30, 1)), 0, ["the median latency grew by 6"]),
+        (run(flat(300), flat(30), files=growing(40, 1)), 0, ["files grew by 6"]),
+        (run(flat(300), flat(30), threads=growing(20, 0.5)), 0, ["threads grew by 3"]),
         (run(flat(300), flat(30)), 1, ["exit code 1"]),
         (run(flat(300), flat(30)), None, ["exit code None"]),
         (run(flat(300), flat(30), 300), None, ["ended before its time"]),
         ([], 0, ["ended before its time"]),
     ],
-    ids=["memory", "latency", "exit code", "no end", "early end", "no start"],
+    ids=["memory", "latency", "files", "threads", "exit code", "no end", "early end", "no start"],
 )
 def test_what_is_wrong_is_said(samples: list[Sample], exit_code: int | None, said: list[str]) -> None:
     wrong = report(samples, SECONDS, exit_code)["wrong"]
