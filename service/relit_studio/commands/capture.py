@@ -53,7 +53,8 @@ def capture(
         if person == "mannequin"
         else FieldPerson(Path(person), height, light_map)
     )
-    scene = Scene(somebody, light, Timing(seconds=seconds, flash_hz=flash_hz), seed, motion, balls=2 if second_ball else 1)
+    timing = Timing(seconds=seconds, flash_hz=flash_hz)
+    scene = Scene(somebody, light, timing, seed, motion, balls=2 if second_ball else 1)
     with shown_progress("Frames") as progress:
         video, truth = record(scene, stages, out, environment.name, seed, progress)
     typer.echo(f"{video}: {scene.timing.frames} frames of {scene.camera.width}x{scene.camera.height}; truth in {truth}")
