@@ -22,8 +22,14 @@ Indices = NDArray[np.intp]
 
 _APART_DEG, _TIMES_USUAL = 3.0, 4.0
 """Two balls show different things where their rays pass each other by more than this and so many times the usual."""
+_MOST_ELSEWHERE = 0.5
 _BEYOND_BALL = 1.2
 """The lamp is at least so many times as far from the head as a ball is."""
+
+_CURE = (
+    "both must be mirror balls of one size: give their circles with --ball and --second-ball, give --focal-px, "
+    "or leave --balls 2 out"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +61,9 @@ def place_lamps(seen: Survey, place: Place) -> LampPlaces:
         InputError: the lamp would be nearer to the head than the ball is.
     """
     shown, unusable = _shown(seen, place)
-    located = _located(shown)
-    usual = np.median([each.gap_deg for each in located.values()]) if located else 0.0
-    for index in [index for index, each in located.items() if each.gap_deg > max(_APART_DEG, _TIMES_USUAL * usual)]:
-        del shown[index], located[index]
+    located, elsewhere = _located(shown)
+    for index in elsewhere:
+        del shown[index]
         unusable[index] = "the two balls show the lamp in different places"
     frames = np.array(list(shown), np.intp)
     distances = _distances(seen, place, frames, located)
@@ -88,10 +93,22 @@ def _shown(seen: Survey, place: Place) -> tuple[dict[int, list[BallHighlight]], 
     return shown, unusable
 
 
-def _located(shown: Mapping[int, list[BallHighlight]]) -> dict[int, LightPosition]:
-    """Where two balls put the lamp, by index of the frames in which both show it."""
-    places = ((index, locate_light(*lights)) for index, lights in shown.items() if len(lights) == 2)
-    return {index: place for index, place in places if place is not None}
+def _located(shown: Mapping[int, list[BallHighlight]]) -> tuple[dict[int, LightPosition], list[int]]:
+    """Where two balls put the lamp, by index of the frames in which both show it; and those in which they do not agree.
+
+    Raises:
+        CaptureError: these are most.
+    """
+    both = {index: locate_light(*lights) for index, lights in shown.items() if len(lights) == 2}
+    met = {index: place for index, place in both.items() if place is not None}
+    usual = np.median([place.gap_deg for place in met.values()]) if met else 0.0
+    near = {index: place for index, place in met.items() if place.gap_deg < max(_APART_DEG, _TIMES_USUAL * usual)}
+    elsewhere = [index for index in both if index not in near]
+    if len(elsewhere) > _MOST_ELSEWHERE * len(both):
+        raise CaptureError(
+            f"the two mirror balls show the lamp in different places in {len(elsewhere)} of {len(both)} frames", _CURE
+        )
+    return near, elsewhere
 
 
 def _distances(seen: Survey, place: Place, frames: Indices, located: Mapping[int, LightPosition]) -> LampDistances:
@@ -104,8 +121,7 @@ def _distances(seen: Survey, place: Place, frames: Indices, located: Mapping[int
         raise CaptureError(
             f"two mirror balls put the lamp {found.cm.min():.0f} cm from the head, the farther ball is {reach:.0f} cm "
             "from it",
-            "both must be mirror balls of one size: give their circles with --ball and --second-ball, give --focal-px, "
-            "or leave --balls 2 out",
+            _CURE,
         )
     return found
 

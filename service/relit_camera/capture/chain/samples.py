@@ -156,6 +156,7 @@ def _strengths(
             inside,
             (x * factor, y * factor),
             lamps.place.pixels_per_cm * square.scale * factor,
+            measured=lamps.measured,
         )
         for times in (1.0, _FAR)
     )

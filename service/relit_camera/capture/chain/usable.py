@@ -59,6 +59,11 @@ class Lamps:
     area_sr: float
 
     @property
+    def measured(self) -> bool:
+        """Whether two balls tell the lamp's distance."""
+        return bool(self.located)
+
+    @property
     def directions(self) -> Floats:
         """Unit vectors (count, 3) from the head's middle."""
         return np.asarray(self.lamps_cm / np.linalg.norm(self.lamps_cm, axis=1, keepdims=True))

@@ -12,12 +12,15 @@ from relit_camera.capture.ball.two_balls import LightPosition
 
 Floats = NDArray[np.float64]
 
-_RAY = np.radians(0.6)
-"""Error of a ray: rendered films' is about that."""
+_LEAST_RAY = np.radians(0.2)
+"""Error of a ray, even where two pass each other more nearly."""
+_DEVIATION = 1.48
+"""Of the normal distribution, by the median of its values."""
 _UNKNOWN = 0.5
 """What is known of the usual distance beforehand: it is as said, give or take half."""
-_HAND, _CALM_S = 0.12, 1.0
-"""A hand that goes about somebody comes nearer and goes farther by an eighth, and keeps that for about a second."""
+_HAND, _CALM_S = 0.12, 0.5
+"""A hand that goes about somebody comes nearer and goes farther by an eighth, and keeps that for about half a second.
+"""
 _ALIKE = 5.0
 """A ray's error comes from the ball's outline and changes as slowly: so many successive frames count as one."""
 
@@ -40,7 +43,8 @@ def follow_distance(
 ) -> LampDistances:
     """The distance in each frame, by a Gaussian process over time (Rasmussen and Williams 2006, 2.2).
 
-    What two balls tell is 1 / distance, with errors that do not depend on it; so that is followed.
+    What two balls tell is 1 / distance, with errors that do not depend on it; so that is followed. How sure a ray is,
+    tells how nearly two pass each other.
 
     Args:
         times_s: (count,) of the frames.
@@ -48,9 +52,11 @@ def follow_distance(
         head_cm: (3,) the head's middle, camera axes.
         usual_cm: what is known beforehand.
     """
-    at = np.array(list(seen), np.intp)
-    nearness = np.array([usual_cm / np.linalg.norm(each.position_cm - head_cm) for each in seen.values()])
-    noise = np.array([np.sqrt(2) * _RAY * usual_cm / each.across_cm for each in seen.values()])
+    at, places = np.array(list(seen), np.intp), list(seen.values())
+    gap = np.median([each.gap_deg for each in places]) if places else 0.0
+    ray = max(_LEAST_RAY, _DEVIATION * np.radians(gap))
+    nearness = np.array([usual_cm / np.linalg.norm(each.position_cm - head_cm) for each in places])
+    noise = np.array([np.sqrt(2) * ray * usual_cm / each.across_cm for each in places])
     alike = _UNKNOWN**2 + _HAND**2 * np.exp(-0.5 * ((times_s[:, None] - times_s) / _CALM_S) ** 2)
     weights = np.linalg.solve(alike[np.ix_(at, at)] + np.diag(_ALIKE * noise**2), alike[at]).T
     found = 1 + weights @ (nearness - 1)
