@@ -22,7 +22,8 @@ Indices = NDArray[np.intp]
 
 _APART_DEG, _TIMES_USUAL = 3.0, 4.0
 """Two balls show different things where their rays pass each other by more than this and so many times the usual."""
-_MOST_ELSEWHERE = 0.5
+_MOST_ELSEWHERE = 0.2
+"""Share of the frames in which they may do so now and then: a hand, a lamp mirrored twice."""
 _BEYOND_BALL = 1.2
 """The lamp is at least so many times as far from the head as a ball is."""
 
