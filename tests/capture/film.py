@@ -1,4 +1,4 @@
-"""A film of a round head on shoulders, a mirror ball and a blinking lamp that goes about, by formulas."""
+"""A film of a round head on shoulders, a mirror ball or two and a blinking lamp that goes about, by formulas."""
 
 from __future__ import annotations
 
@@ -29,6 +29,12 @@ def head_cm() -> np.ndarray:
     return np.array([(HEAD[0] - SIZE[0] / 2) / PX_PER_CM, (SIZE[1] / 2 - HEAD[1]) / PX_PER_CM, -DEPTH_CM])
 
 
+def with_ball(across_px: float, up_px: float, behind_cm: float) -> MirrorScene:
+    """A camera and a ball, so far from the picture's middle where it is as far away as the head, or farther."""
+    at = np.array([across_px / PX_PER_CM, up_px / PX_PER_CM, -DEPTH_CM])
+    return MirrorScene(SIZE, FOCAL_PX, at * (1 + behind_cm / DEPTH_CM), 30 / PX_PER_CM, lamp_radius_cm=4.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Film:
     """The lamp is on for three frames, off for three.
@@ -38,7 +44,10 @@ class Film:
         azimuth, elevation: degrees through which the lamp goes from left to right, and up and down.
         hunting: how much exposure and balance swing (logarithm).
         distance_cm: from the lamp to the head.
+        sway: frames in which the hand moves to and fro by about a radian.
         enhanced: how much the camera evens bright and dark out by itself, from place to place.
+        scene: the camera, the ball, and the room that it shows.
+        second: the same with another ball, if there are two.
     """
 
     frames: int = 240
@@ -46,12 +55,15 @@ class Film:
     elevation: tuple[float, float] = (-15.0, 60.0)
     hunting: float = 0.15
     distance_cm: float = 100.0
+    sway: float = 2.3
     enhanced: float = 0.0
-    scene: MirrorScene = field(
-        default_factory=lambda: MirrorScene(
-            SIZE, FOCAL_PX, np.array([70 / PX_PER_CM, 80 / PX_PER_CM, -DEPTH_CM]), 30 / PX_PER_CM, lamp_radius_cm=4.0
-        )
-    )
+    scene: MirrorScene = field(default_factory=lambda: with_ball(70, 80, 0))
+    second: MirrorScene | None = None
+
+    @property
+    def scenes(self) -> tuple[MirrorScene, ...]:
+        """With one ball each."""
+        return (self.scene,) if self.second is None else (self.scene, self.second)
 
     def lamp_cm(self, index: int) -> np.ndarray:
         """From the head's middle, camera axes."""
@@ -64,7 +76,7 @@ class Film:
 
     def strength(self, index: int) -> float:
         """Light at the head, that at the usual distance being 1."""
-        return float(np.exp(0.25 * np.sin(index / 2.3)))
+        return float(np.exp(0.25 * np.sin(index / self.sway)))
 
     def gain(self, index: int) -> np.ndarray:
         """What the camera multiplies the frame by (3,)."""
@@ -113,29 +125,33 @@ class Film:
         return self.reflectance * (cosine * beam * self.distance_cm**2 / squared)[..., None]
 
     @cached_property
-    def _mirror(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _mirrors(self) -> list[tuple[MirrorScene, np.ndarray, np.ndarray, np.ndarray]]:
         width, height = SIZE
         place = np.meshgrid((np.arange(width * FINE) + 0.5) / FINE, (np.arange(height * FINE) + 0.5) / FINE)
-        rays = self.scene.rays(*place)
-        hit, points = self.scene.hit(rays)
-        return hit, points[hit], self.scene.mirror(rays[hit], points[hit])
+        made = []
+        for scene in self.scenes:
+            rays = scene.rays(*place)
+            hit, points = scene.hit(rays)
+            made.append((scene, hit, points[hit], scene.mirror(rays[hit], points[hit])))
+        return made
 
     @cached_property
     def _room(self) -> tuple[np.ndarray, np.ndarray]:
-        """The wall with the ball's mirror image of the room (height, width, 3), and how much of a pixel the ball is."""
-        hit, _, mirrored = self._mirror
+        """The wall with the balls' mirror images of the room (height, width, 3), and how much of a pixel they are."""
         x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
         wall = WALL * (1 + 0.25 * np.sin(x / 9) * np.sin(y / 13))[..., None]
-        fine = np.zeros(hit.shape)
-        fine[hit] = self.scene.reflectance * self.scene.room(mirrored)
-        ball, cover = (cv2.resize(each.astype(np.float32), SIZE, interpolation=cv2.INTER_AREA) for each in (fine, hit))
+        fine = np.zeros((2, SIZE[1] * FINE, SIZE[0] * FINE), np.float32)
+        for scene, hit, _, mirrored in self._mirrors:
+            fine[0, hit] = scene.reflectance * scene.room(mirrored)
+            fine[1, hit] = 1
+        ball, cover = (cv2.resize(each, SIZE, interpolation=cv2.INTER_AREA) for each in fine)
         return wall * (1 - cover[..., None]) + ball[..., None], cover
 
     def _glint(self, index: int) -> np.ndarray:
-        """The lamp's mirror image in the ball (height, width)."""
-        hit, points, mirrored = self._mirror
-        fine = np.zeros(hit.shape, np.float32)
-        fine[hit] = self.scene.lamp_seen(points, mirrored, self.lamp_cm(index) + head_cm(), 60.0)
+        """The lamp's mirror image in the balls (height, width)."""
+        fine = np.zeros((SIZE[1] * FINE, SIZE[0] * FINE), np.float32)
+        for scene, hit, points, mirrored in self._mirrors:
+            fine[hit] = scene.lamp_seen(points, mirrored, self.lamp_cm(index) + head_cm(), 60.0)
         return cv2.GaussianBlur(cv2.resize(fine, SIZE, interpolation=cv2.INTER_AREA), (0, 0), 0.7)
 
     def shift(self, index: int) -> tuple[float, float]:

@@ -71,6 +71,21 @@ def test_errors_put_in_are_found(compare: Compare, report: Document) -> None:
     assert errors.focal_ratio == pytest.approx(1.05)
 
 
+def test_the_lights_distance_and_either_ball_are_compared(compare: Compare, truth: Document, report: Document) -> None:
+    truth["second_ball"] = {"x_px": 20.0, "y_px": 50.0, "radius_px": 18.0}
+    for known, found in zip(truth["frames"], report["frames"], strict=True):
+        known["light"]["at_second_ball"] = known["light"]["at_ball"]
+        known["light"]["at_ball"] = [0.0, 1.0, 0.0]
+        found["distance_cm"] = 95.0
+    report["ball"] = {"x": 21.0, "y": 50.0, "radius": 18.0}
+    errors = compare(report)
+    assert errors.ball_px == (1, 0, 0)
+    assert errors.at_ball_deg.max() < 1e-6
+    np.testing.assert_allclose(errors.distance_ratio, 0.95)
+    assert capture_json(errors)["distance"]["mean"] == pytest.approx(0.05)
+    assert "light's distance from the head: mean 5.00" in capture_text(errors)
+
+
 def test_frames_taken_for_others_are_counted(compare: Compare, report: Document) -> None:
     report["frames"][2]["kind"] = "rejected"
     report["frames"][4]["kind"] = "bright"

@@ -209,6 +209,31 @@ def test_interrupted_capture_goes_on_and_ends_the_same(brief: Scene, tmp_path: P
     assert (gains[:, 2] == 1).all()
 
 
+def test_a_second_ball_is_filmed_and_told(brief: Scene, tmp_path: Path) -> None:
+    scene = Scene(brief.person, brief.room, brief.timing, seed=2, balls=2)
+    record(scene, PLAIN, tmp_path, "overcast", 2)
+    frames, truth = read(tmp_path)
+    second = truth["second_ball"]
+    assert second["radius_cm"] == truth["ball"]["radius_cm"]
+    assert second["x_px"] < brief.camera.width / 2 < truth["ball"]["x_px"]
+    # Nothing but the second ball is new, and it shows the lamp where the truth says.
+    index = next(frame["index"] for frame in truth["frames"] if frame["flash"]["state"] == "bright")
+    alone = brief.light(brief.moment(index)) * SENSOR.white * 255
+    new = np.abs(frames[index] - np.clip(alone, 0, 255)).max(axis=2)
+    x, y = brief.camera.pixel_grid()
+    away = np.hypot(x - second["x_px"], y - second["y_px"]) / second["radius_px"]
+    assert new[away > 3].max() < 1
+    assert np.median(new[away < 0.9]) > 2
+    added = scene.parts(scene.moment(index))[1].sum(axis=2) * (away < 1)
+    bright = added * (added > 0.5 * added.max())
+    light = truth["frames"][index]
+    np.testing.assert_allclose(
+        [(x * bright).sum() / bright.sum(), (y * bright).sum() / bright.sum()], light["second_highlight_px"], atol=0.3
+    )
+    toward = np.subtract(light["light"]["position_cm"], second["centre_cm"])
+    np.testing.assert_allclose(light["light"]["at_second_ball"], toward / np.linalg.norm(toward), atol=1e-5)
+
+
 def test_frames_of_other_settings_are_not_taken_up(brief: Scene, tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         record(brief, Stages(), tmp_path, "overcast", 2, _interrupt)

@@ -93,6 +93,12 @@ def build(
     ball: Annotated[
         str | None, typer.Option(help="X,Y,RADIUS of the mirror ball in those pixels; it is found by itself.")
     ] = None,
+    balls: Annotated[
+        int, typer.Option(help="Mirror balls in the film: two of one size tell the lamp's distance.", min=1, max=2)
+    ] = 1,
+    second_ball: Annotated[
+        str | None, typer.Option(help="X,Y,RADIUS of the second ball; with --balls 2 it is found by itself.")
+    ] = None,
     face: Annotated[
         str | None, typer.Option(help="X,Y,RADIUS of the face, brow to chin; it is found by itself.")
     ] = None,
@@ -100,7 +106,9 @@ def build(
         float | None,
         typer.Option(help="The ball's diameter; without, it is taken to be as far away as the head.", min=1),
     ] = None,
-    light_distance_cm: Annotated[float, typer.Option(help="From the lamp to the head.", min=20, max=1000)] = 100.0,
+    light_distance_cm: Annotated[
+        float, typer.Option(help="From the lamp to the head, as far as two balls do not tell it.", min=20, max=1000)
+    ] = 100.0,
     size: Annotated[int, typer.Option(help="Pixels a side, fewer where the video shows fewer.", min=64)] = 384,
     method: Annotated[str, typer.Option(help="Reflectance method.")] = "default",
     gamma: Annotated[str, typer.Option(help="Curve of the video: srgb, linear, or an exponent.")] = "srgb",
@@ -141,6 +149,8 @@ def build(
         gamma=parse_gamma(gamma),
         size=size,
         focal_px=focal_px,
+        balls=2 if second_ball else balls,
+        second_ball=Outline(*_circle(second_ball, "--second-ball")) if second_ball else None,
         ball=Outline(*_circle(ball, "--ball")) if ball else None,
         face=Circle(*_circle(face, "--face")) if face else None,
         ball_diameter_cm=ball_diameter_cm,

@@ -28,6 +28,7 @@ class _ReportFrame(Record):
     kind: Kind
     direction: Vector | None = None
     at_ball: Vector | None = None
+    distance_cm: Annotated[float, Field(gt=0)] | None = None
     rotation_deg: float | None = None
     translation_px: tuple[float, float] | None = None
 
@@ -47,6 +48,8 @@ class _TrueBall(Record):
 class _Light(Record):
     direction: Vector
     at_ball: Vector
+    at_second_ball: Vector | None = None
+    distance_cm: Annotated[float, Field(gt=0)]
 
 
 class _Flash(Record):
@@ -71,6 +74,7 @@ class _TrueFrame(Record):
 
 class _Truth(Record):
     ball: _TrueBall
+    second_ball: _TrueBall | None = None
     focal_px: float
     frames: Annotated[list[_TrueFrame], Field(min_length=1)]
 
@@ -87,9 +91,10 @@ class CaptureErrors:
         index: (bright,) of the frames whose errors follow: those that both call bright.
         direction_deg, at_ball_deg: (bright,) angle between the found and the true direction toward the light, from the
             head and from the ball; NaN where the report has none.
+        distance_ratio: (bright,) found over true distance from the head to the light; NaN where the report has none.
         rotation_deg, translation_px: (moved,), (moved, 2) what remains of the head's motion after the found transform,
             over the bright and dark frames, its mean taken out: the reference frame need not be the truth's.
-        ball_px: error of the ball's x, y and radius; None where the report has no ball.
+        ball_px: error of the ball's x, y and radius, of two that of the first; None where it has none.
         focal_ratio: found over true focal length; None where the report has none.
     """
 
@@ -100,6 +105,7 @@ class CaptureErrors:
     index: NDArray[np.intp]
     direction_deg: NDArray[np.float64]
     at_ball_deg: NDArray[np.float64]
+    distance_ratio: NDArray[np.float64]
     rotation_deg: NDArray[np.float64]
     translation_px: NDArray[np.float64]
     ball_px: Vector | None
@@ -130,7 +136,8 @@ def compare_capture(report: Path, truth: Path) -> CaptureErrors:
     moved = [(f.rotation_deg, f.translation_px, t.head.to_rest) for f, t in pairs if f.kind in ("bright", "dark")]
     rotation = [r - t.rotation_deg for r, p, t in moved if r is not None and p is not None]
     shift = [np.subtract(p, t.translation_px) for r, p, t in moved if r is not None and p is not None]
-    ball = found.ball
+    ball, second = found.ball, _is_second(found, known)
+    true_ball = known.second_ball if second and known.second_ball else known.ball
     return CaptureErrors(
         frames=len(known.frames),
         true_bright=sum(frame.flash.state == "bright" for frame in known.frames),
@@ -138,14 +145,25 @@ def compare_capture(report: Path, truth: Path) -> CaptureErrors:
         wrongly_bright=sum(f.kind == "bright" and t.flash.state != "bright" for f, t in pairs),
         index=np.array([f.index for f, _ in lit], np.intp),
         direction_deg=np.array([_angle(f.direction, t.light.direction) for f, t in lit]),
-        at_ball_deg=np.array([_angle(f.at_ball, t.light.at_ball) for f, t in lit]),
+        at_ball_deg=np.array(
+            [_angle(f.at_ball, (second and t.light.at_second_ball) or t.light.at_ball) for f, t in lit]
+        ),
+        distance_ratio=np.array([(f.distance_cm or np.nan) / t.light.distance_cm for f, t in lit]),
         rotation_deg=_centred(np.array(rotation)),
         translation_px=_centred(np.array(shift).reshape(-1, 2)),
-        ball_px=(ball.x - known.ball.x_px, ball.y - known.ball.y_px, ball.radius - known.ball.radius_px)
-        if ball
-        else None,
+        ball_px=(ball.x - true_ball.x_px, ball.y - true_ball.y_px, ball.radius - true_ball.radius_px) if ball else None,
         focal_ratio=found.focal_px / known.focal_px if found.focal_px else None,
     )
+
+
+def _is_second(found: _Report, known: _Truth) -> bool:
+    """Whether the report's ball is the truth's second one."""
+    if found.ball is None or known.second_ball is None:
+        return False
+    first, second = (
+        np.hypot(found.ball.x - each.x_px, found.ball.y - each.y_px) for each in (known.ball, known.second_ball)
+    )
+    return bool(second < first)
 
 
 def _angle(found: Vector | None, known: Vector) -> float:

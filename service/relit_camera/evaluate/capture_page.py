@@ -21,6 +21,7 @@ def capture_json(errors: CaptureErrors) -> dict[str, object]:
         "wrongly_bright": errors.wrongly_bright,
         "direction_deg": _spread(errors.direction_deg),
         "at_ball_deg": _spread(errors.at_ball_deg),
+        "distance": _spread(np.abs(errors.distance_ratio - 1)),
         "rotation_deg": _spread(np.abs(errors.rotation_deg)),
         "translation_px": _spread(np.linalg.norm(errors.translation_px, axis=1)),
         "ball_px": dict(zip(("x", "y", "radius"), errors.ball_px, strict=True)) if errors.ball_px else None,
@@ -76,6 +77,7 @@ def _rows(errors: CaptureErrors) -> list[tuple[str, NDArray[np.float64], str]]:
     return [
         ("light from the head", errors.direction_deg, "degrees"),
         ("light from the ball", errors.at_ball_deg, "degrees"),
+        ("light's distance from the head", 100 * np.abs(errors.distance_ratio - 1), "%"),
         ("head rotation", np.abs(errors.rotation_deg), "degrees"),
         ("head translation", np.linalg.norm(errors.translation_px, axis=1), "px"),
     ]

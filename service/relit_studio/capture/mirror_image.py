@@ -1,10 +1,11 @@
 """What is seen in the mirror ball: the room, ray-traced, and the torch as a small, very bright disc.
 
-The ball and the person do not see each other: neither the head's mirror image nor shadows between them are made.
+Balls and person do not see each other: neither their mirror images of one another nor shadows between them are made.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -79,6 +80,12 @@ def room_in_ball(ball: MirrorBall, camera: Pinhole, room: Room) -> tuple[LinearI
     image[top:bottom, left:right] = averaged[..., :3]
     coverage[top:bottom, left:right] = averaged[..., 3]
     return image, coverage
+
+
+def room_in_balls(balls: Sequence[MirrorBall], camera: Pinhole, room: Room) -> tuple[LinearImage, Mask]:
+    """The same of one or more balls that do not hide each other."""
+    images, coverages = zip(*(room_in_ball(ball, camera, room) for ball in balls), strict=True)
+    return np.sum(images, axis=0), np.sum(coverages, axis=0)
 
 
 def torch_in_ball(ball: MirrorBall, camera: Pinhole, torch: Torch) -> LinearImage:

@@ -14,9 +14,11 @@ from relit_camera.space.picture_files import write_display
 from relit_camera.video.writer import VideoWriter
 from relit_studio.capture.frame_store import Done, FrameStore
 from relit_studio.capture.lossless import LosslessWriter
+from relit_studio.capture.mirror_ball import MirrorBall
 from relit_studio.capture.phone import Phone, Stages
 from relit_studio.capture.scene import Scene
 from relit_studio.capture.truth import capture_truth, frame_truth
+from relit_studio.pinhole import Pinhole
 from relit_studio.processing import Gains
 from relit_studio.progress import Progress, no_progress
 
@@ -85,17 +87,23 @@ def _encode(store: FrameStore, total: int, video: Path, stages: Stages, scene: S
 
 
 def _sheet(store: FrameStore, total: int, scene: Scene) -> DisplayImage:
-    """Frames spread over the video, successive ones from its middle, and the ball in some frames."""
+    """Frames spread over the video, successive ones from its middle, and each ball in some frames."""
     spread = np.linspace(0, total - 1, _STILL_FRAMES).round().astype(int)
     middle = max(0, min(total // 2, total - _BALL_FRAMES)) + np.arange(_BALL_FRAMES)
-    outline = scene.ball.outline(scene.camera)
+    pictures = [[store.picture(int(index)) for index in chosen] for chosen in np.split(spread, 2)]
+    successive = [store.picture(min(int(index), total - 1)) for index in middle]
+    some = [store.picture(int(index)) for index in spread[:: _STILL_FRAMES // _BALL_FRAMES]]
+    balls = [[picture[_around(ball, scene.camera)] for picture in some] for ball in scene.balls]
+    labels = ("spread over the video", "", "successive", "the ball", "the second ball")
+    return contact_sheet([*pictures, successive, *balls], labels[: 3 + len(balls)])
+
+
+def _around(ball: MirrorBall, camera: Pinhole) -> tuple[slice, slice]:
+    """Rows and columns of the picture about a ball."""
+    outline = ball.outline(camera)
     reach = outline.radius * _BALL_MARGIN
     rows, columns = (
         slice(max(0, int(at - reach)), min(size, int(at + reach) + 1))
-        for at, size in ((outline.y, scene.camera.height), (outline.x, scene.camera.width))
+        for at, size in ((outline.y, camera.height), (outline.x, camera.width))
     )
-    pictures = [[store.picture(int(index)) for index in chosen] for chosen in np.split(spread, 2)]
-    successive = [store.picture(min(int(index), total - 1)) for index in middle]
-    balls = [store.picture(int(index))[rows, columns] for index in spread[:: _STILL_FRAMES // _BALL_FRAMES]]
-    labels = ("spread over the video", "", "successive", "the ball")
-    return contact_sheet([*pictures, successive, balls], labels)
+    return rows, columns

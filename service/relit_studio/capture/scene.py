@@ -14,17 +14,17 @@ from relit_camera.space.images import LinearImage
 from relit_studio.capture.flash import FlashSchedule, RollingShutter
 from relit_studio.capture.head_motion import HeadMotion, Motion
 from relit_studio.capture.mirror_ball import MirrorBall
-from relit_studio.capture.mirror_image import Room, room_in_ball, torch_in_ball
+from relit_studio.capture.mirror_image import Room, room_in_balls, torch_in_ball
 from relit_studio.capture.person import Person
 from relit_studio.capture.torch import HandPath, Torch
 from relit_studio.pinhole import Pinhole
 
-_BALL_AT = (0.7, 0.46)
-"""Its place: shares of what half the picture spans, to the right and up, at the head's distance."""
-_BALL_BEFORE_CM = 3.0
-"""How far it stands before the head's origin."""
+_BALLS_AT = ((0.7, 0.46), (-0.7, 0.4))
+"""Their places: shares of what half the picture spans, to the right and up, at the head's distance."""
+_BALLS_BEFORE_CM = (3.0, 1.5)
+"""How far they stand before the head's origin."""
 _BALL_SIZE = 0.16
-"""Its radius as a share of what half the shorter side spans."""
+"""A ball's radius as a share of what half the shorter side spans."""
 _POLISHED = np.array([0.86, 0.85, 0.83], np.float32)
 
 
@@ -77,9 +77,11 @@ class Moment:
 
 
 class Scene:
-    """A person, a mirror ball and a room, and a torch that somebody moves about them."""
+    """A person, mirror balls and a room, and a torch that somebody moves about them."""
 
-    def __init__(self, person: Person, room: Room, timing: Timing, seed: int, motion: float = 1.0) -> None:
+    def __init__(
+        self, person: Person, room: Room, timing: Timing, seed: int, motion: float = 1.0, balls: int = 1
+    ) -> None:
         """Set the scene.
 
         Args:
@@ -88,10 +90,11 @@ class Scene:
             timing: of frames and flashes.
             seed: of the hand, the head and the torch's phase.
             motion: scales the head's movements.
+            balls: how many there are, 1 or 2.
         """
         self.person, self.room, self.timing, self.motion = person, room, timing, motion
         self.camera = person.camera
-        self.ball = place_ball(person)
+        self.balls = place_balls(person)[:balls]
         self.schedule = FlashSchedule(
             frequency_hz=timing.flash_hz * (1 + timing.clock_error),
             duty=timing.duty,
@@ -101,7 +104,7 @@ class Scene:
         self._hand = HandPath(person.origin, timing.seconds, seed)
         self._head = HeadMotion(seed, motion)
         self._behind = _backdrop(self.camera, room)
-        self._in_ball, self._coverage = room_in_ball(self.ball, self.camera, room)
+        self._in_balls, self._coverage = room_in_balls(self.balls, self.camera, room)
 
     def moment(self, index: int) -> Moment:
         """What is so at frame `index`."""
@@ -122,12 +125,13 @@ class Scene:
         """
         shining = moment.torch if moment.lit.any() else None
         layers = self.person.layers(moment.motion, shining)
-        beside_ball = 1 - self._coverage[..., None]
+        beside_balls = 1 - self._coverage[..., None]
         without = self._behind * (1 - layers.matte[..., None]) + layers.ambient
-        torch = layers.flash * beside_ball
+        torch = layers.flash * beside_balls
         if shining is not None:
-            torch += torch_in_ball(self.ball, self.camera, shining)
-        return without * beside_ball + self._in_ball, torch
+            for ball in self.balls:
+                torch += torch_in_ball(ball, self.camera, shining)
+        return without * beside_balls + self._in_balls, torch
 
     def ordinary_mean(self) -> NDArray[np.float32]:
         """Linear RGB (3,): geometric mean of the picture's means without and with the torch, half way through."""
@@ -137,12 +141,15 @@ class Scene:
         return np.asarray(np.sqrt(dark * bright), np.float32)
 
 
-def place_ball(person: Person) -> MirrorBall:
-    """A ball beside the person's head, in the picture's upper right, where it shadows nothing."""
+def place_balls(person: Person) -> tuple[MirrorBall, ...]:
+    """Two balls of one size beside the person's head, in the picture's upper right and left: they shadow nothing."""
     camera, origin = person.camera, person.origin
     half = -origin[2] * np.array([camera.width, camera.height]) / 2 / camera.focal_px
-    centre = np.array([_BALL_AT[0] * half[0], _BALL_AT[1] * half[1], origin[2] + _BALL_BEFORE_CM])
-    return MirrorBall(centre, float(_BALL_SIZE * half.min()), _POLISHED)
+    centres = [
+        np.array([at[0] * half[0], at[1] * half[1], origin[2] + before])
+        for at, before in zip(_BALLS_AT, _BALLS_BEFORE_CM, strict=True)
+    ]
+    return tuple(MirrorBall(centre, float(_BALL_SIZE * half.min()), _POLISHED) for centre in centres)
 
 
 def dimmed(environment: Environment, ambient: float) -> tuple[Room, LightMap]:

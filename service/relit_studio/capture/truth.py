@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_studio.capture.flash import flash_state
+from relit_studio.capture.mirror_ball import MirrorBall
 from relit_studio.capture.mirror_image import highlight_px
 from relit_studio.capture.person import to_rest
 from relit_studio.capture.phone import SENSOR, Stages
 from relit_studio.capture.scene import Moment, Scene
 from relit_studio.capture.torch import BEAM_EXPONENT, RADIUS_CM, REFERENCE_CM
+from relit_studio.pinhole import Pinhole
 from relit_studio.processing import Gains
 
 VERSION = 1
@@ -21,7 +23,7 @@ VERSION = 1
 
 def capture_truth(scene: Scene, stages: Stages, video: str, room: str, seed: int, face: NDArray) -> dict[str, Any]:
     """What holds for the whole video. `face` are the face's surface points (count, 3), camera axes."""
-    camera, ball, outline = scene.camera, scene.ball, scene.ball.outline(scene.camera)
+    camera = scene.camera
     return {
         "version": VERSION,
         "video": video,
@@ -33,16 +35,7 @@ def capture_truth(scene: Scene, stages: Stages, video: str, room: str, seed: int
         "focal_px": camera.focal_px,
         "head_origin_cm": _numbers(scene.person.origin),
         "face_centroid_cm": _numbers(face.mean(axis=0)),
-        "ball": {
-            "x_px": outline.x,
-            "y_px": outline.y,
-            "radius_px": outline.radius,
-            "semi_radial_px": outline.semi_radial,
-            "semi_tangential_px": outline.semi_tangential,
-            "centre_cm": _numbers(ball.centre),
-            "radius_cm": ball.radius_cm,
-            "reflectance": _numbers(ball.reflectance),
-        },
+        **{name: _ball(ball, camera) for name, ball in zip(("ball", "second_ball"), scene.balls, strict=False)},
         "torch": {
             "frequency_hz": scene.schedule.frequency_hz,
             "duty": scene.schedule.duty,
@@ -66,9 +59,8 @@ def frame_truth(scene: Scene, moment: Moment, gains: Gains, face: NDArray) -> di
     """What holds for one frame. `face` as in `capture_truth`."""
     torch, motion = moment.torch, moment.motion
     centroid = face.mean(axis=0)
-    to_face, to_ball = torch.position - centroid, torch.position - scene.ball.centre
+    to_face = torch.position - centroid
     picture = to_rest(scene.person, face, motion)
-    x, y = highlight_px(scene.ball, scene.camera, torch)
     origin = scene.person.origin + motion.apply(np.zeros(3))
     return {
         "index": moment.index,
@@ -79,8 +71,11 @@ def frame_truth(scene: Scene, moment: Moment, gains: Gains, face: NDArray) -> di
             "off_aim_deg": float(np.degrees(np.arccos(np.clip(torch.off_axis_cosine(centroid), 0, 1)))),
             "distance_cm": float(np.linalg.norm(to_face)),
             "irradiance": float(torch.irradiance(centroid)),
-            "direction": _numbers(to_face / np.linalg.norm(to_face)),
-            "at_ball": _numbers(to_ball / np.linalg.norm(to_ball)),
+            "direction": _numbers(_unit(to_face)),
+            **{
+                name: _numbers(_unit(torch.position - ball.centre))
+                for name, ball in zip(("at_ball", "at_second_ball"), scene.balls, strict=False)
+            },
         },
         "flash": {
             "state": flash_state(moment.lit),
@@ -96,10 +91,31 @@ def frame_truth(scene: Scene, moment: Moment, gains: Gains, face: NDArray) -> di
                 "residual_px": picture.residual_px,
             },
         },
-        "highlight_px": [x, y],
+        **{
+            name: list(highlight_px(ball, scene.camera, torch))
+            for name, ball in zip(("highlight_px", "second_highlight_px"), scene.balls, strict=False)
+        },
         "exposure_gain": gains.exposure,
         "white_balance_gain": list(gains.white_balance),
     }
+
+
+def _ball(ball: MirrorBall, camera: Pinhole) -> dict[str, Any]:
+    outline = ball.outline(camera)
+    return {
+        "x_px": outline.x,
+        "y_px": outline.y,
+        "radius_px": outline.radius,
+        "semi_radial_px": outline.semi_radial,
+        "semi_tangential_px": outline.semi_tangential,
+        "centre_cm": _numbers(ball.centre),
+        "radius_cm": ball.radius_cm,
+        "reflectance": _numbers(ball.reflectance),
+    }
+
+
+def _unit(vector: NDArray) -> NDArray:
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def _numbers(vector: NDArray) -> list[float]:

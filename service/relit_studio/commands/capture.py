@@ -29,6 +29,7 @@ def capture(
     h264: Annotated[bool, typer.Option(help="H.264; without, lossless FFV1 (capture.mkv).")] = True,
     auto_exposure: Annotated[bool, typer.Option(help="Exposure that hunts.")] = True,
     white_balance: Annotated[bool, typer.Option(help="White balance that hunts.")] = True,
+    second_ball: Annotated[bool, typer.Option("--second-ball", help="A ball on either side of the head.")] = False,
     plain: Annotated[bool, typer.Option("--plain", help="No processing at all: linear, exact, lossless.")] = False,
 ) -> None:
     """Film a person under a blinking hand-held torch, a mirror ball beside them. Run it again to go on."""
@@ -52,7 +53,8 @@ def capture(
         if person == "mannequin"
         else FieldPerson(Path(person), height, light_map)
     )
-    scene = Scene(somebody, light, Timing(seconds=seconds, flash_hz=flash_hz), seed, motion)
+    timing = Timing(seconds=seconds, flash_hz=flash_hz)
+    scene = Scene(somebody, light, timing, seed, motion, balls=2 if second_ball else 1)
     with shown_progress("Frames") as progress:
         video, truth = record(scene, stages, out, environment.name, seed, progress)
     typer.echo(f"{video}: {scene.timing.frames} frames of {scene.camera.width}x{scene.camera.height}; truth in {truth}")

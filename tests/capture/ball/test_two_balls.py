@@ -28,7 +28,7 @@ def test_the_place_of_a_lamp() -> None:
         found = locate_light(*(seen(scene, lamp) for scene in SCENES))
         assert found is not None
         assert np.linalg.norm(found.position_cm - lamp) < 5  # of about a metre, from 40 cm apart
-        assert found.gap_cm < 2
+        assert found.gap_deg < 1
 
 
 def test_rays_that_part_meet_nowhere() -> None:

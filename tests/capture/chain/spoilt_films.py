@@ -102,6 +102,10 @@ def ball_over_exposed(codes: Codes) -> Shot:
     return Shot(white)
 
 
+def one_ball_of_two(codes: Codes) -> Shot:
+    return Shot(codes[:60], {"balls": 2})
+
+
 def lamp_of_the_phone(codes: Codes) -> Shot:
     return Shot(Film(frames=60, azimuth=(-8, 8), elevation=(-8, 8)).codes(), {"ball": NAMED_BALL})
 

@@ -58,6 +58,11 @@ def build(film: Path, shot: Shot, folder: Path) -> Answer:
         (films.ball_cut_off, "is cut off by the picture's right edge", "with all of the ball in the picture"),
         (films.named_ball_cut_off, "is cut off by the picture's right edge", "with all of the ball in the picture"),
         (films.ball_over_exposed, "is over-exposed", "lower the exposure and lock it"),
+        (
+            films.one_ball_of_two,
+            "only one mirror ball was found, at 19",
+            "film the second on the other side of the head",
+        ),
         (films.lamp_of_the_phone, "the light comes only from beside the camera", "do not use the phone's own lamp"),
         (films.lamp_on_one_side, "the light comes only from one side", "move another around the head"),
         (films.few_directions, "usable directions of light in", "film half a minute or more"),

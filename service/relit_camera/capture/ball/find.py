@@ -25,6 +25,7 @@ _CHANCE_COVERAGE = 0.5
 _CUT_OFF = 0.02
 _CLIPPED, _MOSTLY = 250, 0.4
 _AVERAGES = 6
+_CORRECTED = "; corrected by the ball's outline"
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,10 @@ def find_ball(sample: SceneSample, focal: Focal) -> FoundBall:
 def find_balls(sample: SceneSample, focal: Focal, count: int) -> list[FoundBall]:
     """At most `count` mirror balls that do not overlap, at least one, the clearest first (see `find_ball`).
 
+    What one's outline tells of the focal length, is known when the next is measured.
+
     Raises:
-        CaptureError: there is none, the clearest is cut off by the picture's edge, or over-exposed.
+        CaptureError: there is none, one is cut off by the picture's edge, or over-exposed.
     """
     edges, glints = edge_map(sample), Glints(sample)
     circles = circle_candidates(edges, _CANDIDATES)
@@ -77,8 +80,11 @@ def find_balls(sample: SceneSample, focal: Focal, count: int) -> list[FoundBall]
     )
     if not limbs:
         raise _nothing_found(sample, edges, circles)
-    _check_whole(limbs[0].outline, sample)
-    return [_measured(sample, limb.outline, glints, focal) for limb in limbs[:count]]
+    found: list[FoundBall] = []
+    for limb in limbs[:count]:
+        _check_whole(limb.outline, sample)
+        found.append(_measured(sample, limb.outline, glints, found[-1].focal if found else focal))
+    return found
 
 
 def given_ball(sample: SceneSample, given: Outline, focal: Focal) -> FoundBall:
@@ -113,7 +119,7 @@ def _measured(sample: SceneSample, rough: Outline, glints: Glints, focal: Focal)
     known = focal.scaled(sample.scale)
     limb = fit_mirror_limb(sample.averages(_AVERAGES), rough, known.log, known.error)
     better = limb.log_focal_error < 0.8 * focal.error
-    source = f"{focal.source}; corrected by the ball's outline" if better else focal.source
+    source = focal.source if focal.source.endswith(_CORRECTED) or not better else focal.source + _CORRECTED
     pixels = float(np.exp(limb.log_focal)) / sample.scale
     return FoundBall(
         limb.outline.scaled(1 / sample.scale),

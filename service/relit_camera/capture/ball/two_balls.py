@@ -15,11 +15,14 @@ class LightPosition:
 
     Attributes:
         position_cm: (3,) camera axes.
-        gap_cm: between the two rays where they are closest: how well they agree.
+        gap_deg: angle at which the two balls see the gap between the rays where they are closest: how well they agree.
+        across_cm: how far apart the rays start, across them: where both are off by an angle e, 1 / distance is off by
+            about √2 e / across_cm.
     """
 
     position_cm: Vectors
-    gap_cm: float
+    gap_deg: float
+    across_cm: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +45,10 @@ class BallHighlight:
 
 
 def locate_light(first: BallHighlight, second: BallHighlight) -> LightPosition | None:
-    """Where the rays that two balls mirror come closest, half way between them; None where they part."""
+    """Where the rays that two balls mirror come closest; None where they part.
+
+    Between them, nearer to the one that is shorter: rays that are equally sure are surer the nearer.
+    """
     (start_a, ray_a), (start_b, ray_b) = first.ray(), second.ray()
     between, cosine = start_b - start_a, float(ray_a @ ray_b)
     under = 1 - cosine**2
@@ -53,4 +59,7 @@ def locate_light(first: BallHighlight, second: BallHighlight) -> LightPosition |
     if along_a <= 0 or along_b <= 0:
         return None
     a, b = start_a + along_a * ray_a, start_b + along_b * ray_b
-    return LightPosition((a + b) / 2, float(np.linalg.norm(a - b)))
+    position = (a * along_b**2 + b * along_a**2) / (along_a**2 + along_b**2)
+    gap = float(np.linalg.norm(a - b)) / float(np.hypot(along_a, along_b))
+    middle = (ray_a + ray_b) / np.linalg.norm(ray_a + ray_b)
+    return LightPosition(position, float(np.degrees(gap)), float(np.linalg.norm(np.cross(between, middle))))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.capture.ball.focal import TAG_ERROR
+from relit_camera.capture.chain.balls import SeenBall
 from relit_camera.capture.chain.options import CaptureOptions
 from relit_camera.capture.chain.survey import Survey
 from relit_camera.capture.chain.usable import Lamps
@@ -21,6 +22,10 @@ REPORT_VERSION = 1
 
 _DOUBTFUL_BALL = 0.7
 """Share of the ball's outline that shows, below which its place is uncertain."""
+_FEW_LOCATED = 0.5
+"""Share of the usable frames in which two balls show the lamp, below which they hardly tell its distance."""
+_DISAGREE_DEG = 1.5
+"""Gap between two balls' rays that is thrice what their errors make."""
 _UNLIKE_REASON = "its light does not fit the person's shape: the lamp was hidden, or its mirror image mistaken"
 
 
@@ -58,20 +63,22 @@ class Findings:
     def warnings(self) -> list[str]:
         """What may have made the result worse, and what to do about it."""
         seen, told = self.seen, []
-        if seen.ball.evidence is not None and seen.ball.evidence < _DOUBTFUL_BALL:
+        for ball, name, option in zip(seen.balls, ("ball", "second ball"), ("--ball", "--second-ball"), strict=False):
+            if ball.found.evidence is not None and ball.found.evidence < _DOUBTFUL_BALL:
+                told.append(
+                    f"only {ball.found.evidence:.0%} of the {name}'s outline shows, directions may be degrees off: "
+                    f"film it before something plain, or give its circle with {option} X,Y,RADIUS"
+                )
+            told += [
+                f"the {name} was {each.kind} in the frames {each.first} to {each.last}: fix it in its place"
+                for each in ball.episodes
+            ]
+        if seen.focal.error > TAG_ERROR:
             told.append(
-                f"only {seen.ball.evidence:.0%} of the ball's outline shows, directions may be degrees off: film it "
-                "before something plain, or give its circle with --ball X,Y,RADIUS"
-            )
-        if seen.ball.focal.error > TAG_ERROR:
-            told.append(
-                f"the camera's focal length is a guess, give or take {seen.ball.focal.error:.0%}, directions may be "
+                f"the camera's focal length is a guess, give or take {seen.focal.error:.0%}, directions may be "
                 "degrees off: give it with --focal-px, or film with a phone that writes it into the film"
             )
-        told += [
-            f"the ball was {each.kind} in the frames {each.first} to {each.last}: fix it in its place"
-            for each in seen.episodes
-        ]
+        told += self._of_two_balls()
         if seen.gains.too_dim:
             told.append(
                 "the room is too dark, or too bright, in nearly all of the picture, so that it does not tell what the "
@@ -93,26 +100,15 @@ class Findings:
 
     def report(self) -> dict[str, Any]:
         """The report of `relit capture build`; docs/capture.md tells what is in it."""
-        seen, ball = self.seen, self.seen.ball
+        seen = self.seen
         return {
             "version": REPORT_VERSION,
             "video": self.video,
             "width_px": seen.size[0],
             "height_px": seen.size[1],
-            "focal_px": ball.focal.pixels,
-            "focal": {"source": ball.focal.source, "error": ball.focal.error},
-            "ball": {
-                "x": ball.outline.x,
-                "y": ball.outline.y,
-                "radius": ball.outline.radius,
-                "radius_cm": self.lamps.place.ball_radius_cm,
-                "evidence": ball.evidence,
-                "glints": ball.glints,
-                "episodes": [
-                    {"kind": each.kind, "first": each.first, "last": each.last, "shift_px": [each.dx, each.dy]}
-                    for each in seen.episodes
-                ],
-            },
+            "focal_px": seen.focal.pixels,
+            "focal": {"source": seen.focal.source, "error": seen.focal.error},
+            **{name: self._ball(ball) for name, ball in zip(("ball", "second_ball"), seen.balls, strict=False)},
             "flash": {
                 "frequency_hz": seen.flashes.schedule.frequency_hz,
                 "duty": seen.flashes.schedule.duty,
@@ -141,6 +137,7 @@ class Findings:
                 "misfit": float(np.median(self.strengths.misfit[self.good])),
                 "misfit_if_far": self.misfit_if_far,
             },
+            "lamp_distance": self._lamp_distance(),
             "light": {"area_sr": self.lamps.area_sr, "frames": len(self.good), "lights": self.lights},
             "square": {
                 "left": self.square.left,
@@ -150,6 +147,46 @@ class Findings:
             },
             "warnings": self.warnings,
             "frames": [self._frame(index) for index in range(len(seen.flashes.frames))],
+        }
+
+    def _of_two_balls(self) -> list[str]:
+        """Warnings of what two balls tell of the lamp's distance."""
+        if len(self.seen.balls) == 1:
+            return []
+        told, share = [], len(self.lamps.located) / max(len(self.lamps.index), 1)
+        if share < _FEW_LOCATED:
+            told.append(
+                f"both balls show the lamp in {share:.0%} of the flashes' frames only, its distance is uncertain in "
+                "the others: stand them on either side of the head, where lamp and camera see both"
+            )
+        if self.lamps.located and self._gap_deg > _DISAGREE_DEG:
+            told.append(
+                f"the two balls disagree about the lamp by {self._gap_deg:.1f} degrees, its distance may be far off: "
+                "use balls of one size, and give the camera's focal length with --focal-px"
+            )
+        return told
+
+    @property
+    def _gap_deg(self) -> float:
+        return float(np.median([each.gap_deg for each in self.lamps.located.values()]))
+
+    def _lamp_distance(self) -> dict[str, Any]:
+        told: dict[str, Any] = {"median_cm": float(np.median(self.lamps.distances.cm))}
+        if len(self.seen.balls) == 1:
+            return {"source": "said"} | told
+        located = {"frames": len(self.lamps.located), "gap_deg": self._gap_deg if self.lamps.located else None}
+        return {"source": "two balls"} | told | {"error": float(np.median(self.lamps.distances.error))} | located
+
+    def _ball(self, ball: SeenBall) -> dict[str, Any]:
+        return {
+            **asdict(ball.found.outline),
+            "radius_cm": self.lamps.place.ball_radius_cm,
+            "evidence": ball.found.evidence,
+            "glints": ball.found.glints,
+            "episodes": [
+                {"kind": each.kind, "first": each.first, "last": each.last, "shift_px": [each.dx, each.dy]}
+                for each in ball.episodes
+            ],
         }
 
     def _frame(self, index: int) -> dict[str, Any]:
@@ -174,6 +211,7 @@ class Findings:
             told |= {
                 "direction": _numbers(self.lamps.directions[place]),
                 "at_ball": _numbers(self.lamps.at_ball[place]),
+                "distance_cm": round(float(self.lamps.distances.cm[place]), 2),
             }
         if index in self._kept:
             kept = self._kept[index]

@@ -24,10 +24,11 @@ class CaptureOptions:
         gamma: the video's curve.
         size: pixels a side of the subject; fewer where the video shows fewer.
         focal_px: the camera's focal length in pixels of the upright video, where it is known.
-        ball: the mirror ball's outline in those pixels, where it is known.
+        balls: how many mirror balls there are, 1 or 2; two, of one size, tell the lamp's distance.
+        ball, second_ball: their outlines in those pixels, where they are known.
         face: its circle, brow to chin, where it is known.
         ball_diameter_cm: its size, where it is known.
-        light_distance_cm: from the lamp to the head.
+        light_distance_cm: from the lamp to the head, as far as two balls do not tell it.
         subtract_room: whether the room's light is taken off; None where it helps.
         near_field: whether the lamp's nearness is corrected.
         threads: of the decoder.
@@ -36,7 +37,9 @@ class CaptureOptions:
     gamma: Gamma = "srgb"
     size: int = DEFAULT_SIZE
     focal_px: float | None = None
+    balls: int = 1
     ball: Outline | None = None
+    second_ball: Outline | None = None
     face: Circle | None = None
     ball_diameter_cm: float | None = None
     light_distance_cm: float = LIGHT_DISTANCE_CM

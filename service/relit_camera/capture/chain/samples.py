@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,7 +36,7 @@ _PIXEL_BYTES = 6
 _SMALL = 96
 """Pixels a side of the pictures in which strengths and shape are found."""
 _BALL_REACH = 1.15
-"""Radii about the ball in which nobody is."""
+"""Radii about a ball in which nobody is."""
 _UNLIKE = 3.0
 """Frames whose light fits the person's shape so many times worse than usual are left out."""
 _FAR = 1e3
@@ -88,10 +89,10 @@ def build_samples(
         progress=lambda done: progress("Cutting out the flash's light", done, total),
     )
     progress("Finding the person", 0, None)
-    matte = _matte(lights, square, seen.ball.outline, seen.motion.circle)
+    matte = _matte(lights, square, [ball.found.outline for ball in seen.balls], seen.motion.circle)
     strengths, misfit_if_far = _strengths(lights, lamps, square, matte, seen.motion.circle)
     good = strengths.alike(_UNLIKE)
-    refuse_one_sided(lamps.directions[good], len(seen.highlights))
+    refuse_one_sided(lamps.directions[good], len(seen.bright))
     groups = [thinned(good[group]) for group in group_lights(lamps.directions[good])]
     pictures = np.empty((len(groups), square.size, square.size, 3), np.float32)
     with workers() as pool:
@@ -117,8 +118,9 @@ def _refuse_large(size: int) -> None:
         raise InputError(f"{size} pixels a side are more than memory holds", f"give a --size of {most} or less")
 
 
-def _matte(lights: OneLight, square: HeadSquare, ball: Outline, face: Circle) -> Mask:
-    nobody = _disc(square, ball.x, ball.y, _BALL_REACH * ball.radius)
+def _matte(lights: OneLight, square: HeadSquare, balls: Sequence[Outline], face: Circle) -> Mask:
+    discs = [_disc(square, ball.x, ball.y, _BALL_REACH * ball.radius) for ball in balls]
+    nobody = np.logical_or.reduce(discs)
     matte = flash_matte(lights.pictures, lights.room, nobody)
     share = matte[_disc(square, *face)].mean()
     if share < _LEAST_FACE:
@@ -154,6 +156,7 @@ def _strengths(
             inside,
             (x * factor, y * factor),
             lamps.place.pixels_per_cm * square.scale * factor,
+            measured=lamps.measured,
         )
         for times in (1.0, _FAR)
     )

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.capture.ball.find import FoundBall, find_ball, given_ball
 from relit_camera.capture.ball.focal import Focal, given_focal, tagged_focal, typical_focal
 from relit_camera.capture.ball.focal_tag import read_focal_tag
-from relit_camera.capture.ball.highlight import Highlight, NoHighlight
 from relit_camera.capture.ball.sample import MAX_FRAMES, SceneSample, sample_scene
 from relit_camera.capture.ball.view import PinholeView
-from relit_camera.capture.ball.watch import BallWatch, Episode, episodes
+from relit_camera.capture.chain.balls import BallLog, SeenBall, find_all
 from relit_camera.capture.chain.options import CaptureOptions, Progress
 from relit_camera.capture.face_circle import Circle
 from relit_camera.capture.flash.brightness import watch
 from relit_camera.capture.flash.classify import Flashes, find_flashes
 from relit_camera.capture.flash.kind import Kind
 from relit_camera.capture.light.gains import FrameGains, cells_of, find_gains
-from relit_camera.capture.light.highlights import BallFilm
 from relit_camera.capture.light.place import eye_distance
 from relit_camera.capture.locate_face import LocatedFace, locate_face
 from relit_camera.capture.stabilise.stabilise import Stabilisation, stabilise
@@ -49,9 +44,9 @@ class Survey:
         detector: whether one that finds the eyes is installed.
         eyes_px: distance of the eyes, None where they are not found.
         motion: where the face went.
-        ball: the mirror ball.
-        episodes: in which it was hidden or elsewhere.
-        highlights: of the bright frames about which the face was found, by index.
+        focal: of the camera.
+        balls: the mirror balls, one or two.
+        bright: growing indices of the bright frames about which the face was found.
         gains: of bright and dark frames, in the order of `frames`.
         frames: growing indices of those.
     """
@@ -62,16 +57,16 @@ class Survey:
     detector: bool
     eyes_px: float | None
     motion: Stabilisation
-    ball: FoundBall
-    episodes: list[Episode]
-    highlights: Mapping[int, Highlight | NoHighlight]
+    focal: Focal
+    balls: tuple[SeenBall, ...]
+    bright: Indices
     gains: FrameGains
     frames: Indices
 
     @property
-    def view(self) -> PinholeView:
-        """How the camera sees the ball."""
-        return PinholeView(self.ball.outline, self.size, self.ball.focal.pixels)
+    def views(self) -> list[PinholeView]:
+        """How the camera sees the balls."""
+        return [PinholeView(ball.found.outline, self.size, self.focal.pixels) for ball in self.balls]
 
     @property
     def dark(self) -> Indices:
@@ -95,7 +90,9 @@ def survey(video: Path, options: CaptureOptions, progress: Progress) -> Survey:
     total = len(seen.times_s)
     flashes = find_flashes(seen)
     progress("Looking for the mirror ball", 0, None)
-    ball, sample = _ball(video, seen.size, flashes, options)
+    sample = _sample(video, flashes, options)
+    found = find_all(sample, _focal(video, seen.size, options.focal_px), options)
+    focal = found[-1].focal
     face = LocatedFace(options.face, "user") if options.face else locate_face(seen, flashes)
     motion = stabilise(
         video,
@@ -106,21 +103,18 @@ def survey(video: Path, options: CaptureOptions, progress: Progress) -> Survey:
     )
     bright, dark = (np.setdiff1d(flashes.indices(kind), list(motion.lost)) for kind in (Kind.BRIGHT, Kind.DARK))
     frames = np.union1d(bright, dark)
-    film, sightings, cells, stills = BallFilm(ball.outline, seen.size), [], [], []
-    ball_watch = BallWatch(sample, ball.outline)
+    logs = [BallLog(ball, sample, PinholeView(ball.outline, seen.size, focal.pixels)) for ball in found]
+    cells, stills = [], []
     chosen = frozenset(bright[:: max(1, len(bright) // _STILLS)].tolist())
     is_dark = frozenset(dark.tolist())
     with LinearReader(video, options.gamma, only=frozenset(frames.tolist()), threads=options.threads) as reader:
         for frame in reader:
-            film.add(frame.index, frame.image)
+            for log in logs:
+                log.add(frame.index, frame.image, dark=frame.index in is_dark)
             cells.append(cells_of(frame.image))
-            if frame.index in is_dark:
-                sightings.append(ball_watch.see(frame.index, frame.image))
-            elif frame.index in chosen:
+            if frame.index in chosen:
                 stills.append(uint8_from_linear(frame.image))
             progress("Looking at the light", frame.index + 1, total)
-    found = episodes(sightings, ball.outline.radius)
-    view = PinholeView(ball.outline, seen.size, ball.focal.pixels)
     detector = _detector()
     flash = np.array([flashes.frames[index].flash for index in frames])
     return Survey(
@@ -130,9 +124,9 @@ def survey(video: Path, options: CaptureOptions, progress: Progress) -> Survey:
         detector is not None,
         eye_distance(stills, detector) if detector else None,
         motion,
-        ball,
-        found,
-        film.highlights(bright.tolist(), view, found),
+        focal,
+        tuple(log.seen(bright.tolist()) for log in logs),
+        bright,
         find_gains(np.stack(cells), flashes.times_s[frames], np.isin(frames, bright), flash),
         frames,
     )
@@ -147,20 +141,15 @@ def _refuse_outside(face: Circle, video: Path) -> None:
         raise ConfigError(what, "give --face in pixels of the upright film, or leave it out")
 
 
-def _ball(
-    video: Path, size: tuple[int, int], flashes: Flashes, options: CaptureOptions
-) -> tuple[FoundBall, SceneSample]:
-    """The ball, in as many dark frames as bright ones, spread over the video."""
+def _sample(video: Path, flashes: Flashes, options: CaptureOptions) -> SceneSample:
+    """As many dark frames as bright ones, spread over the video, in which to look for balls."""
     half = MAX_FRAMES // 2
     picked = [
         indices[:: max(1, -(-len(indices) // half))] for indices in map(flashes.indices, (Kind.BRIGHT, Kind.DARK))
     ]
     only = frozenset(np.concatenate(picked).tolist())
     with LinearReader(video, options.gamma, only=only, threads=options.threads) as reader:
-        sample = sample_scene(frame.image for frame in reader)
-    focal = _focal(video, size, options.focal_px)
-    find = find_ball if options.ball is None else partial(given_ball, given=options.ball)
-    return find(sample, focal=focal), sample
+        return sample_scene(frame.image for frame in reader)
 
 
 def _focal(video: Path, size: tuple[int, int], given_px: float | None) -> Focal:

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.capture.ball.highlight import NoHighlight
-from relit_camera.capture.ball.watch import outline_in
+from relit_camera.capture.ball.two_balls import LightPosition
+from relit_camera.capture.chain.lamp_places import place_lamps
 from relit_camera.capture.chain.options import CaptureOptions
 from relit_camera.capture.chain.survey import Survey
+from relit_camera.capture.light.lamp_distance import LampDistances
 from relit_camera.capture.light.place import EYES_CM, Place, place_scene
 from relit_camera.errors import CaptureError
 from relit_camera.space.directions import texel_directions, texel_solid_angles
@@ -41,7 +42,9 @@ class Lamps:
         index: (count,) of the frames, growing.
         lamps_cm: (count, 3) from the head's middle, camera axes.
         at_ball: (count, 3) unit vectors from the ball's centre.
-        place: of head and ball.
+        place: of head and balls.
+        distances: from the head, of all usable frames.
+        located: where two balls show the lamp, by the frame's index.
         unusable: why other bright frames cannot be used, by index.
         area_sr: of the directions from which light is known.
     """
@@ -50,8 +53,15 @@ class Lamps:
     lamps_cm: Floats
     at_ball: Floats
     place: Place
+    distances: LampDistances
+    located: Mapping[int, LightPosition]
     unusable: Mapping[int, str]
     area_sr: float
+
+    @property
+    def measured(self) -> bool:
+        """Whether two balls tell the lamp's distance."""
+        return bool(self.located)
 
     @property
     def directions(self) -> Floats:
@@ -67,36 +77,32 @@ def find_lamps(seen: Survey, options: CaptureOptions) -> Lamps:
     """Where the lamp was in every bright frame that shows it.
 
     Raises:
-        CaptureError: too few frames do, the light comes from one side only, or the camera did more than expose.
+        CaptureError: too few frames do, the light comes from one side only, the camera did more than expose, or what
+            two balls show is no lamp before the head.
         InputError: the lamp would be nearer to the head than the ball is.
     """
     refuse_enhanced(seen.gains.spread)
     circle = seen.motion.circle
     eyes_px = seen.eyes_px or circle.radius / _FACE_RADIUS_CM * EYES_CM
     radius_cm = None if options.ball_diameter_cm is None else options.ball_diameter_cm / 2
-    place = place_scene(seen.view, (circle.x, circle.y), eyes_px, options.light_distance_cm, radius_cm)
-    usable: list[tuple[int, Floats, Floats]] = []
-    unusable: dict[int, str] = {}
-    for index, highlight in seen.highlights.items():
-        outline = outline_in(seen.episodes, seen.ball.outline, index)
-        if isinstance(highlight, NoHighlight) or outline is None:
-            unusable[index] = highlight.reason if isinstance(highlight, NoHighlight) else "the ball is hidden"
-            continue
-        near = place.near_light(outline)
-        usable.append((index, near.position_cm(highlight.normal), near.ball_cm))
-    if not usable:
-        raise _too_few(0, len(seen.highlights))
-    frames, lamp, ball = (np.array(column) for column in zip(*usable, strict=True))
-    to_ball = lamp - ball
+    ball, *second = seen.views
+    place = place_scene(ball, (circle.x, circle.y), eyes_px, options.light_distance_cm, radius_cm, *second)
+    found = place_lamps(seen, place)
+    if not len(found.index):
+        raise _too_few(0, len(seen.bright))
+    to_ball = found.lamps_cm - found.balls_cm
+    lamps_cm = found.lamps_cm - place.head_cm
     lamps = Lamps(
-        frames,
-        lamp - place.head_cm,
+        found.index,
+        lamps_cm,
         to_ball / np.linalg.norm(to_ball, axis=1, keepdims=True),
         place,
-        unusable,
-        known_area(lamp - place.head_cm),
+        found.distances,
+        found.located,
+        found.unusable,
+        known_area(lamps_cm),
     )
-    refuse_one_sided(lamps.directions, len(seen.highlights))
+    refuse_one_sided(lamps.directions, len(seen.bright))
     return lamps
 
 

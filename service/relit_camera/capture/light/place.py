@@ -22,14 +22,15 @@ EYES_CM = 6.3
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Head and ball, camera axes.
+    """Head and balls, camera axes.
 
     Attributes:
         head_cm: (3,) middle of the face's surface.
         pixels_per_cm: at the head's distance.
-        ball: how the camera sees the ball.
-        ball_radius_cm: as given, or as it is if the ball is as far from the camera as the head.
-        light_distance_cm: from the lamp to the head.
+        ball: how the camera sees the ball, the first if there are two.
+        ball_radius_cm: as given, or as it is if the ball is as far from the camera as the head; of two that are of one
+            size, if they are so in the mean.
+        light_distance_cm: from the lamp to the head, as far as two balls do not tell it.
     """
 
     head_cm: Vector
@@ -38,16 +39,22 @@ class Place:
     ball_radius_cm: float
     light_distance_cm: float
 
-    def near_light(self, outline: Outline) -> NearLight:
-        """The lamp as a ball with this outline tells it; where the ball was pushed, not the usual one.
+    def near_light(self, outline: Outline, distance_cm: float | None = None) -> NearLight:
+        """The lamp as a ball with this outline tells it: another ball's, or that of one that was pushed.
+
+        Args:
+            outline: of the ball.
+            distance_cm: from the lamp to the head, where it is not the usual.
 
         Raises:
             InputError: the lamp would be nearer to the head than the ball is.
         """
-        view = self.ball
-        if outline != view.outline:
-            view = PinholeView(outline, view.size, view.focal_px)
-        return NearLight(view, self.ball_radius_cm, self.head_cm, self.light_distance_cm)
+        distance_cm = self.light_distance_cm if distance_cm is None else distance_cm
+        return NearLight(self.view(outline), self.ball_radius_cm, self.head_cm, distance_cm)
+
+    def view(self, outline: Outline) -> PinholeView:
+        """How the camera sees a ball with this outline."""
+        return self.ball if outline == self.ball.outline else PinholeView(outline, self.ball.size, self.ball.focal_px)
 
 
 def place_scene(
@@ -56,8 +63,9 @@ def place_scene(
     eyes_px: float,
     light_distance_cm: float,
     ball_radius_cm: float | None = None,
+    second: PinholeView | None = None,
 ) -> Place:
-    """Place head and ball: the head by the distance of its eyes, the ball by its size, or else beside the head.
+    """Place head and balls: the head by the distance of its eyes, a ball by its size, or else beside the head.
 
     Args:
         ball: how the camera sees it.
@@ -65,11 +73,17 @@ def place_scene(
         eyes_px: distance of the eyes' middles.
         light_distance_cm: from the lamp to the head.
         ball_radius_cm: where it is known.
+        second: how the camera sees a second ball of the same size.
     """
     pixels_per_cm = eyes_px / EYES_CM
     depth_cm = ball.focal_px / pixels_per_cm
     x, y = (head_px[0] - ball.size[0] / 2) / pixels_per_cm, (ball.size[1] / 2 - head_px[1]) / pixels_per_cm
-    radius_cm = radius_at_depth(ball, depth_cm) if ball_radius_cm is None else ball_radius_cm
+    if ball_radius_cm is None:
+        alone = [radius_at_depth(each, depth_cm) for each in (ball, second) if each is not None]
+        # The mean of their depths, which go with the size, is then the head's.
+        radius_cm = len(alone) / sum(1 / each for each in alone)
+    else:
+        radius_cm = ball_radius_cm
     return Place(np.array([x, y, -depth_cm]), pixels_per_cm, ball, radius_cm, light_distance_cm)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.capture.light.near_field import Lamp, Surface, light_at, to_distant
+from relit_camera.capture.light.strength_trend import with_the_trend_of_distance, without_half_the_trend
 from relit_camera.geometry.completion import complete_normals
 from relit_camera.geometry.depth import integrate_normals
 from relit_camera.geometry.photometric_stereo import photometric_stereo
@@ -67,7 +68,13 @@ class Strengths:
 
 
 def find_strengths(
-    pictures: Pictures, lamps_cm: Floats, matte: Mask, head: tuple[float, float], pixels_per_cm: float
+    pictures: Pictures,
+    lamps_cm: Floats,
+    matte: Mask,
+    head: tuple[float, float],
+    pixels_per_cm: float,
+    *,
+    measured: bool = False,
 ) -> Strengths:
     """The strengths of the flashes.
 
@@ -77,9 +84,11 @@ def find_strengths(
         matte: (height, width).
         head: the head's middle in the pictures.
         pixels_per_cm: of these pictures.
+        measured: whether the lamps' distances are measured, and not the usual one.
     """
     lamps = [Lamp(place, np.zeros(3)) for place in lamps_cm]
     directions = np.stack([lamp.direction for lamp in lamps])
+    settled = with_the_trend_of_distance if measured else without_half_the_trend
     corrected = pictures
     for _ in range(_ROUNDS):
         shading = photometric_stereo(corrected, directions, matte)
@@ -93,9 +102,7 @@ def find_strengths(
         told = np.isfinite(misfit)
         strength = np.ones(len(pictures))
         if told.any():
-            strength[told] = _without_half_the_trend(
-                np.array([each.strength for each in found])[told], directions[told]
-            )
+            strength[told] = settled(np.array([each.strength for each in found])[told], lamps_cm[told])
         lamps = [each.lamp for each in found]
         corrected = np.stack(
             [
@@ -104,19 +111,6 @@ def find_strengths(
             ]
         )
     return Strengths(strength, lamps, surface, misfit)
-
-
-def _without_half_the_trend(strength: Floats, directions: Floats) -> Floats:
-    """Strengths (lights,), median 1, with half of what goes with the direction (lights, 3) alone.
-
-    A hand may hold the lamp nearer on one side; skin that obeys the law of the cosine only nearly looks the same.
-    Either makes a tenth of a difference: half is what to expect of each.
-    """
-    logs = np.log(np.maximum(strength, 1e-6))
-    terms = np.concatenate([directions, np.ones((len(directions), 1))], axis=1)
-    trend = terms @ np.linalg.lstsq(terms, logs, rcond=None)[0]
-    left = logs - (trend - trend.mean()) / 2
-    return np.asarray(np.exp(left - np.median(left)))
 
 
 def _points(depth: NDArray[np.float32], head: tuple[float, float], pixels_per_cm: float) -> NDArray[np.float32]:
