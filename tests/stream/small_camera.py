@@ -117,6 +117,7 @@ def running_camera(
     tracker: Tracker | None = None,
     subject: Subject | None = None,
     look: Look | None = None,
+    on_viewer: Callable[[], None] = lambda: None,
 ) -> Iterator[Camera]:
     """Run a camera with its API on a real port; `folder` is for what it stores."""
     settings = RelitSettings(
@@ -128,7 +129,7 @@ def running_camera(
     director.set_look(look or Look(lighting=Lighting(transition_s=0)))
     director.show_subject("small", subject or small_subject())
     sink = RememberingSink()
-    daemon = Daemon(settings, director, source or memory_source(), sink, tracker or SteadyTracker())
+    daemon = Daemon(settings, director, source or memory_source(), sink, tracker or SteadyTracker(), on_viewer)
     daemon.start()
     try:
         with (

@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 
@@ -34,6 +35,8 @@ log = logging.getLogger(__name__)
 READ_TIMEOUT_S = 0.2
 STALE_AFTER_S = 3.0
 """Without a new picture for this long the placeholder is shown."""
+RELEASED = "the webcam is off until somebody looks"
+"""What the placeholder says in on-demand mode."""
 RETRY_S = 1.0
 """Pause after a frame that could not be processed."""
 STOP_S = 2.0
@@ -44,9 +47,15 @@ class Daemon:
     """Implements `stream.control.CameraControl`. Owns source and sink: `stop` closes them."""
 
     def __init__(
-        self, settings: RelitSettings, director: Director, source: Source, sink: Sink, tracker: Tracker
+        self,
+        settings: RelitSettings,
+        director: Director,
+        source: Source,
+        sink: Sink,
+        tracker: Tracker,
+        on_viewer: Callable[[], None] = lambda: None,
     ) -> None:
-        """Set up; `start` begins.
+        """Set up; `start` begins. `on_viewer` is called whenever somebody asks for a preview or a snapshot.
 
         Raises:
             ImageError: the placeholder picture cannot be read.
@@ -64,6 +73,8 @@ class Daemon:
             on_sink_error=self._sink_changed,
         )
         self._waiting_picture = placeholder(size, "waiting for the camera", settings.output.placeholder)
+        self._released_picture = placeholder(size, RELEASED, settings.output.placeholder)
+        self._on_viewer = on_viewer
         self._troubles: dict[str, Degradation] = {}
         self._face = FaceStatus.LOST
         self._camera_rate, self._pipeline_rate = RateMeter(), RateMeter()
@@ -133,6 +144,7 @@ class Daemon:
 
     def picture(self, after: int, timeout_s: float) -> tuple[int, DisplayImage] | None:
         """The newest published picture and its count; see `CameraControl.picture`."""
+        self._on_viewer()
         found = self._publisher.shown.newer(after, timeout_s)
         return None if found is None or self.stopping() else (found[0], found[1])
 
@@ -184,6 +196,9 @@ class Daemon:
             return None
         if frame is not None:
             self._recovered("source")
+        elif self._source.state is SourceState.RELEASED:
+            self._recovered("source")
+            self._show(self._released_picture, CameraState.RELEASED)
         elif self._source.state is not SourceState.RUNNING:
             reason = self._source.reason
             if reason:
@@ -193,8 +208,11 @@ class Daemon:
         return frame
 
     def _show_waiting(self) -> None:
-        self._publisher.placeholder = self._waiting_picture
-        self._set_state(CameraState.WAITING)
+        self._show(self._waiting_picture, CameraState.WAITING)
+
+    def _show(self, picture: DisplayImage, state: CameraState) -> None:
+        self._publisher.placeholder = picture
+        self._set_state(state)
 
     def _count(self, frame: Frame) -> None:
         """Frames that the source gave, those too that were replaced before the worker came: indices have gaps there."""

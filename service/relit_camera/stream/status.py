@@ -16,6 +16,8 @@ class CameraState(StrEnum):
     """The source gives pictures, but no face is tracked: the subject eases to neutral."""
     WAITING = "waiting"
     """The source gives no pictures: the placeholder is shown."""
+    RELEASED = "released"
+    """On demand, and nobody looks: the webcam is released, the placeholder is shown."""
     FROZEN = "frozen"
     STOPPING = "stopping"
 

@@ -17,6 +17,7 @@ const STATES = {
   live: "Live",
   searching: "Looking for your face",
   waiting: "Waiting for the camera",
+  released: "Webcam released until somebody looks",
   frozen: "Frozen",
   stopping: "Stopping…",
   lost: "Not connected",
