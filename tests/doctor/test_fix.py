@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -189,13 +190,20 @@ def test_systemd_finds_no_fault_with_the_unit(tmp_path):
     command.parent.mkdir()
     command.write_text("#!/bin/sh\n")
     command.chmod(0o755)
-    unit = tmp_path / "relit-camera.service"
-    unit.write_text(unit_text(command))
-    done = subprocess.run(
-        ["systemd-analyze", "verify", "--user", str(unit)], capture_output=True, text=True, check=False, timeout=60
-    )
-    complaints = [line for line in done.stderr.splitlines() if "relit-camera" in line]
-    assert complaints == []
+    text = unit_text(command)
+
+    def complaints(text: str) -> list[str]:
+        unit = tmp_path / "relit-camera.service"
+        unit.write_text(text)
+        done = subprocess.run(
+            ["systemd-analyze", "verify", "--user", str(unit)],
+            env={**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)},
+            capture_output=True, text=True, check=True, timeout=60,
+        )  # fmt: skip
+        return [line for line in done.stderr.splitlines() if unit.name in line]
+
+    assert complaints(text) == []
+    assert len(complaints(text.replace("WatchdogSec", "WatchdogSc"))) == 1
 
 
 # The subject, and the command.

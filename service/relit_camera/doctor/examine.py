@@ -37,7 +37,10 @@ def examine(
     """
     host = host or Host()
     settings, configuration = _configuration(config)
-    fixed = fix(settings, host, access) if with_fix else None
+    fixed = None
+    if with_fix:
+        fixed = fix(settings, host, access)
+        settings, configuration = _configuration(config)  # there may be a file now
     checks: tuple[Callable[[], Finding], ...] = (
         check_python,
         check_packages,
