@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test check lint types floors scripts generated image-steps pytest clean
+.PHONY: help setup demo test check lint types floors scripts generated image-steps tool-install pytest clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -52,6 +52,9 @@ image-steps: setup ## the image's build without Docker: a wheel, installed by it
 	sh docker/build-steps.sh build/image
 	build/image/bin/python scripts/check_installed.py
 	rm -rf build/image
+
+tool-install: setup ## the wheel as users install it, used from an empty home; make tool-install WITH=pipx
+	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
 pytest: setup ## the tests alone
 	$(BIN)/python -m pytest

@@ -1,12 +1,15 @@
 """Checks an installed Relit Camera against this checkout: run it with the Python of the environment to check.
 
 The wheel must hold every file of the package, byte for byte, data and licences too; its plug-ins must load;
-its own licence must be with it.
+its own licence must be with it; its demonstration must show a picture, from a folder and a home that are empty.
 """
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
+import tempfile
 from importlib.metadata import distribution
 from pathlib import Path
 
@@ -31,8 +34,23 @@ def main() -> str | None:
         point.load()
     if not any(file.name == "LICENSE" and file.read_text() for file in package.files or ()):
         return "the wheel has no LICENSE"
+    if not _shows_a_picture():
+        return "its demonstration shows no picture"
     print(f"relit-camera {package.version} in {installed.parent}: {len(package.entry_points)} entry points load")
     return None
+
+
+def _shows_a_picture() -> bool:
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("RELIT_", "XDG_", "PYTHON"))}
+    command = [Path(sys.executable).parent / "relit", "demo", "--headless", "--seconds", "20", "--port", "0"]
+    with tempfile.TemporaryDirectory() as empty:
+        done = subprocess.run(  # noqa: S603 - our own command
+            command, cwd=empty, env={**kept, "HOME": empty}, capture_output=True, text=True, timeout=300, check=False
+        )
+    if "First picture" not in done.stdout or done.returncode != 0:
+        print(done.stdout, done.stderr, file=sys.stderr)
+        return False
+    return True
 
 
 if __name__ == "__main__":

@@ -1,5 +1,10 @@
 """Relit Camera: a virtual webcam that shows its owner lit by any place they choose."""
 
+import os
 from importlib.metadata import version
 
 __version__ = version("relit-camera")
+
+# ONNX Runtime's wheels count uses, keep a device's number in the user's cache, and would send it to their makers. It
+# looks at this when it is loaded, so it stands before every import.
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"

@@ -105,6 +105,24 @@ def test_light_changes_while_it_runs_and_the_clip_loops(material: Material, tmp_
         assert http.get("lighting").json()["lamps"][0]["azimuth_deg"] == 90
 
 
+def test_on_demand_the_source_waits_for_a_viewer(material: Material, tmp_path: Path) -> None:
+    with running(material, tmp_path, "--on-demand") as (_, http):
+
+        def wait_for(state: str) -> None:
+            deadline = time.monotonic() + START_S
+            while http.get("status").json()["state"] != state:
+                assert time.monotonic() < deadline, http.get("status").json()
+                time.sleep(0.1)
+
+        wait_for("released")
+        published = http.get("status").json()["frames"]["published"]
+        assert http.get("snapshot.jpg").status_code == 200
+        wait_for("live")
+        wait_for("released")  # five seconds later
+        assert http.get("status").json()["frames"]["published"] > published + 40
+        assert http.get("status").json()["degraded"] == []
+
+
 def test_environment_of_a_file_lights_this_run(material: Material, tmp_path: Path) -> None:
     with running(material, tmp_path, "--environment", "sunset", "--mode", "ratio") as (_, http):
         assert http.get("lighting").json()["environment"] == "sunset"

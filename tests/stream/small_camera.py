@@ -120,6 +120,7 @@ def running_camera(
     sink: RememberingSink | None = None,
     new_tracker: Callable[[], Tracker] | None = None,
     fallback: Fallback = Fallback.PLACEHOLDER,
+    on_viewer: Callable[[], None] = lambda: None,
 ) -> Iterator[Camera]:
     """Run a camera with its API on a real port; `folder` is for what it stores."""
     settings = RelitSettings(
@@ -130,8 +131,8 @@ def running_camera(
     director = Director(settings.storage)
     director.set_look(look or Look(lighting=Lighting(transition_s=0)))
     director.show_subject("small", subject or small_subject())
-    sink = sink or RememberingSink()
-    daemon = Daemon(settings, director, source or memory_source(), sink, tracker or SteadyTracker(), new_tracker)
+    sink, tracker = sink or RememberingSink(), tracker or SteadyTracker()
+    daemon = Daemon(settings, director, source or memory_source(), sink, tracker, new_tracker, on_viewer)
     daemon.start()
     try:
         with (

@@ -13,11 +13,15 @@ app = typer.Typer()
 def doctor(
     context: typer.Context,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of text.")] = False,
+    fix: Annotated[
+        bool, typer.Option("--fix", help="Write your own missing files, and print the lines for root.")
+    ] = False,
 ) -> None:
     """Find out what keeps the camera from working, and the cure. Exits with 1 if there is a problem."""
-    from relit_camera.doctor.examine import examine, table
+    from relit_camera.doctor.examine import examine
+    from relit_camera.doctor.text import table
 
-    report = examine((context.find_root().obj or {}).get("config"))
+    report = examine((context.find_root().obj or {}).get("config"), with_fix=fix)
     typer.echo(report.model_dump_json(indent=2) if as_json else "\n".join(table(report)))
     if not report.healthy:
         raise typer.Exit(1)

@@ -21,6 +21,9 @@ def run(
     host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback only.")] = None,
     port: Annotated[int | None, typer.Option(help="Port of API and panel; 0 picks one.")] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of the output.")] = None,
+    on_demand: Annotated[
+        bool | None, typer.Option("--on-demand/--always-on", help="Release the webcam while nobody looks (Linux).")
+    ] = None,
 ) -> None:
     """Run the camera until it is told to stop (Ctrl-C or SIGTERM)."""
     from functools import partial
@@ -35,7 +38,7 @@ def run(
     load = partial(
         settings_of,
         context,
-        source={"source": source},
+        source={"source": source, "on_demand": on_demand},
         output={"sink": sink, "width": width, "height": height},
         subject=subject,
         look={"mode": str(parse_mode(mode)) if mode else None},

@@ -19,6 +19,7 @@ import typer
 
 from relit_camera.api.app import create_app
 from relit_camera.api.server import listen, serve
+from relit_camera.cli.service_manager import announced
 from relit_camera.config.look import Look
 from relit_camera.config.settings import OutputSettings, RelitSettings
 from relit_camera.config.watch import watch_config
@@ -26,6 +27,7 @@ from relit_camera.cores import leave_to_stay, share_cores
 from relit_camera.errors import ConfigError
 from relit_camera.stream.assembly import make_tracker
 from relit_camera.stream.daemon import Daemon
+from relit_camera.stream.demand.on_demand import OnDemand
 from relit_camera.stream.director import Director
 from relit_camera.stream.sinks.base import Sink
 from relit_camera.stream.sinks.factory import open_sink
@@ -73,11 +75,18 @@ def run_camera(
     with contextlib.ExitStack() as cleanup:
         listener = cleanup.enter_context(listen(settings.server))
         tracker = make_tracker(settings)
-        source = open_source(settings.source, own_label=settings.output.label)
+        make_source = partial(open_source, settings.source, own_label=settings.output.label)
+        source = make_source()
         cleanup.callback(source.close)
         sink = sink_for(settings.output)
         cleanup.callback(sink.close)
-        daemon = Daemon(settings, director, source, sink, tracker, partial(make_tracker, settings))
+        new_tracker = partial(make_tracker, settings)
+        if settings.source.on_demand:
+            demand = OnDemand(source, make_source, sink)
+            cleanup.callback(demand.close)
+            daemon = Daemon(settings, director, demand.source, sink, tracker, new_tracker, demand.note_viewer)
+        else:
+            daemon = Daemon(settings, director, source, sink, tracker, new_tracker)
         cleanup.callback(_leave_what_hangs, daemon)
         cleanup.callback(daemon.stop)
         daemon.start()
@@ -91,6 +100,7 @@ def run_camera(
             path, load = reload
             apply, tell = partial(_apply, director, settings), partial(daemon.tell, "configuration")
             cleanup.enter_context(watch_config(path, settings, load, apply, tell))
+        cleanup.enter_context(announced(daemon.status))
         ends_at = time.monotonic() + (math.inf if seconds is None else seconds)
         while not stop.is_set() and (left := ends_at - time.monotonic()) > 0:
             stop.wait(min(left, 0.5))

@@ -24,6 +24,8 @@ class SourceSettings(Settings):
     """Asked of a webcam; it may answer with another size."""
     height: Even = 720
     fps: Annotated[float, Field(ge=1, le=240)] = 30.0
+    on_demand: bool = False
+    """Release the webcam while nobody reads the virtual camera or watches a preview (Linux)."""
 
 
 class Fallback(StrEnum):

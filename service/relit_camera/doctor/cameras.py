@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from relit_camera.config.settings import OutputSettings, SourceSettings
 from relit_camera.doctor.findings import Finding, fine, problem, problem_from, warning
+from relit_camera.doctor.host import Host
 from relit_camera.errors import DeviceError
 from relit_camera.stream.devices import (
     OWN_LABEL,
-    SYSTEM,
     DeviceTree,
     find_virtual_camera,
     find_webcam,
@@ -29,9 +28,10 @@ Access = Callable[[str, int], bool]
 
 
 def check_webcam(
-    settings: SourceSettings, tree: DeviceTree = SYSTEM, access: Access = os.access, own_label: str = OWN_LABEL
+    settings: SourceSettings, host: Host, access: Access = os.access, own_label: str = OWN_LABEL
 ) -> Finding:
-    """The camera that the settings name: there, readable, and not our own virtual one, called `own_label`."""
+    """The camera that the settings name: there, readable, free, and not our own virtual one, called `own_label`."""
+    tree = host.tree
     topic, found = "webcam", list_webcams(tree)
     names = ", ".join(f"{webcam.id} ({webcam.node})" for webcam in found) or "none"
     if settings.source in NO_DEVICE_SOURCES or Path(settings.source).expanduser().is_file():
@@ -43,16 +43,22 @@ def check_webcam(
     if Path(webcam.node).exists() and not access(webcam.node, os.R_OK | os.W_OK):
         group = _group(webcam.node)
         return problem(topic, f"{webcam.name} at {webcam.node} may only be read by group {group}", _join(group))
-    others = f"; all: {names}" if len(found) > 1 else ""
+    users = host.holders(webcam.node)
+    foreign = [str(holder) for holder in users if not holder.is_relit]
+    if foreign:
+        who = f"{webcam.name} at {webcam.node} is in use by {', '.join(foreign)}"
+        return warning(topic, who, "close it there: a webcam serves one program at a time")
+    others = f", read by {', '.join(map(str, users))}" if users else ""
+    others += f"; all: {names}" if len(found) > 1 else ""
     return fine(topic, f"{webcam.name} at {webcam.node}{others}")
 
 
-def check_virtual_camera(settings: OutputSettings, tree: DeviceTree = SYSTEM, access: Access = os.access) -> Finding:
+def check_virtual_camera(settings: OutputSettings, host: Host, access: Access = os.access) -> Finding:
     """The virtual camera that the settings name: module, label, rights, and that browsers will list it."""
-    topic = "virtual camera"
+    topic, tree = "virtual camera", host.tree
     if settings.sink != "camera" and not settings.sink.startswith(str(tree.dev / "video")):
         return fine(topic, f"not needed: the sink is '{settings.sink}'")
-    if not sys.platform.startswith("linux") and tree is SYSTEM:
+    if not host.is_linux:
         return fine(topic, "OBS Studio's is used here; it shows when the camera starts")
     cameras = list_virtual_cameras(tree, settings.label)
     named = next((camera for camera in cameras if camera.node == settings.sink), None)
@@ -60,6 +66,9 @@ def check_virtual_camera(settings: OutputSettings, tree: DeviceTree = SYSTEM, ac
         known = ", ".join(f"{camera.node} ('{camera.label}')" for camera in cameras)
         cure = f"choose one of {known}" if known else f"run: {load_command(settings.label)}"
         return problem(topic, f"{settings.sink} is no virtual camera", cure)
+    if not cameras:
+        what = f"there is no '{settings.label}': the kernel module v4l2loopback is not loaded"
+        return problem(topic, what, f"once it is installed (see kernel module), run: {load_command(settings.label)}")
     try:
         camera = named or find_virtual_camera(tree, settings.label)
     except DeviceError as error:
@@ -75,6 +84,8 @@ def check_virtual_camera(settings: OutputSettings, tree: DeviceTree = SYSTEM, ac
             topic, f"'{camera.label}' at {camera.node} without exclusive_caps: Chrome does not list it", cure
         )
     use = f", in use at {camera.size[0]}x{camera.size[1]}" if camera.size else ""
+    openers = ", ".join(map(str, host.holders(camera.node)))
+    use += f", opened by {openers}" if openers else ""
     return fine(topic, f"'{camera.label}' at {camera.node}{use}")
 
 
@@ -93,3 +104,10 @@ def _group(node: str) -> str:
 
 def _join(group: str) -> str:
     return JOIN_GROUP.format(group=group)
+
+
+def groups_to_join(tree: DeviceTree, access: Access = os.access) -> tuple[str, ...]:
+    """The groups that own video devices which this user may not use."""
+    nodes = [str(tree.dev / folder.name) for folder in tree.nodes]
+    shut = [node for node in nodes if Path(node).exists() and not access(node, os.R_OK | os.W_OK)]
+    return tuple(sorted({_group(node) for node in shut}))

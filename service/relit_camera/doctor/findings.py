@@ -33,6 +33,41 @@ class Finding(BaseModel):
     """What to do, where the state is not ok."""
 
 
+class FileState(StrEnum):
+    """What became of a file or folder that `--fix` looks after."""
+
+    WRITTEN = "written"
+    RENEWED = "renewed"
+    """It was an older one of ours, which nobody had changed."""
+    UNCHANGED = "unchanged"
+    KEPT = "kept"
+    """A person has changed it, or wrote it: it was left alone."""
+    FAILED = "failed"
+
+
+class FixedFile(BaseModel):
+    """A file or folder, and what became of it."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    path: str
+    state: FileState
+    note: str = ""
+    """Why it failed, or from what was kept to what we would have written, as a unified diff."""
+
+
+class Fix(BaseModel):
+    """What `--fix` did: files of the user's own. The rest are lines to paste."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    files: tuple[FixedFile, ...]
+    root_commands: tuple[str, ...]
+    """For root, in order; empty where nothing is left to do."""
+    user_commands: tuple[str, ...]
+    """Worth running as oneself: nothing is downloaded or started unasked."""
+
+
 class Report(BaseModel):
     """Everything that was looked at."""
 
@@ -41,6 +76,8 @@ class Report(BaseModel):
     version: str
     """Of Relit Camera."""
     findings: tuple[Finding, ...]
+    fix: Fix | None = None
+    """What `--fix` did, and what is left for others."""
 
     @property
     def healthy(self) -> bool:

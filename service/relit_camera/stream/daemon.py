@@ -37,6 +37,8 @@ log = logging.getLogger(__name__)
 READ_TIMEOUT_S = 0.2
 STALE_AFTER_S = 3.0
 """Without a new picture for this long the placeholder is shown."""
+RELEASED = "the webcam is off until somebody looks"
+"""What the placeholder says in on-demand mode."""
 RETRY_S = 1.0
 """Pause after a failure of the source."""
 STOP_S = 2.0
@@ -54,6 +56,7 @@ class Daemon:
         sink: Sink,
         tracker: Tracker,
         new_tracker: Callable[[], Tracker] | None = None,
+        on_viewer: Callable[[], None] = lambda: None,
     ) -> None:
         """Set up; `start` begins.
 
@@ -64,6 +67,7 @@ class Daemon:
             sink: takes finished ones.
             tracker: follows the face.
             new_tracker: makes another like it, in place of one that hangs; the same again if not given.
+            on_viewer: called whenever somebody asks for a preview or a snapshot.
 
         Raises:
             ImageError: the placeholder picture cannot be read.
@@ -89,6 +93,8 @@ class Daemon:
         self._waiting_picture = placeholder(size, "waiting for the camera", settings.output.placeholder)
         trouble = placeholder(size, "the picture has failed: see the panel", settings.output.placeholder)
         self._stand_in = StandIn(size, settings.output.fallback, trouble)
+        self._released_picture = placeholder(size, RELEASED, settings.output.placeholder)
+        self._on_viewer = on_viewer
         self._troubles: dict[str, Degradation] = {}
         self._face = FaceStatus.LOST
         self._camera_rate, self._pipeline_rate = RateMeter(), RateMeter()
@@ -164,6 +170,7 @@ class Daemon:
 
     def picture(self, after: int, timeout_s: float) -> tuple[int, DisplayImage] | None:
         """The newest published picture and its count; see `CameraControl.picture`."""
+        self._on_viewer()
         found = self._publisher.shown.newer(after, timeout_s)
         return None if found is None or self.stopping() else (found[0], found[1])
 
@@ -213,6 +220,9 @@ class Daemon:
             return None
         if frame is not None:
             self._recovered("source")
+        elif self._source.state is SourceState.RELEASED:
+            self._recovered("source")
+            self._show(self._released_picture, CameraState.RELEASED)
         elif self._source.state is not SourceState.RUNNING:
             reason = self._source.reason
             if reason:
@@ -222,8 +232,11 @@ class Daemon:
         return frame
 
     def _show_waiting(self) -> None:
-        self._publisher.placeholder = self._waiting_picture
-        self._set_state(CameraState.WAITING)
+        self._show(self._waiting_picture, CameraState.WAITING)
+
+    def _show(self, picture: DisplayImage, state: CameraState) -> None:
+        self._publisher.placeholder = picture
+        self._set_state(state)
 
     def _count(self, frame: Frame) -> None:
         """Frames that the source gave, those too that were replaced before the worker came: indices have gaps there."""

@@ -154,7 +154,12 @@ def find_virtual_camera(tree: DeviceTree = SYSTEM, label: str = OWN_LABEL) -> Vi
 
 def load_command(label: str = OWN_LABEL) -> str:
     """Write the shell command that makes the virtual camera; `exclusive_caps` is what lets Chrome list it."""
-    return f'sudo modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=1 card_label="{label}"'
+    return f"sudo modprobe v4l2loopback {module_options(label)}"
+
+
+def module_options(label: str = OWN_LABEL) -> str:
+    """Write the module's options for one device of that label, as modprobe and its configuration files take them."""
+    return f'devices=1 video_nr=10 exclusive_caps=1 card_label="{label}"'
 
 
 def negotiated_size(node: str, tree: DeviceTree = SYSTEM) -> tuple[int, int] | None:

@@ -18,6 +18,8 @@ class CameraState(StrEnum):
     """The source gives no pictures: the placeholder is shown."""
     STANDING_IN = "standing-in"
     """Pictures fail or hang: the relit still is shown, or what `output.fallback` says, until they come again."""
+    RELEASED = "released"
+    """On demand, and nobody looks: the webcam is released, the placeholder is shown."""
     FROZEN = "frozen"
     STOPPING = "stopping"
 

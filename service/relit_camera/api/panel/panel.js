@@ -18,6 +18,7 @@ const STATES = {
   searching: "Looking for your face",
   "standing-in": "Showing a still: see below",
   waiting: "Waiting for the camera",
+  released: "Webcam released until somebody looks",
   frozen: "Frozen",
   stopping: "Stopping…",
   lost: "Not connected",

@@ -22,6 +22,8 @@ class SourceState(StrEnum):
     """Open, but no frame came for longer than its patience."""
     RECONNECTING = "reconnecting"
     """Gone; it is looked for again and again."""
+    RELEASED = "released"
+    """On demand, and nobody looks: closed until somebody does (`stream.demand`). No single source is ever so."""
     FAILED = "failed"
     """It cannot go on: `read` raises why."""
     ENDED = "ended"
@@ -35,6 +37,7 @@ MOVES: dict[SourceState, frozenset[SourceState]] = {
     _S.RUNNING: frozenset({_S.STALLED, _S.RECONNECTING, _S.FAILED, _S.ENDED}),
     _S.STALLED: frozenset({_S.RUNNING, _S.RECONNECTING, _S.FAILED, _S.ENDED}),
     _S.RECONNECTING: frozenset({_S.OPENING, _S.FAILED, _S.ENDED}),
+    _S.RELEASED: frozenset(),
     _S.FAILED: frozenset({_S.ENDED}),
     _S.ENDED: frozenset(),
 }

@@ -1,0 +1,107 @@
+"""`relit doctor --fix`: writes what is the user's own, and says what others must do.
+
+Nothing that a person wrote or changed is touched, nothing is downloaded, started or asked of root. Run twice, it does
+nothing the second time.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from pathlib import Path
+
+from platformdirs import user_config_path
+
+from relit_camera.config.settings import RelitSettings
+from relit_camera.doctor.cameras import Access, groups_to_join
+from relit_camera.doctor.findings import FileState, Fix, FixedFile
+from relit_camera.doctor.host import Host
+from relit_camera.doctor.inference import check_models
+from relit_camera.doctor.kernel import needs_module
+from relit_camera.doctor.root_commands import root_commands
+from relit_camera.doctor.unit import is_ours, relit_command, unit_path, unit_text
+from relit_camera.errors import StorageError
+from relit_camera.files import make_folder, write_atomic
+from relit_camera.models.registry import models_folder
+
+CONFIG_TEXT = """\
+# Relit Camera's settings; what is not here has its default. `relit config schema` lists all of them, `relit config
+# check` tells whether this file is right, `relit config show` what is in force.
+
+subject: null               # who is shown: a stored subject's name or a .relit file; null is the live picture as it is
+
+source:
+  source: webcam            # webcam, a camera's id from `relit devices`, a video or picture file, or pattern
+  on_demand: false          # true: the webcam is released while nobody reads the virtual camera or watches a preview
+
+look:
+  mode: reenact             # reenact: the subject's still, moved as you move. ratio: the live picture itself, relit
+  lighting:
+    environment: studio     # studio, window, sunset, night-street, party, overcast, or one of your own
+"""
+
+
+def user_config() -> Path:
+    """The user's configuration file, which holds for the service too."""
+    return user_config_path("relit-camera", appauthor=False) / "config.yaml"
+
+
+def fix(settings: RelitSettings, host: Host, access: Access = os.access) -> Fix:
+    """Write the missing files and folders of the user.
+
+    Args:
+        settings: that hold now; their folders are made.
+        host: this machine.
+        access: `os.access` or a stand-in.
+    """
+    storage = settings.storage
+    folders = [storage.subjects, storage.environments, storage.backgrounds, storage.presets, models_folder()]
+    files = [*map(_folder, folders), _config(user_config())]
+    user_commands = [] if check_models(settings).state == "ok" else ["relit models pull"]
+    if host.is_linux:
+        files.append(_unit(unit_path()))
+        user_commands.append("systemctl --user daemon-reload && systemctl --user enable --now relit-camera")
+    lines = root_commands(settings.output, host, groups_to_join(host.tree, access))
+    return Fix(
+        files=tuple(files),
+        root_commands=lines if needs_module(settings.output, host) else (),
+        user_commands=tuple(user_commands),
+    )
+
+
+def _folder(path: Path) -> FixedFile:
+    if path.is_dir():
+        return FixedFile(path=str(path), state=FileState.UNCHANGED)
+    return _attempt(path, FileState.WRITTEN, None)
+
+
+def _config(path: Path) -> FixedFile:
+    if path.exists():  # it is there to be changed
+        return FixedFile(path=str(path), state=FileState.UNCHANGED)
+    return _attempt(path, FileState.WRITTEN, CONFIG_TEXT)
+
+
+def _unit(path: Path) -> FixedFile:
+    wanted = unit_text(relit_command())
+    if not path.exists():
+        return _attempt(path, FileState.WRITTEN, wanted)
+    found = path.read_text(encoding="utf-8", errors="replace")
+    if found == wanted:
+        return FixedFile(path=str(path), state=FileState.UNCHANGED)
+    if not is_ours(found):
+        diff = difflib.unified_diff(
+            found.splitlines(), wanted.splitlines(), str(path), "what --fix would write", "", "", 1, ""
+        )
+        return FixedFile(path=str(path), state=FileState.KEPT, note="\n".join(diff))
+    return _attempt(path, FileState.RENEWED, wanted)
+
+
+def _attempt(path: Path, state: FileState, text: str | None) -> FixedFile:
+    """Make a folder, or write a file and the folders above it."""
+    try:
+        make_folder(path if text is None else path.parent)
+        if text is not None:
+            write_atomic(path, text)
+    except StorageError as error:
+        return FixedFile(path=str(path), state=FileState.FAILED, note=str(error))
+    return FixedFile(path=str(path), state=state)

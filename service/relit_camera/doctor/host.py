@@ -1,0 +1,83 @@
+"""The machine as its own files tell of it: nothing is run, nothing needs root."""
+
+from __future__ import annotations
+
+import platform
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from relit_camera.stream.devices import SYSTEM, DeviceTree
+from relit_camera.stream.holders import Holder, holders
+
+SECURE_BOOT = "sys/firmware/efi/efivars/SecureBoot-8be4df61-93ca-11d2-aa0d-00e098032b8c"
+MODULE = "v4l2loopback"
+
+
+@dataclass(frozen=True)
+class Host:
+    """The machine that this runs on, or one that a test made up.
+
+    Attributes:
+        root: where its files are.
+        tree: its devices.
+        release: of the kernel that runs, such as 6.1.0-56-amd64.
+        is_linux: whether it has v4l2loopback at all.
+        holders: who else has a device node open.
+    """
+
+    root: Path = Path("/")
+    tree: DeviceTree = SYSTEM
+    release: str = field(default_factory=platform.release)
+    is_linux: bool = field(default_factory=lambda: platform.system() == "Linux")
+    holders: Callable[[str], list[Holder]] = holders
+
+    def read(self, path: str) -> str:
+        """Text of a file below the root; empty where it cannot be read."""
+        return self.tree.read(self.root / path)
+
+    @property
+    def family(self) -> str:
+        """`debian` (Ubuntu too), `fedora`, `arch`, or empty: what its packages are installed with."""
+        fields = dict(line.split("=", 1) for line in self.read("etc/os-release").splitlines() if "=" in line)
+        names = [" ".join(shlex.split(fields.get(key, ""))) for key in ("ID", "ID_LIKE")]
+        words = " ".join(names).split()
+        return next((family for family in ("debian", "fedora", "arch") if family in words), "")
+
+    @property
+    def secure_boot(self) -> bool:
+        """Whether the firmware says that Secure Boot is on: then the kernel takes signed modules only."""
+        try:
+            return (self.root / SECURE_BOOT).read_bytes()[4:5] == b"\1"  # after four bytes of attributes
+        except OSError:
+            return False
+
+    @property
+    def module_loaded(self) -> bool:
+        """Whether v4l2loopback is in the running kernel."""
+        return (self.tree.sys / "module" / MODULE).is_dir()
+
+    @property
+    def module_version(self) -> str:
+        """Of the loaded module; empty for 0.12, which does not tell."""
+        return self.tree.read(self.tree.sys / "module" / MODULE / "version")
+
+    @property
+    def kernels_with_module(self) -> list[str]:
+        """Releases of the installed kernels for which modprobe knows the module."""
+        found = (self.root / "lib/modules").glob("*/modules.dep")
+        return sorted(path.parent.name for path in found if f"/{MODULE}.ko" in self.tree.read(path))
+
+    @property
+    def module_built_by_dkms(self) -> bool:
+        """Whether DKMS has the module's source, built or not."""
+        return (self.root / "var/lib/dkms" / MODULE).is_dir()
+
+    def configured(self, folder: str, words: str) -> list[Path]:
+        """Files of a folder such as etc/modprobe.d with a line that begins with these words, comments left out."""
+        return [
+            path
+            for path in sorted((self.root / folder).glob("*.conf"))
+            if any(line.split()[: len(words.split())] == words.split() for line in self.tree.read(path).splitlines())
+        ]

@@ -1,0 +1,96 @@
+"""The systemd user unit that runs the camera from login on.
+
+The first line of what we write carries a checksum of the rest: by it an old unit of ours is told from one that a
+person has changed, and that is never overwritten.
+"""
+
+from __future__ import annotations
+
+import sys
+from hashlib import sha256
+from pathlib import Path
+
+from platformdirs import user_config_path
+
+from relit_camera.doctor.findings import Finding, fine, warning
+from relit_camera.doctor.host import Host
+
+UNIT_NAME = "relit-camera.service"
+STAMP = "# By `relit doctor --fix`, sum "
+STAMP_END = ". Changed files are left alone; `systemctl --user edit relit-camera` changes it without touching it.\n"
+FIX = "run: relit doctor --fix"
+
+# No mount namespaces (PrivateTmp, ProtectHome …): the user's manager would need user namespaces for them, in which the
+# groups that own the cameras are lost. No MemoryDenyWriteExecute: CUDA and OpenVINO make code while they run.
+TEMPLATE = """\
+[Unit]
+Description=Relit Camera: a virtual webcam that shows you lit by any place you choose
+StartLimitIntervalSec=300
+StartLimitBurst=5
+
+[Service]
+Type=notify
+ExecStart={command} run
+TimeoutStartSec=120
+TimeoutStopSec=10
+WatchdogSec=30
+Restart=on-failure
+RestartSec=3
+UMask=0077
+NoNewPrivileges=yes
+LockPersonality=yes
+RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_NETLINK
+RestrictNamespaces=yes
+RestrictRealtime=yes
+RestrictSUIDSGID=yes
+SystemCallArchitectures=native
+SystemCallFilter=@system-service
+SystemCallErrorNumber=EPERM
+
+[Install]
+WantedBy=default.target
+"""
+
+
+def unit_path() -> Path:
+    """Where systemd looks for the user's own units."""
+    return user_config_path("systemd", appauthor=False) / "user" / UNIT_NAME
+
+
+def relit_command() -> Path:
+    """The command `relit` as it was called, else the one beside this Python. Links are kept: pipx's outlive updates."""
+    called = Path(sys.argv[0])
+    return called.absolute() if called.name == "relit" and called.is_file() else Path(sys.executable).parent / "relit"
+
+
+def unit_text(command: Path) -> str:
+    """The unit that runs a command, with its stamp."""
+    quoted = str(command).replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%").replace("$", "$$")
+    body = TEMPLATE.format(command=f'"{quoted}"')
+    return f"{STAMP}{_sum(body)}{STAMP_END}{body}"
+
+
+def is_ours(text: str) -> bool:
+    """Whether `unit_text` wrote it, in this version or another, and nobody has changed it since."""
+    stamp, _, body = text.partition("\n")
+    return stamp.startswith(STAMP) and stamp.removeprefix(STAMP).startswith(_sum(body))
+
+
+def check_service(host: Host) -> Finding:
+    """Whether the camera starts by itself, and starts what is here."""
+    topic, path = "service", unit_path()
+    if not host.is_linux:
+        return fine(topic, "systemd's alone; not on this system")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError:
+        return fine(topic, "not installed, relit run is started by hand (relit doctor --fix writes the unit)")
+    if not is_ours(text):
+        return fine(topic, f"{path}, changed or written by you")
+    if text != unit_text(relit_command()):
+        return warning(topic, f"{path} is for another installation or version", FIX)
+    return fine(topic, str(path))
+
+
+def _sum(body: str) -> str:
+    return sha256(body.encode()).hexdigest()[:12]

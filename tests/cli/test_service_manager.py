@@ -1,0 +1,191 @@
+"""What systemd is told: by a stand-in for its socket, with made-up figures and with a real `relit run`."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from relit_camera.cli.service_manager import ServiceManager, announced, status_line
+from relit_camera.stream.status import CameraState, Degradation, FrameCounts
+from tests.api.fake_camera import STATUS
+from tests.cli.relit_command import Material, environment
+
+START_S = 60.0
+WATCHDOG_S = 1.0
+INJECTED = """
+import sys, time
+from pathlib import Path
+from relit_camera.errors import DeviceError
+from relit_camera.stream.sinks.null import NullSink
+real, stuck = NullSink.write, Path(sys.argv.pop(1))
+def write(self, image):
+    if stuck.exists():
+        raise DeviceError("the device takes no pictures", "wait")
+    real(self, image)
+NullSink.write = write
+sys.argv[0] = "relit"
+from relit_camera.cli.main import run
+run()
+"""
+"""`relit` whose sink fails while a file exists."""
+
+
+class Listener:
+    """Stands for systemd's socket."""
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind("\0" + address[1:] if address.startswith("@") else address)
+
+    def next(self, timeout_s: float = START_S) -> list[str]:
+        """The lines of the next message; empty when none came in time."""
+        self._socket.settimeout(timeout_s)
+        try:
+            return self._socket.recv(4096).decode().split("\n")
+        except TimeoutError:
+            return []
+
+    def wait_for(self, line: str, timeout_s: float = START_S) -> list[str]:
+        """The first message that has a line; what came before it is passed over."""
+        deadline = time.monotonic() + timeout_s
+        while (left := deadline - time.monotonic()) > 0:
+            message = self.next(left)
+            if line in message:
+                return message
+        raise AssertionError(f"{line} did not come")
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def drain(self) -> None:
+        while self.next(0.05):
+            pass
+
+
+@pytest.fixture(params=["path", "abstract"])
+def listener(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Listener]:
+    listener = Listener(str(tmp_path / "notify") if request.param == "path" else f"@relit-test-{os.getpid()}")
+    yield listener
+    listener.close()
+
+
+class Camera:
+    """Figures of a camera that publishes as it is told."""
+
+    def __init__(self) -> None:
+        self.base, self.published = STATUS, 0
+
+    def __call__(self):
+        return replace(self.base, frames=FrameCounts(self.published, 0, 0))
+
+
+def test_no_service_manager_no_message() -> None:
+    assert ServiceManager.from_environment({}) is None
+    assert ServiceManager.from_environment({"NOTIFY_SOCKET": "vsock:2:1234"}) is None
+
+
+def test_the_watchdog_is_read_for_this_process_alone() -> None:
+    def watchdog(**more: str) -> float | None:
+        manager = ServiceManager.from_environment({"NOTIFY_SOCKET": "/run/n", **more})
+        assert manager is not None
+        return manager.watchdog_s
+
+    assert watchdog() is None
+    assert watchdog(WATCHDOG_USEC="30000000") == 30.0
+    assert watchdog(WATCHDOG_USEC="30000000", WATCHDOG_PID=str(os.getpid())) == 30.0
+    assert watchdog(WATCHDOG_USEC="30000000", WATCHDOG_PID="1") is None
+    assert watchdog(WATCHDOG_USEC="soon") is None
+    assert watchdog(WATCHDOG_USEC="0") is None
+
+
+def test_ready_comes_with_the_first_picture_and_life_with_the_others(listener: Listener) -> None:
+    camera = Camera()
+    with announced(camera, ServiceManager(listener.address, watchdog_s=0.2)):
+        assert listener.next(0.3) == []
+        camera.published = 1
+        assert listener.next()[0] == "READY=1"
+        assert listener.next()[0].startswith("STATUS=")  # nothing was published since
+        camera.published = 2
+        assert "WATCHDOG=1" in listener.wait_for("WATCHDOG=1", 2)
+        assert "WATCHDOG=1" not in listener.next()
+    listener.wait_for("STOPPING=1", 2)
+
+
+def test_stopped_before_the_first_picture_it_was_never_ready(listener: Listener) -> None:
+    with announced(Camera(), ServiceManager(listener.address)):
+        pass
+    assert listener.next() == ["STOPPING=1", "STATUS=stopping"]
+
+
+def test_a_manager_that_does_not_listen_changes_nothing(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with announced(Camera(), ServiceManager(str(tmp_path / "nobody"))):
+        pass
+    assert "cannot be told STOPPING=1" in caplog.text
+
+
+def test_the_status_is_one_line_with_the_first_trouble() -> None:
+    good = replace(STATUS, state=CameraState.LIVE, source="webcam C920", sink="camera /dev/video10", degraded=[])
+    assert status_line(good) == "live: webcam C920 to camera /dev/video10"
+    bad = replace(good, degraded=[Degradation("sink failed", "no\nroom", "x"), Degradation("b", "c")])
+    assert status_line(bad).endswith("/dev/video10; sink failed: no room")
+
+
+@contextmanager
+def service(listener: Listener, material: Material, folder: Path, stuck: Path) -> Iterator[subprocess.Popen[str]]:
+    """`relit run` as systemd starts it, of the test pattern."""
+    told = {"NOTIFY_SOCKET": listener.address, "WATCHDOG_USEC": str(int(WATCHDOG_S * 1e6))}
+    small = {"RELIT_SOURCE__WIDTH": "128", "RELIT_SOURCE__HEIGHT": "96"}
+    process = subprocess.Popen(
+        [
+            sys.executable, "-c", INJECTED, str(stuck), "run", "--source", "pattern", "--sink", "null", "--port", "0",
+            "--size", "128x96", "--tracker", material.tracker,
+        ],
+        env={**environment(folder), **told, **small}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_a_real_camera_is_ready_alive_silent_when_pictures_stop_and_says_when_it_stops(
+    listener: Listener, material: Material, tmp_path: Path
+) -> None:
+    stuck = tmp_path / "stuck"
+    with service(listener, material, tmp_path, stuck) as process:
+        first = listener.next()
+        assert first, process.stderr and process.stderr.read()
+        assert first[0] == "READY=1"
+        assert "pattern" in first[1]
+        times = []
+        for _ in range(4):
+            listener.wait_for("WATCHDOG=1")
+            times.append(time.monotonic())
+        assert max(b - a for a, b in pairwise(times)) < WATCHDOG_S
+
+        stuck.touch()
+        time.sleep(WATCHDOG_S)  # what was on its way
+        listener.drain()
+        for _ in range(3):
+            message = listener.next()
+            assert message[0].startswith("STATUS="), message
+            assert "sink failed: the device takes no pictures" in message[0]
+
+        stuck.unlink()
+        listener.wait_for("WATCHDOG=1")
+        process.send_signal(signal.SIGTERM)
+        listener.wait_for("STOPPING=1")
+        assert process.wait(10) == 0

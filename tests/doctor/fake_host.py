@@ -1,0 +1,82 @@
+"""A machine in a folder: devices, kernels, modules and configuration as a test wants them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from relit_camera.doctor.findings import Finding, State
+from relit_camera.doctor.host import SECURE_BOOT, Host
+from relit_camera.stream.holders import Holder
+from tests.stream.fake_devices import FakeTree
+
+RELEASE = "6.1.0-56-amd64"
+DISTRIBUTIONS = {
+    "debian": 'PRETTY_NAME="Debian GNU/Linux 12 (bookworm)"\nID=debian\n',
+    "ubuntu": "NAME=Ubuntu\nID=ubuntu\nID_LIKE=debian\n",
+    "fedora": 'NAME="Fedora Linux"\nID=fedora\n',
+    "nobara": 'ID=nobara\nID_LIKE="rhel centos fedora"\n',
+    "arch": "ID=arch\n",
+    "nixos": "ID=nixos\n",
+}
+
+
+class FakeMachine:
+    """Files of a machine under one folder, and the `Host` that sees them."""
+
+    def __init__(self, root: Path, distribution: str = "debian", is_linux: bool = True) -> None:
+        self.root = root
+        self.tree = FakeTree(root)
+        self.users: dict[str, list[Holder]] = {}
+        self.write("etc/os-release", DISTRIBUTIONS[distribution])
+        self.add_kernel(RELEASE)
+        self.host = Host(root, self.tree, RELEASE, is_linux, lambda node: self.users.get(node, []))
+
+    def write(self, path: str, text: str) -> Path:
+        file = self.root / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+        return file
+
+    def add_kernel(self, release: str, with_module: bool = False) -> None:
+        module = "updates/dkms/v4l2loopback.ko.xz: kernel/drivers/media/v4l2-core/videodev.ko.xz\n"
+        self.write(f"lib/modules/{release}/modules.dep", "kernel/fs/ext4.ko:\n" + (module if with_module else ""))
+
+    def load_module(self, version: str = "", exclusive_caps: str = "Y,N,N,N,N,N,N,N") -> None:
+        folder = "sys/module/v4l2loopback"
+        self.write(f"{folder}/parameters/exclusive_caps", exclusive_caps + "\n")
+        if version:
+            self.write(f"{folder}/version", version + "\n")
+
+    def load_at_boot(self, label: str = "Relit Camera", file: str = "relit-camera.conf") -> None:
+        self.write(f"etc/modprobe.d/{file}", f"# ours\noptions v4l2loopback {OPTIONS.format(label)}\n")
+        self.write(f"etc/modules-load.d/{file}", "v4l2loopback\n")
+
+    def set_secure_boot(self, on: bool) -> None:
+        file = self.root / SECURE_BOOT
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(b"\6\0\0\0" + bytes([on]))
+
+    def open_by(self, node: str, *users: Holder) -> None:
+        self.users[node] = list(users)
+
+
+OPTIONS = 'devices=1 video_nr=10 exclusive_caps=1 card_label="{}"'
+FIREFOX = Holder(30, "firefox", ("/usr/bin/firefox",))
+RELIT = Holder(40, "python3", ("/venv/bin/python3", "/venv/bin/relit", "run"))
+
+
+def nobody_may(path, mode):
+    return False
+
+
+def everybody_may(path, mode):
+    return True
+
+
+def expect(finding: Finding, state: State, *words: str):
+    """Of that state; the words are in what was seen or its cure. What is not ok has a cure, what is ok has none."""
+    assert finding.state is state, finding
+    for word in words:
+        assert word in f"{finding.seen} → {finding.cure}", finding
+    assert bool(finding.cure) == (state is not State.OK), finding
+    assert "\n" not in finding.seen + finding.cure

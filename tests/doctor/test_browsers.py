@@ -1,0 +1,49 @@
+"""Browsers in sandboxes."""
+
+from __future__ import annotations
+
+import pytest
+
+from relit_camera.doctor.browsers import check_browsers
+from relit_camera.doctor.findings import State
+from tests.doctor.fake_host import expect
+
+CHROME = "com.google.Chrome"
+METADATA = "app/{}/current/active/metadata"
+
+
+def flatpak(machine, app, devices, folder="var/lib/flatpak"):
+    machine.write(f"{folder}/{METADATA.format(app)}", f"[Application]\nname={app}\n\n[Context]\ndevices={devices}\n")
+
+
+def test_none_is_fine(machine, tmp_path):
+    expect(check_browsers(machine.host, tmp_path), State.OK, "none in a sandbox")
+
+
+def test_a_flatpak_with_all_devices_is_fine_and_one_without_is_named(machine, tmp_path):
+    flatpak(machine, "org.mozilla.firefox", "dri;all;")
+    expect(check_browsers(machine.host, tmp_path), State.OK)
+    flatpak(machine, CHROME, "dri;")
+    finding = check_browsers(machine.host, tmp_path)
+    expect(finding, State.WARNING, f"flatpak override --user --device=all {CHROME}")
+    assert "firefox" not in finding.seen
+
+
+@pytest.mark.parametrize("name", [CHROME, "global"])
+def test_an_override_opens_it(machine, tmp_path, name):
+    home = machine.root / "home/me"
+    flatpak(machine, CHROME, "dri;", "home/me/.local/share/flatpak")
+    home = home.relative_to(machine.root)
+    expect(check_browsers(machine.host, home), State.WARNING, CHROME)
+    machine.write(f"home/me/.local/share/flatpak/overrides/{name}", "[Context]\ndevices=all;\n")
+    expect(check_browsers(machine.host, home), State.OK)
+
+
+def test_a_damaged_file_is_as_none(machine, tmp_path):
+    machine.write(f"var/lib/flatpak/{METADATA.format(CHROME)}", "][")
+    expect(check_browsers(machine.host, tmp_path), State.WARNING, CHROME)
+
+
+def test_snaps_are_a_hint(machine, tmp_path):
+    (machine.root / "snap/chromium").mkdir(parents=True)
+    expect(check_browsers(machine.host, tmp_path), State.OK, "sudo snap connect chromium:camera")

@@ -1,0 +1,201 @@
+"""When the webcam is wanted, and who is asked about it."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import struct
+from pathlib import Path
+
+import pytest
+
+from relit_camera.stream.demand import usage
+from relit_camera.stream.demand.demand import LINGER_S, Demand
+from relit_camera.stream.demand.usage import Unanswerable, driver_says
+from relit_camera.stream.demand.watch import ReaderWatch
+from tests.stream.small_camera import wait_until
+
+
+class Clock:
+    now = 100.0
+
+    def __call__(self):
+        return self.now
+
+
+class Readers:
+    """Stands for the readers of a device."""
+
+    there = False
+    error: Exception | None = None
+    calls = 0
+
+    def __call__(self, node=""):
+        self.calls += 1
+        if self.error is not None:
+            raise self.error
+        return self.there
+
+
+# Wanted or not.
+
+
+def test_nobody_wants_it_at_the_start():
+    assert not Demand(Readers()).wanted()
+
+
+def test_a_reader_wants_it_at_once_and_five_seconds_longer():
+    readers, clock = Readers(), Clock()
+    demand = Demand(readers, clock=clock)
+    readers.there = True
+    assert demand.wanted()
+    clock.now += 60
+    assert demand.wanted()
+    readers.there = False
+    clock.now += LINGER_S - 0.1
+    assert demand.wanted()
+    clock.now += 0.2
+    assert not demand.wanted()
+    assert LINGER_S == 5
+
+
+def test_who_lets_go_and_takes_again_keeps_it_open():
+    readers, clock = Readers(), Clock()
+    demand = Demand(readers, clock=clock)
+    for there in (True, False) * 20:
+        readers.there = there
+        assert demand.wanted()
+        clock.now += 2.4
+
+
+def test_a_viewer_counts_as_a_reader():
+    clock = Clock()
+    demand = Demand(Readers(), clock=clock)
+    demand.note_viewer()
+    clock.now += LINGER_S - 0.1
+    assert demand.wanted()
+    clock.now += 0.2
+    assert not demand.wanted()
+
+
+# The watch.
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr("relit_camera.stream.demand.watch.ASK_EVERY_S", 0.01)
+    monkeypatch.setattr("relit_camera.stream.demand.watch.SCAN_EVERY_S", 0.01)
+
+
+def watch_with(ask, scan, node="/dev/video10"):
+    return ReaderWatch(lambda: node, ask, scan)
+
+
+def test_the_driver_is_asked_and_proc_left_alone(quick):
+    ask, scan = Readers(), Readers()
+    watch = watch_with(ask, scan)
+    try:
+        assert not watch.anybody()
+        ask.there = True
+        wait_until(watch.anybody)
+        ask.there = False
+        wait_until(lambda: not watch.anybody())
+        assert scan.calls == 0
+    finally:
+        watch.close()
+
+
+def test_the_first_answer_is_no_guess():
+    ask = Readers()
+    ask.there = True
+    watch = watch_with(ask, Readers())
+    assert watch.anybody()
+    watch.close()
+
+
+def test_an_old_driver_is_asked_once_then_proc_is_searched(quick, caplog):
+    ask, scan = Readers(), Readers()
+    ask.error = Unanswerable()
+    watch = watch_with(ask, scan)
+    with caplog.at_level(logging.WARNING):
+        assert not watch.anybody()
+        scan.there = True
+        wait_until(watch.anybody)
+    watch.close()
+    assert ask.calls == 1
+    (said,) = [record.getMessage() for record in caplog.records]
+    assert said.startswith("/dev/video10: this v4l2loopback does not tell who reads it")
+    assert "only programs of the same user" in said
+
+
+def test_a_device_that_cannot_be_opened_now_leaves_the_answer_as_it_was(quick):
+    ask = Readers()
+    ask.there = True
+    watch = watch_with(ask, Readers())
+    assert watch.anybody()
+    ask.error = OSError(errno.EBUSY, "too many openers")
+    known = ask.calls
+    wait_until(lambda: ask.calls > known + 3)
+    assert watch.anybody()
+    ask.error, ask.there = None, False
+    wait_until(lambda: not watch.anybody())
+    watch.close()
+
+
+# What is asked of the driver.
+
+
+@pytest.fixture
+def node(tmp_path):
+    path = tmp_path / "video10"
+    path.touch()
+    return str(path)
+
+
+def open_files():
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+def driver(monkeypatch, answer):
+    """Let `fcntl.ioctl` answer like a driver; returns what was asked."""
+    asked = []
+
+    def ioctl(device, request, argument):
+        asked.append((request, bytes(argument)))
+        return answer(request, argument)
+
+    monkeypatch.setattr("fcntl.ioctl", ioctl)
+    return asked
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_the_first_event_of_a_subscription_is_the_answer(monkeypatch, node, count):
+    def answer(request, argument):
+        if request == usage.VIDIOC_DQEVENT:
+            struct.pack_into("=I4xI", argument, 0, usage.CLIENT_USAGE, count)
+        return 0
+
+    asked = driver(monkeypatch, answer)
+    before = open_files()
+    assert driver_says(node) is (count > 0)
+    assert open_files() == before
+    assert [request for request, _ in asked] == [usage.VIDIOC_SUBSCRIBE_EVENT, usage.VIDIOC_DQEVENT]
+    assert struct.unpack("=8I", asked[0][1]) == (0x10E00001, 0, 1, 0, 0, 0, 0, 0)
+    assert len(asked[1][1]) == (usage.VIDIOC_DQEVENT >> 16) & 0x3FFF  # the size that the request announces
+
+
+@pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTTY])
+def test_a_driver_without_the_event_cannot_answer(monkeypatch, node, number):
+    def refuse(request, argument):
+        raise OSError(number, "no")
+
+    driver(monkeypatch, refuse)
+    with pytest.raises(Unanswerable):
+        driver_says(node)
+
+
+def test_a_plain_file_cannot_answer_and_a_missing_one_is_an_os_error(node, tmp_path):
+    with pytest.raises(Unanswerable):
+        driver_says(node)
+    with pytest.raises(FileNotFoundError):
+        driver_says(str(tmp_path / "video11"))

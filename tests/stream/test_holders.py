@@ -1,0 +1,63 @@
+"""Who has a device open, by /proc: made-up processes, and a real one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+from relit_camera.stream.holders import Holder, holders
+
+NODE = "/dev/video10"
+
+
+def add_process(proc, pid, *targets, name="chrome", command=("chrome",)):
+    folder = proc / str(pid) / "fd"
+    folder.mkdir(parents=True)
+    (proc / str(pid) / "comm").write_text(name + "\n")
+    (proc / str(pid) / "cmdline").write_text("\0".join(command) + "\0")
+    for number, target in enumerate(targets):
+        (folder / str(number)).symlink_to(target)
+
+
+def test_whoever_has_the_node_open_is_named_once(tmp_path):
+    add_process(tmp_path, 30, "/dev/null", NODE, NODE, name="firefox", command=("/usr/bin/firefox", "-new"))
+    add_process(tmp_path, 4, "/dev/video1", "socket:[1]")
+    add_process(tmp_path, 200, NODE)
+    (tmp_path / "self").symlink_to(tmp_path / "30")
+    assert holders(NODE, tmp_path) == [
+        Holder(30, "firefox", ("/usr/bin/firefox", "-new")),
+        Holder(200, "chrome", ("chrome",)),
+    ]
+    assert str(holders(NODE, tmp_path)[0]) == "firefox (process 30)"
+
+
+def test_this_process_is_no_holder(tmp_path):
+    add_process(tmp_path, os.getpid(), NODE)
+    assert holders(NODE, tmp_path) == []
+
+
+def test_the_command_relit_is_known_by_its_arguments():
+    assert Holder(1, "python3", ("/opt/venv/bin/python3", "/opt/venv/bin/relit", "run")).is_relit
+    assert Holder(1, "relit", ("/usr/bin/relit",)).is_relit
+    assert not Holder(1, "vim", ("vim", "notes", "relit")).is_relit
+    assert not Holder(1, "python3").is_relit
+
+
+def test_without_proc_nobody_is_seen(tmp_path):
+    assert holders(NODE, tmp_path / "none") == []
+
+
+def test_a_real_process_is_found(tmp_path):
+    path = tmp_path / "device"
+    path.touch()
+    assert holders(str(path)) == []
+    program = f"f = open({str(path)!r}); print(flush=True); input()"
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert [holder.pid for holder in holders(str(path))] == [process.pid]
+        process.communicate("\n")
+    assert holders(str(path)) == []
