@@ -109,6 +109,11 @@ class StorageSettings(Settings):
     data_dir: Path = Field(default_factory=lambda: user_data_path("relit-camera", appauthor=False))
 
     @property
+    def folders(self) -> tuple[Path, ...]:
+        """All of them."""
+        return self.environments, self.subjects, self.backgrounds, self.presets
+
+    @property
     def environments(self) -> Path:
         """Folder of stored environments."""
         return self.data_dir / "environments"

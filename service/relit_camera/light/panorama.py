@@ -77,11 +77,20 @@ def panorama_from_radiance(radiance: NDArray[np.float32], name: str = "panorama"
     return Panorama(_as_map(radiance, "map", name))
 
 
+def check_suffix(suffix: str, name: str) -> None:
+    """Check that a file of this suffix can be a panorama; `name` is what the file is called to a person.
+
+    Raises:
+        PanoramaError: it cannot.
+    """
+    if suffix.lower() not in SUFFIXES:
+        raise PanoramaError(f"{name}: '{suffix}' is no panorama format known here", "use .hdr, .exr, .png or .jpg")
+
+
 def _check_header(path: Path) -> None:
     if path.is_dir() or not path.exists():
         raise PanoramaError(f"no panorama at {path}", "check the path")
-    if path.suffix.lower() not in SUFFIXES:
-        raise PanoramaError(f"{path}: '{path.suffix}' is no panorama format known here", "use .hdr, .exr, .png or .jpg")
+    check_suffix(path.suffix, str(path))
     try:
         width, height = picture_size(path)
     except ValueError as error:
