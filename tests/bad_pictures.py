@@ -1,4 +1,4 @@
-"""Picture files that mean harm: a few bytes that stand for any amount of memory or time, or say one thing and are another."""
+"""Picture files that mean harm: few bytes that stand for much memory or time, or lie."""
 
 from __future__ import annotations
 
@@ -48,9 +48,7 @@ def jpeg_of_size(width: int, height: int) -> bytes:
 
 def jpeg_of_scans(count: int) -> bytes:
     """A progressive JPEG file that repeats its last scan: each costs a pass over all pixels."""
-    sound = bytes(
-        cv2.imencode(".jpg", np.full((1000, 2000, 3), 128, np.uint8), [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1]
-    )
+    sound = bytes(cv2.imencode(".jpg", np.full((1000, 2000, 3), 128, np.uint8), [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1])
     last = sound.rindex(b"\xff\xda")
     return sound[:last] + sound[last:-2] * count + sound[-2:]
 
@@ -58,7 +56,9 @@ def jpeg_of_scans(count: int) -> bytes:
 def webp_of_size(width: int, height: int) -> bytes:
     """A WebP file whose canvas is of another size than its picture."""
     picture = encoded(".webp")[12:]
-    canvas = b"VP8X" + struct.pack("<II", 10, 0) + (width - 1).to_bytes(3, "little") + (height - 1).to_bytes(3, "little")
+    canvas = (
+        b"VP8X" + struct.pack("<II", 10, 0) + (width - 1).to_bytes(3, "little") + (height - 1).to_bytes(3, "little")
+    )
     body = b"WEBP" + canvas + picture
     return b"RIFF" + struct.pack("<I", len(body)) + body
 

@@ -38,9 +38,13 @@ def read_linear(path: Path, gamma: Gamma = "srgb") -> LinearImage:
     if suffix == ".exr":
         image = _read_exr(path)
     elif suffix == ".hdr":
-        image = _read_coded(path)
+        image = _unit_range(_rgb(_decoded(path.read_bytes(), path)))
     else:
-        image = decode(_read_coded(path), gamma)
+        coded = _decoded(path.read_bytes(), path)
+        if coded.dtype == np.uint8:  # a table: a large picture's powers would take seconds, and thrice its memory
+            table = decode(np.arange(256, dtype=np.float32) / np.float32(255), gamma)
+            return np.asarray(cv2.LUT(_rgb(coded), table), dtype=np.float32)
+        image = decode(_unit_range(_rgb(coded)), gamma)
     if not np.isfinite(image).all():
         raise ImageError(f"{path} holds NaN or infinity", "render or export it again")
     return image
@@ -52,6 +56,8 @@ def read_display(path: Path) -> DisplayImage:
     Raises:
         ImageError: as `read_linear`.
     """
+    if path.suffix.lower() in LDR_SUFFIXES and path.is_file():
+        return decode_display(_read_bytes(path), str(path))
     return uint8_from_linear(read_linear(path))
 
 
@@ -62,7 +68,10 @@ def decode_display(data: bytes, name: str = "the file") -> DisplayImage:
         ImageError: they are none of these, damaged or too large; `name` says what the file is called to a person.
     """
     _check_size(lambda: coded_size(data), name)
-    return uint8_from_linear(decode(_from_coded(_imdecode(data), name), "srgb"))
+    coded = _rgb(_decoded(data, name))
+    if coded.dtype == np.uint8:
+        return coded
+    return np.rint(np.clip(_unit_range(coded), 0, 1) * 255).astype(np.uint8)
 
 
 def read_mask(path: Path) -> Mask:
@@ -155,19 +164,27 @@ def _imdecode(data: bytes, flags: int = _UPRIGHT) -> NDArray | None:
         return None
 
 
-def _from_coded(coded: NDArray | None, name: object) -> NDArray[np.float32]:
+def _decoded(data: bytes, name: object) -> NDArray:
+    coded = _imdecode(data)
     if coded is None:
         raise ImageError(f"{name} cannot be read as a picture", "it may be truncated; save or download it again")
-    scaled = _unit_range(coded)
-    if scaled.ndim == 2:
-        return np.repeat(scaled[..., None], 3, axis=2)
-    if scaled.shape[2] == 2:
-        return np.repeat(scaled[..., :1], 3, axis=2)
-    return np.ascontiguousarray(scaled[..., 2::-1])
+    return coded
 
 
-def _read_coded(path: Path) -> NDArray[np.float32]:
-    return _from_coded(_imdecode(path.read_bytes()), path)
+def _rgb(coded: NDArray) -> NDArray:
+    """OpenCV's channels as RGB (height, width, 3)."""
+    if coded.ndim == 2:
+        return np.repeat(coded[..., None], 3, axis=2)
+    if coded.shape[2] == 2:
+        return np.repeat(coded[..., :1], 3, axis=2)
+    return np.ascontiguousarray(coded[..., 2::-1])
+
+
+def _read_bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ImageError(f"cannot read {path}: {error.strerror}", "check your permission to read it") from error
 
 
 def _unit_range(coded: NDArray) -> NDArray[np.float32]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
+from safetensors.numpy import save
 
 from relit_camera.errors import SubjectError
-from relit_camera.files import atomic_path
+from relit_camera.files import write_atomic
 from relit_camera.subject.local_basis import LocalBasis, whole_basis
 from relit_camera.subject.pack import decode_basis, encode_basis
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
@@ -78,14 +77,8 @@ def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
     else:
         tensors |= {BASIS + name: getattr(subject.basis, name) for name in LOCAL}
     contiguous = {name: np.ascontiguousarray(value) for name, value in tensors.items()}
-    with atomic_path(path) as temporary:
-        try:
-            save_file(contiguous, temporary, metadata={HEADER_KEY: meta.model_dump_json()})
-        except SafetensorError as error:
-            # The library hides the system's error number in its message.
-            if "os error" in str(error).lower() or "I/O" in str(error):
-                raise OSError(_errno_in(str(error)), str(error)) from error
-            raise
+    # In memory: `save_file` would write beside the target, to a file of its own that a crash leaves behind.
+    write_atomic(path, save(contiguous, metadata={HEADER_KEY: meta.model_dump_json()}))
 
 
 def read_subject(path: Path) -> Subject:
@@ -181,7 +174,3 @@ def _check(path: Path, tensors: Mapping[str, NDArray], version: int) -> None:
 
 def _damaged(path: Path, reason: str) -> SubjectError:
     return SubjectError(f"{path} is not a usable subject file: {reason}", "restore it from a copy or build it again")
-
-
-def _errno_in(message: str) -> int:
-    return next((code for code in (28, 13, 30, 2) if os.strerror(code).lower() in message.lower()), 5)
