@@ -60,7 +60,7 @@ def load_settings(path: Path | None = None, overrides: Nested | None = None) -> 
     _check_no_secret(document, found)
     try:
         # A section whose every line is commented out reads as null: its defaults.
-        given = {k: v for k, v in document.items() if v is not None or k not in RelitSettings.model_fields}
+        given = {str(k): v for k, v in document.items() if v is not None or k not in RelitSettings.model_fields}
         return _settings_class(given)(**_without_none(overrides or {}))
     except SettingsError as error:  # a variable of a whole section is JSON; its text may hold the token
         raise ConfigError(f"the environment holds no setting: {error}", "give JSON, or one variable a field") from None
