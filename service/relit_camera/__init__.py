@@ -3,6 +3,10 @@
 import os
 from importlib.metadata import version
 
+# OpenCV reads it when it is loaded: whatever a header says, no decoder takes memory for more than `space.picture_files`
+# lets through.
+os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "64000000")
+
 __version__ = version("relit-camera")
 
 # ONNX Runtime's wheels count uses, keep a device's number in the user's cache, and would send it to their makers. It

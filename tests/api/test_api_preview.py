@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import threading
+import asyncio
+import contextlib
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import cv2
 import httpx
 import numpy as np
 import pytest
+from anyio import CapacityLimiter
 from fastapi import FastAPI
 
 from relit_camera.api import preview as module
-from relit_camera.api.preview import MAX_VIEWERS, Channel, PreviewFeed, Variant, encode
+from relit_camera.api.preview import MAX_VARIANTS, Channel, Encoded, PreviewFeed, Variant, encode
 from relit_camera.api.server import ApiServer
 from relit_camera.space.images import DisplayImage
 from tests.api.api_client import Client, check_problem
@@ -71,6 +72,17 @@ def test_a_picture_is_scaled_and_mirrored(camera: FakeCamera) -> None:
     assert decoded(encode(camera.image, Variant(width=4000))).shape == (180, 320, 3)
 
 
+async def see(channel: Channel, count: int, timeout_s: float = 2.0) -> list[Encoded]:
+    """The next pictures of a channel."""
+    seen = [Encoded(-1, b"")]
+    for _ in range(count):
+        picture = await channel.next(seen[-1].count, timeout_s)
+        assert picture is not None
+        assert picture.count > seen[-1].count
+        seen.append(picture)
+    return seen[1:]
+
+
 def test_viewers_of_one_variant_share_each_encoding(camera: FakeCamera, monkeypatch: pytest.MonkeyPatch) -> None:
     encodings = []
 
@@ -79,75 +91,126 @@ def test_viewers_of_one_variant_share_each_encoding(camera: FakeCamera, monkeypa
         return encode(picture, variant)
 
     monkeypatch.setattr(module, "encode", counted)
-    feed, all_watch = PreviewFeed(camera), threading.Barrier(4)
 
-    def view(_: int) -> list[tuple[int, bytes]]:
-        seen, count = [], -1
+    async def view(feed: PreviewFeed) -> list[Encoded]:
         with feed.watch(Variant()) as channel:
-            all_watch.wait(5)
-            for _ in range(8):
-                picture = channel.next(count, 2.0)
-                assert picture is not None
-                assert picture.count > count
-                count = picture.count
-                seen.append((count, picture.jpeg))
-            all_watch.wait(5)
-        return seen
+            return await see(channel, 8)
 
-    with ThreadPoolExecutor(4) as pool:
-        views = list(pool.map(view, range(4)))
+    async def all_view() -> list[list[Encoded]]:
+        feed = PreviewFeed(camera)
+        return await asyncio.gather(*(view(feed) for _ in range(40)))
+
+    views = asyncio.run(all_view())
     files: dict[int, set[bytes]] = {}
-    for count, jpeg in (pair for seen in views for pair in seen):
-        files.setdefault(count, set()).add(jpeg)
-    assert len(encodings) == len(files) < 4 * 8
+    for picture in (picture for seen in views for picture in seen):
+        files.setdefault(picture.count, set()).add(picture.jpeg)
+    assert len(files) <= len(encodings) < 2 * 8
     assert all(len(same) == 1 for same in files.values())
 
 
-def test_a_rate_limit_is_kept(camera: FakeCamera) -> None:
-    channel, times, count = Channel(camera, Variant(fps=10)), [], -1
-    for _ in range(8):
-        picture = channel.next(count, 1.0)
+def test_a_slow_viewer_skips_pictures_and_delays_nobody(camera: FakeCamera) -> None:
+    async def view() -> tuple[list[int], list[int]]:
+        feed = PreviewFeed(camera)
+        with feed.watch(Variant()) as channel, feed.watch(Variant()) as same:
+            slow: list[int] = [-1]
+
+            async def dawdle() -> None:
+                while True:
+                    picture = await same.next(slow[-1], 1.0)
+                    slow.append(picture.count if picture else slow[-1])
+                    await asyncio.sleep(0.2)
+
+            task = asyncio.create_task(dawdle())
+            fast = [picture.count for picture in await see(channel, 20)]
+            task.cancel()
+            return fast, slow[1:]
+
+    fast, slow = asyncio.run(view())
+    assert fast[-1] - fast[0] <= 19 + 4
+    assert all(later - earlier >= 4 for earlier, later in pairwise(slow))
+
+
+async def made(channel: Channel, count: int) -> list[tuple[float, Encoded]]:
+    """The next pictures of a channel that nobody else watches, each with when it came."""
+    task = asyncio.create_task(channel.run(CapacityLimiter(1)))
+    seen, last = [], -1
+    for _ in range(count):
+        picture = await channel.next(last, 2.0)
         assert picture is not None
-        count = picture.count
-        times.append(time.monotonic())
+        last = picture.count
+        seen.append((time.monotonic(), picture))
+    task.cancel()
+    return seen
+
+
+def test_a_rate_limit_is_kept(camera: FakeCamera) -> None:
+    times = [at for at, _ in asyncio.run(made(Channel(camera, Variant(fps=10)), 8))]
     assert (times[-1] - times[0]) / 7 == pytest.approx(0.1, abs=0.025)
     assert all(later - earlier > 0.05 for earlier, later in pairwise(times[1:]))
 
 
 def test_a_limit_at_the_camera_s_rate_drops_no_picture(camera: FakeCamera) -> None:
-    channel, counts = Channel(camera, Variant(fps=FPS)), [-1]
-    for _ in range(20):
-        picture = channel.next(counts[-1], 1.0)
-        assert picture is not None
-        counts.append(picture.count)
-    assert counts[-1] - counts[1] <= 19 + 3  # a busy machine may miss one now and then, not every other
+    counts = [picture.count for _, picture in asyncio.run(made(Channel(camera, Variant(fps=FPS)), 20))]
+    assert counts[-1] - counts[0] <= 19 + 3  # a busy machine may miss one now and then, not every other
+
+
+def test_many_viewers_share_what_may_be_sent(camera: FakeCamera, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "SENT_PER_S", 40)
+
+    async def rate() -> float:
+        feed = PreviewFeed(camera)
+        with contextlib.ExitStack() as stack:
+            channels = [stack.enter_context(feed.watch(Variant())) for _ in range(4)]
+            await see(channels[0], 1)
+            began = time.monotonic()
+            await see(channels[0], 6)
+            return 5 / (time.monotonic() - began)
+
+    assert asyncio.run(rate()) == pytest.approx(40 / 4, rel=0.3)
 
 
 def test_waiting_ends_when_time_is_up(camera: FakeCamera) -> None:
     camera.publishing = False
-    channel = Channel(camera, Variant())
-    started = time.monotonic()
-    assert channel.next(-1, 0.1) is None
-    assert time.monotonic() - started < 0.5
+
+    async def wait() -> float:
+        with PreviewFeed(camera).watch(Variant()) as channel:
+            started = time.monotonic()
+            assert await channel.next(-1, 0.1) is None
+            return time.monotonic() - started
+
+    assert 0.09 < asyncio.run(wait()) < 0.5
 
 
-def test_a_second_viewer_waits_no_longer_than_it_said(camera: FakeCamera) -> None:
-    camera.publishing = False
-    channel = Channel(camera, Variant())
-    first = threading.Thread(target=channel.next, args=(-1, 1.0))
-    first.start()
-    started = time.monotonic()
-    assert channel.next(-1, 0.1) is None
-    assert time.monotonic() - started < 0.5
-    first.join()
+def test_a_preview_that_fails_ends_and_says_so(
+    camera: FakeCamera, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(*_: object) -> bytes:
+        raise MemoryError("no room")
+
+    monkeypatch.setattr(module, "encode", fail)
+
+    async def look() -> bool:
+        with PreviewFeed(camera).watch(Variant()) as channel:
+            assert await channel.next(-1, 2.0) is None
+            return channel.ended
+
+    assert asyncio.run(look())
+    assert "a preview has ended" in caplog.text
 
 
 def test_channels_last_as_long_as_somebody_watches(camera: FakeCamera) -> None:
-    feed = PreviewFeed(camera)
-    with feed.watch(Variant()) as one, feed.watch(Variant()) as same, feed.watch(Variant(mirror=True)) as other:
-        assert one is same is not other
-        assert feed.viewers == 3
-    assert feed.viewers == 0
+    async def look() -> None:
+        feed = PreviewFeed(camera)
+        with feed.watch(Variant()) as one, feed.watch(Variant()) as same, feed.watch(Variant(mirror=True)) as other:
+            assert one is same is not other
+            assert feed.viewers == 3
+            await asyncio.gather(see(one, 1), see(other, 1))
+        assert feed.viewers == 0
+        await asyncio.sleep(0.05)
+        assert one.ended
+        assert other.ended
+
+    asyncio.run(look())
 
 
 def test_snapshot_is_the_newest_picture_whole(client: Client, camera: FakeCamera) -> None:
@@ -197,17 +260,31 @@ def test_a_viewer_who_leaves_while_nothing_comes_is_noticed(
     assert wait_until(lambda: feed.viewers == 0)
 
 
-def test_one_viewer_too_many_is_told_so(server: ApiServer, app: FastAPI) -> None:
+def test_one_viewer_too_many_is_told_so(server: ApiServer, app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MAX_VIEWERS", 3)
     feed = app.state.context.preview
     with httpx.Client(base_url=server.address.url, timeout=5) as client:
-        opened = [client.send(client.build_request("GET", PREVIEW), stream=True) for _ in range(MAX_VIEWERS)]
-        assert wait_until(lambda: feed.viewers == MAX_VIEWERS)
-        assert "8 previews" in check_problem(client.get(PREVIEW), 503)["what"]
+        opened = [client.send(client.build_request("GET", PREVIEW), stream=True) for _ in range(3)]
+        assert wait_until(lambda: feed.viewers == 3)
+        assert "3 previews" in check_problem(client.get(PREVIEW), 503)["what"]
         assert client.get("api/v1/mode").status_code == 200
         opened.pop().close()
-        assert wait_until(lambda: feed.viewers < MAX_VIEWERS)
+        assert wait_until(lambda: feed.viewers < 3)
         opened.append(client.send(client.build_request("GET", PREVIEW), stream=True))
         assert opened[-1].status_code == 200
+        for answer in opened:
+            answer.close()
+
+
+def test_one_variant_too_many_is_told_so(server: ApiServer, app: FastAPI) -> None:
+    """Viewers of those that there are may still come: they cost no encoding."""
+    feed = app.state.context.preview
+    with httpx.Client(base_url=server.address.url, timeout=5) as client:
+        urls = [f"{PREVIEW}?width={64 + number}" for number in range(MAX_VARIANTS)]
+        opened = [client.send(client.build_request("GET", url), stream=True) for url in (*urls, urls[0])]
+        assert wait_until(lambda: feed.viewers == MAX_VARIANTS + 1)
+        assert "sizes and rates" in check_problem(client.get(f"{PREVIEW}?width=200"), 503)["what"]
+        assert client.get("api/v1/mode").status_code == 200
         for answer in opened:
             answer.close()
 

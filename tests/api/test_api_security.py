@@ -7,7 +7,7 @@ import re
 import pytest
 
 from relit_camera.api.app import PANEL
-from relit_camera.api.security import is_ours
+from relit_camera.api.security import OurNames, Place
 from tests.api.api_client import BASE_URL, Client, check_problem
 from tests.api.fake_camera import FakeCamera
 
@@ -43,9 +43,10 @@ def test_other_hosts_are_refused(client: Client, host: str, path: str) -> None:
 
 
 def test_port_80_need_not_be_named() -> None:
-    assert is_ours("localhost", 80)
-    assert not is_ours("localhost", 8470)
-    assert not is_ours("localhost:80", None)
+    names = OurNames()
+    assert names.include("localhost", Place("127.0.0.1", 80))
+    assert not names.include("localhost", Place("127.0.0.1", 8470))
+    assert not names.include("localhost:80", Place("", None))
 
 
 @pytest.mark.parametrize("origin", [BASE_URL, "http://localhost:8470", "http://[::1]:8470"])

@@ -67,7 +67,7 @@ def test_show_is_what_holds_after_file_environment_and_options(elsewhere, monkey
     path = write(elsewhere, "server:\n  port: 1000\nlog_level: error\noutput:\n  width: 640\n")
     monkeypatch.setenv("RELIT_SERVER__PORT", "2000")
     settings = shown("--config", path, "--log-level", "debug")
-    assert settings["server"] == {"host": "127.0.0.1", "port": 2000}
+    assert settings["server"] == {"host": "127.0.0.1", "port": 2000, "token_file": None, "names": []}
     assert settings["log_level"] == "debug"
     assert settings["output"]["width"] == 640
     assert settings["output"]["height"] == 720

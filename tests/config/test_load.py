@@ -86,7 +86,7 @@ def test_parts_of_one_topic_come_from_all_three_places(write, monkeypatch):
         ("log_level: info\nserver:\n  prot: 1\n", 3, ["server.prot", "not permitted", "is 1"]),
         ("output:\n  sink: null\n\n  width: 1281\n", 4, ["output.width", "multiple of 2", "1281"]),
         ("output:\n  fps: .nan\n", 2, ["output.fps", "finite", "nan"]),
-        ("server:\n  host: 0.0.0.0\n", 2, ["server.host", "loopback", "0.0.0.0"]),
+        ("server:\n  names: [a, B]\n", 2, ["server.names.1", "pattern", "'B'"]),
         ("log_level: loud\n", 1, ["log_level", "'debug'", "loud"]),
         ("nonsense: 3\n", 1, ["nonsense", "not permitted"]),
         (

@@ -48,7 +48,7 @@ def test_add_load_and_remove(store: EnvironmentStore, tmp_path: Path) -> None:
 
 def test_bytes_are_stored_as_they_are(store: EnvironmentStore, tmp_path: Path) -> None:
     data = hdr(tmp_path / "a.hdr").read_bytes()
-    store.add("upload", data, ".HDR")
+    store.add_upload("upload", data, ".HDR")
     assert (store.folder / "upload.hdr").read_bytes() == data
 
 
@@ -71,6 +71,14 @@ def test_map_axes_are_stored_as_a_picture(store: EnvironmentStore, tmp_path: Pat
     stored = store.add("room", source, axes="map")
     np.testing.assert_array_equal(stored.panorama.radiance, read_panorama(source, axes="map").radiance)
     assert left_behind(store) == ["room.exr"]
+
+
+def test_of_two_files_with_one_name_none_stays(store: EnvironmentStore, tmp_path: Path) -> None:
+    """A crash between writing one and deleting the other leaves both."""
+    store.add("room", hdr(tmp_path / "a.hdr"))
+    cv2.imwrite(str(store.folder / "room.png"), np.full((16, 32, 3), 128, np.uint8))
+    store.remove("room")
+    assert left_behind(store) == []
 
 
 def test_clipped_highlights_are_said_in_a_note(store: EnvironmentStore, tmp_path: Path) -> None:
@@ -99,10 +107,10 @@ def test_built_in_environments_stay(store: EnvironmentStore) -> None:
 def test_what_is_no_light_is_refused_and_leaves_what_was(store: EnvironmentStore, tmp_path: Path) -> None:
     good = store.add("room", hdr(tmp_path / "a.hdr"))
     with pytest.raises(PanoramaError, match=r"^room\.hdr cannot be read") as caught:
-        store.add("room", b"rubbish", ".hdr")
+        store.add_upload("room", b"rubbish", ".hdr")
     assert str(tmp_path) not in str(caught.value)
     with pytest.raises(PanoramaError, match="format"):
-        store.add("room", b"rubbish", "")
+        store.add_upload("room", b"rubbish", "")
     with pytest.raises(PanoramaError, match="no panorama at"):
         store.add("room", tmp_path / "none.hdr")
     assert store.load("room") is good
@@ -152,7 +160,7 @@ def test_a_file_put_there_by_hand_counts_and_a_damaged_one_is_said_to_be(store: 
 
 def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(StorageError, match="cannot make"):
+    with pytest.raises(StorageError, match="cannot write"):
         EnvironmentStore(tmp_path / "file" / "environments").add("room", hdr(tmp_path / "a.hdr"))
 
 

@@ -125,7 +125,7 @@ def test_a_full_disk_leaves_nothing(subject: Subject, tmp_path: Path, monkeypatc
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("relit_camera.subject.tensor_file.save_file", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(StorageError, match="free some space"):
         write_subject(tmp_path / "s.relit", subject)
     assert list(tmp_path.iterdir()) == []
@@ -135,7 +135,7 @@ def test_the_store_names_what_is_near(path: Path, tmp_path: Path) -> None:
     store = SubjectStore(tmp_path / "store")
     store.folder.mkdir()
     shutil.copy(path, store.folder / "anna.relit")
-    (store.folder / ".anna.0x1y.relit").touch()  # a write under way
+    (store.folder / ".anna.unfinished-0x1y2z3a.relit").touch()  # a write under way
     assert store.names() == ["anna"]
     assert store.resolve("anna")[0] == "anna"
     assert store.resolve(str(path))[0] == "s"

@@ -10,6 +10,7 @@ from starlette.responses import FileResponse
 from starlette.staticfiles import StaticFiles
 
 from relit_camera import __version__
+from relit_camera.api.access import TokenRequired
 from relit_camera.api.bodies import BodyLimit, HeadAsGet
 from relit_camera.api.context import make_context
 from relit_camera.api.error_handlers import install_error_handlers
@@ -25,8 +26,9 @@ from relit_camera.api.routes import (
     status,
     subjects,
 )
-from relit_camera.api.security import LocalOnly
+from relit_camera.api.security import OurNames, OurPagesOnly
 from relit_camera.config.settings import RelitSettings
+from relit_camera.config.token import read_token
 from relit_camera.stream.control import CameraControl
 
 PREFIX = "/api/v1"
@@ -34,9 +36,19 @@ PANEL = Path(__file__).with_name("panel")
 
 
 def create_app(camera: CameraControl, settings: RelitSettings) -> FastAPI:
-    """The API and the panel of a running camera."""
+    """The API and the panel of a running camera.
+
+    Raises:
+        ConfigError: as `read_token`.
+    """
     app = bare_app()
     app.state.context = make_context(camera, settings)
+    token = read_token(settings.server)
+    app.add_middleware(HeadAsGet)
+    app.add_middleware(BodyLimit)
+    if token is not None:
+        app.add_middleware(TokenRequired, token=token)
+    app.add_middleware(OurPagesOnly, names=OurNames.of(settings.server))  # the last is met first
     return app
 
 
@@ -61,8 +73,6 @@ def bare_app() -> FastAPI:
     app.mount("/panel", StaticFiles(directory=PANEL), "panel")
     install_error_handlers(app)
     app.openapi = lambda: _described(app)  # type: ignore[method-assign]
-    for check in (HeadAsGet, BodyLimit, LocalOnly):  # the last is met first
-        app.add_middleware(check)
     return app
 
 

@@ -61,8 +61,8 @@ def make_context(camera: CameraControl, settings: RelitSettings) -> ApiContext:
     return ApiContext(camera, PresetStore(settings.storage.presets), PreviewFeed(camera))
 
 
-def context_of(request: Request) -> ApiContext:
-    """The context that `create_app` put into the application."""
+async def context_of(request: Request) -> ApiContext:
+    """The context that `create_app` put into the application. Async: else each request would borrow a thread for it."""
     context: ApiContext = request.app.state.context
     return context
 

@@ -21,6 +21,7 @@ TAGS = [
     {"name": "status", "description": "How the camera is doing."},
     {"name": "probes", "description": "For supervisors and Prometheus."},
 ]
+OTHER_ERRORS = "Any other error: 401 the token is needed, 403 another site, 421 wrong host, 500 a fault"
 
 
 def operation_id(route: APIRoute) -> str:
@@ -38,12 +39,16 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
         routes=app.routes,
         tags=TAGS,
     )
+    document["components"]["securitySchemes"] = {
+        "token": {"type": "http", "scheme": "bearer", "description": "Needed where the camera was given a token"}
+    }
+    document["security"] = [{}, {"token": []}]
     for operations in document["paths"].values():
         for operation in operations.values():
             answers = operation["responses"]
             for status in ("400", "413") if "requestBody" in operation else ():
                 answers.setdefault(status, {"description": KINDS[int(status)][1]})
-            answers["default"] = {"description": "Any other error: 403 another site, 421 wrong host, 500 a fault"}
+            answers["default"] = {"description": OTHER_ERRORS}
             for status, answer in answers.items():
                 if status >= "400":
                     answer["content"] = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}

@@ -9,6 +9,7 @@ import yaml
 from pydantic import ValidationError
 
 from relit_camera.config.look import Look
+from relit_camera.config.yaml_text import MAX_BYTES, parse_yaml
 from relit_camera.errors import InputError, NotFoundError
 from relit_camera.files import make_folder, write_atomic
 
@@ -37,12 +38,14 @@ class PresetStore:
         """
         path = self._path(name)
         try:
-            return Look.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+            if path.stat().st_size > MAX_BYTES:
+                raise ValueError(f"it is larger than {MAX_BYTES >> 20} MiB")
+            return Look.model_validate(parse_yaml(path.read_text(encoding="utf-8")))
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             reason = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-        except (yaml.YAMLError, OSError, UnicodeDecodeError) as error:
-            reason = str(error)
+        except (OSError, ValueError) as error:
+            reason = str(error).strip(" :")
         raise InputError(f"preset '{name}' cannot be read: {reason}", "correct its file, or save it again")
 
     def save(self, name: str, look: Look) -> bool:

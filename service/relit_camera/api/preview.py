@@ -1,27 +1,38 @@
 """Preview pictures: each is scaled and encoded once, however many look on.
 
-All viewers who ask for the same size, mirroring and rate share one channel. Whoever comes first for the next picture
-waits for it and encodes it; the others find it done. A slow viewer skips pictures and delays nobody.
+All viewers who ask for the same size, mirroring and rate share one channel: one task takes the published pictures,
+encodes them in a thread, and wakes those who wait. A viewer has no thread and is sent the newest picture when it has
+taken the one before: a slow viewer skips pictures and delays nobody. All of this belongs to the server's event loop.
 """
 
 from __future__ import annotations
 
-import threading
+import asyncio
+import logging
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from anyio import CapacityLimiter, to_thread
 
 from relit_camera.api.problems import NotReadyError
 from relit_camera.space.images import DisplayImage
 from relit_camera.space.picture_files import encode_display
 from relit_camera.stream.control import CameraControl
 
-MAX_VIEWERS = 8
-"""A viewer waits on one of the event loop's 40 threads: more would leave too few for the other operations."""
+log = logging.getLogger(__name__)
+
+MAX_VARIANTS = 8
+"""Each is encoded for itself, in a thread."""
+MAX_VIEWERS = 256
+"""Each is an open connection, of the 1024 files that a process may usually have open."""
+SENT_PER_S = 1000
+"""Pictures sent a second to all viewers together: beyond that each gets fewer, so that the camera keeps its cores."""
+WAIT_S = 0.25
+"""How long to wait for a picture before looking whether to end."""
 JPEG_QUALITY = 82
 
 
@@ -49,41 +60,63 @@ class Encoded:
 
 
 class Channel:
-    """The pictures of one variant."""
+    """The pictures of one variant, while `run` makes them.
 
-    def __init__(self, camera: CameraControl, variant: Variant) -> None:
+    Attributes:
+        viewers: how many look on.
+        ended: `run` is over: no more pictures come.
+    """
+
+    def __init__(self, camera: CameraControl, variant: Variant, fps: Callable[[], float] | None = None) -> None:
+        """Set up.
+
+        Args:
+            camera: whose pictures they are.
+            variant: how they are wanted.
+            fps: pictures a second that may be made at present; the variant's if not given.
+        """
+        self.viewers = 0
+        self.ended = False
         self._camera = camera
         self._variant = variant
-        self._turn = threading.Lock()
+        self._fps = fps or (lambda: variant.fps)
         self._newest = Encoded(-1, b"")
-        self._due = 0.0
+        self._came = asyncio.Event()
 
-    def next(self, after: int, timeout_s: float) -> Encoded | None:
-        """The newest picture whose count is above `after`, waiting up to `timeout_s` for one; None when time is up.
+    async def next(self, after: int, timeout_s: float) -> Encoded | None:
+        """The newest picture whose count is above `after`, waiting up to `timeout_s` for one; None when time is up."""
+        if self._newest.count <= after and not self.ended:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(timeout_s):
+                    await self._came.wait()
+        return self._newest if self._newest.count > after else None
 
-        Blocks: call it off the event loop.
-        """
-        deadline = time.monotonic() + timeout_s
-        if not self._turn.acquire(timeout=timeout_s):
-            return None
+    async def run(self, limiter: CapacityLimiter) -> None:
+        """Make pictures until cancelled, each in a thread that `limiter` lends."""
+        due = 0.0
         try:
-            if self._newest.count > after:
-                return self._newest
-            pause = min(self._due, deadline) - time.monotonic()
-            if pause > 0:
-                time.sleep(pause)
-            now = time.monotonic()
-            if now >= deadline:
-                return None
-            published = self._camera.picture(after, deadline - now)
-            if published is None:
-                return None
-            # From the last due time, not from now: else waking late would slow the rate, each time a little.
-            self._due = max(self._due + 1 / self._variant.fps, time.monotonic())
-            self._newest = Encoded(published[0], encode(published[1], self._variant))
-            return self._newest
+            while True:
+                await asyncio.sleep(max(0.0, due - time.monotonic()))
+                made = await to_thread.run_sync(self._make, limiter=limiter, abandon_on_cancel=True)
+                if made is None:
+                    continue
+                # From the last due time, not from now: else waking late would slow the rate, each time a little.
+                due = max(due + 1 / self._fps(), time.monotonic())
+                self._newest = made
+                self._wake()
+        except Exception:
+            log.exception("a preview has ended")
         finally:
-            self._turn.release()
+            self.ended = True
+            self._wake()
+
+    def _make(self) -> Encoded | None:
+        published = self._camera.picture(self._newest.count, WAIT_S)
+        return None if published is None else Encoded(published[0], encode(published[1], self._variant))
+
+    def _wake(self) -> None:
+        self._came.set()
+        self._came = asyncio.Event()
 
 
 class PreviewFeed:
@@ -91,37 +124,49 @@ class PreviewFeed:
 
     def __init__(self, camera: CameraControl) -> None:
         self._camera = camera
-        self._lock = threading.Lock()
-        self._channels: dict[Variant, tuple[Channel, int]] = {}
+        self._channels: dict[Variant, tuple[Channel, asyncio.Task[None]]] = {}
+        self._limiter: CapacityLimiter | None = None
 
     @property
     def viewers(self) -> int:
         """How many look on now."""
-        with self._lock:
-            return sum(count for _, count in self._channels.values())
+        return sum(channel.viewers for channel, _ in list(self._channels.values()))
 
-    def check_room(self) -> None:
+    def check_room(self, variant: Variant) -> None:
         """Check that one more may look on.
 
         Raises:
-            NotReadyError: `MAX_VIEWERS` look on already.
+            NotReadyError: `MAX_VIEWERS` look on already, or at `MAX_VARIANTS` other variants.
         """
         if self.viewers >= MAX_VIEWERS:
             raise NotReadyError(f"{MAX_VIEWERS} previews are open already", "close one of them")
+        if variant not in self._channels and len(self._channels) >= MAX_VARIANTS:
+            raise NotReadyError(
+                f"previews of {MAX_VARIANTS} sizes and rates are open already", "ask for one of those, or close one"
+            )
 
     @contextmanager
     def watch(self, variant: Variant) -> Iterator[Channel]:
-        """The channel of a variant; it lasts as long as somebody watches."""
-        with self._lock:
-            channel, count = self._channels.get(variant) or (Channel(self._camera, variant), 0)
-            self._channels[variant] = channel, count + 1
+        """The channel of a variant, inside the event loop; it lasts as long as somebody watches.
+
+        Raises:
+            NotReadyError: as `check_room`.
+        """
+        self.check_room(variant)
+        if self._limiter is None:  # its own threads: those of the other operations stay free
+            self._limiter = CapacityLimiter(MAX_VARIANTS)
+        if variant not in self._channels:
+            made = Channel(self._camera, variant, lambda: min(variant.fps, SENT_PER_S / max(1, self.viewers)))
+            self._channels[variant] = made, asyncio.get_running_loop().create_task(made.run(self._limiter))
+        channel, task = self._channels[variant]
+        channel.viewers += 1
         try:
             yield channel
         finally:
-            with self._lock:
-                channel, count = self._channels.pop(variant)
-                if count > 1:
-                    self._channels[variant] = channel, count - 1
+            channel.viewers -= 1
+            if channel.viewers == 0:
+                del self._channels[variant]
+                task.cancel()
 
 
 def encode(picture: DisplayImage, variant: Variant) -> bytes:

@@ -78,6 +78,7 @@ STATUS_OF = {
 
 KINDS = {
     400: ("unreadable", "The request cannot be read"),
+    401: ("token-needed", "The token is needed"),
     403: ("refused", "Refused"),
     404: ("not-found", "Not found"),
     405: ("method-not-allowed", "Method not allowed"),

@@ -15,8 +15,10 @@ import uvicorn
 from fastapi import FastAPI
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from relit_camera.api.connections import SEND_BUFFER, TimedConnection
 from relit_camera.api.problems import NotReadyError, problem_of
 from relit_camera.config.settings import ServerSettings
+from relit_camera.config.token import read_token
 from relit_camera.errors import ConfigError, PortInUseError, RelitError
 
 START_S = 10.0
@@ -47,6 +49,7 @@ class ApiServer:
         self._closing: threading.Event = app.state.context.closing
         config = uvicorn.Config(
             _QuietEnd(app, self._closing),
+            http=TimedConnection,
             log_config=None,
             access_log=False,
             lifespan="off",
@@ -118,12 +121,16 @@ def listen(settings: ServerSettings) -> socket.socket:
 
     Raises:
         PortInUseError: another program listens there.
-        ConfigError: the address does not exist on this machine, or the port needs rights.
+        ConfigError: the address does not exist on this machine, the port needs rights, or the address can be reached
+            from other machines and there is no token (`read_token`).
     """
+    read_token(settings)
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     place = f"port {settings.port} on {settings.host}"
     try:
-        return socket.create_server((settings.host, settings.port), family=family, backlog=BACKLOG)
+        listener = socket.create_server((settings.host, settings.port), family=family, backlog=BACKLOG)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)  # of the connections that it accepts
+        return listener
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
             cure = (

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from relit_camera.errors import LightsError
 from relit_camera.face.schemes import landmark_scheme
 from relit_camera.space.images import Points
+
+MAX_BYTES = 16 << 20
 
 _Layout = TypeAdapter(dict[str, list[tuple[float, float]]])
 
@@ -26,8 +27,10 @@ def read_landmarks(path: Path, required: bool) -> Mapping[str, Points]:
     if not path.is_file() and not required:
         return {}
     try:
-        listed = _Layout.validate_python(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, ValueError, ValidationError) as error:
+        if path.stat().st_size > MAX_BYTES:
+            raise ValueError(f"it is larger than {MAX_BYTES >> 20} MiB")
+        listed = _Layout.validate_json(path.read_bytes())
+    except (OSError, ValueError) as error:
         cure = "it must be JSON {scheme: [[x, y], …]}"
         raise LightsError(f"{path} holds no landmarks: {str(error).splitlines()[0]}", cure) from error
     for scheme, points in listed.items():

@@ -12,6 +12,7 @@ from relit_camera.errors import LightsError
 
 NORM_TOLERANCE = 0.01
 MIN_LIGHTS = 4
+MAX_BYTES = 4 << 20
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,8 @@ def read_lights(path: Path) -> list[LightPicture]:
         LightsError: not an .lp file, a wrong count, a missing picture, a direction that is not a unit vector.
     """
     try:
+        if path.stat().st_size > MAX_BYTES:
+            raise LightsError(f"{path} is larger than {MAX_BYTES >> 20} MiB", "is it an .lp file?")
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = "not a text file" if isinstance(error, UnicodeDecodeError) else error.strerror

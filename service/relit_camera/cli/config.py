@@ -21,9 +21,10 @@ def group() -> None:
 def check(context: typer.Context, file: ConfigFile = None) -> None:
     """Check the configuration. What is wrong is said with file, line, key and value, and exits with 1."""
     from relit_camera.config.load import config_path, load_settings
+    from relit_camera.config.token import read_token
 
     chosen = file or (context.find_root().obj or {}).get("config")
-    load_settings(chosen)
+    read_token(load_settings(chosen).server)
     path = config_path(chosen)
     typer.echo(f"{path} is right" if path else "there is no configuration file: the defaults hold")
 

@@ -14,7 +14,7 @@ def demo(
     context: typer.Context,
     headless: Annotated[bool, typer.Option("--headless", help="Do not open the page in a browser.")] = False,
     seconds: Annotated[float | None, typer.Option(min=0, help="End after so long; until Ctrl-C if not given.")] = None,
-    host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback only.")] = None,
+    host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback, or a token is set.")] = None,
     port: Annotated[int | None, typer.Option(help="Port of API and panel; 0 picks one.")] = None,
 ) -> None:
     """Show a bundled person in one place after another; whoever touches the panel takes over."""

@@ -18,7 +18,7 @@ def run(
     environment: Annotated[str | None, typer.Option(help="A stored environment's name, or a panorama file.")] = None,
     mode: Annotated[str | None, typer.Option(help="reenact or ratio.")] = None,
     tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
-    host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback only.")] = None,
+    host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback, or a token is set.")] = None,
     port: Annotated[int | None, typer.Option(help="Port of API and panel; 0 picks one.")] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of the output.")] = None,
     on_demand: Annotated[

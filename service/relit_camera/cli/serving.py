@@ -25,6 +25,7 @@ from relit_camera.config.settings import OutputSettings, RelitSettings
 from relit_camera.config.watch import watch_config
 from relit_camera.cores import leave_to_stay, share_cores
 from relit_camera.errors import ConfigError
+from relit_camera.files import sweep_unfinished
 from relit_camera.stream.assembly import make_tracker
 from relit_camera.stream.daemon import Daemon
 from relit_camera.stream.demand.on_demand import OnDemand
@@ -63,6 +64,8 @@ def run_camera(
         RelitError: the port is in use, a file, device or model is missing …
     """
     share_cores()
+    for folder in settings.storage.folders:
+        sweep_unfinished(folder)  # what an earlier run left where it was killed
     look, director = settings.look, Director(settings.storage)
     if environment is not None:
         named = look.lighting.model_copy(update={"environment": director.admit_environment(environment)})

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from zipfile import BadZipFile
+from typing import IO
+from zipfile import BadZipFile, ZipFile
 
 import cv2
 import numpy as np
@@ -15,6 +17,10 @@ from relit_camera.compose.background import cover
 from relit_camera.errors import InputError
 from relit_camera.files import atomic_path
 from relit_camera.space.images import Frame, Mask
+
+MAX_BYTES = 1 << 30
+"""Of all mattes in memory: ten minutes of 256x256 at 30 frames a second are that much."""
+CURE = "name a file that holds `alpha`, uint8 (frames, height, width)"
 
 
 class RecordedMatte:
@@ -26,16 +32,12 @@ class RecordedMatte:
         Raises:
             InputError: the file is missing or holds no mattes.
         """
-        cure = "name a file that holds `alpha`, uint8 (frames, height, width)"
         try:
-            with path.open("rb") as file, np.load(file) as kept:
-                self._alpha: NDArray[np.uint8] = kept["alpha"]
+            self._alpha = _read_alpha(path)
         except OSError as error:
-            raise InputError(f"cannot read {path}: {error.strerror or error}", cure) from error
-        except (ValueError, TypeError, KeyError, EOFError, BadZipFile, zlib.error) as error:  # TypeError: a bare .npy
-            raise InputError(f"{path} holds no recorded mattes: {error}", cure) from error
-        if self._alpha.dtype != np.uint8 or self._alpha.ndim != 3 or 0 in self._alpha.shape:
-            raise InputError(f"the mattes in {path} are {self._alpha.dtype} {self._alpha.shape}", cure)
+            raise InputError(f"cannot read {path}: {error.strerror or error}", CURE) from error
+        except (ValueError, KeyError, EOFError, NotImplementedError, BadZipFile, zlib.error) as error:
+            raise InputError(f"{path} holds no recorded mattes: {error}", CURE) from error
 
     def matte(self, frame: Frame) -> Mask:
         """Alpha of the person, float32 (height, width) of the frame in 0..1, straight.
@@ -45,6 +47,26 @@ class RecordedMatte:
         alpha = self._alpha[frame.index % len(self._alpha)]
         filled = cover(alpha, frame.size, cv2.INTER_LINEAR)
         return np.multiply(filled, np.float32(1 / 255), dtype=np.float32)
+
+
+def _read_alpha(path: Path) -> NDArray[np.uint8]:
+    """The array, after looking at its header: a few bytes of a zip may stand for any amount of memory."""
+    with ZipFile(path) as kept, kept.open("alpha.npy") as file:
+        shape, _, dtype = _header(file)
+        if dtype != np.uint8 or len(shape) != 3 or 0 in shape:
+            raise ValueError(f"they are {dtype} {shape}")
+        if math.prod(shape) > MAX_BYTES:
+            raise ValueError(f"they are {math.prod(shape) >> 20} MiB, more than {MAX_BYTES >> 20}")
+    with np.load(path, allow_pickle=False) as kept_arrays:
+        alpha: NDArray[np.uint8] = kept_arrays["alpha"]
+        return alpha
+
+
+def _header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
+    version = np.lib.format.read_magic(file)
+    if version == (1, 0):
+        return np.lib.format.read_array_header_1_0(file)
+    return np.lib.format.read_array_header_2_0(file)
 
 
 def write_mattes(path: Path, mattes: Sequence[Mask]) -> None:

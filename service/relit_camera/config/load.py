@@ -10,9 +10,10 @@ from typing import Any
 import yaml
 from platformdirs import user_config_path
 from pydantic import ValidationError
-from pydantic_settings import BaseSettings, PydanticBaseSettingsSource
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsError
 
 from relit_camera.config.settings import RelitSettings
+from relit_camera.config.yaml_text import MAX_BYTES, parse_yaml
 from relit_camera.errors import ConfigError
 
 CONFIG_VARIABLE = "RELIT_CONFIG"
@@ -50,18 +51,19 @@ def load_settings(path: Path | None = None, overrides: Nested | None = None) -> 
     found = config_path(path)
     text = _read(found) if found else ""
     try:
-        document = yaml.safe_load(text) or {}
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f" line {mark.line + 1}" if mark else ""
-        raise ConfigError(f"{found}{line}: {getattr(error, 'problem', None) or error}", "correct the YAML") from error
+        document = parse_yaml(text) or {}
+    except ValueError as error:
+        raise ConfigError(f"{found}{error}", "correct the YAML") from error
     if not isinstance(document, dict):
         raise ConfigError(f"{found}: expected keys and values, found {type(document).__name__}", "see config.yaml")
     _check_environment()
+    _check_no_secret(document, found)
     try:
         # A section whose every line is commented out reads as null: its defaults.
-        given = {k: v for k, v in document.items() if v is not None or k not in RelitSettings.model_fields}
+        given = {str(k): v for k, v in document.items() if v is not None or k not in RelitSettings.model_fields}
         return _settings_class(given)(**_without_none(overrides or {}))
+    except SettingsError as error:  # a variable of a whole section is JSON; its text may hold the token
+        raise ConfigError(f"the environment holds no setting: {error}", "give JSON, or one variable a field") from None
     except ValidationError as error:
         raise _config_error(error, overrides or {}, found, text) from error
 
@@ -98,6 +100,8 @@ class _Document(PydanticBaseSettingsSource):
 
 def _read(path: Path) -> str:
     try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ConfigError(f"{path} is larger than {MAX_BYTES >> 20} MiB", "name a configuration file")
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"cannot read {path}: {error}", "check the file") from error
@@ -116,6 +120,15 @@ def _check_environment() -> None:
             )
 
 
+def _check_no_secret(document: Nested, path: Path | None) -> None:
+    """Refuse a token beside the other settings: those are shown, shared and readable by others."""
+    server = document.get("server")
+    if isinstance(server, dict) and "token" in server:
+        raise ConfigError(
+            f"{path}: server.token does not belong here", "put the token into a file of its own: server.token_file"
+        )
+
+
 def _without_none(values: Nested) -> dict[str, Any]:
     cleaned = {k: _without_none(v) if isinstance(v, Mapping) else v for k, v in values.items()}
     return {k: v for k, v in cleaned.items() if v is not None and v != {}}
@@ -126,7 +139,11 @@ def _config_error(error: ValidationError, overrides: Nested, path: Path | None, 
     location = [part for part in first["loc"] if not str(part).startswith("function-")]
     key = ".".join(map(str, location))
     message = first["msg"].removeprefix("Value error, ")
-    shown = f" (is {first['input']!r:.60})" if not isinstance(first["input"], dict) else ""
+    # Nothing that may be the token: the word may be misspelt.
+    misspelt = first["type"] == "extra_forbidden" and isinstance(first["input"], str)
+    secret = location[:1] == ["server"] and (misspelt or "token" in location)
+    tells = not secret and not isinstance(first["input"], dict)
+    shown = f" (is {first['input']!r:.60})" if tells else ""
     place = _place_of(location, overrides, path, text, missing=first["type"] == "missing")
     return ConfigError(f"{place}{key}: {message}{shown}", "see 'relit config schema'")
 
@@ -148,7 +165,7 @@ def _place_of(location: list[Any], overrides: Nested, path: Path | None, text: s
 
 def _line_of(text: str, location: list[Any]) -> int | None:
     """Line of a key in the YAML text, or None where it is not there."""
-    node = yaml.compose(text)
+    node = yaml.compose(text)  # which `parse_yaml` has read
     line = None
     for part in location:
         if isinstance(node, yaml.MappingNode):

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 Channel = Annotated[float, Field(ge=0, le=100)]
 Rgb = tuple[Channel, Channel, Channel]
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9 _.-]{0,62}[A-Za-z0-9_-])?$")]
-"""A stored thing's name: letters, digits, space, dot, dash, underscore; no dot or space last, so that it is safe as a
-file name everywhere."""
+_DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9]) *(\..*)?", re.IGNORECASE)
+"""Names that stand for devices on Windows, in every folder and with every suffix."""
+
+
+def _no_device(name: str) -> str:
+    if _DEVICES.fullmatch(name):
+        raise ValueError(f"'{name}' is a device on Windows")
+    return name
+
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9 _.-]{0,62}[A-Za-z0-9_-])?$"), AfterValidator(_no_device)]
+"""A stored thing's name: letters, digits, space, dot, dash, underscore; no dot or space last, and no device of Windows,
+so that it is safe as a file name everywhere."""
 
 
 class Settings(BaseModel):

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from ipaddress import ip_address
 from pathlib import Path
 from typing import Annotated, Literal
 
 from platformdirs import user_data_path
-from pydantic import Field, field_validator
+from pydantic import Field, SecretStr, field_validator
+from pydantic.json_schema import SkipJsonSchema
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from relit_camera.config.look import Look, Settings
 
 Even = Annotated[int, Field(ge=64, le=8192, multiple_of=2)]
+HostName = Annotated[str, Field(pattern=r"^([a-z0-9.-]{1,253}|\[[0-9a-f:.]+\])(:[0-9]{1,5})?$")]
+"""A host as a browser names it: lower case, an IPv6 address in brackets, the port where it is not ours or the usual."""
 
 
 class SourceSettings(Settings):
@@ -92,21 +96,36 @@ class ServerSettings(Settings):
     """The REST API and the panel."""
 
     host: str = "127.0.0.1"
+    """Address to listen on. Any other than a loopback address needs a token: the preview shows your home."""
     port: Annotated[int, Field(ge=0, le=65535)] = 8470
     """0 picks a free port and prints it."""
+    token_file: Path | None = None
+    """A file with the token that clients must show, which other users of the machine may not read."""
+    token: SkipJsonSchema[Annotated[SecretStr | None, Field(exclude=True)]] = None
+    """The token itself, from the environment only: RELIT_SERVER__TOKEN."""
+    names: Annotated[tuple[HostName, ...], Field(max_length=16)] = ()
+    """Other names by which clients reach the server, such as `camera.lan` or, behind a proxy, `camera.example:8443`."""
 
-    @field_validator("host")
-    @classmethod
-    def _loopback(cls, host: str) -> str:
-        if host not in ("127.0.0.1", "::1", "localhost"):
-            raise ValueError("only loopback addresses (127.0.0.1, ::1, localhost) for now: the preview shows your home")
-        return host
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only programs of this machine can reach the address."""
+        if self.host == "localhost":
+            return True
+        try:
+            return ip_address(self.host).is_loopback
+        except ValueError:
+            return False
 
 
 class StorageSettings(Settings):
     """Where environments, subjects, backgrounds and presets are kept."""
 
     data_dir: Path = Field(default_factory=lambda: user_data_path("relit-camera", appauthor=False))
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """All of them."""
+        return self.environments, self.subjects, self.backgrounds, self.presets
 
     @property
     def environments(self) -> Path:

@@ -33,5 +33,5 @@ def read_json(path: Path, form: type[Form], cure: str, error_type: type[InputErr
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"])) or "top level"
         raise error_type(f"{path}: {place}: {first['msg']}", cure) from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise error_type(f"{path} is no JSON: {error}", cure) from error

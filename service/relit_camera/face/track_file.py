@@ -20,6 +20,8 @@ from relit_camera.files import write_atomic
 from relit_camera.space.rotation import angles_from_rotation, rotation_from_angles
 
 VERSION: Literal[1] = 1
+MAX_BYTES = 512 << 20
+"""Of a file: some 20 minutes. Read, it takes several times that in memory."""
 
 Positive = Annotated[float, Field(gt=0)]
 Pixels = Annotated[int, Field(gt=0, le=16384)]
@@ -156,6 +158,8 @@ def read_track(path: Path) -> Track:
         TrackError: it is missing, no track, of another version, or damaged; the message says where.
     """
     try:
+        if path.stat().st_size > MAX_BYTES:
+            raise TrackError(f"track {path} is larger than {MAX_BYTES >> 20} MiB", "track a shorter video")
         text = path.read_bytes()
     except OSError as error:
         raise TrackError(f"cannot read track {path}: {error.strerror or error}", "check the path") from error

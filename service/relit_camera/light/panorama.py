@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relit_camera.errors import ImageError, PanoramaError
 from relit_camera.light.maps import resample_by_area
 from relit_camera.space.directions import texel_solid_angles
-from relit_camera.space.picture_files import MAX_PIXELS, read_linear
+from relit_camera.space.picture_files import read_linear
 from relit_camera.space.picture_size import picture_size
 
 Axes = Literal["picture", "map"]
@@ -20,6 +20,8 @@ Axes = Literal["picture", "map"]
 (what cameras and renderers write); `map` as a light map is, +X to the right."""
 
 SUFFIXES = frozenset({".hdr", ".exr", ".png", ".jpg", ".jpeg"})
+MAX_PIXELS = 1 << 25
+"""8192x4096. Some environments are kept in memory, as float32: 400 MB each at that size."""
 _LARGEST = 1e9
 """Radiance above this is no light (the sun is 3e4 to 1e5 times the sky) and would overflow sums in float32."""
 _ROUNDING = 1e-6
@@ -77,11 +79,20 @@ def panorama_from_radiance(radiance: NDArray[np.float32], name: str = "panorama"
     return Panorama(_as_map(radiance, "map", name))
 
 
+def check_suffix(suffix: str, name: str) -> None:
+    """Check that a file of this suffix can be a panorama; `name` is what the file is called to a person.
+
+    Raises:
+        PanoramaError: it cannot.
+    """
+    if suffix.lower() not in SUFFIXES:
+        raise PanoramaError(f"{name}: '{suffix}' is no panorama format known here", "use .hdr, .exr, .png or .jpg")
+
+
 def _check_header(path: Path) -> None:
     if path.is_dir() or not path.exists():
         raise PanoramaError(f"no panorama at {path}", "check the path")
-    if path.suffix.lower() not in SUFFIXES:
-        raise PanoramaError(f"{path}: '{path.suffix}' is no panorama format known here", "use .hdr, .exr, .png or .jpg")
+    check_suffix(path.suffix, str(path))
     try:
         width, height = picture_size(path)
     except ValueError as error:
@@ -102,7 +113,7 @@ def _check_size(width: int, height: int, name: str) -> None:
             f"{size}, not twice as wide as high", "use a 360° latitude-longitude (equirectangular) panorama"
         )
     if width * height > MAX_PIXELS:
-        raise PanoramaError(f"{size}, more than {MAX_PIXELS // 10**6} million", "scale it down; 2048x1024 is plenty")
+        raise PanoramaError(f"{size}, more than {MAX_PIXELS / 1e6:.1f} million", "scale it down; 2048x1024 is plenty")
 
 
 def _as_map(image: NDArray[np.float32], axes: Axes, name: str) -> NDArray[np.float32]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
@@ -13,10 +14,10 @@ from pydantic import TypeAdapter, ValidationError
 
 from relit_camera.config.look import Name
 from relit_camera.errors import InputError, NotFoundError, PanoramaError, StorageError
-from relit_camera.files import atomic_path, write_atomic
+from relit_camera.files import atomic_path, make_folder
 from relit_camera.light.builtin.catalogue import BUILTIN_NAMES, builtin_environment
 from relit_camera.light.environment import Environment, environment_from_panorama
-from relit_camera.light.panorama import SUFFIXES, Axes, read_panorama
+from relit_camera.light.panorama import SUFFIXES, Axes, check_suffix, read_panorama
 from relit_camera.light.tone import thumbnail_image
 from relit_camera.space.picture_files import encode_display, write_linear
 
@@ -74,8 +75,8 @@ class EnvironmentStore:
         path = self._file(name)
         return _thumbnail(path, _version(path))
 
-    def add(self, name: str, source: Path | bytes, suffix: str = "", axes: Axes = "picture") -> Environment:
-        """Store a panorama file, or the bytes of one with its suffix (".hdr"), and give its environment.
+    def add(self, name: str, source: Path, axes: Axes = "picture") -> Environment:
+        """Store a panorama file and give its environment.
 
         It is checked first and stored whole or not at all, replacing one of that name. The file stays as it is; one in
         `map` axes becomes an .exr in `picture` axes.
@@ -86,16 +87,30 @@ class EnvironmentStore:
             StorageError: it cannot be written.
         """
         _check_name(name)
-        if not isinstance(source, bytes):
-            self._keep(name, Path(source), axes)
-            return self.load(name)
-        with tempfile.TemporaryDirectory() as scratch:
-            uploaded = Path(scratch) / f"{name}{suffix.lower()}"
-            write_atomic(uploaded, source)
+        panorama = read_panorama(source, axes)
+        with self._place(name, source.suffix.lower() if axes == "picture" else ".exr") as temporary:
+            if axes == "picture":
+                shutil.copyfile(source, temporary)
+            else:
+                write_linear(temporary, panorama.radiance[:, ::-1])
+        return self.load(name)
+
+    def add_upload(self, name: str, data: bytes, suffix: str) -> Environment:
+        """Store the bytes of a panorama file of that suffix (".hdr"), in `picture` axes, as `add` does.
+
+        Raises:
+            InputError, PanoramaError, StorageError: as `add`.
+        """
+        _check_name(name)
+        suffix = suffix.lower()
+        check_suffix(suffix, name + suffix)
+        # Checked where it will be, not in a folder for temporary files: what a crash leaves there nobody sweeps.
+        with self._place(name, suffix) as temporary:
+            temporary.write_bytes(data)
             try:
-                self._keep(name, uploaded, axes)
+                read_panorama(temporary)
             except PanoramaError as error:
-                raise PanoramaError(error.what.replace(str(uploaded), uploaded.name), error.cure) from error
+                raise PanoramaError(error.what.replace(str(temporary), name + suffix), error.cure) from error
         return self.load(name)
 
     def remove(self, name: str) -> None:
@@ -110,25 +125,24 @@ class EnvironmentStore:
             raise InputError(f"'{name}' is built in and stays", "remove stored environments only")
         path = self._file(name)
         try:
-            path.unlink()
+            self._unlink_all(name)
         except OSError as error:
             raise StorageError(f"cannot delete {path}: {error.strerror}", "check the folder's permissions") from error
 
-    def _keep(self, name: str, source: Path, axes: Axes) -> None:
-        panorama = read_panorama(source, axes)
-        before = self._files().get(name)
-        target = self.folder / f"{name}{source.suffix.lower() if axes == 'picture' else '.exr'}"
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StorageError(f"cannot make {self.folder}: {error.strerror}", "choose another data folder") from error
+    @contextmanager
+    def _place(self, name: str, suffix: str) -> Iterator[Path]:
+        """A temporary path to write to, which on success becomes the only file of that name."""
+        make_folder(self.folder)
+        target = self.folder / f"{name}{suffix}"
         with atomic_path(target) as temporary:
-            if axes == "picture":
-                shutil.copyfile(source, temporary)
-            else:
-                write_linear(temporary, panorama.radiance[:, ::-1])
-        if before is not None and before.name != target.name:
-            before.unlink(missing_ok=True)
+            yield temporary
+        self._unlink_all(name, but=target)
+
+    def _unlink_all(self, name: str, but: Path | None = None) -> None:
+        """Delete the files of a name, also those that another of that name hides."""
+        for path in self.folder.iterdir():
+            if path.stem == name and path.suffix.lower() in SUFFIXES and path != but:
+                path.unlink(missing_ok=True)
 
     def _file(self, name: str) -> Path:
         files = self._files()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,7 @@ from relit_camera.errors import ImageError
 from relit_camera.files import atomic_path, write_atomic
 from relit_camera.space.colour import Gamma, decode, uint8_from_linear
 from relit_camera.space.images import DisplayImage, LinearImage, Mask
-from relit_camera.space.picture_size import picture_size
+from relit_camera.space.picture_size import coded_size, picture_size
 from relit_camera.space.quiet import quiet_decoders
 
 LDR_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff"})
@@ -33,13 +34,17 @@ def read_linear(path: Path, gamma: Gamma = "srgb") -> LinearImage:
         raise ImageError(f"no picture at {path}", "check the path")
     if suffix not in LDR_SUFFIXES | {".exr", ".hdr"}:
         raise ImageError(f"{path}: '{suffix}' is not a picture format known here", "use .png, .jpg, .exr or .hdr")
-    _check_size(path)
+    _check_size(lambda: picture_size(path), path)
     if suffix == ".exr":
         image = _read_exr(path)
     elif suffix == ".hdr":
-        image = _read_coded(path)
+        image = _unit_range(_rgb(_decoded(path.read_bytes(), path)))
     else:
-        image = decode(_read_coded(path), gamma)
+        coded = _decoded(path.read_bytes(), path)
+        if coded.dtype == np.uint8:  # a table: a large picture's powers would take seconds, and thrice its memory
+            table = decode(np.arange(256, dtype=np.float32) / np.float32(255), gamma)
+            return np.asarray(cv2.LUT(_rgb(coded), table), dtype=np.float32)
+        image = decode(_unit_range(_rgb(coded)), gamma)
     if not np.isfinite(image).all():
         raise ImageError(f"{path} holds NaN or infinity", "render or export it again")
     return image
@@ -51,7 +56,22 @@ def read_display(path: Path) -> DisplayImage:
     Raises:
         ImageError: as `read_linear`.
     """
+    if path.suffix.lower() in LDR_SUFFIXES and path.is_file():
+        return decode_display(_read_bytes(path), str(path))
     return uint8_from_linear(read_linear(path))
+
+
+def decode_display(data: bytes, name: str = "the file") -> DisplayImage:
+    """The bytes of a PNG, JPEG, WebP, BMP or TIFF file as uint8 sRGB (height, width, 3), upright.
+
+    Raises:
+        ImageError: they are none of these, damaged or too large; `name` says what the file is called to a person.
+    """
+    _check_size(lambda: coded_size(data), name)
+    coded = _rgb(_decoded(data, name))
+    if coded.dtype == np.uint8:
+        return coded
+    return np.rint(np.clip(_unit_range(coded), 0, 1) * 255).astype(np.uint8)
 
 
 def read_mask(path: Path) -> Mask:
@@ -62,8 +82,8 @@ def read_mask(path: Path) -> Mask:
     """
     if not path.is_file():
         raise ImageError(f"no matte at {path}", "check the path")
-    _check_size(path)
-    coded = _imread(path)
+    _check_size(lambda: picture_size(path), path)
+    coded = _imdecode(path.read_bytes(), cv2.IMREAD_UNCHANGED)
     if coded is None:
         raise ImageError(f"{path} cannot be read as a picture", "save it again as PNG")
     scaled = _unit_range(coded)
@@ -117,41 +137,54 @@ def encode_display(image: DisplayImage, suffix: str = ".jpg", quality: int = 90)
     return bytes(data)
 
 
-def _check_size(path: Path) -> None:
+def _check_size(size: Callable[[], tuple[int, int]], name: object) -> None:
     """Refuse by its header what is no picture, or would fill the memory."""
     try:
-        width, height = picture_size(path)
+        width, height = size()
     except ValueError as error:
         cure = "it may be truncated; save or download it again"
-        raise ImageError(f"{path} cannot be read as a picture: {error}", cure) from error
+        raise ImageError(f"{name} cannot be read as a picture: {error}", cure) from error
     except OSError as error:
-        raise ImageError(f"cannot read {path}: {error.strerror}", "check your permission to read it") from error
+        raise ImageError(f"cannot read {name}: {error.strerror}", "check your permission to read it") from error
     if width * height > MAX_PIXELS:
-        what = f"{path} is {width}x{height} pixels, more than {MAX_PIXELS // 10**6} million"
+        what = f"{name} is {width}x{height} pixels, more than {MAX_PIXELS // 10**6} million"
         raise ImageError(what, "scale it down")
 
 
-def _imread(path: Path, flags: int = cv2.IMREAD_UNCHANGED) -> NDArray | None:
+# These flags turn the picture upright as its EXIF says, which UNCHANGED does not; they drop alpha.
+_UPRIGHT = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH
+
+
+def _imdecode(data: bytes, flags: int = _UPRIGHT) -> NDArray | None:
     # From memory: cv2.imread knows no paths beyond the locale's encoding.
-    data = np.frombuffer(path.read_bytes(), np.uint8)
     try:
         with quiet_decoders():
-            return cv2.imdecode(data, flags) if data.size else None
-    except cv2.error:
+            return cv2.imdecode(np.frombuffer(data, np.uint8), flags) if data else None
+    except (cv2.error, MemoryError):
         return None
 
 
-def _read_coded(path: Path) -> NDArray[np.float32]:
-    # These flags turn the picture upright as its EXIF says, which UNCHANGED does not; they drop alpha.
-    coded = _imread(path, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
+def _decoded(data: bytes, name: object) -> NDArray:
+    coded = _imdecode(data)
     if coded is None:
-        raise ImageError(f"{path} cannot be read as a picture", "it may be truncated; save or download it again")
-    scaled = _unit_range(coded)
-    if scaled.ndim == 2:
-        return np.repeat(scaled[..., None], 3, axis=2)
-    if scaled.shape[2] == 2:
-        return np.repeat(scaled[..., :1], 3, axis=2)
-    return np.ascontiguousarray(scaled[..., 2::-1])
+        raise ImageError(f"{name} cannot be read as a picture", "it may be truncated; save or download it again")
+    return coded
+
+
+def _rgb(coded: NDArray) -> NDArray:
+    """OpenCV's channels as RGB (height, width, 3)."""
+    if coded.ndim == 2:
+        return np.repeat(coded[..., None], 3, axis=2)
+    if coded.shape[2] == 2:
+        return np.repeat(coded[..., :1], 3, axis=2)
+    return np.ascontiguousarray(coded[..., 2::-1])
+
+
+def _read_bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ImageError(f"cannot read {path}: {error.strerror}", "check your permission to read it") from error
 
 
 def _unit_range(coded: NDArray) -> NDArray[np.float32]:

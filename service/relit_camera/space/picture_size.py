@@ -4,11 +4,19 @@ from __future__ import annotations
 
 import re
 import struct
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from relit_camera.space.quiet import quiet_decoders
 
 _JPEG_FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+MAX_JPEG_SCANS = 500
+"""A progressive picture has about ten. Each costs a pass over all pixels, though it may have no bytes to speak of."""
+MAX_EXR_VALUES = 256_000_000
+"""Of all parts and channels, which are read together: 1 GB as float32."""
+MAX_HDR_LINE = 120
+"""OpenCV reads a header in pieces of 127 bytes: a longer line may hold another size for it than for us."""
 
 
 def picture_size(path: Path) -> tuple[int, int]:
@@ -26,14 +34,25 @@ def picture_size(path: Path) -> tuple[int, int]:
     with path.open("rb") as file:
         if path.suffix.lower() == ".hdr":
             return _radiance_size(file.read(1 << 16))
-        data = file.read()  # a JPEG's size may stand behind any amount of metadata
+        return coded_size(file.read())  # a JPEG's size may stand behind any amount of metadata
+
+
+def coded_size(data: bytes) -> tuple[int, int]:
+    """Width and height in pixels that the bytes of a PNG, JPEG, WebP, BMP or TIFF file state.
+
+    Raises:
+        ValueError: they are none of these, or the header is damaged.
+    """
     try:
-        return _coded_size(data)
+        width, height = _stated_size(data)
     except struct.error as error:
         raise ValueError("its header is cut off") from error
+    if min(width, height) < 1:
+        raise ValueError(f"its header states {width}x{height} pixels")
+    return width, height
 
 
-def _coded_size(data: bytes) -> tuple[int, int]:
+def _stated_size(data: bytes) -> tuple[int, int]:
     if data.startswith(b"\x89PNG\r\n\x1a\n") and data[12:16] == b"IHDR":
         width, height = struct.unpack_from(">II", data, 16)
         return width, height
@@ -81,7 +100,12 @@ def _radiance_size(header: bytes) -> tuple[int, int]:
     found = re.match(rb"#\?.*?\n\r?\n-Y (\d{1,9}) \+X (\d{1,9})\s", header, re.DOTALL)
     if not found:
         raise ValueError("not a Radiance file with rows from the top and columns from the left")
-    return int(found[2]), int(found[1])
+    if any(len(line) > MAX_HDR_LINE for line in found[0].split(b"\n")):
+        raise ValueError(f"its header has a line longer than {MAX_HDR_LINE} bytes")
+    width, height = int(found[2]), int(found[1])
+    if min(width, height) < 1:
+        raise ValueError(f"its header states {width}x{height} pixels")
+    return width, height
 
 
 def _exr_size(path: Path) -> tuple[int, int]:
@@ -90,14 +114,31 @@ def _exr_size(path: Path) -> tuple[int, int]:
     path.open("rb").close()
     try:
         with quiet_decoders(), OpenEXR.File(str(path), header_only=True) as file:
-            low, high = file.header()["dataWindow"]
+            headers = [dict(part.header) for part in file.parts]  # which closing the file empties
     except Exception as error:  # OpenEXR raises RuntimeError, ValueError or KeyError
         raise ValueError("not an OpenEXR file, or its header is damaged") from error
-    return int(high[0]) - int(low[0]) + 1, int(high[1]) - int(low[1]) + 1
+    sizes = [_exr_part_size(header) for header in headers]
+    pairs = zip(sizes, headers, strict=True)
+    values = sum(width * height * len(header["channels"]) for (width, height), header in pairs)
+    if values > MAX_EXR_VALUES:
+        raise ValueError(f"it holds {values // 10**6} million values in all its parts and channels")
+    return sizes[0]
+
+
+def _exr_part_size(header: Mapping[str, Any]) -> tuple[int, int]:
+    if "deep" in str(header.get("type", "")):
+        raise ValueError("deep OpenEXR files have no size that could be known before they are read")
+    low, high = header["dataWindow"]
+    width, height = int(high[0]) - int(low[0]) + 1, int(high[1]) - int(low[1]) + 1
+    if min(width, height) < 1:
+        raise ValueError(f"its header states {width}x{height} pixels")
+    return width, height
 
 
 def _jpeg_size(data: bytes) -> tuple[int, int]:
     # ITU T.81 annex B: markers with their lengths, until the frame header.
+    if data.count(b"\xff\xda") > MAX_JPEG_SCANS:  # in a picture's own bytes 0 follows each 0xFF
+        raise ValueError(f"a JPEG file of more than {MAX_JPEG_SCANS} scans")
     position = 2
     while position + 9 <= len(data) and data[position] == 0xFF:
         marker, length = data[position + 1], int.from_bytes(data[position + 2 : position + 4], "big")

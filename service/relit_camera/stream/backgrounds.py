@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import tempfile
 from difflib import get_close_matches
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from relit_camera.errors import ImageError, NotFoundError
+from relit_camera.errors import NotFoundError
 from relit_camera.files import make_folder, write_atomic
 from relit_camera.space.images import DisplayImage
-from relit_camera.space.picture_files import LDR_SUFFIXES, encode_display, read_display
+from relit_camera.space.picture_files import LDR_SUFFIXES, decode_display, encode_display, read_display
 
 LONGEST_SIDE = 3840
 """A stored picture is scaled down to this: no output is larger."""
@@ -50,7 +49,7 @@ class BackgroundStore:
             ImageError: `data` is no picture that can be read.
             StorageError: it cannot be written.
         """
-        picture = _fitted(_decoded(data))
+        picture = _fitted(decode_display(data))
         make_folder(self.folder)
         replaced = self._files().get(name)
         target = self.folder / f"{name}.jpg"
@@ -79,16 +78,6 @@ class BackgroundStore:
             return {}
         found = (path for path in self.folder.iterdir() if path.suffix.lower() in LDR_SUFFIXES)
         return {path.stem: path for path in sorted(found) if not path.name.startswith(".")}
-
-
-def _decoded(data: bytes) -> DisplayImage:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "picture.png"  # decoders go by the content, not by the suffix
-        path.write_bytes(data)
-        try:
-            return read_display(path)
-        except ImageError as error:
-            raise ImageError(error.what.replace(str(path), "the file"), error.cure) from error
 
 
 def _fitted(picture: DisplayImage) -> DisplayImage:

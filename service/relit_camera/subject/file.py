@@ -127,7 +127,7 @@ def _metadata(path: Path, header: Mapping[str, str]) -> SubjectMetadata:
     try:
         raw = json.loads(header[HEADER_KEY])
         version = raw.get("format_version")
-    except (KeyError, ValueError, AttributeError) as error:
+    except (KeyError, ValueError, AttributeError, RecursionError) as error:
         raise _damaged(path, "it has no Relit Camera header") from error
     if version not in (1, FORMAT_VERSION):
         raise SubjectError(

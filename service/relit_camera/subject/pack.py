@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.errors import InputError, SubjectError
+from relit_camera.space.picture_files import MAX_PIXELS
+from relit_camera.space.picture_size import coded_size
 from relit_camera.space.quality import psnr
 from relit_camera.space.quiet import quiet_decoders
 from relit_camera.subject.local_basis import whole_basis
@@ -89,7 +91,8 @@ def encode_basis(basis: NDArray) -> NDArray[np.uint8]:
     """
     _, components, height, width = basis.shape
     across, down = _grid(components)
-    if max(across * width, down * height) > _LARGEST_WEBP:
+    sides = across * width, down * height
+    if max(sides) > _LARGEST_WEBP or sides[0] * sides[1] > MAX_PIXELS:
         raise InputError(
             f"{components} pictures of {width}x{height} do not fit into one WebP picture", "keep fewer components"
         )
@@ -111,8 +114,10 @@ def decode_basis(encoded: NDArray[np.uint8], shape: tuple[int, int, int, int]) -
     """
     _, components, height, width = shape
     across, down = _grid(components)
-    with quiet_decoders():
-        picture = cv2.imdecode(np.array(encoded), cv2.IMREAD_UNCHANGED) if encoded.size and encoded.ndim == 1 else None
+    picture = None
+    if encoded.ndim == 1 and _states(encoded.tobytes(), (across * width, down * height)):
+        with quiet_decoders():
+            picture = cv2.imdecode(np.array(encoded), cv2.IMREAD_UNCHANGED)
     if picture is None or picture.shape != (down * height, across * width, 3):
         raise SubjectError("its principal pictures cannot be decoded", "restore the file from a copy")
     coloured = cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
@@ -120,6 +125,14 @@ def decode_basis(encoded: NDArray[np.uint8], shape: tuple[int, int, int, int]) -
     codes = tiled.reshape(3, across * down, height, width)[:, :components]
     rooted = (np.arange(256, dtype=np.float32) - 128) / 127
     return np.ascontiguousarray((np.sign(rooted) * rooted**2).astype(np.float16)[codes])
+
+
+def _states(data: bytes, size: tuple[int, int]) -> bool:
+    """Whether a picture file's header says this size, and it is one that decoders take."""
+    try:
+        return coded_size(data) == size and size[0] * size[1] <= MAX_PIXELS
+    except ValueError:
+        return False
 
 
 def _grid(components: int) -> tuple[int, int]:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from safetensors import SafetensorError
-from safetensors.numpy import save_file
+from safetensors.numpy import save
 
-from relit_camera.files import atomic_path
+from relit_camera.files import write_atomic
 
 
 def write_tensors(path: Path, tensors: Mapping[str, NDArray], header: Mapping[str, str]) -> None:
@@ -21,15 +19,5 @@ def write_tensors(path: Path, tensors: Mapping[str, NDArray], header: Mapping[st
         StorageError: the file cannot be written.
     """
     contiguous = {name: np.ascontiguousarray(value) for name, value in tensors.items()}
-    with atomic_path(path) as temporary:
-        try:
-            save_file(contiguous, temporary, metadata=dict(header))
-        except SafetensorError as error:
-            # The library hides the system's error number in its message.
-            if "os error" in str(error).lower() or "I/O" in str(error):
-                raise OSError(_errno_in(str(error)), str(error)) from error
-            raise
-
-
-def _errno_in(message: str) -> int:
-    return next((code for code in (28, 13, 30, 2) if os.strerror(code).lower() in message.lower()), 5)
+    # In memory: `save_file` would write beside the target, to a file of its own that a crash leaves behind.
+    write_atomic(path, save(contiguous, metadata=dict(header)))

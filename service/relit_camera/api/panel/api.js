@@ -19,6 +19,7 @@ export async function request(method, path, body) {
     toast("The camera does not answer", "Is it still running?");
     throw error;
   }
+  if (answer.status === 401) location.assign("/login"); // the camera began anew, or has another token
   const text = await answer.text();
   const json = text ? JSON.parse(text) : null;
   if (!answer.ok) {

@@ -141,7 +141,9 @@ function openEvents() {
   };
   events.onerror = () => {
     showState("lost");
-    if (events.readyState === EventSource.CLOSED) setTimeout(openEvents, RETRY_MS);
+    if (events.readyState !== EventSource.CLOSED) return;
+    attempt("GET", "mode"); // which finds out whether the token is needed again
+    setTimeout(openEvents, RETRY_MS);
   };
 }
 

@@ -39,7 +39,7 @@ def add_environment(api: Context, name: Annotated[Name, Form()], file: UploadFil
     with api.slow_work():  # the check too: of two at a time with one name, one must hear of the other
         if name in RESERVED_NAMES or name in {*director.background_names(), *director.guest_environments()}:
             raise ConflictError(f"an environment or background '{name}' exists already", "choose another name")
-        director.environments.add(name, data, PurePath(file.filename or "").suffix)
+        director.environments.add_upload(name, data, PurePath(file.filename or "").suffix)
     api.changed("environments")
     return _details(api, name)
 

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator
+from contextlib import suppress
 from typing import Annotated, Any
 
-from anyio import to_thread
 from fastapi import APIRouter, Query
 from starlette.responses import Response, StreamingResponse
 
 from relit_camera.api.context import ApiContext, Context
 from relit_camera.api.pictures import JPEG_RESPONSE
-from relit_camera.api.preview import Variant
+from relit_camera.api.preview import WAIT_S, Variant
 from relit_camera.api.problems import NotReadyError, responses
 from relit_camera.space.picture_files import encode_display
 
 router = APIRouter(tags=["preview"])
 
 BOUNDARY = "picture"
-WAIT_S = 0.25
-"""How long to wait for a picture before looking whether to end."""
 FIRST_PICTURE_S = 2.0
 STREAM_RESPONSE: dict[int | str, dict[str, Any]] = {
     200: {
@@ -45,9 +43,9 @@ def get_snapshot(api: Context) -> Response:
 @router.get("/preview.mjpg", response_class=StreamingResponse, responses=STREAM_RESPONSE | responses(422, 503))
 async def get_preview(api: Context, width: Width = None, mirror: Mirror = False, fps: Fps = 30.0) -> StreamingResponse:
     """The published pictures as motion JPEG, for an `<img>`."""
-    api.preview.check_room()
-    pictures = motion_jpeg(api, Variant(width, mirror, fps))
-    return StreamingResponse(pictures, media_type=f"multipart/x-mixed-replace; boundary={BOUNDARY}")
+    variant = Variant(width, mirror, fps)
+    api.preview.check_room(variant)
+    return StreamingResponse(motion_jpeg(api, variant), media_type=f"multipart/x-mixed-replace; boundary={BOUNDARY}")
 
 
 async def motion_jpeg(api: ApiContext, variant: Variant) -> AsyncIterator[bytes]:
@@ -56,11 +54,11 @@ async def motion_jpeg(api: ApiContext, variant: Variant) -> AsyncIterator[bytes]
     Each part is followed at once by the next boundary: browsers show a part when they see its end. Cancelling it, which
     is what happens when the client leaves, frees the viewer's place.
     """
-    with api.preview.watch(variant) as channel:
+    with suppress(NotReadyError), api.preview.watch(variant) as channel:  # the last place may be taken by now
         count = -1
         yield f"--{BOUNDARY}\r\n".encode()
-        while not api.ending():
-            picture = await to_thread.run_sync(channel.next, count, WAIT_S, abandon_on_cancel=True)
+        while not api.ending() and not channel.ended:
+            picture = await channel.next(count, WAIT_S)
             if picture is None:
                 continue
             count = picture.count

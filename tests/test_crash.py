@@ -1,0 +1,16 @@
+"""State survives `kill -9`: ten times here, two hundred by hand (`python -m tests.crash`)."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.crash import run
+
+
+@pytest.mark.slow
+def test_what_is_stored_survives_kill_9() -> None:
+    found = run(kills=10, seed=7)
+    assert found["wrong"] == []
+    changes = found["changes"]
+    assert isinstance(changes, int)
+    assert changes > 10
