@@ -37,11 +37,10 @@ MOVES: dict[SourceState, frozenset[SourceState]] = {
     _S.RUNNING: frozenset({_S.STALLED, _S.RECONNECTING, _S.FAILED, _S.ENDED}),
     _S.STALLED: frozenset({_S.RUNNING, _S.RECONNECTING, _S.FAILED, _S.ENDED}),
     _S.RECONNECTING: frozenset({_S.OPENING, _S.FAILED, _S.ENDED}),
-    _S.RELEASED: frozenset(),
     _S.FAILED: frozenset({_S.ENDED}),
     _S.ENDED: frozenset(),
 }
-"""The legal moves. Staying where one is is always legal."""
+"""The legal moves. Staying where one is is always legal. No source goes to RELEASED: what wraps it says so."""
 
 
 class IllegalMoveError(RuntimeError):
