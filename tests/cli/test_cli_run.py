@@ -210,8 +210,10 @@ def test_the_configuration_is_edited_while_it_runs(material: Material, tmp_path:
             assert http.get("lighting").json()["environment"] == "studio"  # kept as it was
         config.unlink()
         wait(lambda: "no configuration file" in told(http))
+        assert http.put("lighting", json={"environment": "studio", "saturation": 0.5}).status_code == 200
         config.write_text("look: {lighting: {environment: sunset}}\noutput: {fps: 25}\n", encoding="utf-8")
         wait(lambda: http.get("lighting").json()["environment"] == "sunset")
+        assert http.get("lighting").json()["saturation"] == 0.5  # set by the API, not edited
         assert "output counts from the next start" in told(http)
         assert http.get("background").json()["color"] == "#102030"  # what was not edited stays as it was set
         config.write_text("look: {lighting: {environment: party}}\n", encoding="utf-8")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relit_camera.config.look import Look, Mode
 from relit_camera.config.settings import Fallback
 from relit_camera.errors import TrackError
 from relit_camera.face.follow import FaceMotion
@@ -22,7 +23,7 @@ from relit_camera.space.images import Frame, LinearImage
 from relit_camera.stream import line as line_module
 from relit_camera.stream.placeholder import placeholder
 from tests.faults.watched import Survived, watched_camera
-from tests.stream.small_camera import SIZE, SteadyTracker, difference, grey, wait_until
+from tests.stream.small_camera import SIZE, SteadyTracker, difference, grey, memory_source, wait_until
 
 
 @pytest.fixture(autouse=True)
@@ -107,6 +108,51 @@ def test_trackers_that_all_hang_leave_the_still(tracker: FaultyTracker, tmp_path
         tracker.release.set()
         watched.recovers()
         survived("every new tracker hangs", watched)
+
+
+def test_thousands_of_errors_in_a_row(
+    tracker: FaultyTracker, tmp_path: Path, survived: Survived, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(line_module, "RETRY_S", 0.0)
+    with watched_camera(tmp_path, tracker=tracker) as watched:
+        tracker.error = TrackError("a track that ends")
+        watched.told("a track that ends")
+        keeper = watched.camera.daemon._lines
+        keeper._errors = 5000  # a night of them
+        watched.goes_on(20)
+        assert keeper._errors > 5000
+        tracker.error = None
+        watched.recovers()
+        survived("5000 errors in a row", watched)
+
+
+def test_what_is_late_does_not_break_a_held_picture(tracker: FaultyTracker, tmp_path: Path) -> None:
+    with watched_camera(tmp_path, tracker=tracker) as watched:
+        tracker.release.clear()
+        watched.told("in: track")
+        watched.camera.put("freeze", frozen=True)
+        watched.goes_on(5)
+        held, count = watched.sink.new[-1], len(watched.sink.new)
+        tracker.release.set()
+        watched.goes_on(20)
+        assert watched.sink.new[-1] is held
+        assert len(watched.sink.new) == count
+
+
+def test_what_is_late_does_not_show_the_room(tracker: FaultyTracker, tmp_path: Path) -> None:
+    """A frame of mode ratio hangs; when it comes at last the live picture is private."""
+    room = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    room[..., 1] = 255
+    with watched_camera(tmp_path, tracker=tracker, source=memory_source(room), look=Look(mode=Mode.RATIO)) as watched:
+        tracker.release.clear()
+        watched.told("in: track")
+        watched.camera.put("mode", mode="reenact")
+        count = len(watched.sink.new)
+        tracker.release.set()
+        watched.recovers()
+        watched.goes_on(10)
+        for picture in watched.sink.new[count:]:
+            assert difference(picture, room) > 20
 
 
 def test_it_stops_in_time_while_a_tracker_hangs(tracker: FaultyTracker, tmp_path: Path) -> None:

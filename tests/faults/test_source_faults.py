@@ -92,6 +92,22 @@ def test_a_stall(mode: str, tmp_path: Path, tree: FakeTree, survived: Survived) 
         survived(f"webcam {what} for {STALL_S:g} s", watched)
 
 
+def test_it_stops_in_time_while_the_webcam_hangs(tmp_path: Path, tree: FakeTree) -> None:
+    cameras = Cameras()
+    with watched_webcam(tmp_path, tree, cameras) as watched:
+        hanging = cameras.opened[-1]
+        hanging.mode = "stuck"
+        time.sleep(0.2)
+        daemon, began = watched.camera.daemon, time.monotonic()
+        daemon.begin_stop()
+        time.sleep(2.2)  # what else ends meanwhile
+        daemon.stop()
+        assert time.monotonic() - began < 3
+        assert [name for name in daemon.left_behind if name.startswith("source-")]
+        hanging.unstick.set()
+        wait_until(lambda: daemon.left_behind == [])
+
+
 class Odd(FakeCapture):
     """Gives pictures of a list, over and over."""
 

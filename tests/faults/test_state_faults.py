@@ -5,16 +5,28 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from relit_camera.errors import DeviceError
+from relit_camera.errors import DeviceError, StorageError
 from relit_camera.space.images import DisplayImage
+from relit_camera.stream import daemon as daemon_module
+from relit_camera.stream.placeholder import placeholder
+from relit_camera.stream.sinks.base import SinkInfo
 from relit_camera.subject.file import write_subject
 from tests.faults.watched import Survived, TimedSink, watched_camera
-from tests.stream.small_camera import SteadyTracker, difference, running_camera, small_subject, wait_until
+from tests.stream.small_camera import (
+    SIZE,
+    SteadyTracker,
+    difference,
+    memory_source,
+    running_camera,
+    small_subject,
+    wait_until,
+)
 
 
 def overwritten(path: Path) -> None:
@@ -105,8 +117,42 @@ def test_it_stops_in_time_while_the_driver_hangs(tmp_path: Path) -> None:
         began = time.monotonic()
         camera.daemon.stop()
         assert time.monotonic() - began < 3
-        assert camera.daemon.left_behind
+        assert camera.daemon.left_behind == ["publisher"]
         sink.release.set()
+
+
+def test_the_end_of_a_recording_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk that is slow to answer costs time, one that does not answer costs the recording: neither is silent."""
+
+    class Recording(FaultySink):
+        def describe(self) -> SinkInfo:
+            return SinkInfo("file", "rec.mp4", SIZE)
+
+    for seconds, lost in ((1.5, False), (60.0, True)):
+        monkeypatch.setattr(daemon_module, "DISK_S", 2.0)
+        sink = Recording()
+        with ExitStack() as ended:
+            if lost:
+                ended.enter_context(pytest.raises(StorageError, match="the disk does not answer"))
+            with running_camera(tmp_path, sink=sink) as camera:
+                sink.wait_for(3)
+                sink.release.clear()
+                time.sleep(0.2)
+                threading.Timer(seconds, sink.release.set).start()
+                camera.daemon.stop()
+        sink.release.set()
+
+
+def test_a_picture_that_gave_way_does_not_come_back_by_holding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(daemon_module, "STALE_AFTER_S", 0.3)
+    waiting = placeholder(SIZE, "waiting for the camera")
+    with running_camera(tmp_path, source=memory_source(count=8)) as camera:
+        wait_until(lambda: difference(camera.sink.new[-1], waiting) == 0 and camera.status()["state"] == "waiting")
+        for frozen in (True, False):
+            camera.put("freeze", frozen=frozen)
+            count = camera.sink.count
+            wait_until(lambda count=count: camera.sink.count > count + 10)  # type: ignore[misc]
+            assert difference(camera.sink.new[-1], waiting) == 0
 
 
 def test_a_tracker_made_anew_may_fail_too(tmp_path: Path, survived: Survived) -> None:

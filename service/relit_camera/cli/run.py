@@ -32,18 +32,20 @@ def run(
     from relit_camera.cli.parse import size as parse_size
     from relit_camera.cli.serving import run_camera
     from relit_camera.cli.settings import settings_of
-    from relit_camera.config.load import config_path
+    from relit_camera.config.load import config_path, load_settings
 
     width, height = parse_size(size) if size else (None, None)
-    load = partial(
-        settings_of,
-        context,
-        source={"source": source, "on_demand": on_demand},
-        output={"sink": sink, "width": width, "height": height},
-        subject=subject,
-        look={"mode": str(parse_mode(mode)) if mode else None},
-        tracker={"name": tracker},
-        server={"host": host, "port": port},
-    )
+    given = {
+        "source": {"source": source, "on_demand": on_demand},
+        "output": {"sink": sink, "width": width, "height": height},
+        "subject": subject,
+        "look": {"mode": str(parse_mode(mode)) if mode else None},
+        "tracker": {"name": tracker},
+        "server": {"host": host, "port": port},
+    }
+    settings = settings_of(context, **given)
     path = config_path((context.find_root().obj or {}).get("config"))
-    run_camera(load(), environment, reload=(path, load) if path else None)
+    # The same file each time: where it is gone, another one must not be taken in its place.
+    load = partial(load_settings, overrides={"log_level": settings.log_level, **given})
+    reload = (path.absolute(), load) if path else None
+    run_camera(settings, environment, reload=reload)

@@ -10,21 +10,23 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import typer
 
 from relit_camera.api.app import create_app
 from relit_camera.api.server import listen, serve
 from relit_camera.cli.service_manager import announced
-from relit_camera.config.look import Look
+from relit_camera.config.look import Look, Settings
 from relit_camera.config.settings import OutputSettings, RelitSettings
 from relit_camera.config.watch import watch_config
 from relit_camera.cores import leave_to_stay, share_cores
-from relit_camera.errors import ConfigError
+from relit_camera.errors import ConfigError, RelitError
 from relit_camera.files import sweep_unfinished
 from relit_camera.stream.assembly import make_tracker
 from relit_camera.stream.daemon import Daemon
@@ -46,7 +48,7 @@ def run_camera(
     beside: Beside | None = None,
     seconds: float | None = None,
     sink_for: Callable[[OutputSettings], Sink] = open_sink,
-    reload: tuple[Path, Callable[[], RelitSettings]] | None = None,
+    reload: tuple[Path, Callable[[Path], RelitSettings]] | None = None,
 ) -> None:
     """Run the camera until SIGTERM or SIGINT, then end within 3 s.
 
@@ -82,7 +84,8 @@ def run_camera(
         source = make_source()
         cleanup.callback(source.close)
         sink = sink_for(settings.output)
-        cleanup.callback(sink.close)
+        unowned = cleanup.enter_context(contextlib.ExitStack())
+        unowned.callback(sink.close)
         new_tracker = partial(make_tracker, settings)
         if settings.source.on_demand:
             demand = OnDemand(source, make_source, sink)
@@ -90,7 +93,8 @@ def run_camera(
             daemon = Daemon(settings, director, demand.source, sink, tracker, new_tracker, demand.note_viewer)
         else:
             daemon = Daemon(settings, director, source, sink, tracker, new_tracker)
-        cleanup.callback(_leave_what_hangs, daemon)
+        unowned.pop_all()  # the daemon closes it, where closing does not hang
+        cleanup.push(partial(_leave_what_hangs, daemon))
         cleanup.callback(daemon.stop)
         daemon.start()
         server = serve(create_app(daemon, settings), settings.server, listener=listener)
@@ -100,9 +104,8 @@ def run_camera(
         if beside is not None:
             cleanup.enter_context(beside(daemon, server.address.url))
         if reload is not None:
-            path, load = reload
             apply, tell = partial(_apply, director, settings), partial(daemon.tell, "configuration")
-            cleanup.enter_context(watch_config(path, settings, load, apply, tell))
+            cleanup.enter_context(watch_config(*reload, settings, apply, tell))
         cleanup.enter_context(announced(daemon.status))
         ends_at = time.monotonic() + (math.inf if seconds is None else seconds)
         while not stop.is_set() and (left := ends_at - time.monotonic()) > 0:
@@ -113,26 +116,47 @@ def run_camera(
 def _apply(
     director: Director, started: RelitSettings, before: RelitSettings, after: RelitSettings
 ) -> ConfigError | None:
-    """Show what was changed in the configuration's look and subject; returns what counts from the next start only.
+    """Show what was edited of the configuration's look and subject; returns what a person should know.
 
     Raises:
-        RelitError: something of it is not there.
+        RelitError: something of it is not there; then nothing is changed.
     """
-    parts = {name: getattr(after.look, name) for name in Look.model_fields}
-    changed = {name: part for name, part in parts.items() if part != getattr(before.look, name)}
-    if changed:
-        director.update_look(lambda look: look.model_copy(update=changed))
-    if after.subject != before.subject:
-        director.set_subject(after.subject)
+    if after.subject is None and before.subject is not None and "subject" not in after.model_fields_set:
+        # Else an edit that lost a line would show the live picture, room and all.
+        raise ConfigError("it no longer names the subject", "name one, or write 'subject: null' for the live picture")
+    chosen = director.subjects.resolve(after.subject) if after.subject not in (None, before.subject) else None
+    if after.look != before.look:
+        director.update_look(partial(_edited, before=before.look, after=after.look))
+    if chosen is not None:
+        director.show_subject(*chosen)
+    elif after.subject is None and before.subject is not None:
+        director.set_subject(None)
     fixed = [name for name in RelitSettings.model_fields if name not in ("look", "subject")]
     later = [name for name in fixed if getattr(after, name) != getattr(started, name)]
     return ConfigError(f"what changed of {', '.join(later)} counts from the next start", "restart") if later else None
 
 
-def _leave_what_hangs(daemon: Daemon) -> None:
-    """End the process at once if a driver or a network still hangs: the interpreter would wait for its thread."""
-    if daemon.left_behind:
-        log.warning("something did not end in time and is left behind")
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(0)
+def _edited(look: Look, before: Look, after: Look) -> Look:
+    """`look` with what differs between `before` and `after`; of the lighting, those values alone."""
+    lighting = look.lighting.model_copy(update=_changes(before.lighting, after.lighting))
+    parts = _changes(before, after)
+    return look.model_copy(update=parts | {"lighting": lighting})
+
+
+def _changes(before: Settings, after: Settings) -> dict[str, Any]:
+    values = {name: getattr(after, name) for name in type(after).model_fields}
+    return {name: value for name, value in values.items() if value != getattr(before, name)}
+
+
+def _leave_what_hangs(daemon: Daemon, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+    """End the process here if a driver or a network still hangs: the interpreter would wait for its thread."""
+    if not daemon.left_behind:
+        return
+    log.warning("left behind: %s", ", ".join(daemon.left_behind))
+    if isinstance(error, RelitError):
+        print(f"relit: {error}", file=sys.stderr)
+    elif error is not None:
+        traceback.print_exception(error)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(1 if error else 0)

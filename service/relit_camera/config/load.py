@@ -21,6 +21,8 @@ LOADER_VARIABLES = frozenset({CONFIG_VARIABLE, "RELIT_MODELS_DIR", "RELIT_SHARED
 """Variables of our prefix that are no settings."""
 
 Nested = Mapping[str, Any]
+_SECTIONS = frozenset(name for name, field in RelitSettings.model_fields.items() if field.default is not None)
+"""Keys that are not null."""
 
 
 def config_path(given: Path | None = None) -> Path | None:
@@ -60,7 +62,7 @@ def load_settings(path: Path | None = None, overrides: Nested | None = None) -> 
     _check_no_secret(document, found)
     try:
         # A section whose every line is commented out reads as null: its defaults.
-        given = {str(k): v for k, v in document.items() if v is not None or k not in RelitSettings.model_fields}
+        given = {str(k): v for k, v in document.items() if v is not None or k not in _SECTIONS}
         return _settings_class(given)(**_without_none(overrides or {}))
     except SettingsError as error:  # a variable of a whole section is JSON; its text may hold the token
         raise ConfigError(f"the environment holds no setting: {error}", "give JSON, or one variable a field") from None

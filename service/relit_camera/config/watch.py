@@ -14,14 +14,15 @@ from relit_camera.errors import RelitError
 log = logging.getLogger(__name__)
 
 LOOK_EVERY_S = 1.0
+STOP_S = 1.0
 
-Load = Callable[[], RelitSettings]
+Load = Callable[[Path], RelitSettings]
 Apply = Callable[[RelitSettings, RelitSettings], RelitError | None]
 
 
 @contextmanager
 def watch_config(
-    path: Path, settings: RelitSettings, load: Load, apply: Apply, tell: Callable[[Exception | None], None]
+    path: Path, load: Load, settings: RelitSettings, apply: Apply, tell: Callable[[Exception | None], None]
 ) -> Iterator[None]:
     """Look at the file once a second within the with-statement, in a thread of its own.
 
@@ -29,40 +30,41 @@ def watch_config(
 
     Args:
         path: of the configuration file.
+        load: reads the settings from it; raises RelitError.
         settings: as they are.
-        load: reads them anew, as they were read at the start; raises RelitError.
         apply: takes the settings before and after; returns what a person should know, and raises RelitError where
             they cannot be used.
         tell: gets what is wrong or should be known, and None once there is no more of that.
     """
     stopping = threading.Event()
-    thread = threading.Thread(target=_watch, args=(path, settings, load, apply, tell, stopping), name="config")
+    arguments = (path, load, settings, apply, tell, stopping)
+    thread = threading.Thread(target=_watch, args=arguments, name="config", daemon=True)
     thread.start()
     try:
         yield
     finally:
         stopping.set()
-        thread.join()
+        thread.join(STOP_S)
 
 
 def _watch(
     path: Path,
-    settings: RelitSettings,
     load: Load,
+    settings: RelitSettings,
     apply: Apply,
     tell: Callable[[Exception | None], None],
     stopping: threading.Event,
 ) -> None:
-    seen = _version(path)
+    used = last = _version(path)
     told = False
     while not stopping.wait(LOOK_EVERY_S):
-        version = _version(path)
-        if version == seen:
+        before, last = last, _version(path)
+        if last == used or last != before:  # one that was just written may be written on
             continue
-        seen = version
+        used = last
         note: Exception | None = None
         try:
-            after = load()
+            after = load(path)
             note = apply(settings, after)
             settings = after
         except RelitError as error:

@@ -27,6 +27,8 @@ from relit_camera.space.images import Frame, LinearImage, Mask
 RATIO_RANGE = (0.02, 12.0)
 FLOOR = 0.03
 """Share of the room-lit face's mean that is added to both sides of the ratio: shadows stay bounded."""
+DARKEST = 1e-3
+"""Linear: the least mean of a channel under the room's light that counts; three sRGB codes."""
 EDGE = 0.02
 """Share of the still's width at the matte's edge that is not trusted."""
 COARSE = 2
@@ -92,7 +94,8 @@ class RatioReenactor:
 
     def _ratio(self, relit: LinearImage, under_room: LinearImage) -> LinearImage:
         """How much brighter the still is relit than under the room's light."""
-        floor = FLOOR * under_room[self._weight > 0.5].mean(axis=0)
+        # A room may have no light at all of one colour; then the live picture has none of it either.
+        floor = FLOOR * np.maximum(under_room[self._weight > 0.5].mean(axis=0), DARKEST)
         ratio = (relit + floor) / (np.maximum(under_room, 0) + floor)
         return np.asarray(np.clip(ratio, *RATIO_RANGE), dtype=np.float32)
 

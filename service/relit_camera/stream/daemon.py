@@ -15,7 +15,7 @@ from functools import partial
 
 from relit_camera import __version__
 from relit_camera.config.settings import RelitSettings
-from relit_camera.errors import DeviceError, RelitError
+from relit_camera.errors import DeviceError, RelitError, StorageError
 from relit_camera.face.state import FaceStatus, Tracker
 from relit_camera.models.session import session_report
 from relit_camera.space.images import DisplayImage, Frame
@@ -43,6 +43,10 @@ RETRY_S = 1.0
 """Pause after a failure of the source."""
 STOP_S = 2.0
 """What has not ended by then, a device or a network that hangs, is left behind."""
+DISK_S = 30.0
+"""For so long a disk that does not answer is waited for at the end of a recording."""
+HANGING = ("source-", "worker", "line", "finisher", "publisher")
+"""Threads that may be inside a driver or a network."""
 
 
 class Daemon:
@@ -72,6 +76,7 @@ class Daemon:
         Raises:
             ImageError: the placeholder picture cannot be read.
         """
+        self._before = set(threading.enumerate())
         self.director = director
         self.events = EventHub()
         self._source, self._sink, self._tracker = source, sink, tracker
@@ -105,7 +110,6 @@ class Daemon:
         self._stop_by = 0.0
         self._ending: list[threading.Thread] = []
         self._worker = threading.Thread(target=self._run, name="worker", daemon=True)
-        self.left_behind = False
 
     def start(self) -> None:
         """Begin to read, relight and publish."""
@@ -128,17 +132,31 @@ class Daemon:
     def stop(self) -> None:
         """End all threads and free the devices, within `STOP_S` of `begin_stop`. Harmless when repeated.
 
-        What hangs is left behind, and `left_behind` is true: a thread that is inside OpenCV or a driver when the
-        interpreter ends would abort or hold up the process.
+        What hangs is left behind (see `left_behind`), but for a disk that is slow to take the end of a recording.
+
+        Raises:
+            StorageError: the end of the recording cannot be written, or it was lost before.
         """
         self.begin_stop()
         for thread in (self._worker, *self._ending):
             if thread.ident is not None:
                 thread.join(max(0.0, self._stop_by - time.monotonic()))
-        alive = [thread.name for thread in (self._worker, *self._ending) if thread.is_alive()]
-        self.left_behind = bool(alive) or not self._lines.ended(self._stop_by) or self._publisher.stuck
-        if not self._publisher.stuck:  # else closing would wait for the driver that writing waits for
+        self._lines.ended(self._stop_by)
+        recording = self._sink.describe().kind == "file"
+        if self._publisher.ended(DISK_S if recording else 0.0):
             self._sink.close()
+        elif recording:
+            raise StorageError("the recording is lost: the disk does not answer", "write it to another disk")
+        # else closing would wait for the driver that writing waits for
+
+    @property
+    def left_behind(self) -> list[str]:
+        """Threads that have not ended, by name.
+
+        One that is inside OpenCV or a driver when the interpreter ends would abort or hold up the process.
+        """
+        threads = set(threading.enumerate()) - self._before
+        return [thread.name for thread in threads if thread.name.startswith(HANGING)]
 
     def stopping(self) -> bool:
         """Whether the camera is shutting down."""
@@ -193,7 +211,11 @@ class Daemon:
             if frame is None:
                 continue
             self._count(frame)
-            if not self.director.scene.frozen and not self._lines.offer(frame):
+            if self.director.scene.frozen:
+                continue
+            if self._lines.offer(frame):
+                self._stand_in.rest()
+            else:
                 self._show_stand_in(frame)
 
     def _show_stand_in(self, frame: Frame) -> None:
@@ -203,6 +225,9 @@ class Daemon:
             self._set_state(CameraState.STANDING_IN)
 
     def _done(self, frame: Frame, finished: Finished) -> None:
+        now, then = self.director.scene, finished.scene
+        if now.frozen or now.subject is not then.subject or now.look.mode is not then.look.mode:
+            return  # it hung, maybe for long: the live picture must not show once it is private
         self._pipeline_rate.tick()
         self._publish(finished.image, frame)
         self._follow(finished)

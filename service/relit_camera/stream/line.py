@@ -14,12 +14,12 @@ from relit_camera.stream.scene import Scene
 from relit_camera.stream.slot import Slot
 
 RETRY_S = 1.0
-"""Pause after a frame that could not be processed; it doubles with each one in a row, up to `LONGEST_RETRY_S`."""
-LONGEST_RETRY_S = 16.0
+"""Pause after a frame that could not be processed; it doubles with each one in a row."""
+MOST_DOUBLINGS = 4
 STUCK_S = 2.0
 """A frame that takes longer hangs: something else is shown meanwhile."""
 GIVE_UP_S = 10.0
-"""One that takes so long is left behind, and another line begun. Twice as long with each one in a row."""
+"""One that takes so long is left behind, and another line begun. Twice as long with each in a row, as the pauses."""
 FIRST_FRAME_TIMES = 6
 """A line's first frame may take so many times as long: models are opened for it."""
 MOST_LEFT_BEHIND = 3
@@ -97,8 +97,10 @@ class Line:
             frame = self._newest.get(_POLL_S)
             if frame is not None:
                 self._began_at = time.monotonic()
-                self._work(frame)
-                self._began_at = None
+                try:
+                    self._work(frame)
+                finally:
+                    self._began_at = None
         self._finisher.shutdown()
 
     def _work(self, frame: Frame) -> None:
@@ -116,12 +118,11 @@ class Line:
     def _finish(self, frame: Frame, finish: Finish) -> None:
         try:
             finished = finish()
+            if not self._closing.is_set():
+                self.pictures += 1
+                self._on_done(frame, finished)
         except Exception as error:
             self._failed(error)
-            return
-        if not self._closing.is_set():
-            self.pictures += 1
-            self._on_done(frame, finished)
 
     def _failed(self, error: Exception) -> None:
         if not self._closing.is_set():
@@ -171,6 +172,7 @@ class LineKeeper:
 
     def offer(self, frame: Frame) -> bool:
         """Hand a frame to the line. Returns whether its picture can be expected: if not, something must stand in."""
+        self._left = [line for line in self._left if not line.ended()]
         line = self._line or self._renewed()
         if line is None:
             return False
@@ -207,7 +209,7 @@ class LineKeeper:
         self._on_done(frame, finished)
 
     def _failed(self, error: Exception) -> None:
-        self._retry_at = time.monotonic() + min(RETRY_S * 2**self._errors, LONGEST_RETRY_S)
+        self._retry_at = time.monotonic() + RETRY_S * 2 ** min(self._errors, MOST_DOUBLINGS)
         self._failed_scene = self._scene()
         self._errors += 1
         self._suspect = not isinstance(error, RelitError) and self._errors % FAULTS_TO_RENEW == 0
@@ -223,7 +225,7 @@ class LineKeeper:
                     "a still stands in, and it is begun anew by itself; if that does not help, restart the camera",
                 )
             )
-        if line.busy_s > GIVE_UP_S * 2**self._hung * (FIRST_FRAME_TIMES if starts else 1):
+        if line.busy_s > GIVE_UP_S * 2 ** min(self._hung, MOST_DOUBLINGS) * (FIRST_FRAME_TIMES if starts else 1):
             self._hung += 1
             self._retire(line)
 
@@ -234,7 +236,6 @@ class LineKeeper:
         self._line = None
 
     def _renewed(self) -> Line | None:
-        self._left = [line for line in self._left if not line.ended()]
         if len(self._left) < MOST_LEFT_BEHIND:
             self._line = Line(self._next, self._scene, self._done, self._failed)
             self._next = self._make

@@ -48,10 +48,12 @@ class Finished:
     Attributes:
         image: uint8 sRGB RGB of the output's size.
         motion: what the face did; None while there is no tracker or no subject.
+        scene: that it was made for.
     """
 
     image: DisplayImage
     motion: FaceMotion | None
+    scene: Scene
 
 
 Finish = Callable[[], Finished]
@@ -169,12 +171,12 @@ class Pipeline:
             with self.timer.stage("move"):
                 moved = move(relit)
             with self.timer.stage("compose"):
-                return Finished(self._compose(moved, mode, live, scene), motion)
+                return Finished(self._compose(moved, mode, live, scene), motion, scene)
 
         return finish
 
     def _unlit(self, live: Frame, scene: Scene) -> Finished:
-        return Finished(self._composer.live(linear_from_display(live.image), live, scene), None)
+        return Finished(self._composer.live(linear_from_display(live.image), live, scene), None, scene)
 
     def _mode(self, scene: Scene) -> Mode:
         """The mode asked for, or reenact where the live face is known not to be the subject's."""

@@ -103,10 +103,11 @@ class Publisher:
         self.shown.close()
         return not self._thread.is_alive()
 
-    @property
-    def stuck(self) -> bool:
-        """Whether the thread has not ended after `stop`: it waits for the sink."""
-        return self._stopping.is_set() and self._thread.is_alive()
+    def ended(self, timeout_s: float = 0.0) -> bool:
+        """Whether the thread has ended, waiting up to `timeout_s` for it; if not after `stop`, the sink is stuck."""
+        if self._thread.ident is not None:
+            self._thread.join(timeout_s)
+        return not self._thread.is_alive()
 
     @property
     def counts(self) -> FrameCounts:
@@ -167,8 +168,9 @@ class Publisher:
         if self.hold:
             self._held_at = now
         fresh_at = max(self._newest.put_at, self._held_at)
-        stale = self._stale_after_s is not None and now - fresh_at > self._stale_after_s
-        return self.placeholder if last is None or stale else last.image
+        if self._stale_after_s is not None and now - fresh_at > self._stale_after_s:
+            last = self._last = None  # gone for good: holding later must not bring back what nobody saw any more
+        return self.placeholder if last is None else last.image
 
     def _show(self, image: DisplayImage) -> None:
         found = self.shown.newer(0, 0)

@@ -43,6 +43,10 @@ class StandIn:
         self._still: _Still | None = None
         self._spoiled: Subject | None = None
 
+    def rest(self) -> None:
+        """Let go of the memory that pictures take: none is wanted now."""
+        self._still = None
+
     def picture(self, frame: Frame, scene: Scene) -> DisplayImage:
         """A picture for this live frame: uint8 sRGB RGB of the output's size. Never fails."""
         subject = scene.subject
