@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import resource
 from pathlib import Path
 
 import cv2
@@ -9,7 +11,7 @@ import numpy as np
 import pytest
 
 from relit_camera.subject.field import TEXELS
-from relit_camera.subject.file import write_subject
+from relit_camera.subject.file import MAX_HELD_BYTES, write_subject
 from relit_camera.subject.local_basis import whole_basis
 from relit_camera.subject.subject import Subject, SubjectMetadata
 from tests.api.api_client import Client, check_problem
@@ -105,3 +107,24 @@ def test_a_damaged_subject_is_said_without_its_place(client: Client, camera: Fak
     assert str(stored) not in answer.text
     assert camera.director.scene.subject is None
     assert [item["name"] for item in client.get("/api/v1/subjects").json()] == ["ada", "broken"]
+
+
+def test_what_is_too_large_to_be_shown_is_told_and_seen(client: Client, camera: FakeCamera, stored: Path) -> None:
+    """Its size is that of a tensor that nobody need read, and that takes no room on the disk."""
+    path = stored / "ada.relit"
+    data = path.read_bytes()
+    start = 8 + int.from_bytes(data[:8], "little")
+    header, size = json.loads(data[8:start]), MAX_HELD_BYTES
+    header["more"] = {"dtype": "U8", "shape": [size], "data_offsets": [len(data) - start, len(data) - start + size]}
+    text = json.dumps(header).encode()
+    path.write_bytes(len(text).to_bytes(8, "little") + text + data[start:])
+    with path.open("ab") as file:
+        file.truncate(file.tell() + size)
+
+    problem = check_problem(client.put("/api/v1/subject", {"name": "ada"}), 422)
+    assert "larger than 1 GiB" in problem["what"]
+    assert camera.director.scene.subject is None
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert client.get("/api/v1/subjects/ada").json()["metadata"]["method"] == "nearest"
+    assert client.get("/api/v1/subjects/ada/thumbnail.jpg").status_code == 200
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100 << 10  # KiB

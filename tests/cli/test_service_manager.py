@@ -28,17 +28,19 @@ import sys, time
 from pathlib import Path
 from relit_camera.errors import DeviceError
 from relit_camera.stream.sinks.null import NullSink
-real, stuck = NullSink.write, Path(sys.argv.pop(1))
+real, failing, stuck = NullSink.write, Path(sys.argv.pop(1)), Path(sys.argv.pop(1))
 def write(self, image):
-    if stuck.exists():
+    if failing.exists():
         raise DeviceError("the device takes no pictures", "wait")
+    while stuck.exists():
+        time.sleep(0.01)
     real(self, image)
 NullSink.write = write
 sys.argv[0] = "relit"
 from relit_camera.cli.main import run
 run()
 """
-"""`relit` whose sink fails while a file exists."""
+"""`relit` whose sink fails while one file exists, and hangs while another does."""
 
 
 class Listener:
@@ -123,6 +125,19 @@ def test_ready_comes_with_the_first_picture_and_life_with_the_others(listener: L
     listener.wait_for("STOPPING=1", 2)
 
 
+def test_a_sink_that_fails_and_is_told_is_no_camera_that_hangs(listener: Listener) -> None:
+    camera = Camera()
+    camera.published = 1
+    other, sink = Degradation("source failed", "x"), Degradation("sink failed", "the device takes no pictures")
+    with announced(camera, ServiceManager(listener.address, watchdog_s=0.2)):
+        assert listener.next()[0] == "READY=1"
+        camera.base = replace(STATUS, degraded=[other])
+        assert "WATCHDOG=1" not in listener.next()
+        camera.base = replace(STATUS, degraded=[other, sink])
+        listener.wait_for("WATCHDOG=1", 1)
+        listener.wait_for("WATCHDOG=1", 1)
+
+
 def test_stopped_before_the_first_picture_it_was_never_ready(listener: Listener) -> None:
     with announced(Camera(), ServiceManager(listener.address)):
         pass
@@ -143,13 +158,13 @@ def test_the_status_is_one_line_with_the_first_trouble() -> None:
 
 
 @contextmanager
-def service(listener: Listener, material: Material, folder: Path, stuck: Path) -> Iterator[subprocess.Popen[str]]:
+def service(listener: Listener, material: Material, folder: Path) -> Iterator[subprocess.Popen[str]]:
     """`relit run` as systemd starts it, of the test pattern."""
     told = {"NOTIFY_SOCKET": listener.address, "WATCHDOG_USEC": str(int(WATCHDOG_S * 1e6))}
     small = {"RELIT_SOURCE__WIDTH": "128", "RELIT_SOURCE__HEIGHT": "96"}
     process = subprocess.Popen(
         [
-            sys.executable, "-c", INJECTED, str(stuck), "run", "--source", "pattern", "--sink", "null", "--port", "0",
+            sys.executable, "-c", INJECTED, str(folder / "failing"), str(folder / "stuck"), "run", "--source", "pattern", "--sink", "null", "--port", "0",
             "--size", "128x96", "--tracker", material.tracker,
         ],
         env={**environment(folder), **told, **small}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -161,11 +176,11 @@ def service(listener: Listener, material: Material, folder: Path, stuck: Path) -
         process.communicate()
 
 
-def test_a_real_camera_is_ready_alive_silent_when_pictures_stop_and_says_when_it_stops(
+def test_a_real_camera_is_ready_alive_silent_when_it_hangs_and_says_when_it_stops(
     listener: Listener, material: Material, tmp_path: Path
 ) -> None:
-    stuck = tmp_path / "stuck"
-    with service(listener, material, tmp_path, stuck) as process:
+    failing, stuck = tmp_path / "failing", tmp_path / "stuck"
+    with service(listener, material, tmp_path) as process:
         first = listener.next()
         assert first, process.stderr and process.stderr.read()
         assert first[0] == "READY=1"
@@ -176,13 +191,24 @@ def test_a_real_camera_is_ready_alive_silent_when_pictures_stop_and_says_when_it
             times.append(time.monotonic())
         assert max(b - a for a, b in pairwise(times)) < WATCHDOG_S
 
-        stuck.touch()
+        failing.touch()
         time.sleep(WATCHDOG_S)  # what was on its way
         listener.drain()
         for _ in range(3):
             message = listener.next()
+            assert message[0] == "WATCHDOG=1", message
+            assert "sink failed: the device takes no pictures" in message[1]
+        failing.unlink()
+        time.sleep(2 * WATCHDOG_S)  # it is tried again each second
+        listener.drain()
+        assert "sink failed" not in listener.wait_for("WATCHDOG=1")[1]
+
+        stuck.touch()
+        time.sleep(WATCHDOG_S)
+        listener.drain()
+        for _ in range(3):
+            message = listener.next()
             assert message[0].startswith("STATUS="), message
-            assert "sink failed: the device takes no pictures" in message[0]
 
         stuck.unlink()
         listener.wait_for("WATCHDOG=1")

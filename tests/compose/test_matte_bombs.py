@@ -11,6 +11,7 @@ import pytest
 
 from relit_camera.compose.recorded_matte import RecordedMatte
 from relit_camera.errors import InputError
+from relit_camera.space.images import Frame
 
 
 def npz(path: Path, header_shape: tuple[int, ...], content: bytes, dtype: str = "|u1") -> Path:
@@ -46,3 +47,13 @@ def test_they_are_refused_before_memory_is_taken(tmp_path: Path, make: object, s
         RecordedMatte(make(tmp_path / "a.npz"))
     assert said in caught.value.what
     assert "\n" not in str(caught.value)
+
+
+def test_what_is_read_is_what_was_looked_at(tmp_path: Path) -> None:
+    """A zip may hold `alpha` beside `alpha.npy`."""
+    path, content = npz(tmp_path / "a.npz", (1, 2, 2), bytes([1, 2, 3, 4])), io.BytesIO()
+    np.lib.format.write_array(content, np.zeros((64, 64, 64), np.uint8))
+    with zipfile.ZipFile(path, "a") as file:
+        file.writestr("alpha", content.getvalue())
+    matte = RecordedMatte(path).matte(Frame(np.zeros((2, 2, 3), np.uint8), 0, 0.0, 0.0))
+    np.testing.assert_allclose(matte * 255, [[1, 2], [3, 4]], atol=1e-3)

@@ -175,9 +175,16 @@ def test_groups_are_those_of_the_nodes(machine, settings):
 def test_a_stamp_tells_a_changed_unit():
     text = unit_text(Path("/home/me/.local/bin/relit"))
     assert is_ours(text)
-    assert not is_ours(text.replace("RestartSec=3", "RestartSec=4"))
+    assert not is_ours(text.replace("RestartSec=10", "RestartSec=4"))
     assert not is_ours("[Unit]\n")
     assert not is_ours("")
+
+
+def test_systemd_never_gives_up_starting_it():
+    unit, service = unit_text(Path("/usr/bin/relit")).split("[Service]")
+    assert "StartLimitIntervalSec=0\n" in unit
+    assert "Burst" not in unit
+    assert "Restart=on-failure\nRestartSec=10\n" in service
 
 
 def test_odd_paths_are_quoted_for_systemd():

@@ -15,7 +15,14 @@ from safetensors.numpy import load_file, save_file
 from relit_camera.capture.build import build_subject
 from relit_camera.demo import bundle
 from relit_camera.errors import NotFoundError, StorageError, SubjectError
-from relit_camera.subject.file import HEADER_KEY, read_subject, write_subject
+from relit_camera.subject.file import (
+    HEADER_KEY,
+    MAX_HELD_BYTES,
+    read_metadata,
+    read_neutral,
+    read_subject,
+    write_subject,
+)
 from relit_camera.subject.pack import decode_basis
 from relit_camera.subject.store import SubjectStore
 from relit_camera.subject.subject import Subject
@@ -105,6 +112,38 @@ def test_wrong_tensors_are_refused(path: Path, change: dict[str, np.ndarray]) ->
     _rewrite(path, change)
     with pytest.raises(SubjectError, match="not a usable subject"):
         read_subject(path)
+
+
+def test_what_is_held_in_memory_may_be_less_than_what_is_mapped(path: Path) -> None:
+    held = read_subject(path, held=True)
+    np.testing.assert_array_equal(held.coefficients, read_subject(path).coefficients)
+    with path.open("ab") as file:
+        file.truncate(MAX_HELD_BYTES + 1)  # takes no room
+    with pytest.raises(SubjectError, match="larger than 1 GiB; build it again at a smaller size"):
+        read_subject(path, held=True)
+    with pytest.raises(SubjectError, match="not a usable subject"):
+        read_subject(path)
+
+
+def test_header_and_neutral_picture_are_read_alone(subject: Subject, path: Path) -> None:
+    _rewrite(path, {"coefficients": np.full((3, 2048), np.nan, np.float32)})
+    assert read_metadata(path) == subject.metadata
+    neutral = read_neutral(path)
+    np.testing.assert_array_equal(neutral, subject.neutral)
+    path.write_bytes(b"")  # it is no view of the file
+    np.testing.assert_array_equal(neutral, subject.neutral)
+    for read in (read_metadata, read_neutral):
+        with pytest.raises(SubjectError, match="not a usable subject"):
+            read(path)
+
+
+@pytest.mark.parametrize("neutral", [np.zeros((17, 16, 3), np.uint8), np.zeros((16, 16, 3), np.int8), None])
+def test_a_neutral_picture_of_another_kind_is_refused(path: Path, neutral: np.ndarray | None) -> None:
+    tensors = {name: tensor for name, tensor in load_file(path).items() if name != "neutral"}
+    header = read_metadata(path).model_dump_json()
+    save_file(tensors if neutral is None else {**tensors, "neutral": neutral}, path, {HEADER_KEY: header})
+    with pytest.raises(SubjectError, match="'neutral'"):
+        read_neutral(path)
 
 
 @pytest.mark.parametrize("keep", [0, 7, 100, 0.5, 0.99])

@@ -1,21 +1,32 @@
 """Connections that nobody uses are cut off, so that their files and memory come back.
 
-uvicorn waits for ever for a client that has connected and asks nothing, and for one that takes no more of an answer.
+uvicorn waits for ever for a client that has connected and asks nothing, for one that does not end what it asks, and
+for one that takes no more of an answer.
 """
 
 from __future__ import annotations
 
 import asyncio
+from enum import Enum, auto
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 STALLED_S = 10.0
 """A client that takes nothing of what waits for it for so long is gone, or means no good."""
 SILENT_S = 10.0
-"""The same for one that has connected and not asked a whole question."""
+"""The same for one that has not asked a whole question, the first or another; a long body has so long for each
+`BODY_BYTES`."""
+BODY_BYTES = 16 << 10
 SEND_BUFFER = 256 << 10
 """Bytes that the system keeps for a client: enough for a picture or two. Left alone it would keep some megabytes for
 each that does not read, and show slow ones what was seconds ago."""
+
+
+class Owed(Enum):
+    """What a client has begun or is to begin, and we wait for."""
+
+    QUESTION = auto()
+    BODY = auto()
 
 
 class TimedConnection(H11Protocol):
@@ -23,11 +34,14 @@ class TimedConnection(H11Protocol):
 
     _silent: asyncio.TimerHandle | None = None
     _stalled: asyncio.TimerHandle | None = None
+    _owed: Owed | None = None
+    _received = _unsent = 0
+    """Bytes received since the timer was started, and what had not been taken from us then."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for the first question."""
         super().connection_made(transport)
-        self._silent = self.loop.call_later(SILENT_S, self._end_silent)
+        self._await_client()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait for nothing more."""
@@ -35,6 +49,17 @@ class TimedConnection(H11Protocol):
             if timer is not None:
                 timer.cancel()
         super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """The client said something, which may end the waiting or not."""
+        self._received += len(data)
+        super().data_received(data)
+        self._await_client()
+
+    def on_response_complete(self) -> None:
+        """Begin to wait for the next question."""
+        super().on_response_complete()
+        self._await_client()
 
     def pause_writing(self) -> None:
         """More waits for the client than it takes: it has until `STALLED_S`."""
@@ -47,6 +72,30 @@ class TimedConnection(H11Protocol):
             self._stalled.cancel()
         super().resume_writing()
 
+    def _await_client(self) -> None:
+        """Wait for what the client owes now; the time runs on while that is the same."""
+        owed = self._what_is_owed()
+        if owed is self._owed:
+            return
+        self._owed = owed
+        if self._silent is not None:
+            self._silent.cancel()
+        if owed is not None:
+            self._start_timer()
+
+    def _what_is_owed(self) -> Owed | None:
+        if self.cycle is None or self.cycle.response_complete:
+            return Owed.QUESTION
+        return Owed.BODY if self.cycle.more_body else None
+
+    def _start_timer(self) -> None:
+        self._received, self._unsent = 0, self.transport.get_write_buffer_size()
+        self._silent = self.loop.call_later(SILENT_S, self._end_silent)
+
     def _end_silent(self) -> None:
-        if self.cycle is None:
+        still_takes = self.transport.get_write_buffer_size() < self._unsent  # the last answer, before it asks again
+        still_sends = self._owed is Owed.BODY and (self._received >= BODY_BYTES or self.flow.read_paused)
+        if still_takes or still_sends:
+            self._start_timer()
+        else:
             self.transport.abort()

@@ -17,6 +17,8 @@ from relit_camera.stream.status import CameraStatus
 
 log = logging.getLogger(__name__)
 
+SINK_FAILED = "sink failed"
+"""What the status says while the sink takes no pictures and is tried again."""
 FIRST_PICTURE_POLL_S = 0.05
 STATUS_EVERY_S = 5.0
 """How often the status line is renewed where no watchdog asks for more."""
@@ -61,7 +63,8 @@ def announced(status: Callable[[], CameraStatus], manager: ServiceManager | None
     """While the context lasts, tell the service manager, if there is one, how the camera does.
 
     READY=1 when the first picture was published, then WATCHDOG=1 at half the watchdog's time, though only if pictures
-    went out since the last one: a camera that stands still is to be started anew. STOPPING=1 at the end.
+    went out since the last one, or the status says that the sink takes none: a camera that stands still is to be started
+    anew, not one that knows what is wrong and tries again. STOPPING=1 at the end.
     """
     manager = manager or ServiceManager.from_environment()
     if manager is None:
@@ -87,9 +90,13 @@ def _report(manager: ServiceManager, status: Callable[[], CameraStatus], over: t
     published = now.frames.published
     while not over.wait(STATUS_EVERY_S if manager.watchdog_s is None else manager.watchdog_s / 2):
         now = status()
-        alive = ["WATCHDOG=1"] if now.frames.published > published else []
+        alive = ["WATCHDOG=1"] if now.frames.published > published or _sink_failed(now) else []
         published = now.frames.published
         manager.tell(*alive, f"STATUS={status_line(now)}")
+
+
+def _sink_failed(status: CameraStatus) -> bool:
+    return any(trouble.what == SINK_FAILED for trouble in status.degraded)
 
 
 def status_line(status: CameraStatus) -> str:

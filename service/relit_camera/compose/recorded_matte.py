@@ -57,8 +57,8 @@ def _read_alpha(path: Path) -> NDArray[np.uint8]:
             raise ValueError(f"they are {dtype} {shape}")
         if math.prod(shape) > MAX_BYTES:
             raise ValueError(f"they are {math.prod(shape) >> 20} MiB, more than {MAX_BYTES >> 20}")
-    with np.load(path, allow_pickle=False) as kept_arrays:
-        alpha: NDArray[np.uint8] = kept_arrays["alpha"]
+        file.seek(0)  # the very member: np.load would take one that is called `alpha` instead
+        alpha: NDArray[np.uint8] = np.lib.format.read_array(file, allow_pickle=False)
         return alpha
 
 

@@ -10,7 +10,7 @@ from relit_camera.subject.store import SubjectStore
 
 def check_subject(settings: RelitSettings) -> Finding:
     """The subject that the settings name: there and whole. With none the live picture passes through."""
-    topic, store = "subject", SubjectStore(settings.storage.subjects)
+    topic, store = "subject", SubjectStore(settings.storage.subjects, held=True)  # as the camera does
     stored = ", ".join(store.names())
     if settings.subject is None:
         cure = f"choose one by `subject:` in config.yaml or --subject; stored are: {stored}"

@@ -22,11 +22,11 @@ FIX = "run: relit doctor --fix"
 
 # No mount namespaces (PrivateTmp, ProtectHome …): the user's manager would need user namespaces for them, in which the
 # groups that own the cameras are lost. No MemoryDenyWriteExecute: CUDA and OpenVINO make code while they run.
+# No limit of starts: without its webcam the camera ends at once, and it shall be there when the webcam is, hours later.
 TEMPLATE = """\
 [Unit]
 Description=Relit Camera: a virtual webcam that shows you lit by any place you choose
-StartLimitIntervalSec=300
-StartLimitBurst=5
+StartLimitIntervalSec=0
 
 [Service]
 Type=notify
@@ -35,7 +35,7 @@ TimeoutStartSec=120
 TimeoutStopSec=10
 WatchdogSec=30
 Restart=on-failure
-RestartSec=3
+RestartSec=10
 UMask=0077
 NoNewPrivileges=yes
 LockPersonality=yes
@@ -82,7 +82,7 @@ def check_service(host: Host) -> Finding:
     if not host.is_linux:
         return fine(topic, "systemd's alone; not on this system")
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8", errors="replace")
     except OSError:
         return fine(topic, "not installed, relit run is started by hand (relit doctor --fix writes the unit)")
     if not is_ours(text):

@@ -11,6 +11,8 @@ from typing import Any
 from relit_camera.space.quiet import quiet_decoders
 
 _JPEG_FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_JPEG_MARKERS_ALONE = frozenset({0x01, *range(0xD0, 0xD8)})
+"""TEM and RST0 to RST7: no length follows them."""
 MAX_JPEG_SCANS = 500
 """A progressive picture has about ten. Each costs a pass over all pixels, though it may have no bytes to speak of."""
 MAX_EXR_VALUES = 256_000_000
@@ -86,11 +88,15 @@ def _tiff_size(data: bytes) -> tuple[int, int]:
     order = "<" if data.startswith(b"II") else ">"
     (start,) = struct.unpack_from(f"{order}I", data, 4)
     (count,) = struct.unpack_from(f"{order}H", data, start)
-    sides = {}
+    sides: dict[int, int] = {}
     for position in range(start + 2, start + 2 + 12 * count, 12):
         tag, kind = struct.unpack_from(f"{order}HH", data, position)
+        if tag not in (256, 257):
+            continue
+        if tag in sides or kind not in (3, 4):  # which of two counts, and what other types mean, each reader decides
+            raise ValueError("a TIFF file whose size is stated twice, or not in 16 or 32 bits")
         (sides[tag],) = struct.unpack_from(f"{order}{'H' if kind == 3 else 'I'}", data, position + 8)
-    if not {256, 257} <= sides.keys():
+    if len(sides) < 2:
         raise ValueError("a TIFF file without a size")
     return sides[256], sides[257]
 
@@ -145,5 +151,12 @@ def _jpeg_size(data: bytes) -> tuple[int, int]:
         if marker in _JPEG_FRAME_MARKERS:
             height, width = struct.unpack(">HH", data[position + 5 : position + 9])
             return width, height
-        position += 1 if marker == 0xFF else 2 + length
+        if marker == 0xFF:  # a fill byte
+            position += 1
+        elif marker in _JPEG_MARKERS_ALONE:
+            position += 2
+        elif marker in (0x00, 0xD8, 0xD9) or length < 2:
+            break  # no segment; decoders skip it, or give up
+        else:
+            position += 2 + length
     raise ValueError("a JPEG file without a frame header")

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ from pydantic import ValidationError
 from safetensors import SafetensorError, safe_open
 
 from relit_camera.errors import SubjectError
+from relit_camera.space.images import DisplayImage
 from relit_camera.subject.local_basis import LocalBasis, whole_basis
 from relit_camera.subject.pack import decode_basis, encode_basis
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
@@ -22,6 +25,8 @@ HEADER_KEY = "relit_subject"
 LANDMARKS = "landmarks."
 MAX_TENSORS = 64
 MAX_BYTES = 8 << 30
+MAX_HELD_BYTES = 1 << 30
+"""Of a subject that is read into memory: the largest that is built, 1024 pixels a side, has under 700 MB."""
 REQUIRED = ("coefficients", "light_directions", "light_coefficients", "matte", "neutral")
 OPTIONAL = ("normals", "albedo", "depth", "horizons")
 BASIS = "basis."
@@ -86,24 +91,17 @@ def read_subject(path: Path, held: bool = False) -> Subject:
     Args:
         path: the file.
         held: read it into memory instead. What runs for long needs that: where somebody cuts a mapped file short, the
-            system ends the process that looks at it.
+            system ends the process that looks at it. It may have `MAX_HELD_BYTES` then, else `MAX_BYTES`.
 
     Raises:
-        SubjectError: missing, damaged, of another version, or with values that are not finite.
+        SubjectError: missing, too large, damaged, of another version, or with values that are not finite.
     """
-    if not path.is_file():
-        raise SubjectError(f"no subject file at {path}", "build one with 'relit capture import' or check the path")
-    if path.stat().st_size > MAX_BYTES:
-        raise SubjectError(f"{path} is larger than {MAX_BYTES >> 30} GiB", "build it again at a smaller size")
-    try:
-        with safe_open(path, framework="numpy") as file:
-            metadata = _metadata(path, file.metadata() or {})
-            names = list(file.keys())
-            if len(names) > MAX_TENSORS:
-                raise _damaged(path, f"it holds {len(names)} tensors")
+    with _opened(path, MAX_HELD_BYTES if held else MAX_BYTES) as file:
+        metadata = _metadata(path, file.metadata() or {})
+        names = list(file.keys())
+        if len(names) > MAX_TENSORS:
+            raise _damaged(path, f"it holds {len(names)} tensors")
         tensors = _views(path, names, held)
-    except (SafetensorError, OSError) as error:
-        raise _damaged(path, str(error)) from error
     _check(path, tensors, metadata.format_version)
     landmarks = {n.removeprefix(LANDMARKS): t for n, t in tensors.items() if n.startswith(LANDMARKS)}
     arrays = {name: tensors[name] for name in (*REQUIRED, *OPTIONAL) if name in tensors}
@@ -111,6 +109,47 @@ def read_subject(path: Path, held: bool = False) -> Subject:
         return Subject(metadata=metadata, basis=_basis(tensors, metadata), landmarks=landmarks, **arrays)
     except (ValueError, SubjectError) as error:
         raise _damaged(path, error.what if isinstance(error, SubjectError) else str(error)) from error
+
+
+def read_metadata(path: Path) -> SubjectMetadata:
+    """What a subject's header says. Its tensors are not looked at.
+
+    Raises:
+        SubjectError: missing, too large, no subject, or of another version.
+    """
+    with _opened(path, MAX_BYTES) as file:
+        return _metadata(path, file.metadata() or {})
+
+
+def read_neutral(path: Path) -> DisplayImage:
+    """A copy of the neutral picture, uint8 sRGB RGB (height, width, 3). No other tensor is looked at.
+
+    Raises:
+        SubjectError: missing, too large, no subject, of another version, or without such a picture.
+    """
+    with _opened(path, MAX_BYTES) as file:
+        metadata = _metadata(path, file.metadata() or {})
+        if "neutral" not in file.keys():
+            raise _damaged(path, "it has no tensor 'neutral'")
+        stored, shape = file.get_slice("neutral"), [metadata.height, metadata.width, 3]
+        if stored.get_dtype() != "U8" or stored.get_shape() != shape:
+            raise _damaged(path, f"'neutral' is {stored.get_dtype()} {stored.get_shape()}, not U8 {shape}")
+        neutral: DisplayImage = file.get_tensor("neutral")
+        return neutral
+
+
+@contextmanager
+def _opened(path: Path, most_bytes: int) -> Iterator[Any]:
+    """A sound file of tensors (`safe_open`, which has no types); faults that are found while it is open are a subject's, too."""
+    if not path.is_file():
+        raise SubjectError(f"no subject file at {path}", "build one with 'relit capture import' or check the path")
+    if path.stat().st_size > most_bytes:
+        raise SubjectError(f"{path} is larger than {most_bytes >> 30} GiB", "build it again at a smaller size")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            yield file
+    except (SafetensorError, OSError) as error:
+        raise _damaged(path, str(error)) from error
 
 
 def _basis(tensors: Mapping[str, NDArray], metadata: SubjectMetadata) -> LocalBasis:

@@ -6,8 +6,9 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from relit_camera.errors import NotFoundError
-from relit_camera.subject.file import SUFFIX, read_subject
-from relit_camera.subject.subject import Subject
+from relit_camera.space.images import DisplayImage
+from relit_camera.subject.file import SUFFIX, read_metadata, read_neutral, read_subject
+from relit_camera.subject.subject import Subject, SubjectMetadata
 
 
 class SubjectStore:
@@ -40,9 +41,25 @@ class SubjectStore:
 
         Raises:
             NotFoundError: none of that name.
-            SubjectError: its file is damaged.
+            SubjectError: its file is damaged, or too large.
         """
         return read_subject(self.path(name), self._held)
+
+    def metadata(self, name: str) -> SubjectMetadata:
+        """What a stored subject's header says, whatever the size of its file.
+
+        Raises:
+            NotFoundError, SubjectError: as `load`.
+        """
+        return read_metadata(self.path(name))
+
+    def neutral(self, name: str) -> DisplayImage:
+        """A stored subject's neutral picture, uint8 sRGB RGB (height, width, 3), whatever the size of its file.
+
+        Raises:
+            NotFoundError, SubjectError: as `load`.
+        """
+        return read_neutral(self.path(name))
 
     def resolve(self, name_or_path: str) -> tuple[str, Subject]:
         """A stored name first, else a path. Returns the name to show and the subject.

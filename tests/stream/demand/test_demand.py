@@ -142,6 +142,19 @@ def test_a_device_that_cannot_be_opened_now_leaves_the_answer_as_it_was(quick):
     watch.close()
 
 
+@pytest.mark.parametrize("number", [errno.ENOENT, errno.ENODEV, errno.ENXIO])
+def test_nobody_reads_a_device_that_is_gone(quick, number):
+    ask = Readers()
+    ask.there = True
+    watch = watch_with(ask, Readers())
+    assert watch.anybody()
+    ask.error = OSError(number, "gone")
+    wait_until(lambda: not watch.anybody())
+    ask.error = None
+    wait_until(watch.anybody)
+    watch.close()
+
+
 # What is asked of the driver.
 
 

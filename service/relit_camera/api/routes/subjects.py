@@ -41,8 +41,8 @@ def list_subjects(api: Context) -> list[SubjectItem]:
 def get_subject_details(api: Context, name: Name) -> SubjectDetails:
     """One stored subject and what its file says of how it was made."""
     with api.slow_work():
-        subject = api.camera.director.subjects.load(name)
-    return SubjectDetails(**dict(_item(api, name)), metadata=subject.metadata)
+        metadata = api.camera.director.subjects.metadata(name)
+    return SubjectDetails(**dict(_item(api, name)), metadata=metadata)
 
 
 @router.delete("/subjects/{name}", status_code=HTTPStatus.NO_CONTENT, responses=responses(404, 409, 422))
@@ -62,7 +62,7 @@ def delete_subject(api: Context, name: Name) -> None:
 def get_subject_thumbnail(api: Context, request: Request, name: Name) -> Response:
     """A small picture of a stored subject's face."""
     with api.slow_work():
-        jpeg = thumbnail(api.camera.director.subjects.load(name).neutral)
+        jpeg = thumbnail(api.camera.director.subjects.neutral(name))
     return jpeg_answer(request, jpeg)
 
 

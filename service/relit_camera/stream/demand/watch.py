@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import threading
 from collections.abc import Callable
@@ -12,6 +13,8 @@ log = logging.getLogger(__name__)
 
 ASK_EVERY_S, SCAN_EVERY_S = 0.25, 1.0
 """Seconds between questions to the driver, and between walks through /proc."""
+GONE = (errno.ENOENT, errno.ENODEV, errno.ENXIO)
+"""What a node says that is no more: nobody can read it."""
 
 
 class ReaderWatch:
@@ -55,6 +58,6 @@ class ReaderWatch:
                 "are noticed",
                 node,
             )
-        except OSError:
-            return self._somebody  # the device is away or crowded: as it was
+        except OSError as error:
+            return self._somebody and error.errno not in GONE  # crowded: as it was
         return self._scan(node)

@@ -1,0 +1,122 @@
+"""Connections that are cut off, and those that are not."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Iterator
+
+import pytest
+from fastapi import FastAPI
+
+from relit_camera.api import connections
+from relit_camera.api.app import create_app
+from relit_camera.api.server import ApiServer, serve
+from relit_camera.config.settings import RelitSettings, ServerSettings
+from tests.api.fake_camera import FakeCamera
+
+SILENT_S = 0.4
+TOKEN = "0123456789abcdef" * 2
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "SILENT_S", SILENT_S)
+    monkeypatch.setattr(connections, "STALLED_S", SILENT_S)
+
+
+@pytest.fixture
+def server(app: FastAPI) -> Iterator[ApiServer]:
+    with serve(app, ServerSettings(port=0)) as server:
+        yield server
+
+
+def connect(server: ApiServer) -> socket.socket:
+    return socket.create_connection((server.address.host, server.address.port), 5)
+
+
+def question(server: ApiServer, line: str, *headers: str) -> bytes:
+    return "\r\n".join([f"{line} HTTP/1.1", f"Host: 127.0.0.1:{server.address.port}", *headers, "", ""]).encode()
+
+
+def ask_whether_alive(server: ApiServer, client: socket.socket) -> None:
+    client.sendall(question(server, "GET /healthz"))
+    answer = b""
+    while b"alive" not in answer:
+        piece = client.recv(1 << 16)
+        assert piece
+        answer += piece
+
+
+def is_cut_off(client: socket.socket, within_s: float = 4 * SILENT_S) -> bool:
+    """Whether the server ends the connection in time, whatever it sends before."""
+    deadline = time.monotonic() + within_s
+    while (left := deadline - time.monotonic()) > 0:
+        client.settimeout(left)
+        try:
+            if not client.recv(1 << 16):
+                return True
+        except TimeoutError:
+            return False
+        except ConnectionError:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("more", [b"", b"G", b"GET /healthz HTTP/1.1\r\nHost: 127"], ids=["nothing", "a byte", "half"])
+def test_who_asked_once_and_then_nothing_whole_is_cut_off(server: ApiServer, more: bytes) -> None:
+    with connect(server) as client:
+        ask_whether_alive(server, client)
+        client.sendall(more)
+        assert is_cut_off(client)
+
+
+def test_bytes_now_and_then_are_no_question(server: ApiServer) -> None:
+    with connect(server) as client:
+        client.settimeout(SILENT_S / 8)
+        began = time.monotonic()
+        for byte in question(server, "GET /healthz", f"X-Long: {'x' * 100}"):
+            try:
+                client.sendall(bytes([byte]))
+                if not client.recv(1):
+                    break
+            except TimeoutError:
+                continue
+            except ConnectionError:
+                break
+        assert time.monotonic() - began < 4 * SILENT_S
+
+
+@pytest.mark.parametrize("path", ["/login", "/api/v1/subject"])
+def test_a_body_that_does_not_come_is_not_waited_for(camera: FakeCamera, settings: RelitSettings, path: str) -> None:
+    guarded = settings.model_copy(update={"server": ServerSettings(port=0, token=TOKEN)})
+    headers = ("Content-Length: 100", "Content-Type: application/json", f"Authorization: Bearer {TOKEN}")
+    with serve(create_app(camera, guarded), guarded.server) as server, connect(server) as client:
+        client.sendall(question(server, f"{'POST' if path == '/login' else 'PUT'} {path}", *headers) + b"t")
+        assert is_cut_off(client)
+
+
+def test_a_body_that_comes_slowly_is_taken(server: ApiServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connections, "BODY_BYTES", 10)
+    body = b'{"name": null}' + b" " * 200
+    with connect(server) as client:
+        headers = (f"Content-Length: {len(body)}", "Content-Type: application/json")
+        client.sendall(question(server, "PUT /api/v1/subject", *headers))
+        for start in range(0, len(body), 10):
+            client.sendall(body[start : start + 10])
+            time.sleep(SILENT_S / 8)
+        assert client.recv(1 << 16).startswith(b"HTTP/1.1 200")
+
+
+@pytest.mark.parametrize("path", ["events", "preview.mjpg"])
+def test_a_stream_that_is_taken_goes_on(server: ApiServer, path: str) -> None:
+    with connect(server) as client:
+        client.sendall(question(server, f"GET /api/v1/{path}"))
+        assert not is_cut_off(client)
+
+
+def test_who_asks_again_in_time_stays(server: ApiServer) -> None:
+    with connect(server) as client:
+        for _ in range(8):
+            ask_whether_alive(server, client)
+            time.sleep(SILENT_S / 3)
