@@ -164,7 +164,8 @@ def service(listener: Listener, material: Material, folder: Path) -> Iterator[su
     small = {"RELIT_SOURCE__WIDTH": "128", "RELIT_SOURCE__HEIGHT": "96"}
     process = subprocess.Popen(
         [
-            sys.executable, "-c", INJECTED, str(folder / "failing"), str(folder / "stuck"), "run", "--source", "pattern", "--sink", "null", "--port", "0",
+            sys.executable, "-c", INJECTED, str(folder / "failing"), str(folder / "stuck"),
+            "run", "--source", "pattern", "--sink", "null", "--port", "0",
             "--size", "128x96", "--tracker", material.tracker,
         ],
         env={**environment(folder), **told, **small}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

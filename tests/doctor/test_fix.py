@@ -13,6 +13,7 @@ import pytest
 from relit_camera.config.load import load_settings
 from relit_camera.config.settings import OutputSettings, RelitSettings
 from relit_camera.doctor import fix as fixing
+from relit_camera.doctor.examine import examine
 from relit_camera.doctor.findings import FileState, State
 from relit_camera.doctor.fix import fix, user_config
 from relit_camera.doctor.root_commands import root_commands
@@ -88,6 +89,61 @@ def test_a_unit_that_a_person_changed_is_kept_and_the_difference_shown(machine, 
     assert "-WatchdogSec=90" in note
     assert "+WatchdogSec=30" in note
     expect(check_service(machine.host), State.OK, "changed or written by you")
+
+
+def unit_after_fix(settings, machine):
+    return next(f for f in fix(settings, machine.host, everybody_may).files if f.path == str(unit_path()))
+
+
+def test_a_folder_in_the_units_place_is_said(machine, settings):
+    unit_path().mkdir(parents=True)
+    found = unit_after_fix(settings, machine)
+    assert found.state is FileState.FAILED
+    assert "Is a directory" in found.note
+    expect(check_service(machine.host), State.WARNING, "cannot be read: Is a directory", "move it away")
+
+
+def test_a_unit_that_cannot_be_read_is_said(machine, settings, monkeypatch):
+    fix(settings, machine.host, everybody_may)
+
+    def refuse(path, *_, **__):
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "read_text", refuse)
+    found = unit_after_fix(settings, machine)
+    assert found.state is FileState.FAILED
+    assert "Permission denied" in found.note
+
+
+def test_a_unit_that_is_no_text_is_the_users_own(machine, settings):
+    unit_path().parent.mkdir(parents=True)
+    unit_path().write_bytes(b"\xff\xfe[Unit]")
+    assert unit_after_fix(settings, machine).state is FileState.KEPT
+    expect(check_service(machine.host), State.OK, "changed or written by you")
+
+
+def test_links_that_lead_nowhere_are_the_users_own(machine, settings, tmp_path):
+    for path in (unit_path(), user_config()):
+        path.parent.mkdir(parents=True)
+        path.symlink_to(tmp_path / "away")
+    done = fix(settings, machine.host, everybody_may)
+    assert states(done)["config.yaml"] is FileState.UNCHANGED
+    assert states(done)["relit-camera.service"] is FileState.KEPT
+    assert "away" in unit_after_fix(settings, machine).note
+    assert unit_path().is_symlink()
+    assert user_config().is_symlink()
+    assert not (tmp_path / "away").exists()
+
+
+def test_with_a_faulty_configuration_no_folders_are_made(machine, tmp_path):
+    path = tmp_path / "mine.yaml"
+    path.write_text("look: [")
+    before = {each for each in tmp_path.rglob("*") if each.is_dir()}
+    report = examine(path, machine.host, everybody_may, with_fix=True)
+    assert report.fix is not None
+    assert set(states(report.fix)) == {"config.yaml", "relit-camera.service"}
+    made = {each for each in tmp_path.rglob("*") if each.is_dir()} - before
+    assert made <= {*user_config().parents, *unit_path().parents}
 
 
 def test_what_cannot_be_written_is_said_and_the_rest_goes_on(machine, settings, tmp_path):

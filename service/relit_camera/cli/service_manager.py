@@ -63,8 +63,8 @@ def announced(status: Callable[[], CameraStatus], manager: ServiceManager | None
     """While the context lasts, tell the service manager, if there is one, how the camera does.
 
     READY=1 when the first picture was published, then WATCHDOG=1 at half the watchdog's time, though only if pictures
-    went out since the last one, or the status says that the sink takes none: a camera that stands still is to be started
-    anew, not one that knows what is wrong and tries again. STOPPING=1 at the end.
+    went out since the last one, or the status says that the sink takes none: a camera that stands still is to be
+    started anew, not one that knows what is wrong and tries again. STOPPING=1 at the end.
     """
     manager = manager or ServiceManager.from_environment()
     if manager is None:

@@ -11,7 +11,7 @@ from relit_camera.config.load import LOADER_VARIABLES, config_path, load_setting
 from relit_camera.config.settings import RelitSettings
 from relit_camera.doctor.browsers import check_browsers
 from relit_camera.doctor.cameras import Access, check_virtual_camera, check_webcam
-from relit_camera.doctor.findings import Finding, Report, fine, problem_from
+from relit_camera.doctor.findings import Finding, Report, State, fine, problem_from
 from relit_camera.doctor.fix import fix
 from relit_camera.doctor.host import Host
 from relit_camera.doctor.inference import check_models, check_provider
@@ -33,13 +33,14 @@ def examine(
         config: the configuration file; the usual places if not given. Where it is at fault, the defaults are examined.
         host: this machine if not given.
         access: `os.access` or a stand-in.
-        with_fix: first write the user's files that are missing (`doctor.fix`); the report is of what is then.
+        with_fix: first write the user's files that are missing (`doctor.fix`), though no folders where the
+            configuration is at fault; the report is of what is then.
     """
     host = host or Host()
     settings, configuration = _configuration(config)
     fixed = None
     if with_fix:
-        fixed = fix(settings, host, access)
+        fixed = fix(settings, host, access, with_folders=configuration.state is State.OK)
         settings, configuration = _configuration(config)  # there may be a file now
     checks: tuple[Callable[[], Finding], ...] = (
         check_python,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from platformdirs import user_config_path
@@ -46,17 +47,18 @@ def user_config() -> Path:
     return user_config_path("relit-camera", appauthor=False) / "config.yaml"
 
 
-def fix(settings: RelitSettings, host: Host, access: Access = os.access) -> Fix:
+def fix(settings: RelitSettings, host: Host, access: Access = os.access, with_folders: bool = True) -> Fix:
     """Write the missing files and folders of the user.
 
     Args:
         settings: that hold now; their folders are made.
         host: this machine.
         access: `os.access` or a stand-in.
+        with_folders: false where the configuration is at fault, and nobody knows which folders it means.
     """
     storage = settings.storage
     folders = [storage.subjects, storage.environments, storage.backgrounds, storage.presets, models_folder()]
-    files = [*map(_folder, folders), _config(user_config())]
+    files = [*map(_folder, folders if with_folders else []), _config(user_config())]
     user_commands = [] if check_models(settings).state == "ok" else ["relit models pull"]
     if host.is_linux:
         files.append(_unit(unit_path()))
@@ -70,22 +72,28 @@ def fix(settings: RelitSettings, host: Host, access: Access = os.access) -> Fix:
 
 
 def _folder(path: Path) -> FixedFile:
-    if path.is_dir():
-        return FixedFile(path=str(path), state=FileState.UNCHANGED)
+    with suppress(OSError):  # where one may not look one may not write, which `_attempt` says
+        if path.is_dir():
+            return FixedFile(path=str(path), state=FileState.UNCHANGED)
     return _attempt(path, FileState.WRITTEN, None)
 
 
 def _config(path: Path) -> FixedFile:
-    if path.exists():  # it is there to be changed
+    if os.path.lexists(path):  # it is there to be changed; a link that leads nowhere is the user's too
         return FixedFile(path=str(path), state=FileState.UNCHANGED)
     return _attempt(path, FileState.WRITTEN, CONFIG_TEXT)
 
 
 def _unit(path: Path) -> FixedFile:
     wanted = unit_text(relit_command())
-    if not path.exists():
+    if not os.path.lexists(path):
         return _attempt(path, FileState.WRITTEN, wanted)
-    found = path.read_text(encoding="utf-8", errors="replace")
+    try:
+        found = path.read_text(encoding="utf-8", errors="replace")
+    except FileNotFoundError:
+        return FixedFile(path=str(path), state=FileState.KEPT, note=f"a link to {path.readlink()}, which is not there")
+    except OSError as error:
+        return FixedFile(path=str(path), state=FileState.FAILED, note=f"cannot read {path}: {error.strerror}")
     if found == wanted:
         return FixedFile(path=str(path), state=FileState.UNCHANGED)
     if not is_ours(found):

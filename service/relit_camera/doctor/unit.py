@@ -83,8 +83,10 @@ def check_service(host: Host) -> Finding:
         return fine(topic, "systemd's alone; not on this system")
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
+    except FileNotFoundError:
         return fine(topic, "not installed, relit run is started by hand (relit doctor --fix writes the unit)")
+    except OSError as error:
+        return warning(topic, f"{path} cannot be read: {error.strerror}", "move it away, then " + FIX)
     if not is_ours(text):
         return fine(topic, f"{path}, changed or written by you")
     if text != unit_text(relit_command()):

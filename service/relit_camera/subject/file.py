@@ -129,7 +129,7 @@ def read_neutral(path: Path) -> DisplayImage:
     """
     with _opened(path, MAX_BYTES) as file:
         metadata = _metadata(path, file.metadata() or {})
-        if "neutral" not in file.keys():
+        if "neutral" not in list(file.keys()):
             raise _damaged(path, "it has no tensor 'neutral'")
         stored, shape = file.get_slice("neutral"), [metadata.height, metadata.width, 3]
         if stored.get_dtype() != "U8" or stored.get_shape() != shape:
@@ -140,7 +140,7 @@ def read_neutral(path: Path) -> DisplayImage:
 
 @contextmanager
 def _opened(path: Path, most_bytes: int) -> Iterator[Any]:
-    """A sound file of tensors (`safe_open`, which has no types); faults that are found while it is open are a subject's, too."""
+    """A sound file of tensors, by `safe_open`, which has no types. What fails while it is open is a SubjectError."""
     if not path.is_file():
         raise SubjectError(f"no subject file at {path}", "build one with 'relit capture import' or check the path")
     if path.stat().st_size > most_bytes:
