@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 
-from relit_camera.stream.holders import Holder, holders
+from relit_camera.stream.holders import Holder, holders, maps
 
 NODE = "/dev/video10"
 
@@ -61,3 +61,22 @@ def test_a_real_process_is_found(tmp_path):
         assert [holder.pid for holder in holders(str(path))] == [process.pid]
         process.communicate("\n")
     assert holders(str(path)) == []
+
+
+def test_who_has_a_device_in_memory_is_told_from_who_has_it_open(tmp_path):
+    path = tmp_path / "device"
+    path.write_bytes(bytes(4096))
+    program = f"import mmap; f = open({str(path)!r}, 'r+b'); m = FIRST; print(flush=True); input()"
+    for first, mapped in (("mmap.mmap(f.fileno(), 4096)", True), ("None", False)):
+        with subprocess.Popen(
+            [sys.executable, "-c", program.replace("FIRST", first)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as process:
+            assert process.stdout is not None
+            process.stdout.readline()
+            (holder,) = holders(str(path))
+            assert maps(holder, str(path)) is mapped
+            process.communicate("\n")
+    assert not maps(holder, str(path))  # it has ended

@@ -8,11 +8,12 @@ import pytest
 from relit_camera.config.settings import OutputSettings
 from relit_camera.errors import DeviceError, ImageError, InputError, StorageError, VideoError
 from relit_camera.stream.devices import DeviceTree
+from relit_camera.stream.holders import Holder
 from relit_camera.stream.sinks import camera as camera_module
 from relit_camera.stream.sinks import loopback
 from relit_camera.stream.sinks.base import SinkInfo
 from relit_camera.stream.sinks.camera import CameraSink
-from relit_camera.stream.sinks.factory import open_sink
+from relit_camera.stream.sinks.factory import open_sink, published_label
 from relit_camera.stream.sinks.file import FileSink
 from relit_camera.stream.sinks.null import NullSink
 from relit_camera.stream.sources.pattern import draw_pattern, read_number
@@ -153,6 +154,37 @@ def test_after_a_failed_write_the_next_one_opens_again(tree):
     assert read_number(opener.cameras[1].sent[0]) == 2
 
 
+def test_a_second_relit_camera_is_refused_until_the_first_lets_go(tree):
+    first, opener = CameraSink(SIZE, 30, tree=tree, open_camera=Opener()), Opener()
+    with pytest.raises(DeviceError, match=r"another Relit Camera publishes to .*video10 already; stop that one"):
+        CameraSink(SIZE, 30, tree=tree, open_camera=opener)
+    assert opener.cameras == []
+    first.close()
+    CameraSink(SIZE, 30, tree=tree, open_camera=opener).close()
+    assert len(opener.cameras) == 1
+
+
+def test_a_camera_that_cannot_be_opened_is_not_claimed(tree):
+    with pytest.raises(DeviceError, match="something else"):
+        CameraSink(SIZE, 30, tree=tree, open_camera=Opener(RuntimeError("something else")))
+    CameraSink(SIZE, 30, tree=tree, open_camera=Opener()).close()
+
+
+@pytest.mark.parametrize(("text", "now"), [("\n", "was taken away or reset"), ("YU12:640x360@30\n", "is 640x360 now")])
+def test_a_device_that_drops_what_is_written_is_noticed_and_opened_anew(tree, monkeypatch, text, now):
+    monkeypatch.setattr(camera_module, "CHECK_S", 0.0)
+    tree.set_format(10, "YU12:320x180@30\n")
+    opener = Opener()
+    sink = CameraSink(SIZE, 30, tree=tree, open_camera=opener)
+    sink.write(draw_pattern(SIZE, 0))
+    tree.set_format(10, text)
+    with pytest.raises(DeviceError, match=f"takes no pictures: it {now}"):
+        sink.write(draw_pattern(SIZE, 1))
+    tree.set_format(10, "YU12:320x180@30\n")
+    sink.write(draw_pattern(SIZE, 2))
+    assert [camera.closed for camera in opener.cameras] == [True, False]
+
+
 def test_only_uint8_pictures_are_taken(tree):
     sink = CameraSink(SIZE, 30, tree=tree, open_camera=Opener())
     with pytest.raises(ImageError, match="float32"):
@@ -181,7 +213,7 @@ class FakeDevice:
     ("capabilities", "state", "revived"),
     [
         (0x05200000, None, True),  # neither capture nor output, no state file: 0.12 after its first writer
-        (0x05200001, None, False),  # capture: a writer may be at work
+        (0x05200001, None, True),  # capture: its writer has gone, a reader has not
         (0x05200002, None, False),  # output: free already
         (0x05200000, "output", False),  # newer versions have no need
     ],
@@ -193,6 +225,17 @@ def test_only_a_stuck_device_is_revived(tmp_path, monkeypatch, capabilities, sta
     device = FakeDevice(monkeypatch, capabilities)
     assert loopback.revive(node, tree) is revived
     assert (loopback.VIDIOC_STREAMON in device.calls) is revived
+
+
+@pytest.mark.parametrize("is_reader", [True, False])
+def test_a_stuck_device_is_revived_beside_readers_only(tmp_path, monkeypatch, is_reader):
+    tree = FakeTree(tmp_path)
+    node = tree.add_loopback(10, "Relit Camera")
+    monkeypatch.setattr(loopback.sys, "platform", "linux")
+    monkeypatch.setattr(loopback, "holders", lambda _: [Holder(7, "program")])
+    monkeypatch.setattr(loopback, "maps", lambda holder, _: is_reader)
+    FakeDevice(monkeypatch, 0x05200001)
+    assert loopback.revive(node, tree) is is_reader
 
 
 def test_what_is_no_video_device_is_left_alone(tree):
@@ -247,6 +290,12 @@ def test_the_null_sink_counts_and_keeps_the_last():
     assert sink.count == 3
     assert read_number(sink.last) == 2
     sink.close()
+
+
+def test_the_camera_published_to_is_known_by_its_label(tree):
+    assert published_label(settings(tree.dev / "video3"), tree) == "Other Cam"
+    assert published_label(settings("camera"), tree) == "Relit Camera"
+    assert published_label(settings("null"), tree) == "Relit Camera"
 
 
 def settings(sink):

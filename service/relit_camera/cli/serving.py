@@ -33,7 +33,7 @@ from relit_camera.stream.daemon import Daemon
 from relit_camera.stream.demand.on_demand import OnDemand
 from relit_camera.stream.director import Director
 from relit_camera.stream.sinks.base import Sink
-from relit_camera.stream.sinks.factory import open_sink
+from relit_camera.stream.sinks.factory import open_sink, published_label
 from relit_camera.stream.sources.factory import open_source
 
 log = logging.getLogger(__name__)
@@ -80,7 +80,7 @@ def run_camera(
     with contextlib.ExitStack() as cleanup:
         listener = cleanup.enter_context(listen(settings.server))
         tracker = make_tracker(settings)
-        make_source = partial(open_source, settings.source, own_label=settings.output.label)
+        make_source = partial(open_source, settings.source, own_label=published_label(settings.output))
         source = make_source()
         cleanup.callback(source.close)
         sink = sink_for(settings.output)

@@ -42,6 +42,15 @@ def holders(node: str, proc: Path = PROC) -> list[Holder]:
     return [_holder(folder) for folder in _processes(proc) if _has_open(folder, node)]
 
 
+def maps(holder: Holder, node: str, proc: Path = PROC) -> bool:
+    """Whether a program has the device's buffers in its memory, as one that reads pictures from it has."""
+    try:
+        lines = (proc / str(holder.pid) / "maps").read_text(errors="replace").splitlines()
+    except OSError:  # ended meanwhile, or guarded
+        return False
+    return any(line.endswith(f" {node}") for line in lines)
+
+
 def _processes(proc: Path) -> Iterator[Path]:
     try:
         numbers = sorted(int(entry.name) for entry in proc.iterdir() if entry.name.isdigit())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -21,17 +22,23 @@ from relit_camera.stream.devices import (
     negotiated_size,
 )
 from relit_camera.stream.sinks.base import SinkInfo
+from relit_camera.stream.sinks.claim import Claim
 from relit_camera.stream.sinks.loopback import revive
 
 OpenCamera = Callable[..., Any]
 """`pyvirtualcam.Camera` or a stand-in: (width, height, fps, device=node) → object with `send` and `close`."""
 
 
+CHECK_S = 1.0
+"""How often the device is asked whether it still has the format that is written: pyvirtualcam tells of no failed write."""
+
+
 class CameraSink:
     """Shows pictures as the virtual camera of one label, at one fixed size.
 
     A device that a reader still holds keeps its old size whatever is asked for; then pictures are scaled to it.
-    After a failed write the next one opens the device again.
+    The device is claimed, so that no second Relit Camera can write to it. After a failed write the next one opens the
+    device again.
     """
 
     def __init__(
@@ -67,6 +74,8 @@ class CameraSink:
         self._camera_size = size
         self._size_is_known = False
         self._node = ""
+        self._claim: Claim | None = None
+        self._check_at = 0.0
         self._open()
 
     def write(self, image: DisplayImage) -> None:
@@ -88,6 +97,8 @@ class CameraSink:
             raise DeviceError(f"the virtual camera {self._node} takes no pictures: {error}") from error
         if not self._size_is_known:  # some versions of the driver tell it only once a picture was written
             self._follow_device_size()
+        elif self._by_node and time.monotonic() >= self._check_at:
+            self._check_device()
 
     def describe(self) -> SinkInfo:
         """Say what the sink is."""
@@ -95,6 +106,12 @@ class CameraSink:
 
     def close(self) -> None:
         """Let go of the device."""
+        self._close_camera()
+        claim, self._claim = self._claim, None
+        if claim is not None:
+            claim.release()
+
+    def _close_camera(self) -> None:
         camera, self._camera = self._camera, None
         if camera is not None:
             camera.close()
@@ -106,10 +123,28 @@ class CameraSink:
             if not os.access(node, os.R_OK | os.W_OK):
                 cure = 'run: sudo usermod -aG video "$USER", and log in again'
                 raise DeviceError(f"no permission to write to {node}", cure)
-        self._open_at(self._size, node)
-        self._node = node or str(getattr(self._camera, "device", ""))
-        self._size_is_known = node is None
-        self._follow_device_size()
+            self._claim = Claim(node)
+        try:
+            self._open_at(self._size, node)
+            self._node = node or str(getattr(self._camera, "device", ""))
+            self._size_is_known = node is None
+            self._follow_device_size()
+        except BaseException:
+            self.close()
+            raise
+
+    def _check_device(self) -> None:
+        """Notice that the driver has dropped what is written, or changed its format.
+
+        Raises:
+            DeviceError: it has; the next `write` opens the device anew.
+        """
+        self._check_at = time.monotonic() + CHECK_S
+        actual = negotiated_size(self._node, self._tree)
+        if actual != self._camera_size:
+            self.close()
+            now = f"is {actual[0]}x{actual[1]} now" if actual else "was taken away or reset"
+            raise DeviceError(f"the virtual camera {self._node} takes no pictures: it {now}")
 
     def _follow_device_size(self) -> None:
         """Open the device anew at the size that it really has, where it kept another than was asked for."""
@@ -117,7 +152,7 @@ class CameraSink:
         if self._size_is_known or actual is None:
             return
         if actual != self._camera_size:
-            self.close()
+            self._close_camera()
             self._open_at(actual, self._node)
         self._size_is_known = True
 

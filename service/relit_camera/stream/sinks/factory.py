@@ -6,7 +6,7 @@ from pathlib import Path
 
 from relit_camera.config.settings import OutputSettings
 from relit_camera.errors import InputError
-from relit_camera.stream.devices import SYSTEM, DeviceTree
+from relit_camera.stream.devices import SYSTEM, DeviceTree, list_virtual_cameras
 from relit_camera.stream.sinks.base import Sink
 from relit_camera.stream.sinks.camera import CameraSink
 from relit_camera.stream.sinks.file import FileSink
@@ -34,3 +34,9 @@ def open_sink(settings: OutputSettings, tree: DeviceTree = SYSTEM) -> Sink:
         return FileSink(path, size, fps)
     endings = ", ".join(sorted(VIDEO_SUFFIXES))
     raise InputError(f"unknown sink '{text}'", f"use camera, null, /dev/videoN, or a file ending in {endings}")
+
+
+def published_label(settings: OutputSettings, tree: DeviceTree = SYSTEM) -> str:
+    """Name the virtual camera that will be published to, which must not be taken as source: it would film itself."""
+    labels = {camera.node: camera.label for camera in list_virtual_cameras(tree)}
+    return labels.get(settings.sink, settings.label)

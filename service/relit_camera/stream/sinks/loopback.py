@@ -3,8 +3,9 @@
 With `exclusive_caps=1` that version takes the output capability away at the first written frame and gives it back only
 when an opener that had called VIDIOC_STREAMON closes the device; a plain writer never calls it. So one call of it on an
 open file, and closing that, gives the capability back. While another writer is at work the call would let two writers
-mix their frames, therefore it is made only where the device announces neither capture nor output, and where no `state`
-file shows a newer version, which has no need of it.
+mix their frames. Another of ours cannot be, for the device is claimed before; another program may be one unless it has
+the device's buffers mapped, as readers have and writers by `write` have not. Where a `state` file shows a newer version
+there is no need of the call.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import sys
 from pathlib import Path
 
 from relit_camera.stream.devices import DeviceTree
+from relit_camera.stream.holders import holders, maps
 
 # linux/videodev2.h
 VIDIOC_QUERYCAP = 0x80685600
@@ -26,7 +28,7 @@ BUF_TYPE_VIDEO_OUTPUT = 2
 
 
 def revive(node: str, tree: DeviceTree) -> bool:
-    """Set a stuck device free. Returns whether it was stuck; any other device is left alone."""
+    """Set a stuck device free, which the caller has claimed. Returns whether it was stuck; others are left alone."""
     folder = tree.sys / "class" / "video4linux" / Path(node).name
     if not sys.platform.startswith("linux") or (folder / "state").exists():
         return False
@@ -40,8 +42,10 @@ def revive(node: str, tree: DeviceTree) -> bool:
         answer = bytearray(CAPABILITY_BYTES)
         fcntl.ioctl(device, VIDIOC_QUERYCAP, answer)
         (capabilities,) = struct.unpack_from("=I", answer, DEVICE_CAPS_OFFSET)
-        if capabilities & (CAP_VIDEO_CAPTURE | CAP_VIDEO_OUTPUT):
+        if capabilities & CAP_VIDEO_OUTPUT:
             return False
+        if capabilities & CAP_VIDEO_CAPTURE and not all(maps(holder, node) for holder in holders(node)):
+            return False  # not only readers have it open: one may be writing
         with contextlib.suppress(OSError):  # EINVAL is its usual answer, and it has worked all the same
             fcntl.ioctl(device, VIDIOC_STREAMON, struct.pack("=i", BUF_TYPE_VIDEO_OUTPUT))
         return True
