@@ -180,6 +180,23 @@ def test_the_placeholder_comes_back_when_pictures_are_stale(make, sink):
     wait_until(lambda: 91 in sink.values)
 
 
+def test_a_late_picture_does_not_take_the_placeholders_place(make, sink):
+    publisher = make(stale_after_s=0.2)
+    publisher.give_way(np.full((48, 64, 3), 8, np.uint8), 0)
+    publisher.pictures.put(picture(1))
+    wait_until(lambda: 1 in sink.values)
+    publisher.give_way(np.full((48, 64, 3), 9, np.uint8), 3)
+    publisher.pictures.put(picture(2))
+    wait_until(lambda: 2 in sink.values)  # late, but the placeholder is not shown yet
+    wait_until(lambda: sink.values[-1] == 9)
+    publisher.hold = True
+    publisher.pictures.put(picture(3))
+    wait_until(lambda: publisher.counts.dropped == 1)
+    publisher.pictures.put(picture(4))
+    wait_until(lambda: 4 in sink.values)
+    assert 3 not in sink.values
+
+
 def test_previews_get_each_shown_picture_once(make, sink):
     publisher = make()
     number, image, _ = publisher.shown.newer(0, 5)
