@@ -249,12 +249,14 @@ class Daemon:
         elif self._source.state is SourceState.RELEASED:
             self._recovered("source")
             self._show(self._released_picture, CameraState.RELEASED)
-        elif self._source.state is not SourceState.RUNNING:
+        elif (state := self._source.state) is not SourceState.RUNNING:
             reason = self._source.reason
             if reason:
                 self._failed("source", DeviceError(reason, "it is tried again by itself; see `relit devices`"))
             if reason or self._state is not CameraState.STARTING:
                 self._show_waiting()
+            if state is SourceState.ENDED:
+                self._stopping.wait(READ_TIMEOUT_S)  # its `read` no longer waits
         return frame
 
     def _show_waiting(self) -> None:
