@@ -105,7 +105,8 @@ def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(
         camera.sink.wait_for(3)
         camera.put("freeze", frozen=True)
         wait_until(lambda: camera.status()["state"] == "frozen")
-        time.sleep(2 / FPS)
+        begun = camera.sink.count
+        wait_until(lambda: camera.sink.count >= begun + 3)  # what was on its way
         held, count = camera.sink.new[-1], camera.sink.count
         camera.put("lighting", environment=None, lamps=[LAMP_LEFT], transition_s=0)
         time.sleep(0.8)
