@@ -17,7 +17,7 @@ import pytest
 from tests.cli.relit_command import Material, call, finish, start
 
 END_S = 3.0
-START_S = 20.0
+START_S = 60.0
 
 
 def arguments(material: Material, *more: object) -> list[object]:
@@ -78,13 +78,13 @@ def test_signal_ends_it_within_three_seconds_with_two_previews_open(
             assert viewer.began.wait(START_S), (viewer.bytes, viewer.error)
         began = time.monotonic()
         process.send_signal(number)
-        assert process.wait(10) == 0
+        assert process.wait(START_S) == 0
         took_s = time.monotonic() - began
         assert took_s < END_S, f"it took {took_s:.1f} s"
         assert process.stderr is not None
         assert process.stderr.read() == ""
         for viewer in viewers:
-            viewer.join(5)
+            viewer.join(START_S)
             assert not viewer.is_alive()
 
 
@@ -95,10 +95,10 @@ def test_light_changes_while_it_runs_and_the_clip_loops(material: Material, tmp_
         body = {"environment": None, "lamps": [{"azimuth_deg": 90}], "transition_s": 0}
         assert http.put("lighting", json=body).status_code == 200
         deadline = time.monotonic() + START_S
-        while (status := http.get("status").json())["uptime_s"] < 3.5:  # the clip lasts two seconds
-            assert time.monotonic() < deadline
+        # The clip lasts two seconds.
+        while (status := http.get("status").json())["uptime_s"] < 3.5 or status["state"] != "live":
+            assert time.monotonic() < deadline, status
             time.sleep(0.2)
-        assert status["state"] == "live"
         assert status["frames"]["published"] > 20
         assert status["degraded"] == []
         assert status["source"].startswith("file ")
@@ -142,7 +142,7 @@ def test_a_disk_that_is_full_loses_the_file_not_the_camera(material: Material, t
         time.sleep(1.5)  # the publisher has tried again
         assert http.get("status").json()["state"] == "live"
         process.send_signal(signal.SIGTERM)
-        assert process.wait(10) == 1
+        assert process.wait(START_S) == 1
         assert process.stderr is not None
         said = process.stderr.read().splitlines()
         assert said[-1].startswith(f"relit: cannot write {recording}: File too large;")

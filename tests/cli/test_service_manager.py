@@ -120,9 +120,9 @@ def test_ready_comes_with_the_first_picture_and_life_with_the_others(listener: L
         assert listener.next()[0] == "READY=1"
         assert listener.next()[0].startswith("STATUS=")  # nothing was published since
         camera.published = 2
-        assert "WATCHDOG=1" in listener.wait_for("WATCHDOG=1", 2)
+        assert "WATCHDOG=1" in listener.wait_for("WATCHDOG=1")
         assert "WATCHDOG=1" not in listener.next()
-    listener.wait_for("STOPPING=1", 2)
+    listener.wait_for("STOPPING=1")
 
 
 def test_a_sink_that_fails_and_is_told_is_no_camera_that_hangs(listener: Listener) -> None:
@@ -134,8 +134,8 @@ def test_a_sink_that_fails_and_is_told_is_no_camera_that_hangs(listener: Listene
         camera.base = replace(STATUS, degraded=[other])
         assert "WATCHDOG=1" not in listener.next()
         camera.base = replace(STATUS, degraded=[other, sink])
-        listener.wait_for("WATCHDOG=1", 1)
-        listener.wait_for("WATCHDOG=1", 1)
+        listener.wait_for("WATCHDOG=1")
+        listener.wait_for("WATCHDOG=1")
 
 
 def test_stopped_before_the_first_picture_it_was_never_ready(listener: Listener) -> None:
@@ -215,4 +215,4 @@ def test_a_real_camera_is_ready_alive_silent_when_it_hangs_and_says_when_it_stop
         listener.wait_for("WATCHDOG=1")
         process.send_signal(signal.SIGTERM)
         listener.wait_for("STOPPING=1")
-        assert process.wait(10) == 0
+        assert process.wait(START_S) == 0

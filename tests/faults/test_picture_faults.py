@@ -101,7 +101,7 @@ def test_a_tracker_that_hangs_for_ever_is_replaced(tracker: FaultyTracker, tmp_p
 def test_trackers_that_all_hang_leave_the_still(tracker: FaultyTracker, tmp_path: Path, survived: Survived) -> None:
     with watched_camera(tmp_path, tracker=tracker) as watched:
         tracker.release.clear()
-        wait_until(lambda: tracker.hanging == line_module.MOST_LEFT_BEHIND, 60)
+        wait_until(lambda: tracker.hanging == line_module.MOST_LEFT_BEHIND)
         time.sleep(2)
         assert tracker.hanging == line_module.MOST_LEFT_BEHIND  # and no more
         assert watched.camera.status()["state"] == "standing-in"

@@ -59,7 +59,7 @@ def watched_webcam(tmp_path: Path, tree: FakeTree, cameras: Cameras):  # type: i
 def waiting(watched: Watched) -> None:
     """Wait until the placeholder says so."""
     picture = placeholder(SIZE, "waiting for the camera")
-    wait_until(lambda: difference(watched.sink.new[-1], picture) == 0, 30)
+    wait_until(lambda: difference(watched.sink.new[-1], picture) == 0)
 
 
 def test_unplugged_and_back_under_another_number(tmp_path: Path, tree: FakeTree, survived: Survived) -> None:
@@ -149,7 +149,7 @@ def test_odd_pictures(name: str, tmp_path: Path, tree: FakeTree, survived: Survi
         odd = Odd(ODD[name])
         cameras.make = lambda: odd
         cameras.opened[-1].mode = "silent"  # so that it is opened again
-        wait_until(lambda: cameras.opened[-1] is odd, 30)
+        wait_until(lambda: cameras.opened[-1] is odd)
         time.sleep(0.5)
         watched.goes_on(10)
         cameras.make = lambda: FakeCapture(interval_s=1 / 30)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -12,16 +12,21 @@ import numpy as np
 import pytest
 
 from relit_camera.errors import DeviceError, StorageError
-from relit_camera.space.images import DisplayImage
+from relit_camera.face.state import FaceState
+from relit_camera.space.images import DisplayImage, Frame
 from relit_camera.stream import daemon as daemon_module
 from relit_camera.stream.placeholder import placeholder
 from relit_camera.stream.sinks.base import SinkInfo
+from relit_camera.stream.sources.base import SourceInfo
+from relit_camera.stream.sources.playback import Playback, Timed
 from relit_camera.subject.file import write_subject
 from tests.faults.watched import Survived, TimedSink, watched_camera
 from tests.stream.small_camera import (
+    FPS,
     SIZE,
     SteadyTracker,
     difference,
+    grey,
     memory_source,
     running_camera,
     small_subject,
@@ -59,12 +64,12 @@ def test_a_subject_file_is_spoilt_while_in_use(
         watched.goes_on(20)
         watched.begin()
         spoil(file)
-        before = watched.sink.new[-1]
         # Every picture of the field is asked for again under another light.
         for azimuth in (-90, 90):
+            before = watched.sink.new[-1]
             watched.camera.put("lighting", environment=None, lamps=[{"azimuth_deg": azimuth}], transition_s=0)
+            wait_until(lambda before=before: difference(watched.sink.new[-1], before) > 2)  # type: ignore[misc]
             watched.goes_on(10)
-        assert difference(watched.sink.new[-1], before) > 2
         assert watched.still_told_nothing()
         survived(f"subject file {spoil.__name__.replace('_', ' ')} while in use", watched)
 
@@ -155,6 +160,43 @@ def test_a_picture_that_gave_way_does_not_come_back_by_holding(tmp_path: Path, m
             assert difference(camera.sink.new[-1], waiting) == 0
 
 
+class LateTracker(SteadyTracker):
+    """Takes its time when told to."""
+
+    def __init__(self) -> None:
+        self.release = threading.Event()
+        self.release.set()
+
+    def track(self, frame: Frame) -> FaceState:
+        self.release.wait(60)
+        return super().track(frame)
+
+
+def test_a_late_picture_does_not_take_the_placeholders_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(daemon_module, "STALE_AFTER_S", 0.3)
+    waiting = placeholder(SIZE, "waiting for the camera")
+    tracker, more = LateTracker(), threading.Event()
+
+    def play() -> Iterator[Timed]:
+        yield grey(), 0.0
+        more.wait(60)
+        yield grey(), 1 / FPS
+
+    source = Playback(SourceInfo("still", "memory", SIZE, FPS), play())
+    with running_camera(tmp_path, source=source, tracker=tracker) as camera:
+        wait_until(lambda: camera.status()["state"] == "live")
+        tracker.release.clear()
+        more.set()
+        wait_until(lambda: difference(camera.sink.new[-1], waiting) == 0)
+        with camera.daemon.events.listen() as told:
+            shown, count = len(camera.sink.new), camera.sink.count
+            tracker.release.set()
+            wait_until(lambda: camera.daemon.status().frames.dropped == 1)
+            wait_until(lambda: camera.sink.count > count + 20)
+            assert len(camera.sink.new) == shown
+            assert told.empty()  # nor is it said to be live
+
+
 def test_a_tracker_made_anew_may_fail_too(tmp_path: Path, survived: Survived) -> None:
     """Its model was deleted meanwhile: the still goes on, and says why."""
     from relit_camera.errors import ModelError
@@ -167,5 +209,5 @@ def test_a_tracker_made_anew_may_fail_too(tmp_path: Path, survived: Survived) ->
         raise ModelError("the face model is missing", "run `relit models pull`")
 
     with running_camera(tmp_path, sink=TimedSink(), tracker=Broken(), new_tracker=renew) as camera:
-        wait_until(lambda: "relit models pull" in camera.troubles(), 40)
+        wait_until(lambda: "relit models pull" in camera.troubles())
         assert np.ptp(camera.sink.new[-1]) > 0

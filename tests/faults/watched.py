@@ -53,7 +53,7 @@ class Watched:
 
     def told(self, text: str) -> None:
         """Wait until the status tells of this."""
-        wait_until(lambda: text in self.camera.troubles(), 30)
+        wait_until(lambda: text in self.camera.troubles())
 
     def still_told_nothing(self) -> bool:
         """Whether the status says that all is well."""
@@ -61,11 +61,11 @@ class Watched:
 
     def state(self, state: str) -> None:
         """Wait for a state."""
-        wait_until(lambda: self.camera.status()["state"] == state, 30)
+        wait_until(lambda: self.camera.status()["state"] == state)
 
     def recovers(self) -> None:
         """Wait until all is well: live, with no trouble left."""
-        wait_until(lambda: self.camera.troubles() == "" and self.camera.status()["state"] == "live", 40)
+        wait_until(lambda: self.camera.troubles() == "" and self.camera.status()["state"] == "live")
         self.sink.wait_for(len(self.sink.new))
 
     def goes_on(self, frames: int = 5) -> None:

@@ -29,8 +29,8 @@ from relit_camera.subject.subject import Subject
 
 SIZE = (128, 96)
 FPS = 20.0
-WAIT_S = 15.0
-"""Long enough for a machine that has much else to do."""
+WAIT_S = 60.0
+"""Long enough for a slow machine that has much else to do."""
 
 
 @cache

@@ -19,12 +19,14 @@ from relit_camera.space.images import Frame
 from relit_camera.stream import daemon as daemon_module
 from relit_camera.stream import line as line_module
 from relit_camera.stream.placeholder import placeholder
-from relit_camera.stream.sources.base import SourceState
+from relit_camera.stream.sources.base import SourceInfo, SourceState
+from relit_camera.stream.sources.playback import Playback
 from tests.stream.small_camera import (
     FPS,
     SIZE,
     SteadyTracker,
     difference,
+    grey,
     memory_source,
     running_camera,
     wait_until,
@@ -103,7 +105,8 @@ def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(
         camera.sink.wait_for(3)
         camera.put("freeze", frozen=True)
         wait_until(lambda: camera.status()["state"] == "frozen")
-        time.sleep(2 / FPS)
+        begun = camera.sink.count
+        wait_until(lambda: camera.sink.count >= begun + 3)  # what was on its way
         held, count = camera.sink.new[-1], camera.sink.count
         camera.put("lighting", environment=None, lamps=[LAMP_LEFT], transition_s=0)
         time.sleep(0.8)
@@ -160,6 +163,22 @@ def test_a_source_that_ends_leaves_the_placeholder(tmp_path: Path, monkeypatch: 
         wait_until(lambda: difference(camera.sink.new[-1], waiting) == 0)
         count = camera.sink.count
         wait_until(lambda: camera.sink.count > count + 3)
+
+
+def test_a_source_that_ended_takes_no_time(tmp_path: Path) -> None:
+    reads = []
+
+    class Counted(Playback):
+        def read(self, timeout_s: float) -> Frame | None:
+            reads.append(time.monotonic())
+            return super().read(timeout_s)
+
+    source = Counted(SourceInfo("still", "memory", SIZE, FPS), iter([(grey(), 0.0)]))
+    with running_camera(tmp_path, source=source) as camera:
+        wait_until(lambda: camera.status()["state"] == "waiting")
+        begun, began_at = len(reads), time.monotonic()
+        time.sleep(0.5)
+        assert len(reads) - begun <= (time.monotonic() - began_at) / daemon_module.READ_TIMEOUT_S + 2
 
 
 class BrokenSource:

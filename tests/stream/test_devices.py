@@ -1,5 +1,6 @@
 import json
 import re
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -84,6 +85,15 @@ def test_our_own_camera_is_not_the_first_webcam(tmp_path):
     tree = FakeTree(tmp_path)
     tree.add_loopback(0, "Relit Camera")
     with pytest.raises(DeviceError, match="there is no webcam; plug one in"):
+        find_webcam("webcam", tree)
+
+
+def test_folders_that_vanish_while_they_are_read_hold_nothing(tree, monkeypatch):
+    def gone(self, pattern):
+        raise FileNotFoundError(self)
+
+    monkeypatch.setattr(Path, "glob", gone)
+    with pytest.raises(DeviceError, match="there is no webcam"):
         find_webcam("webcam", tree)
 
 

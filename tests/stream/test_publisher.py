@@ -76,51 +76,53 @@ def test_the_newest_picture_wins_and_the_others_are_counted(make, sink):
 
 
 def test_a_late_picture_is_waited_for_but_a_missing_one_is_not(make, sink):
-    publisher = make(fps=5)
+    period = 0.5
+    publisher = make(fps=1 / period)
     publisher.pictures.put(picture(1))
     wait_until(lambda: 1 in sink.values)
-    due = sink.times[-1] + 0.2
-    time.sleep(max(0.0, due + 0.04 - time.monotonic()))
+    due = sink.times[-1] + period
+    time.sleep(max(0.0, due + period / 5 - time.monotonic()))
     publisher.pictures.put(picture(2))
     wait_until(lambda: 2 in sink.values)
-    assert sink.times[sink.values.index(2)] - due < 0.1  # not a whole period later
+    assert sink.times[sink.values.index(2)] - due < period / 2  # not a whole period later
     wait_until(lambda: sink.values.count(2) == 5)
     steps = np.diff(sink.times[-3:])
-    np.testing.assert_allclose(steps, 0.2, atol=0.05)
+    np.testing.assert_allclose(steps, period, atol=period / 4)
 
 
 def test_a_picture_that_waited_long_gives_way_to_its_successor(make, sink):
-    publisher = make(fps=5)
+    period = 0.5
+    publisher = make(fps=1 / period)
     publisher.pictures.put(picture(1))
     wait_until(lambda: 1 in sink.values)
-    due = sink.times[-1] + 0.2
-    time.sleep(0.03)
+    due = sink.times[-1] + period
+    time.sleep(period / 7)
     publisher.pictures.put(picture(2))
-    time.sleep(max(0.0, due + 0.03 - time.monotonic()))
+    time.sleep(max(0.0, due + period / 7 - time.monotonic()))
     publisher.pictures.put(picture(3))
     wait_until(lambda: 3 in sink.values)
     assert 2 not in sink.values
-    assert sink.times[sink.values.index(3)] - due < 0.1
+    assert sink.times[sink.values.index(3)] - due < period / 2
     assert publisher.counts.dropped == 1
 
 
 def test_the_rate_is_kept_without_drift(make, sink):
     start = time.monotonic()
-    publisher = make(fps=100)
+    publisher = make(fps=25)
     feeding = threading.Event()
 
     def feed():  # at another rate than the publisher's
-        while not feeding.wait(0.013):
+        while not feeding.wait(0.053):
             publisher.pictures.put(picture(1))
 
     feeder = threading.Thread(target=feed)
     feeder.start()
-    time.sleep(1.5)
+    time.sleep(2.5)
     count, took = len(sink.times), time.monotonic() - start
     feeding.set()
     feeder.join()
-    assert count == pytest.approx(100 * took, rel=0.1)
-    assert publisher.fps == pytest.approx(100, rel=0.1)
+    assert count == pytest.approx(25 * took, rel=0.1)
+    assert publisher.fps == pytest.approx(25, rel=0.1)
 
 
 def test_latency_is_from_capture_to_the_end_of_writing(make, sink):
@@ -136,8 +138,8 @@ def test_latency_is_from_capture_to_the_end_of_writing(make, sink):
 def test_a_repeated_picture_has_no_latency(make, sink):
     publisher = make()
     publisher.pictures.put(picture(1))
-    wait_until(lambda: sink.values.count(1) > 20)
-    assert publisher.latency_ms.p95 < 100  # not the age of the repeated picture
+    wait_until(lambda: sink.values.count(1) > 200)
+    assert publisher.latency_ms.p95 < 1000  # not the age of the repeated picture
 
 
 def test_a_failing_sink_is_told_once_and_tried_again(make, sink, monkeypatch):
@@ -162,9 +164,11 @@ def test_a_fault_of_the_sink_does_not_end_the_thread(make, sink, monkeypatch):
     wait_until(lambda: sink.values)
 
 
-def test_failed_writes_are_not_hammered(make, sink):
+def test_failed_writes_are_not_hammered(make, sink, monkeypatch):
+    monkeypatch.setattr(module, "RETRY_S", 60.0)
     sink.error = DeviceError("gone")
     make(fps=200)
+    wait_until(lambda: sink.attempts)
     time.sleep(0.5)
     assert sink.attempts == 1
 
@@ -178,6 +182,23 @@ def test_the_placeholder_comes_back_when_pictures_are_stale(make, sink):
     wait_until(lambda: sink.values[-1] == 8)
     publisher.pictures.put(picture(91))
     wait_until(lambda: 91 in sink.values)
+
+
+def test_a_late_picture_does_not_take_the_placeholders_place(make, sink):
+    publisher = make(stale_after_s=0.2)
+    publisher.give_way(np.full((48, 64, 3), 8, np.uint8), 0)
+    publisher.pictures.put(picture(1))
+    wait_until(lambda: 1 in sink.values)
+    publisher.give_way(np.full((48, 64, 3), 9, np.uint8), 3)
+    publisher.pictures.put(picture(2))
+    wait_until(lambda: 2 in sink.values)  # late, but the placeholder is not shown yet
+    wait_until(lambda: sink.values[-1] == 9)
+    publisher.hold = True
+    publisher.pictures.put(picture(3))
+    wait_until(lambda: publisher.counts.dropped == 1)
+    publisher.pictures.put(picture(4))
+    wait_until(lambda: 4 in sink.values)
+    assert 3 not in sink.values
 
 
 def test_previews_get_each_shown_picture_once(make, sink):

@@ -24,15 +24,15 @@ def test_stages_are_timed_apart_and_kept_in_order():
     timer = StageTimer()
     for _ in range(3):
         with timer.stage("track"):
-            time.sleep(0.02)
+            time.sleep(0.1)
         with timer.stage("relight"):
             pass
     assert list(timer.percentiles()) == ["track", "relight"]
-    assert timer.percentiles()["track"].p50 >= 19
-    assert timer.percentiles()["relight"].p50 < 10
+    assert timer.percentiles()["track"].p50 >= 95
+    assert timer.percentiles()["relight"].p50 < 50
     lap = timer.lap_ms()
     assert list(lap) == ["track", "relight"]
-    assert lap["track"] >= 19
+    assert lap["track"] >= 95
     timer.add("relight", 0.001)
     assert timer.lap_ms() == {"relight": 1.0}  # what did not run again is not told again
     assert timer.lap_ms() == {}

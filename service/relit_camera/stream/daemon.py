@@ -105,6 +105,7 @@ class Daemon:
         self._camera_rate, self._pipeline_rate = RateMeter(), RateMeter()
         self._index, self._passed_over = -1, 0
         self._state = CameraState.STARTING
+        self._showing = threading.Lock()
         self._started_at = time.monotonic()
         self._stopping = threading.Event()
         self._stop_by = 0.0
@@ -230,7 +231,7 @@ class Daemon:
             return  # it hung, maybe for long: the live picture must not show once it is private
         self._pipeline_rate.tick()
         self._publish(finished.image, frame)
-        self._follow(finished)
+        self._follow(frame, finished)
 
     def _publish(self, image: DisplayImage, frame: Frame) -> None:
         self._publisher.pictures.put(PublishedPicture(image, frame.captured_at, frame.index))
@@ -248,20 +249,23 @@ class Daemon:
         elif self._source.state is SourceState.RELEASED:
             self._recovered("source")
             self._show(self._released_picture, CameraState.RELEASED)
-        elif self._source.state is not SourceState.RUNNING:
+        elif (state := self._source.state) is not SourceState.RUNNING:
             reason = self._source.reason
             if reason:
                 self._failed("source", DeviceError(reason, "it is tried again by itself; see `relit devices`"))
             if reason or self._state is not CameraState.STARTING:
                 self._show_waiting()
+            if state is SourceState.ENDED:
+                self._stopping.wait(READ_TIMEOUT_S)  # its `read` no longer waits
         return frame
 
     def _show_waiting(self) -> None:
         self._show(self._waiting_picture, CameraState.WAITING)
 
     def _show(self, picture: DisplayImage, state: CameraState) -> None:
-        self._publisher.placeholder = picture
-        self._set_state(state)
+        with self._showing:
+            self._publisher.give_way(picture, self._index)
+            self._set_state(state)
 
     def _count(self, frame: Frame) -> None:
         """Frames that the source gave, those too that were replaced before the worker came: indices have gaps there."""
@@ -269,13 +273,15 @@ class Daemon:
         self._index, self._passed_over = frame.index, self._passed_over + given - 1
         self._camera_rate.tick(frame.captured_at, given)
 
-    def _follow(self, finished: Finished) -> None:
+    def _follow(self, frame: Frame, finished: Finished) -> None:
         face = finished.motion.status if finished.motion else FaceStatus.LOST
         if face is not self._face:
             self._face = face
             self.events.publish("tracking", state=str(face))
         seen = finished.motion is None or face is not FaceStatus.LOST
-        self._set_state(CameraState.LIVE if seen else CameraState.SEARCHING)
+        with self._showing:
+            if frame.index > self._publisher.late_index:
+                self._set_state(CameraState.LIVE if seen else CameraState.SEARCHING)
 
     def _set_state(self, state: CameraState) -> None:
         # A frame that is finished while the camera stops does not make it live again.

@@ -34,7 +34,7 @@ class DeviceTree:
     def nodes(self) -> list[Path]:
         """The sysfs folder of each video device, by number."""
         folder = self.sys / "class" / "video4linux"
-        found = [path for path in folder.glob("video*") if path.name[5:].isdigit()]
+        found = [path for path in _inside(folder, "video*") if path.name[5:].isdigit()]
         return sorted(found, key=lambda path: int(path.name[5:]))
 
     def read(self, path: Path) -> str:
@@ -175,7 +175,14 @@ def _is_virtual(folder: Path) -> bool:
 
 def _links_by_node(tree: DeviceTree) -> dict[str, str]:
     """Stable names that udev made: node name → name in /dev/v4l/by-id."""
-    return {link.resolve().name: link.name for link in (tree.dev / "v4l" / "by-id").glob("*")}
+    return {link.resolve().name: link.name for link in _inside(tree.dev / "v4l" / "by-id", "*")}
+
+
+def _inside(folder: Path, pattern: str) -> list[Path]:
+    try:
+        return list(folder.glob(pattern))
+    except OSError:  # it goes with the last camera, maybe just now
+        return []
 
 
 def _by_index(text: str) -> Webcam:

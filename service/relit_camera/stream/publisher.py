@@ -49,7 +49,8 @@ class Publisher:
     Attributes:
         pictures: the slot to put finished pictures in.
         shown: what went to the sink last, whether it took it or not, for previews: repeated pictures are not put again.
-        placeholder: uint8 sRGB RGB (height, width, 3), of the sink's size; may be replaced at any time.
+        placeholder: uint8 sRGB RGB (height, width, 3), of the sink's size; see `give_way`.
+        late_index: pictures of frames up to this one are late: none is shown any more once the placeholder is.
         hold: while this is true the last picture stays, however old it is.
     """
 
@@ -76,6 +77,7 @@ class Publisher:
         self.pictures: Slot[PublishedPicture] = Slot()
         self.shown: Slot[DisplayImage] = Slot()
         self.placeholder = placeholder
+        self.late_index = -1
         self.hold = False
         self._sink = sink
         self._fps = fps
@@ -94,6 +96,14 @@ class Publisher:
     def start(self) -> None:
         """Begin to publish."""
         self._thread.start()
+
+    def give_way(self, placeholder: DisplayImage, last_index: int) -> None:
+        """Replace the placeholder, now that no frames come after that of `last_index`. Any thread may say so.
+
+        Pictures of frames up to that one may still come: they are shown only while this placeholder is not.
+        """
+        self.late_index = last_index  # first, so that no late picture follows the placeholder
+        self.placeholder = placeholder
 
     def stop(self) -> bool:
         """End the thread. Returns whether it ended within a second: it does unless the sink is stuck."""
@@ -149,6 +159,9 @@ class Publisher:
         return newer or picture
 
     def _tick(self, picture: PublishedPicture | None, now: float) -> None:
+        if picture is not None and self._last is None and picture.frame_index <= self.late_index:
+            self._overtaken += 1
+            picture = None
         if picture is not None:
             self._last = picture
         image = self._image(now)

@@ -85,9 +85,9 @@ class ThreadedSource(ABC):
     def _publish(self, frame: Frame) -> None:
         if self._stopping.is_set():
             return
-        self._slot.put(frame)
         self._reason = ""
         self._machine.move(SourceState.RUNNING)
+        self._slot.put(frame)  # last, so that whoever gets it finds the source running
 
     @abstractmethod
     def _produce(self) -> None:
