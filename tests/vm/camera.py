@@ -1,0 +1,82 @@
+"""The program in the test machine: started, asked, stopped, killed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from tests.vm.machine import GUEST_PROGRAM, Command, Machine, Outcome, wait_until
+from tests.vm.program import environment
+
+SIZE = (320, 180)
+"""Small: an emulated machine draws ten such pictures a second with ease."""
+FPS = 10
+START_S = 240.0
+"""Thirteen seconds on an idle machine."""
+ADDRESS = "http://127.0.0.1:8470/api/v1"
+TRACK = f"{GUEST_PROGRAM}/relit_camera/demo/data/track.json"
+
+
+class Camera:
+    """`relit run` in a machine."""
+
+    def __init__(self, machine: Machine, arguments: str) -> None:
+        """Start it with these arguments; of its output the end is kept."""
+        self.machine = machine
+        limits = f"export RELIT_SOURCE__WIDTH={SIZE[0]} RELIT_SOURCE__HEIGHT={SIZE[1]} RELIT_SOURCE__FPS={FPS} "
+        limits += f"RELIT_OUTPUT__FPS={FPS}; "
+        self.command = machine.start(f"{environment()}{limits}exec relit run {arguments}", timeout_s=1800.0)
+
+    def status(self) -> dict[str, Any]:
+        """What it says of itself; empty while it does not answer."""
+        answer = self.machine.run(f"curl -s --max-time 5 {ADDRESS}/status", check=False).output
+        found: dict[str, Any] = json.loads(answer) if answer.startswith("{") else {}
+        return found
+
+    def wait_for(self, state: str, within_s: float = START_S) -> dict[str, Any]:
+        """Wait until it is in this state, and return its status."""
+
+        def reached() -> dict[str, Any] | None:
+            if self.command.ended:
+                raise AssertionError(f"the camera ended: {self.command.wait().text}")
+            status = self.status()
+            return status if status.get("state") == state else None
+
+        found: dict[str, Any] = wait_until(reached, within_s, f"the camera is {state}")
+        return found
+
+    def stop(self) -> Outcome:
+        """Ask it to end, and wait until it has."""
+        self.command.kill("TERM")
+        return self.command.wait()
+
+    def kill(self) -> None:
+        """`kill -9`."""
+        self.command.kill("KILL")
+        self.command.wait()
+
+
+@contextmanager
+def running(
+    machine: Machine, source: str = "pattern", size: tuple[int, int] = SIZE, more: str = "", state: str = "live"
+) -> Iterator[Camera]:
+    """Run the camera until the block ends, from when it is in the state."""
+    camera = Camera(machine, f"--source {source} --size {size[0]}x{size[1]} --tracker recorded:{TRACK} {more}")
+    try:
+        camera.wait_for(state)
+        yield camera
+    finally:
+        if not camera.command.ended:
+            camera.kill()
+
+
+def relit(machine: Machine, arguments: str) -> Outcome:
+    """Run a command of the program to its end, whatever that is."""
+    return machine.run(f"{environment()}relit {arguments}", timeout_s=START_S, check=False)
+
+
+def started(machine: Machine, command: str) -> Command:
+    """Begin a command that uses the program's libraries."""
+    return machine.start(environment() + command)

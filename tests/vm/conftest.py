@@ -1,0 +1,64 @@
+"""One machine for each version of v4l2loopback, and at the end of the run a table of what was seen in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from relit_camera.stream.devices import load_command
+from tests.vm.machine import Machine, what_is_missing
+from tests.vm.program import program_disk
+
+VERSIONS = ("0.12.7", "0.13.2", "0.15.0")
+"""Of Debian 12, its backports, and Debian 13."""
+
+ROWS: list[tuple[str, str, str]] = []
+
+
+@pytest.fixture(scope="session")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The disk with the program."""
+    if reason := what_is_missing():
+        pytest.skip(reason)
+    return program_disk(tmp_path_factory.mktemp("program"))
+
+
+@pytest.fixture(scope="session", params=VERSIONS)
+def version(request: pytest.FixtureRequest) -> str:
+    """A version of v4l2loopback."""
+    found: str = request.param
+    return found
+
+
+@pytest.fixture(scope="session")
+def bare(program: Path, version: str) -> Iterator[Machine]:
+    """A machine in which no module is loaded yet."""
+    with Machine(program) as machine:
+        link = f"ln -sf ../v4l2loopback-{version}.ko v4l2loopback.ko"
+        machine.run(f"cd /lib/modules/*/loopback && {link}")
+        yield machine
+
+
+@pytest.fixture(scope="session")
+def machine(bare: Machine) -> Machine:
+    """A machine with the virtual camera, made by the command that we tell people."""
+    bare.run(load_command().removeprefix("sudo "))
+    return bare
+
+
+@pytest.fixture
+def saw(version: str) -> Callable[[str, str], None]:
+    """Notes what a reader saw, for the table."""
+    return lambda reader, what: ROWS.append((reader, version, what))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    if not ROWS:
+        return
+    terminalreporter.section("readers of the virtual camera")
+    terminalreporter.write_line("| reader | v4l2loopback | saw |")
+    terminalreporter.write_line("|---|---|---|")
+    for row in sorted(ROWS):
+        terminalreporter.write_line(f"| {' | '.join(row)} |")

@@ -1,0 +1,83 @@
+"""The virtual camera on a real kernel: who finds it, what they see, and what they see when the camera is restarted."""
+
+import json
+
+import pytest
+
+from relit_camera.stream.sources.pattern import draw_pattern, read_number
+from tests.vm.camera import SIZE, TRACK, relit, running
+from tests.vm.readers import FRAMES, NODE, READERS, Watcher, difference
+
+LARGER = (480, 270)
+
+
+@pytest.fixture(scope="class")
+def camera(machine):
+    """One camera for all tests that leave it as it is."""
+    with running(machine) as camera:
+        yield camera
+
+
+class TestWhileItRuns:
+    @pytest.mark.parametrize("reader", READERS)
+    def test_a_reader_gets_the_right_pixels(self, camera, machine, saw, reader):
+        seen = READERS[reader](machine)
+        number = read_number(seen.image)
+        assert number is not None
+        worst = difference(seen.image, draw_pattern(SIZE, number))
+        saw(reader, f"{seen.format}; {FRAMES} pictures, colours within {worst} of 255")
+        assert worst <= 4
+
+    def test_a_second_camera_is_refused(self, camera, machine):
+        before = camera.status()["frames"]["published"]
+        outcome = relit(machine, f"run --source pattern --tracker recorded:{TRACK} --port 0")
+        assert outcome.status == 1
+        assert outcome.errors.strip() == (
+            f"relit: another Relit Camera publishes to {NODE} already; "
+            "stop that one (relit doctor names its process), or give this one a device"
+        )
+        assert camera.status()["frames"]["published"] > before
+
+    def test_it_never_films_itself(self, camera, machine):
+        outcome = relit(machine, f"run --port 0 --source {NODE} --tracker recorded:{TRACK}")
+        assert outcome.status == 1
+        assert outcome.errors == (
+            f"relit: '{NODE}' is our own virtual camera: it would film itself; choose another source\n"
+        )
+
+    def test_it_is_listed_by_its_label(self, camera, machine):
+        listed = json.loads(relit(machine, "devices --json").output)["virtual_cameras"]
+        assert listed == [{"label": "Relit Camera", "node": NODE, "ours": True, "size": list(SIZE)}]
+
+
+def test_a_reader_that_comes_first_finds_nothing_and_gets_pictures_once_they_come(machine, saw):
+    stream = f"timeout 20 v4l2-ctl -d {NODE} --stream-mmap --stream-count=1 --stream-to=/host/first.raw"
+    machine.run(stream, check=False)
+    assert not (machine.host / "first.raw").exists() or not (machine.host / "first.raw").stat().st_size
+    assert machine.run(f"ffmpeg -v error -f v4l2 -i {NODE} -frames:v 1 -f null -", check=False).status
+    with running(machine):
+        assert read_number(READERS["ffmpeg"](machine).image) is not None
+
+
+def test_a_reader_stays_through_kill_stop_and_another_size(machine, version, saw):
+    with running(machine) as camera:
+        watcher = Watcher(machine, "generations")
+        watcher.wait_for(5)
+        camera.kill()
+    killed = len(watcher.rows())
+    with running(machine) as camera:
+        again = watcher.wait_for(5, after=killed + 2)  # buffers may still hold pictures of before
+        assert camera.stop().status == 0
+    stopped = len(watcher.rows())
+    with running(machine, size=LARGER):
+        other = watcher.wait_for(5, after=stopped + 2)
+        image = watcher.stop()
+    rows = watcher.rows()
+    assert all(row["size"] == list(SIZE) for row in rows), "the size must stay while somebody reads"
+    for generation in (rows[:killed], again, other):
+        numbers = [row["number"] for row in generation]
+        assert None not in numbers[-5:]
+        assert numbers[-1] > numbers[-5]
+    assert difference(image, draw_pattern(SIZE, read_number(image))) <= 6
+    gaps = [rows[end]["at"] - rows[end - 1]["at"] for end in (killed, stopped)]
+    saw("OpenCV, reading on", f"kill -9 and start, stop and start with another size: goes on after {max(gaps):.0f} s")

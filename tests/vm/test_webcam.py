@@ -1,0 +1,84 @@
+"""A webcam that a kernel makes (vivid), unplugged and plugged in again while a call goes on, and used on demand."""
+
+import numpy as np
+import pytest
+
+from tests.vm.camera import SIZE, running
+from tests.vm.readers import LABEL, Call, difference
+
+BARS = [
+    (255, 255, 255),
+    (255, 255, 0),
+    (0, 255, 255),
+    (0, 255, 0),
+    (255, 0, 255),
+    (255, 0, 0),
+    (0, 0, 255),
+    (0, 0, 0),
+]
+"""vivid's "100% Colorbar", from the left."""
+RECOVERY_S = 60.0
+
+
+@pytest.fixture
+def webcam(machine):
+    """A webcam that can be plugged in under a number, and unplugged."""
+    vivid = Vivid(machine)
+    vivid.plug(0)
+    yield vivid
+    vivid.unplug()
+
+
+class Vivid:
+    """The fake webcam."""
+
+    def __init__(self, machine):
+        self._machine, self._number = machine, 0
+
+    def plug(self, number):
+        """Load it as /dev/videoN."""
+        self._machine.run(f"modprobe vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0 vid_cap_nr={number}")
+        self._machine.run(f"v4l2-ctl -d /dev/video{number} -c test_pattern=1,osd_text_mode=2")
+        self._number = number
+
+    def unplug(self):
+        """Have its calls fail, as an unplugged webcam's do, and take its module away as soon as nobody holds it."""
+        disconnect = f"v4l2-ctl -d /dev/video{self._number} -c disconnect=1"
+        self._machine.run(f"{disconnect}; until rmmod vivid 2>/dev/null; do :; done", timeout_s=RECOVERY_S)
+
+    def is_held(self):
+        """Whether a program has it open."""
+        find = f"ls -l /proc/[0-9]*/fd 2>/dev/null | grep /dev/video{self._number}$"
+        return bool(self._machine.run(find, check=False).output)
+
+
+def test_a_call_outlives_an_unplugged_webcam_and_the_webcam_is_held_only_while_somebody_looks(machine, webcam, saw):
+    with running(machine, "webcam", more="--on-demand", state="released") as camera:
+        assert not webcam.is_held()
+        call = Call(machine, "call")
+        camera.wait_for("live")
+        assert webcam.is_held()
+        call.wait_for_frames(10)
+
+        webcam.unplug()
+        camera.wait_for("waiting", RECOVERY_S)
+        call.wait_for_frames(10)
+        webcam.plug(3)
+        camera.wait_for("live", RECOVERY_S)
+        call.wait_for_frames(30)
+
+        found, image = call.stop()
+        camera.wait_for("released", RECOVERY_S)
+        assert not webcam.is_held()
+    rows = call.rows()
+    assert found["label"] == LABEL
+    assert {row["state"] for row in rows} == {"live"}
+    assert {(row["width"], row["height"]) for row in rows} == {SIZE}
+    expected = np.repeat(np.uint8([BARS]), SIZE[1], axis=0).repeat(SIZE[0] // len(BARS), axis=1)
+    worst = difference(image, expected)
+    cameras = ", ".join(f'"{label}"' for label in found["labels"])
+    gap_s = max(row["longest_gap_s"] for row in rows)
+    saw("Chromium", f"lists {cameras}; {SIZE[0]}x{SIZE[1]}, colours within {worst}")
+    what = "webcam unplugged, and back under another number"
+    saw("Chromium, in a call", f"{what}: track live throughout, longest gap {gap_s:.1f} s")
+    assert worst <= 8
