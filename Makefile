@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test check lint types floors scripts generated image-steps tool-install pytest clean
+.PHONY: help setup demo test check lint types floors scripts generated image-steps tool-install pytest vm test-vm vm-picture clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -42,7 +42,7 @@ generated: setup ## files that are built from code are what the code builds
 	cmp docs/openapi.json build/openapi.json
 
 scripts: setup ## shell scripts, Dockerfile and compose files
-	$(BIN)/shellcheck scripts/*.sh docker/*.sh .ci/run
+	$(BIN)/shellcheck scripts/*.sh docker/*.sh tests/vm/*.sh .ci/run
 	$(BIN)/hadolint docker/Dockerfile
 	$(BIN)/check-jsonschema --builtin-schema vendor.compose-spec docker/compose*.yaml
 
@@ -58,6 +58,15 @@ tool-install: setup ## the wheel as users install it, used from an empty home; m
 
 pytest: setup ## the tests alone
 	$(BIN)/python -m pytest
+
+vm: ## build the virtual machine in which the camera is tried on a real kernel (root on Debian 12, two minutes)
+	sh tests/vm/build.sh
+
+test-vm: setup vm ## the camera in that machine, with every version of v4l2loopback
+	RELIT_VM_VERSIONS="0.12.7 0.13.2 0.15.0" $(BIN)/python -m pytest tests/vm
+
+vm-picture: setup vm ## the call shown in docs/virtual-camera.md
+	$(BIN)/python -m tests.vm.picture docs/pictures/call.jpg
 
 clean: ## remove what the targets made, the virtual environment too
 	rm -rf $(VENV) build dist test-failures .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

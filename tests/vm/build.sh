@@ -164,7 +164,7 @@ install -m 755 "$here/init.sh" "$work/root/init.sh"
 {
     echo "kernel $(dpkg-deb -f "$work"/debs/linux-image-*.deb Version)"
     for ko in "$work"/loopback/*.ko; do basename "$ko" .ko | sed 's/-/ /'; done
-    chroot "$work/root" dpkg-query -W -f '${Package} ${Version}\n' python3 v4l-utils ffmpeg chromium
+    chroot "$work/root" dpkg-query -W -f "\${Package} \${Version}\n" python3 v4l-utils ffmpeg chromium
 } >"$work/versions"
 size=$(($(du -sm --apparent-size "$work/root" | cut -f1) * 5 / 4 + 1024))
 quietly mke2fs -q -t ext4 -O ^has_journal -E lazy_itable_init=1 -m 0 -d "$work/root" "$work/root.img" "${size}M"

@@ -68,6 +68,7 @@ def running(
     machine: Machine, source: str = "pattern", size: tuple[int, int] = SIZE, more: str = "", state: str = "live"
 ) -> Iterator[Camera]:
     """Run the camera until the block ends, from when it is in the state."""
+    # The last of an option counts, so `more` may name another environment.
     camera = Camera(machine, f"--source {source} --size {size[0]}x{size[1]} {without_models(machine)} {more}")
     try:
         camera.wait_for(state)

@@ -9,6 +9,8 @@ from tests.vm.camera import SIZE, relit, running, without_models
 from tests.vm.machine import MachineError
 from tests.vm.readers import FRAMES, NODE, READERS, Watcher, difference
 
+pytestmark = pytest.mark.timeout(900)
+
 LARGER = (480, 270)
 
 
@@ -46,7 +48,7 @@ class TestWhileItRuns:
         assert outcome.status == 1
         assert outcome.errors.strip() == (
             f"relit: another Relit Camera publishes to {NODE} already; "
-            "stop that one (relit doctor names its process), or give this one a device"
+            "stop that one (relit doctor names its process), or give this one a device of its own"
         )
         assert camera.status()["frames"]["published"] > before
 

@@ -6,6 +6,8 @@ import pytest
 from tests.vm.camera import SIZE, running
 from tests.vm.readers import LABEL, Call, difference
 
+pytestmark = pytest.mark.timeout(900)
+
 BARS = [
     (255, 255, 255),
     (255, 255, 0),

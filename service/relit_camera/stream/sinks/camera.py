@@ -30,7 +30,7 @@ OpenCamera = Callable[..., Any]
 
 
 CHECK_S = 1.0
-"""How often the device is asked whether it still has the format that is written: pyvirtualcam tells of no failed write."""
+"""How often the device is asked whether it still has our format: pyvirtualcam says nothing of a failed write."""
 
 
 class CameraSink:

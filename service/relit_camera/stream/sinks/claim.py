@@ -35,10 +35,12 @@ class Claim:
         except BlockingIOError:
             self.release()
             what = f"another Relit Camera publishes to {node} already"
-            raise DeviceError(what, "stop that one (relit doctor names its process), or give this one a device") from None
+            cure = "stop that one (relit doctor names its process), or give this one a device of its own"
+            raise DeviceError(what, cure) from None
         except OSError as error:
             self.release()
-            raise DeviceError(f"{node} cannot be opened: {error.strerror}", "see what holds it: relit doctor") from error
+            what = f"{node} cannot be opened: {error.strerror}"
+            raise DeviceError(what, "see what holds it: relit doctor") from error
 
     def release(self) -> None:
         """Let go. Harmless when repeated."""
