@@ -42,7 +42,7 @@ generated: setup ## files that are built from code are what the code builds
 	cmp docs/openapi.json build/openapi.json
 
 scripts: setup ## shell scripts, Dockerfile and compose files
-	$(BIN)/shellcheck scripts/*.sh docker/*.sh tests/vm/*.sh .ci/run
+	$(BIN)/shellcheck scripts/*.sh docker/*.sh tests/vm/*.sh tests/vm/guest/*.sh .ci/run
 	$(BIN)/hadolint docker/Dockerfile
 	$(BIN)/check-jsonschema --builtin-schema vendor.compose-spec docker/compose*.yaml
 

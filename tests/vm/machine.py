@@ -24,6 +24,7 @@ GUEST_PROGRAM = "/opt/relit"
 BOOT_S = 120.0
 """Five seconds on an idle machine."""
 POWER_OFF_S = 20.0
+BOOT_WORDS = "console=ttyS0 quiet loglevel=4 panic=-1 mitigations=off no_timer_check tsc=reliable"
 
 
 def cache_folder() -> Path:
@@ -209,17 +210,24 @@ class Machine:
         cache = cache_folder()
         disks = [cache / "root.img", *([self._program] if self._program else [])]
         return [
-            *("qemu-system-x86_64", "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot"),
-            *("-machine", "pc", "-accel", "tcg,thread=multi,tb-size=512", "-cpu", "max"),
-            *("-smp", "2", "-m", str(self._memory_mib)),
-            *("-kernel", str(cache / "vmlinux"), "-initrd", str(cache / "initrd")),
-            *("-append", "console=ttyS0 quiet loglevel=4 panic=-1 mitigations=off no_timer_check tsc=reliable"),
-            *("-serial", f"file:{self._folder / 'console'}", "-device", "virtio-rng-pci"),
-            *(word for disk in disks for word in ("-drive", f"file={disk},if=virtio,format=raw,snapshot=on")),
-            *("-virtfs", f"local,path={self.host},mount_tag=host,security_model=none,multidevs=remap"),
+            *qemu_command(cache / "vmlinux", cache / "initrd", disks, self.host, self._memory_mib),
+            *("-append", BOOT_WORDS),
+            *("-serial", f"file:{self._folder / 'console'}"),
             *("-device", "virtio-serial-pci", "-chardev", f"socket,id=port,path={address}"),
             *("-device", "virtserialport,chardev=port,name=relit"),
         ]
+
+
+def qemu_command(kernel: Path, initrd: Path, disks: list[Path], host: Path, memory_mib: int) -> list[str]:
+    """The words that start an emulated machine whose disks forget what is written, and which sees `host` as a share."""
+    return [
+        *("qemu-system-x86_64", "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot"),
+        *("-machine", "pc", "-accel", "tcg,thread=multi,tb-size=512", "-cpu", "max"),
+        *("-smp", "2", "-m", str(memory_mib)),
+        *("-kernel", str(kernel), "-initrd", str(initrd), "-device", "virtio-rng-pci"),
+        *(word for disk in disks for word in ("-drive", f"file={disk},if=virtio,format=raw,snapshot=on")),
+        *("-virtfs", f"local,path={host},mount_tag=host,security_model=none,multidevs=remap"),
+    ]
 
 
 def wait_until(condition: Any, within_s: float, what: str) -> Any:
