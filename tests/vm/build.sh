@@ -45,6 +45,7 @@ fi
 export DEBIAN_FRONTEND=noninteractive LC_ALL=C
 work=$(mktemp -d "$cache/work.XXXXXX")
 chmod 755 "$work"
+system=$work/system
 # Never delete through a mount that an interrupted mmdebstrap has left.
 cleanup() {
     awk -v under="$work/" 'index($2, under) == 1 {print $2}' /proc/mounts | sort -r | xargs -r umount -l || true
@@ -118,25 +119,25 @@ say "root file system"
 quietly mmdebstrap --quiet --mode=root --variant=apt --architectures=amd64 --include="$packages" \
     --aptopt='APT::Install-Recommends "0"' --aptopt='Acquire::Languages "none"' --aptopt='Acquire::Retries "3"' \
     --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/man/*' \
-    --dpkgopt='path-exclude=/usr/share/locale/*' "$suite" "$work/root" "$work/sources"
+    --dpkgopt='path-exclude=/usr/share/locale/*' "$suite" "$system" "$work/sources"
 
 say "modules"
 lib=lib/modules/$kernel
 depends() { modprobe -d "$work/image" -S "$kernel" --show-depends "$1" | awk '$1 == "insmod" {print $2}'; }
 depmod -b "$work/image" "$kernel"
 for module in $modules; do depends "$module" || exit 1; done | sort -u | sed "s#^$work/image/##" >"$work/keep"
-mkdir -p "$work/root/$lib"
-(cd "$work/image" && cpio --quiet -pdm "$work/root" <"$work/keep" && cp "$lib"/modules.* "$work/root/$lib/")
+mkdir -p "$system/$lib"
+(cd "$work/image" && cpio --quiet -pdm "$system" <"$work/keep" && cp "$lib"/modules.* "$system/$lib/")
 # `modprobe v4l2loopback` loads what the link names, which the tests change.
-mkdir "$work/root/$lib/loopback"
-cp "$work"/loopback/*.ko "$work/root/$lib/"
+mkdir "$system/$lib/loopback"
+cp "$work"/loopback/*.ko "$system/$lib/"
 first=$(basename "$(find "$work/loopback" -name '*.ko' | sort | head -n 1)")
-ln -s "../$first" "$work/root/$lib/loopback/v4l2loopback.ko"
-chroot "$work/root" depmod "$kernel"
+ln -s "../$first" "$system/$lib/loopback/v4l2loopback.ko"
+chroot "$system" depmod "$kernel"
 
 say "initramfs"
 early=$work/initramfs
-mkdir -p "$early/bin" "$early/modules" "$early/proc" "$early/sys" "$early/dev" "$early/root"
+mkdir -p "$early/bin" "$early/modules" "$early/proc" "$early/sys" "$early/dev" "$early/system"
 cp "$work/busybox/bin/busybox" "$early/bin/"
 for module in $early_modules; do depends "$module" || exit 1; done | awk '!seen[$0]++' | while read -r file; do
     cp "$file" "$early/modules/"
@@ -156,18 +157,18 @@ open(sys.argv[2], "wb").write(lzma.LZMADecompressor().decompress(packed[start:])
 PY
 
 say "disk image"
-rm -rf "$work/root/var/cache/apt" "$work/root/var/lib/apt/lists" "$work/root/etc/resolv.conf"
-echo relit-vm >"$work/root/etc/hostname"
-printf '127.0.0.1 localhost relit-vm\n' >"$work/root/etc/hosts"
-mkdir -p "$work/root/opt/relit" "$work/root/host"
-install -m 755 "$here/init.sh" "$work/root/init.sh"
+rm -rf "$system/var/cache/apt" "$system/var/lib/apt/lists" "$system/etc/resolv.conf"
+echo relit-vm >"$system/etc/hostname"
+printf '127.0.0.1 localhost relit-vm\n' >"$system/etc/hosts"
+mkdir -p "$system/opt/relit" "$system/host"
+install -m 755 "$here/init.sh" "$system/init.sh"
 {
     echo "kernel $(dpkg-deb -f "$work"/debs/linux-image-*.deb Version)"
     for ko in "$work"/loopback/*.ko; do basename "$ko" .ko | sed 's/-/ /'; done
-    chroot "$work/root" dpkg-query -W -f "\${Package} \${Version}\n" python3 v4l-utils ffmpeg chromium
+    chroot "$system" dpkg-query -W -f "\${Package} \${Version}\n" python3 v4l-utils ffmpeg chromium
 } >"$work/versions"
-size=$(($(du -sm --apparent-size "$work/root" | cut -f1) * 5 / 4 + 1024))
-quietly mke2fs -q -t ext4 -O ^has_journal -E lazy_itable_init=1 -m 0 -d "$work/root" "$work/root.img" "${size}M"
+size=$(($(du -sm --apparent-size "$system" | cut -f1) * 5 / 4 + 1024))
+quietly mke2fs -q -t ext4 -O ^has_journal -E lazy_itable_init=1 -m 0 -d "$system" "$work/root.img" "${size}M"
 
 rm -f "$cache/recipe"
 for file in vmlinux initrd root.img versions; do mv -f "$work/$file" "$cache/$file"; done

@@ -15,6 +15,9 @@ from tests.vm.program import program_disk
 VERSIONS = os.environ.get("RELIT_VM_VERSIONS", "0.12.7 0.15.0").split()
 """Of Debian 12 and 13; `make test-vm` tries 0.13.2 too, of Debian 12's backports."""
 
+NEWEST = pytest.mark.parametrize("version", VERSIONS[-1:], indirect=True)
+"""For what does not depend on the version, or takes long."""
+
 ROWS: list[tuple[str, str, str]] = []
 
 

@@ -11,6 +11,6 @@ until [ -b /dev/vda ]; do
     [ $tries -lt 300 ] || $b poweroff -f
     $b sleep 0.1
 done
-$b mount -t ext4 -o noatime /dev/vda /root || $b poweroff -f
-for folder in proc sys dev; do $b mount --move /$folder /root/$folder; done
-exec $b switch_root /root /bin/sh /init.sh
+$b mount -t ext4 -o noatime /dev/vda /system || $b poweroff -f
+for folder in proc sys dev; do $b mount --move /$folder /system/$folder; done
+exec $b switch_root /system /bin/sh /init.sh

@@ -17,6 +17,7 @@ LOOK_EVERY_S = 1.0
 STOP_S = 1.0
 
 Load = Callable[[Path], RelitSettings]
+_Version = tuple[int, int, int] | None
 Apply = Callable[[RelitSettings, RelitSettings], RelitError | None]
 
 
@@ -37,7 +38,7 @@ def watch_config(
         tell: gets what is wrong or should be known, and None once there is no more of that.
     """
     stopping = threading.Event()
-    arguments = (path, load, settings, apply, tell, stopping)
+    arguments = (path, _version(path), load, settings, apply, tell, stopping)
     thread = threading.Thread(target=_watch, args=arguments, name="config", daemon=True)
     thread.start()
     try:
@@ -49,13 +50,14 @@ def watch_config(
 
 def _watch(
     path: Path,
+    used: _Version,
     load: Load,
     settings: RelitSettings,
     apply: Apply,
     tell: Callable[[Exception | None], None],
     stopping: threading.Event,
 ) -> None:
-    used = last = _version(path)
+    last = used
     told = False
     while not stopping.wait(LOOK_EVERY_S):
         before, last = last, _version(path)
@@ -78,7 +80,7 @@ def _watch(
         told = note is not None
 
 
-def _version(path: Path) -> tuple[int, int, int] | None:
+def _version(path: Path) -> _Version:
     """What is another after every edit, in place or by another file; None while there is none."""
     try:
         found = path.stat()
