@@ -10,7 +10,7 @@ step() {
     start=$(date +%s)
     printf '%s\n' "$2" >/tmp/command
     chmod 644 /tmp/command
-    runuser -l you -c "set -e; cd ~; . /tmp/command" >>"/host/output.txt" 2>&1 9>&1
+    runuser -l you -c "set -e; cd ~; . /tmp/command" >>"/host/output.txt" 2>&1
     status=$?
     printf '%s\t%s\t%s\t%s\n' "$(($(date +%s) - start))" "$status" "$1" "$(printf '%s' "$2" | tr '\n\t' ';  ')" >>/host/steps.tsv
     [ "$status" = 0 ] || exit 1
@@ -30,7 +30,7 @@ else
 fi
 # What a person pastes: the lines below "As root:"; and again, for some things show only then.
 for round in first second; do
-    step "doctor, the $round time" 'relit doctor --fix | tee /tmp/doctor.txt'
+    step "doctor, the $round time" 'relit doctor --fix >/tmp/doctor.txt || true; cat /tmp/doctor.txt; grep -q "^Relit Camera" /tmp/doctor.txt'
     sed -n '/^As root:/,/^$/s/^    //p' /tmp/doctor.txt >>/host/pasted.txt
     pasted=$(sed -n '/^As root:/,/^$/s/^    //p' /tmp/doctor.txt)
     [ -z "$pasted" ] || step "its lines for root, pasted" "$pasted"
@@ -40,12 +40,14 @@ step "a browser" 'sudo DEBIAN_FRONTEND=noninteractive apt-get -qy install chromi
 data=$(runuser -l you -c 'ls -d ~/.local/*/venvs/relit-camera/lib/python3*/site-packages/relit_camera/demo/data ~/.local/share/*/venvs/relit-camera/lib/python3*/site-packages/relit_camera/demo/data 2>/dev/null | head -n 1')
 step "the camera starts" "cp $data/adam.relit me.relit
 setsid relit run --source $data/clip.mp4 --subject me.relit --environment sunset --size 640x360 >camera.log 2>&1 </dev/null &
-until curl=\$(python3 -c 'import urllib.request as u; print(u.urlopen(\"http://127.0.0.1:8470/api/v1/status\").read().decode())' 2>/dev/null) && echo \"\$curl\" | grep -qE '\"state\":\"(live|standing-in)\"'; do sleep 2; done
+camera=\$!
+until curl=\$(python3 -c 'import urllib.request as u; print(u.urlopen(\"http://127.0.0.1:8470/api/v1/status\").read().decode())' 2>/dev/null) && echo \"\$curl\" | grep -qE '\"state\":\"(live|standing-in)\"'; do kill -0 \$camera; sleep 2; done
 echo \"\$curl\""
 step "the call" 'python3 /host/guest/call.py "Relit Camera" /tmp/call 25'
 cp /tmp/call-page.png /tmp/call.jsonl /host/
 runuser -l you -c 'python3 -c "import urllib.request as u; print(u.urlopen(\"http://127.0.0.1:8470/api/v1/status\").read().decode())"; cat camera.log' >>/host/output.txt 2>&1
-pkill -INT -f "relit run" && sleep 5
+pkill -INT -f "relit run"
+while pgrep -f "relit run" >/dev/null; do sleep 1; done
 loginctl enable-linger you
 step "as a service" "mkdir -p ~/.config/relit-camera
 export XDG_RUNTIME_DIR=/run/user/\$(id -u)
