@@ -1,7 +1,10 @@
+import contextlib
 import errno
 from itertools import repeat
+from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -23,17 +26,17 @@ from tests.stream.fake_devices import FakeTree
 SIZE = (320, 180)
 
 
-class FakeCamera:
-    """Stands for `pyvirtualcam.Camera`."""
+class FakeOutput:
+    """Stands for a device that is open."""
 
-    def __init__(self, width, height, fps, device):
-        self.size, self.fps, self.device = (width, height), fps, device
+    def __init__(self, size, fps, node):
+        self.size, self.fps, self.node = size, fps, node
         self.sent, self.closed, self.fails = [], False, False
 
     def send(self, image):
         assert not self.closed
         if self.fails:
-            raise RuntimeError("error writing frame")
+            raise OSError(errno.EIO, "Input/output error")
         assert image.shape == (self.size[1], self.size[0], 3)
         assert image.flags["C_CONTIGUOUS"]
         self.sent.append(image)
@@ -43,15 +46,15 @@ class FakeCamera:
 
 
 class Opener:
-    """Opens fake cameras, all remembered; the errors given are raised first."""
+    """Opens fake devices, all remembered; the errors given are raised first."""
 
-    def __init__(self, *errors):
-        self.errors, self.cameras = list(errors), []
+    def __init__(self, *errors, size=None):
+        self.errors, self.size, self.cameras = list(errors), size, []
 
-    def __call__(self, width, height, fps, device):
+    def __call__(self, size, fps, node):
         if self.errors:
             raise self.errors.pop(0)
-        self.cameras.append(FakeCamera(width, height, fps, device))
+        self.cameras.append(FakeOutput(self.size or size, fps, node))
         return self.cameras[-1]
 
 
@@ -65,11 +68,11 @@ def tree(tmp_path):
 
 def test_the_camera_is_found_by_its_label_and_opened_by_its_node(tree):
     opener = Opener()
-    sink = CameraSink(SIZE, 30, tree=tree, open_camera=opener)
+    sink = CameraSink(SIZE, 30, tree=tree, open_output=opener)
     image = draw_pattern(SIZE, 1)
     sink.write(image)
     (camera,) = opener.cameras
-    assert (camera.size, camera.fps, camera.device) == (SIZE, 30, str(tree.dev / "video10"))
+    assert (camera.size, camera.fps, camera.node) == (SIZE, 30, str(tree.dev / "video10"))
     assert (camera.sent[0] == image).all()
     assert sink.describe() == SinkInfo("camera", str(tree.dev / "video10"), SIZE)
     sink.close()
@@ -79,69 +82,59 @@ def test_the_camera_is_found_by_its_label_and_opened_by_its_node(tree):
 
 def test_a_node_may_be_named(tree):
     opener = Opener()
-    CameraSink(SIZE, 30, device=str(tree.dev / "video3"), tree=tree, open_camera=opener)
-    assert opener.cameras[0].device == str(tree.dev / "video3")
+    CameraSink(SIZE, 30, device=str(tree.dev / "video3"), tree=tree, open_output=opener)
+    assert opener.cameras[0].node == str(tree.dev / "video3")
 
 
-def test_pictures_are_scaled_to_the_size_that_the_device_kept(tree):
-    def opener(width, height, fps, device):
-        tree.set_format(10, "YU12:640x360@30\n")  # a reader still holds the device at its old size
-        cameras.append(FakeCamera(width, height, fps, device))
-        return cameras[-1]
-
-    cameras = []
-    sink = CameraSink(SIZE, 30, tree=tree, open_camera=opener)
-    assert [camera.size for camera in cameras] == [SIZE, (640, 360)]
-    assert cameras[0].closed
-    sink.write(draw_pattern(SIZE, 77))
-    assert cameras[1].sent[0].shape == (360, 640, 3)
-    assert read_number(cameras[1].sent[0]) == 77
-    assert sink.describe().size == (640, 360)
-
-
-def test_a_size_that_is_told_only_after_the_first_picture_is_followed_too(tree):
-    opener = Opener()
-    sink = CameraSink(SIZE, 30, tree=tree, open_camera=opener)
-    tree.set_format(10, "YU12:640x360@30\n")
-    for number in range(3):
-        sink.write(draw_pattern(SIZE, number))
-    assert [camera.size for camera in opener.cameras] == [SIZE, (640, 360)]
-    assert [read_number(image) for image in opener.cameras[1].sent] == [1, 2]
+def test_pictures_fill_the_size_that_the_device_kept(tree):
+    opener = Opener(size=(240, 240))  # a reader still holds the device at its old size
+    sink = CameraSink(SIZE, 30, tree=tree, open_output=opener)
+    picture = np.zeros((180, 320, 3), np.uint8)
+    picture[:, 70:250] = 200  # the square that is kept
+    sink.write(picture)
+    assert (opener.cameras[0].sent[0] == 200).mean() > 0.97
+    assert sink.describe().size == (240, 240)
 
 
 def test_odd_sizes_are_refused(tree):
     with pytest.raises(InputError, match="641x480"):
-        CameraSink((641, 480), 30, tree=tree, open_camera=Opener())
+        CameraSink((641, 480), 30, tree=tree, open_output=Opener())
 
 
 def test_a_missing_camera_comes_with_its_command(tmp_path):
     with pytest.raises(DeviceError, match=r"not loaded; run: .*exclusive_caps=1 card_label=\"Relit Camera\""):
-        CameraSink(SIZE, 30, tree=DeviceTree(tmp_path, tmp_path), open_camera=Opener())
+        CameraSink(SIZE, 30, tree=DeviceTree(tmp_path, tmp_path), open_output=Opener())
 
 
 @pytest.mark.parametrize(
     ("error", "message"),
     [
-        (RuntimeError("'v4l2loopback' backend: Device /dev/video10 is not a video output device."), "is in use"),
-        (RuntimeError("'v4l2loopback' backend: Device /dev/video10 is already in use."), "is in use"),
-        (RuntimeError("something else"), "cannot be opened: something else"),
+        (loopback.NotFreeError(errno.EBUSY, "a program still shows it"), "is in use: a program still shows it; stop"),
+        (OSError(errno.EBUSY, "Device or resource busy"), "is in use: Device or resource busy; stop that program"),
+        (OSError(errno.ENOTTY, "Inappropriate ioctl for device"), "cannot be opened: Inappropriate ioctl for device"),
+        (RuntimeError("no backend"), "there is no virtual camera: no backend; install OBS Studio"),
         (ImportError("no such module"), "pip install pyvirtualcam"),
     ],
 )
-def test_what_pyvirtualcam_says_is_explained(tree, error, message):
+def test_why_it_cannot_be_opened_is_explained(tree, error, message):
     with pytest.raises(DeviceError, match=message):
-        CameraSink(SIZE, 30, tree=tree, open_camera=Opener(error))
+        CameraSink(SIZE, 30, tree=tree, open_output=Opener(error))
+
+
+def test_faults_of_ours_are_not_explained_away(tree):
+    with pytest.raises(KeyError):
+        CameraSink(SIZE, 30, tree=tree, open_output=Opener(KeyError("of ours")))
 
 
 def test_no_permission_is_told_with_its_cure(tree, monkeypatch):
     monkeypatch.setattr(camera_module.os, "access", lambda *_: False)
     with pytest.raises(DeviceError, match=r"no permission .*usermod -aG video"):
-        CameraSink(SIZE, 30, tree=tree, open_camera=Opener())
+        CameraSink(SIZE, 30, tree=tree, open_output=Opener())
 
 
 def test_after_a_failed_write_the_next_one_opens_again(tree):
     opener = Opener()
-    sink = CameraSink(SIZE, 30, tree=tree, open_camera=opener)
+    sink = CameraSink(SIZE, 30, tree=tree, open_output=opener)
     opener.cameras[0].fails = True
     with pytest.raises(DeviceError, match="takes no pictures"):
         sink.write(draw_pattern(SIZE, 0))
@@ -155,49 +148,34 @@ def test_after_a_failed_write_the_next_one_opens_again(tree):
 
 
 def test_a_second_relit_camera_is_refused_until_the_first_lets_go(tree):
-    first, opener = CameraSink(SIZE, 30, tree=tree, open_camera=Opener()), Opener()
+    first, opener = CameraSink(SIZE, 30, tree=tree, open_output=Opener()), Opener()
     with pytest.raises(DeviceError, match=r"another Relit Camera publishes to .*video10 already; stop that one"):
-        CameraSink(SIZE, 30, tree=tree, open_camera=opener)
+        CameraSink(SIZE, 30, tree=tree, open_output=opener)
     assert opener.cameras == []
     first.close()
-    CameraSink(SIZE, 30, tree=tree, open_camera=opener).close()
+    CameraSink(SIZE, 30, tree=tree, open_output=opener).close()
     assert len(opener.cameras) == 1
 
 
 def test_a_camera_that_cannot_be_opened_is_not_claimed(tree):
     with pytest.raises(DeviceError, match="something else"):
-        CameraSink(SIZE, 30, tree=tree, open_camera=Opener(RuntimeError("something else")))
-    CameraSink(SIZE, 30, tree=tree, open_camera=Opener()).close()
-
-
-@pytest.mark.parametrize(("text", "now"), [("\n", "was taken away or reset"), ("YU12:640x360@30\n", "is 640x360 now")])
-def test_a_device_that_drops_what_is_written_is_noticed_and_opened_anew(tree, monkeypatch, text, now):
-    monkeypatch.setattr(camera_module, "CHECK_S", 0.0)
-    tree.set_format(10, "YU12:320x180@30\n")
-    opener = Opener()
-    sink = CameraSink(SIZE, 30, tree=tree, open_camera=opener)
-    sink.write(draw_pattern(SIZE, 0))
-    tree.set_format(10, text)
-    with pytest.raises(DeviceError, match=f"takes no pictures: it {now}"):
-        sink.write(draw_pattern(SIZE, 1))
-    tree.set_format(10, "YU12:320x180@30\n")
-    sink.write(draw_pattern(SIZE, 2))
-    assert [camera.closed for camera in opener.cameras] == [True, False]
+        CameraSink(SIZE, 30, tree=tree, open_output=Opener(OSError(errno.EIO, "something else")))
+    CameraSink(SIZE, 30, tree=tree, open_output=Opener()).close()
 
 
 def test_only_uint8_pictures_are_taken(tree):
-    sink = CameraSink(SIZE, 30, tree=tree, open_camera=Opener())
+    sink = CameraSink(SIZE, 30, tree=tree, open_output=Opener())
     with pytest.raises(ImageError, match="float32"):
         sink.write(np.zeros((180, 320, 3), np.float32))
 
 
 class FakeDevice:
-    """Answers the ioctl calls of `revive` as a loopback device would."""
+    """Answers ioctl calls as a loopback device would."""
 
-    def __init__(self, monkeypatch, capabilities):
+    def __init__(self, monkeypatch, capabilities, kept=None):
         import fcntl
 
-        self.capabilities, self.calls = capabilities, []
+        self.capabilities, self.kept, self.calls = capabilities, kept, []
         monkeypatch.setattr(fcntl, "ioctl", self.ioctl)
 
     def ioctl(self, device, request, argument):
@@ -206,16 +184,81 @@ class FakeDevice:
             assert len(argument) == 104
             argument[88:92] = self.capabilities.to_bytes(4, "little")
             return 0
+        if request == loopback.VIDIOC_S_FMT:
+            assert len(argument) == 208
+            if self.kept is not None:
+                width, height, layout = self.kept
+                argument[8:20] = width.to_bytes(4, "little") + height.to_bytes(4, "little") + layout
+            return 0
         raise OSError(22, "Invalid argument")
+
+
+CAPTURE, OUTPUT, NEITHER = 0x05200001, 0x05200002, 0x05200000
+
+
+def test_a_device_is_written_to_as_i420(tree, monkeypatch):
+    FakeDevice(monkeypatch, OUTPUT)
+    node = str(tree.dev / "video10")
+    device = loopback.LoopbackDevice(SIZE, node)
+    image = draw_pattern(SIZE, 5)
+    device.send(image)
+    device.close()
+    device.close()
+    written = np.fromfile(node, np.uint8).reshape(270, 320)
+    shown = cv2.cvtColor(written, cv2.COLOR_YUV2RGB_I420)
+    assert read_number(shown) == 5
+    assert np.median(np.abs(shown.astype(int) - image)) <= 1
+    assert device.size == SIZE
+
+
+def test_a_device_says_which_size_it_kept(tree, monkeypatch):
+    FakeDevice(monkeypatch, OUTPUT, kept=(640, 360, b"YU12"))
+    with contextlib.closing(loopback.LoopbackDevice(SIZE, str(tree.dev / "video10"))) as device:
+        assert device.size == (640, 360)
+
+
+@pytest.mark.parametrize(
+    ("capabilities", "kept", "message"),
+    [
+        (CAPTURE, None, "another program publishes to it"),
+        (OUTPUT, (*SIZE, b"YUYV"), "still shows it in the layout YUYV"),
+    ],
+)
+def test_a_device_that_is_not_free_is_let_go_at_once(tree, monkeypatch, capabilities, kept, message):
+    FakeDevice(monkeypatch, capabilities, kept)
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    with pytest.raises(loopback.NotFreeError, match=message):
+        loopback.LoopbackDevice(SIZE, str(tree.dev / "video10"))
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+@pytest.mark.parametrize("fault", ["short", "error"])
+def test_a_write_that_fails_is_told_and_the_device_opened_anew(tree, monkeypatch, fault):
+    FakeDevice(monkeypatch, OUTPUT)
+    sink = CameraSink(SIZE, 30, tree=tree)
+    sink.write(draw_pattern(SIZE, 0))
+
+    def write(descriptor, data):
+        if fault == "error":
+            raise OSError(errno.ENODEV, "No such device")
+        return len(data) - 1
+
+    with monkeypatch.context() as faulty:
+        faulty.setattr(loopback.os, "write", write)
+        for number in range(3):
+            with pytest.raises(DeviceError, match=r"video10 takes no pictures: .*(No such device|bytes were taken)"):
+                sink.write(draw_pattern(SIZE, number))
+    sink.write(draw_pattern(SIZE, 4))
+    sink.close()
 
 
 @pytest.mark.parametrize(
     ("capabilities", "state", "revived"),
     [
-        (0x05200000, None, True),  # neither capture nor output, no state file: 0.12 after its first writer
-        (0x05200001, None, True),  # capture: its writer has gone, a reader has not
-        (0x05200002, None, False),  # output: free already
-        (0x05200000, "output", False),  # newer versions have no need
+        (NEITHER, None, True),  # neither capture nor output, no state file: 0.12 after its first writer
+        (CAPTURE, None, False),  # capture, and nobody can be seen: a writer may be another user's
+        (OUTPUT, None, False),  # output: free already
+        (NEITHER, "output", False),  # newer versions have no need
     ],
 )
 def test_only_a_stuck_device_is_revived(tmp_path, monkeypatch, capabilities, state, revived):
@@ -234,7 +277,7 @@ def test_a_stuck_device_is_revived_beside_readers_only(tmp_path, monkeypatch, is
     monkeypatch.setattr(loopback.sys, "platform", "linux")
     monkeypatch.setattr(loopback, "holders", lambda _: [Holder(7, "program")])
     monkeypatch.setattr(loopback, "maps", lambda holder, _: is_reader)
-    FakeDevice(monkeypatch, 0x05200001)
+    FakeDevice(monkeypatch, CAPTURE)
     assert loopback.revive(node, tree) is is_reader
 
 
@@ -294,6 +337,8 @@ def test_the_null_sink_counts_and_keeps_the_last():
 
 def test_the_camera_published_to_is_known_by_its_label(tree):
     assert published_label(settings(tree.dev / "video3"), tree) == "Other Cam"
+    (tree.dev / "video-mine").symlink_to("video3")
+    assert published_label(settings(tree.dev / "video-mine"), tree) == "Other Cam"
     assert published_label(settings("camera"), tree) == "Relit Camera"
     assert published_label(settings("null"), tree) == "Relit Camera"
 
@@ -304,10 +349,13 @@ def settings(sink):
 
 def test_sinks_are_opened_by_name(tmp_path, tree, monkeypatch):
     opener = Opener()
-    monkeypatch.setattr(camera_module, "_pyvirtualcam", opener)
+    monkeypatch.setattr(camera_module, "_loopback", opener)
     assert isinstance(open_sink(settings("null")), NullSink)
     assert open_sink(settings("camera"), tree).describe().id == str(tree.dev / "video10")
-    assert open_sink(settings(tree.dev / "video3"), tree).describe().id == str(tree.dev / "video3")
+    (tree.dev / "mine").symlink_to("video3")
+    for name in ("video3", "mine"):
+        with contextlib.closing(open_sink(settings(tree.dev / name), tree)) as sink:
+            assert sink.describe().id == str(tree.dev / "video3")
     file = open_sink(settings(tmp_path / "out.mkv"))
     assert file.describe().kind == "file"
     file.close()

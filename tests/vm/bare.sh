@@ -13,18 +13,20 @@ recipe=$(sha256sum <"$here/bare.sh" | cut -c1-16)
 [ "$(cat "$cache/bare.recipe" 2>/dev/null)" != "$recipe" ] || exit 0
 
 export DEBIAN_FRONTEND=noninteractive LC_ALL=C
+cleanup() {
+    awk -v under="$cache/work." 'index($2, under) == 1 {print $2}' /proc/mounts | sort -r | xargs -r umount -l || true
+    rm -rf --one-file-system "$cache"/work.*
+}
+cleanup
+trap cleanup EXIT
+trap 'exit 130' HUP INT TERM
 work=$(mktemp -d "$cache/work.XXXXXX")
 chmod 755 "$work"
-cleanup() {
-    awk -v under="$work/" 'index($2, under) == 1 {print $2}' /proc/mounts | sort -r | xargs -r umount -l || true
-    rm -rf --one-file-system "$work"
-}
-trap cleanup EXIT
-trap 'exit 130' INT TERM
 
 archives=$(apt-get indextargets --format "\$(REPO_URI)" | sort -u)
 mirror=$(echo "$archives" | grep -E '/debian/?$' | head -n 1)
 security=$(echo "$archives" | grep -E 'debian-security/?$' | head -n 1)
+[ -n "$mirror" ] && [ -n "$security" ] || { echo "bare: apt knows no Debian archive" >&2; exit 1; }
 mmdebstrap --quiet --mode=root --variant=important --architectures=amd64 \
     --include=linux-image-amd64,sudo,ca-certificates,dbus-user-session,libpam-systemd bookworm "$work/root" \
     "deb [signed-by=$keyring] $mirror bookworm main" \

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Makes the small Debian 12 machine in which the virtual camera is tested: a stock kernel with vivid and, compiled for
 # it, three versions of v4l2loopback; v4l-utils, ffmpeg and Chromium. Everything comes from Debian's archive and lands
-# in $RELIT_VM_CACHE (1.4 GB). Called again it returns at once while the recipe is the same. Exit status 69: the machine
+# in $RELIT_VM_CACHE (2 GB). Called again it returns at once while the recipe is the same. Exit status 69: the machine
 # cannot be had here, and why.
 set -eu
 
@@ -35,7 +35,10 @@ grep -q "^VERSION_CODENAME=$suite" /etc/os-release || unavailable "it is made on
 umask 022
 mkdir -p "$cache"
 exec 9>"$cache/lock"
-flock 9
+flock -n 9 || {
+    say "another build is at work"
+    flock 9
+}
 recipe=$(cat "$here/build.sh" "$here/init.sh" "$here/initramfs.sh" | sha256sum | cut -c1-16)
 if [ "$(cat "$cache/recipe" 2>/dev/null)" = "$recipe" ]; then
     say "up to date in $cache"
@@ -43,16 +46,17 @@ if [ "$(cat "$cache/recipe" 2>/dev/null)" = "$recipe" ]; then
 fi
 
 export DEBIAN_FRONTEND=noninteractive LC_ALL=C
+# Never delete through a mount that an interrupted mmdebstrap has left.
+cleanup() {
+    awk -v under="$cache/work." 'index($2, under) == 1 {print $2}' /proc/mounts | sort -r | xargs -r umount -l || true
+    rm -rf --one-file-system "$cache"/work.*
+}
+cleanup # what a killed build left
+trap cleanup EXIT
+trap 'exit 130' HUP INT TERM
 work=$(mktemp -d "$cache/work.XXXXXX")
 chmod 755 "$work"
 system=$work/system
-# Never delete through a mount that an interrupted mmdebstrap has left.
-cleanup() {
-    awk -v under="$work/" 'index($2, under) == 1 {print $2}' /proc/mounts | sort -r | xargs -r umount -l || true
-    rm -rf --one-file-system "$work"
-}
-trap cleanup EXIT
-trap 'exit 130' INT TERM
 
 say "tools of this machine"
 quietly apt-get -q update || unavailable "apt has no package lists"
@@ -63,8 +67,9 @@ quietly apt-get -qy install --no-install-recommends \
 say "package lists"
 # This machine's own archives, of its own and of later suites; of the latter nothing is taken that is not asked for.
 archives=$(apt-get indextargets --format "\$(REPO_URI)" | sort -u)
-mirror=$(echo "$archives" | grep -E '/debian/?$' | head -n 1) || unavailable "apt knows no Debian archive"
-security=$(echo "$archives" | grep -E 'debian-security/?$' | head -n 1) || unavailable "apt knows no security archive"
+mirror=$(echo "$archives" | grep -E '/debian/?$' | head -n 1)
+security=$(echo "$archives" | grep -E 'debian-security/?$' | head -n 1)
+[ -n "$mirror" ] && [ -n "$security" ] || unavailable "apt knows no Debian archive"
 apt_root=$work/apt
 mkdir -p "$apt_root/etc/apt/sources.list.d" "$apt_root/etc/apt/preferences.d" "$apt_root/etc/apt/apt.conf.d" \
     "$apt_root/etc/apt/trusted.gpg.d" "$apt_root/var/lib/apt/lists/partial" \
@@ -86,16 +91,17 @@ apt() {
     "apt-$tool" -q -o "Dir=$apt_root" -o "Dir::State::status=$apt_root/var/lib/dpkg/status" \
         -o APT::Architecture=amd64 -o APT::Sandbox::User=root -o Acquire::Retries=3 -o Acquire::Languages=none "$@"
 }
-quietly apt get update || unavailable "Debian's archive does not answer"
+quietly apt get update -o APT::Update::Error-Mode=any || unavailable "Debian's archive does not answer"
 download() { (cd "$1" && shift && apt get download "$@"); }
 
 # apt-cache names the image that the metapackage stands for.
 image=$(apt cache depends linux-image-amd64 | awk '/Depends: linux-image-[0-9]/ {print $2; exit}')
 kernel=${image#linux-image-}
+[ -n "$kernel" ] || unavailable "Debian's archive names no kernel"
 headers=linux-headers-$kernel
 say "kernel $kernel"
 quietly download "$work/debs" "$image" "$headers" "linux-headers-${kernel%-amd64}-common" \
-    "linux-kbuild-${kernel%%.0-*}" busybox-static
+    "linux-kbuild-${kernel%%.0-*}" busybox-static || unavailable "the kernel cannot be fetched"
 mkdir -p "$work/image" "$work/src" "$work/busybox" "$work/loopback"
 dpkg-deb -x "$work"/debs/linux-image-*.deb "$work/image"
 for deb in "$work"/debs/linux-headers-*.deb "$work"/debs/linux-kbuild-*.deb; do dpkg-deb -x "$deb" "$work/src"; done
@@ -105,7 +111,7 @@ sed -i "s#^include /usr/src/#include $work/src/usr/src/#" "$work/src/usr/src/$he
 
 for from in $loopback_suites; do
     mkdir -p "$work/debs/$from" "$work/source/$from"
-    quietly download "$work/debs/$from" "v4l2loopback-dkms/$from"
+    quietly download "$work/debs/$from" "v4l2loopback-dkms/$from" || unavailable "v4l2loopback cannot be fetched"
     dpkg-deb -x "$work/debs/$from"/v4l2loopback-dkms_*.deb "$work/source/$from"
     source=$(echo "$work/source/$from"/usr/src/v4l2loopback-*)
     version=${source##*/v4l2loopback-}
@@ -119,13 +125,24 @@ say "root file system"
 quietly mmdebstrap --quiet --mode=root --variant=apt --architectures=amd64 --include="$packages" \
     --aptopt='APT::Install-Recommends "0"' --aptopt='Acquire::Languages "none"' --aptopt='Acquire::Retries "3"' \
     --dpkgopt='path-exclude=/usr/share/doc/*' --dpkgopt='path-exclude=/usr/share/man/*' \
-    --dpkgopt='path-exclude=/usr/share/locale/*' "$suite" "$system" "$work/sources"
+    --dpkgopt='path-exclude=/usr/share/locale/*' "$suite" "$system" "$work/sources" \
+    || unavailable "the root file system cannot be fetched"
+# The camera and its readers are a plain user's.
+chroot "$system" useradd --create-home --groups video you
 
 say "modules"
 lib=lib/modules/$kernel
-depends() { modprobe -d "$work/image" -S "$kernel" --show-depends "$1" | awk '$1 == "insmod" {print $2}'; }
+# The files of these modules and of all that they need, in the order of loading.
+depends() {
+    for module in "$@"; do
+        modprobe -d "$work/image" -S "$kernel" --show-depends "$module" >"$work/needs" || return 1
+        awk '$1 == "insmod" {print $2}' "$work/needs"
+    done
+}
 depmod -b "$work/image" "$kernel"
-for module in $modules; do depends "$module" || exit 1; done | sort -u | sed "s#^$work/image/##" >"$work/keep"
+# shellcheck disable=SC2086  # these are lists
+depends $modules >"$work/needed"
+sort -u "$work/needed" | sed "s#^$work/image/##" >"$work/keep"
 mkdir -p "$system/$lib"
 (cd "$work/image" && cpio --quiet -pdm "$system" <"$work/keep" && cp "$lib"/modules.* "$system/$lib/")
 # `modprobe v4l2loopback` loads what the link names, which the tests change.
@@ -139,7 +156,9 @@ say "initramfs"
 early=$work/initramfs
 mkdir -p "$early/bin" "$early/modules" "$early/proc" "$early/sys" "$early/dev" "$early/system"
 cp "$work/busybox/bin/busybox" "$early/bin/"
-for module in $early_modules; do depends "$module" || exit 1; done | awk '!seen[$0]++' | while read -r file; do
+# shellcheck disable=SC2086
+depends $early_modules >"$work/needed"
+awk '!seen[$0]++' "$work/needed" | while read -r file; do
     cp "$file" "$early/modules/"
     basename "$file" >>"$early/modules/order"
 done

@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from tests.vm.machine import GUEST_PROGRAM, Command, Machine, Outcome, wait_until
+from tests.vm.machine import GUEST_PROGRAM, Command, Machine, Outcome, by_user, wait_until
 from tests.vm.program import environment
 
 SIZE = (320, 180)
@@ -20,6 +20,8 @@ START_S = 240.0
 """Thirteen seconds on an idle machine."""
 ADDRESS = "http://127.0.0.1:8470/api/v1"
 TRACK = f"{GUEST_PROGRAM}/relit_camera/demo/data/track.json"
+EXPECTED = ("the live picture is shown as it is",)
+"""What every camera here says, for it has no subject."""
 ROOM = "room.hdr"
 """A small environment: an emulated machine takes a quarter of a minute to paint one of the built-in ones."""
 
@@ -32,7 +34,7 @@ class Camera:
         self.machine = machine
         limits = f"export RELIT_SOURCE__WIDTH={SIZE[0]} RELIT_SOURCE__HEIGHT={SIZE[1]} RELIT_SOURCE__FPS={FPS} "
         limits += f"RELIT_OUTPUT__FPS={FPS}; "
-        self.command = machine.start(f"{environment()}{limits}exec relit run {arguments}", timeout_s=1800.0)
+        self.command = started(machine, f"{limits}exec relit run {arguments}", timeout_s=1800.0)
 
     def status(self) -> dict[str, Any]:
         """What it says of itself; empty while it does not answer."""
@@ -73,6 +75,9 @@ def running(
     try:
         camera.wait_for(state)
         yield camera
+        if not camera.command.ended:
+            status = camera.status()
+            assert not [trouble for trouble in status["degraded"] if trouble["what"] not in EXPECTED], status
     finally:
         if not camera.command.ended:
             camera.kill()
@@ -86,9 +91,9 @@ def without_models(machine: Machine) -> str:
 
 def relit(machine: Machine, arguments: str) -> Outcome:
     """Run a command of the program to its end, whatever that is."""
-    return machine.run(f"{environment()}relit {arguments}", timeout_s=START_S, check=False)
+    return started(machine, f"exec relit {arguments}").wait()
 
 
-def started(machine: Machine, command: str) -> Command:
-    """Begin a command that uses the program's libraries."""
-    return machine.start(environment() + command)
+def started(machine: Machine, command: str, timeout_s: float = 600.0) -> Command:
+    """Begin a command as a plain user, in whose environment the program is."""
+    return machine.start(by_user(environment() + command), timeout_s)

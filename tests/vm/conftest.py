@@ -37,7 +37,7 @@ def version(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture(scope="session")
-def bare(program: Path, version: str) -> Iterator[Machine]:
+def booted(program: Path, version: str) -> Iterator[Machine]:
     """A machine in which no module is loaded yet."""
     with Machine(program) as machine:
         link = f"ln -sf ../v4l2loopback-{version}.ko v4l2loopback.ko"
@@ -46,10 +46,10 @@ def bare(program: Path, version: str) -> Iterator[Machine]:
 
 
 @pytest.fixture(scope="session")
-def machine(bare: Machine) -> Machine:
+def machine(booted: Machine) -> Machine:
     """A machine with the virtual camera, made by the command that we tell people."""
-    bare.run(load_command().removeprefix("sudo "))
-    return bare
+    booted.load(load_command().removeprefix("sudo modprobe "))
+    return booted
 
 
 @pytest.fixture

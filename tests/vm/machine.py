@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import shlex
 import shutil
 import socket
 import subprocess
@@ -39,7 +41,10 @@ def what_is_missing() -> str:
     """Say why there is no machine; empty if there is one."""
     if shutil.which("qemu-system-x86_64") is None:
         return "no QEMU (make vm)"
-    return "" if (cache_folder() / "recipe").exists() else "the test machine is not built (make vm)"
+    recipe = cache_folder() / "recipe"
+    parts = b"".join((HERE / name).read_bytes() for name in ("build.sh", "init.sh", "initramfs.sh"))
+    is_this = recipe.exists() and recipe.read_text().strip() == hashlib.sha256(parts).hexdigest()[:16]
+    return "" if is_this else "the test machine is not built, or is of another recipe (make vm)"
 
 
 def versions() -> list[str]:
@@ -135,6 +140,7 @@ class Machine:
         self._folder = Path(tempfile.mkdtemp(prefix="relit-vm-"))
         self.host = self._folder / "host"
         shutil.copytree(HERE / "guest", self.host / "guest", ignore=shutil.ignore_patterns("__pycache__"))
+        self.host.chmod(0o777)
         self._program, self._memory_mib = program, memory_mib
         self._numbers = count()
         self._commands: dict[int, Command] = {}
@@ -185,6 +191,10 @@ class Machine:
             raise MachineError(f"status {outcome.status}: {command}\n{outcome.text}")
         return outcome
 
+    def load(self, module: str) -> None:
+        """Load a kernel module, by the words that follow `modprobe`, and give its devices to the group `video`."""
+        self.run(f"modprobe {module} && chgrp video /dev/video* && chmod 660 /dev/video*")
+
     def console(self) -> str:
         """The end of what the machine's kernel said."""
         return (self._folder / "console").read_text(errors="replace")[-3000:]
@@ -230,6 +240,12 @@ def qemu_command(kernel: Path, initrd: Path, disks: list[Path], host: Path, memo
         *(word for disk in disks for word in ("-drive", f"file={disk},if=virtio,format=raw,snapshot=on")),
         *("-virtfs", f"local,path={host},mount_tag=host,security_model=none,multidevs=remap"),
     ]
+
+
+def by_user(command: str) -> str:
+    """A shell command, to be run as the plain user `you`."""
+    user = "setpriv --reuid you --regid you --init-groups env HOME=/home/you"
+    return f"cd /tmp && exec {user} sh -c {shlex.quote(command)}"
 
 
 def wait_until(condition: Any, within_s: float, what: str) -> Any:

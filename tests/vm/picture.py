@@ -26,14 +26,14 @@ def main() -> None:
     parser.add_argument("--environment", default="sunset")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, Machine(program_disk(Path(folder))) as machine:
-        machine.run(load_command().removeprefix("sudo "))
+        machine.load(load_command().removeprefix("sudo modprobe "))
         more = f"--subject {DATA}/adam.relit --environment {given.environment}"
         with running(machine, f"{DATA}/clip.mp4", SIZE, more) as camera:
             camera.wait_for("live")
-            call = Call(machine, "call")
-            call.wait_for_frames(60)
             shot = Path(folder, "page.png")
-            found, _ = call.stop(keep=shot)
+            with Call(machine, "call") as call:
+                call.wait_for_frames(60)
+                found, _ = call.stop(keep=shot)
             print(found, camera.status())
         cv2.imwrite(str(given.out), cv2.imread(str(shot)), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
 

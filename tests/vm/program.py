@@ -7,7 +7,6 @@ import hashlib
 import shutil
 import subprocess
 import sys
-import tempfile
 import tomllib
 from pathlib import Path
 
@@ -26,7 +25,7 @@ def program_disk(folder: Path) -> Path:
         subprocess.CalledProcessError: pip or mke2fs failed.
     """
     content = folder / "program"
-    shutil.copytree(_libraries(), content, symlinks=True)
+    _copy_libraries(content)
     wheels = folder / "wheel"
     _pip("wheel", "--no-deps", "--wheel-dir", str(wheels), str(ROOT))
     (wheel,) = wheels.glob("relit_camera-*.whl")
@@ -48,23 +47,22 @@ def environment() -> str:
     return f"export PYTHONPATH={GUEST_PROGRAM} PATH={GUEST_PROGRAM}/bin:$PATH PYTHONUNBUFFERED=1; "
 
 
-def _libraries() -> Path:
+def _copy_libraries(content: Path) -> None:
     needs = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
-    key = hashlib.sha256(repr(needs).encode()).hexdigest()[:16]
+    platforms = [f"--platform=manylinux_2_{minor}_x86_64" for minor in GLIBC]
+    kind = [f"--python-version={GUEST_PYTHON}", "--implementation=cp", "--only-binary=:all:", *platforms]
     cache = cache_folder()
-    found = cache / f"libraries-{key}"
+    found = cache / f"libraries-{hashlib.sha256(repr([kind, needs]).encode()).hexdigest()[:16]}"
     with (cache / "libraries.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not found.exists():
             for old in cache.glob("libraries-*"):
                 shutil.rmtree(old)
-            fresh = Path(tempfile.mkdtemp(dir=cache))
-            platforms = [f"--platform=manylinux_2_{minor}_x86_64" for minor in GLIBC]
-            kind = [f"--python-version={GUEST_PYTHON}", "--implementation=cp", "--only-binary=:all:"]
-            _pip("install", "--target", str(fresh), *platforms, *kind, *needs)
-            shutil.rmtree(fresh / "bin")  # their commands, for the host's Python
-            fresh.rename(found)
-    return found
+            unfinished = cache / "libraries-unfinished"
+            _pip("install", "--target", str(unfinished), *kind, *needs)
+            shutil.rmtree(unfinished / "bin")  # their commands, for the host's Python
+            unfinished.rename(found)
+        shutil.copytree(found, content, symlinks=True)
 
 
 def _pip(*words: str) -> None:

@@ -8,15 +8,14 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import cv2
 import numpy as np
 
 from relit_camera.space.images import DisplayImage
 from tests.vm.camera import START_S, started
-from tests.vm.machine import Command, Machine, MachineError, wait_until
-from tests.vm.program import environment
+from tests.vm.machine import Command, Machine, MachineError, by_user, wait_until
 
 NODE = "/dev/video10"
 LABEL = "Relit Camera"
@@ -34,6 +33,16 @@ class Seen:
 
     format: str
     image: DisplayImage
+
+
+def finds_label(machine: Machine) -> dict[str, bool]:
+    """Whether each program that lists cameras lists ours by its label, at its node."""
+    v4l2_ctl = machine.run("v4l2-ctl --list-devices", check=False).output
+    ffmpeg = machine.run("ffmpeg -hide_banner -sources v4l2", check=False).text
+    return {
+        "v4l2-ctl": re.search(rf"^{LABEL} .*:\n\s+{NODE}$", v4l2_ctl, re.MULTILINE) is not None,
+        "ffmpeg": re.search(rf"{NODE} \[{LABEL}\]", ffmpeg) is not None,
+    }
 
 
 def read_by_v4l2_ctl(machine: Machine) -> Seen:
@@ -61,7 +70,10 @@ def read_by_ffmpeg(machine: Machine) -> Seen:
 
 def read_by_opencv(machine: Machine) -> Seen:
     """Read with OpenCV's VideoCapture."""
-    said = machine.run(f"{environment()}python3 /host/guest/watch.py {NODE} /host/opencv {FRAMES}").output
+    outcome = started(machine, f"exec python3 /host/guest/watch.py {NODE} /host/opencv {FRAMES}").wait()
+    if outcome.status:
+        raise MachineError(outcome.text)
+    said = outcome.output
     image = picture(machine.host / "opencv.png")
     return Seen(f"{said.strip()} {image.shape[1]}x{image.shape[0]}", image)
 
@@ -78,9 +90,9 @@ class Watcher:
     """OpenCV, reading until it is told to stop."""
 
     def __init__(self, machine: Machine, name: str) -> None:
-        """Begin; `name` is that of its files."""
+        """Begin; `name` is that of its files. It ends with its `with` at the latest."""
         self._out = machine.host / name
-        self._command = started(machine, f"python3 /host/guest/watch.py {NODE} /host/{name}")
+        self._command = started(machine, f"exec python3 /host/guest/watch.py {NODE} /host/{name}")
 
     def rows(self) -> list[dict[str, Any]]:
         """The pictures so far: when, number, size."""
@@ -98,6 +110,13 @@ class Watcher:
         found: list[dict[str, Any]] = wait_until(enough, within_s, f"OpenCV read {pictures} pictures")
         return found
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if not self._command.ended:
+            self._command.kill()
+
     def stop(self) -> DisplayImage:
         """End it, and return its last picture."""
         self._out.with_suffix(".stop").touch()
@@ -109,10 +128,17 @@ class Call:
     """A call in headless Chromium, held until it is told to stop."""
 
     def __init__(self, machine: Machine, name: str, label: str = LABEL) -> None:
-        """Begin; `name` is that of its files. Chromium rarely never runs the page: a second start then does."""
+        """Begin; `name` is that of its files. It ends with its `with` at the latest."""
         self._out = machine.host / name
-        call = f"python3 /host/guest/call.py '{label}' /host/{name} 1200"
-        self._command: Command = machine.start(f"{call} || {call}", timeout_s=1800.0)
+        call = f"exec python3 /host/guest/call.py '{label}' /host/{name} 1200"
+        self._command: Command = machine.start(by_user(call), timeout_s=1800.0)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if not self._command.ended:
+            self._command.kill()
 
     def rows(self) -> list[dict[str, Any]]:
         """The call's state, a row a second."""

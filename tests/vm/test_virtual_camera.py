@@ -8,7 +8,7 @@ from relit_camera.stream.sources.pattern import draw_pattern, read_number
 from tests.vm.camera import SIZE, relit, running, without_models
 from tests.vm.conftest import NEWEST
 from tests.vm.machine import MachineError
-from tests.vm.readers import FRAMES, NODE, READERS, Watcher, difference
+from tests.vm.readers import FRAMES, NODE, READERS, Watcher, difference, finds_label
 
 pytestmark = pytest.mark.timeout(900)
 
@@ -62,23 +62,23 @@ class TestWhileItRuns:
         )
 
     def test_it_is_listed_by_its_label(self, camera, machine):
+        assert finds_label(machine) == {"v4l2-ctl": True, "ffmpeg": True}
         listed = json.loads(relit(machine, "devices --json").output)["virtual_cameras"]
         assert listed == [{"label": "Relit Camera", "node": NODE, "ours": True, "size": list(SIZE)}]
 
 
 def test_a_reader_stays_through_kill_stop_and_another_size(machine, version, saw):
-    with running(machine) as camera:
-        watcher = Watcher(machine, "generations")
+    with running(machine) as camera, Watcher(machine, "generations") as watcher:
         watcher.wait_for(5)
         camera.kill()
-    killed = len(watcher.rows())
-    with running(machine) as camera:
-        again = watcher.wait_for(5, after=killed + 2)  # buffers may still hold pictures of before
-        assert camera.stop().status == 0
-    stopped = len(watcher.rows())
-    with running(machine, size=LARGER):
-        other = watcher.wait_for(5, after=stopped + 2)
-        image = watcher.stop()
+        killed = len(watcher.rows())
+        with running(machine) as camera:
+            again = watcher.wait_for(5, after=killed + 2)  # buffers may still hold pictures of before
+            assert camera.stop().status == 0
+        stopped = len(watcher.rows())
+        with running(machine, size=LARGER):
+            other = watcher.wait_for(5, after=stopped + 2)
+            image = watcher.stop()
     rows = watcher.rows()
     assert all(row["size"] == list(SIZE) for row in rows), "the size must stay while somebody reads"
     for generation in (rows[:killed], again, other):

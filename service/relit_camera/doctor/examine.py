@@ -22,6 +22,7 @@ from relit_camera.doctor.subject import check_subject
 from relit_camera.doctor.unit import check_service
 from relit_camera.errors import ConfigError
 from relit_camera.models.registry import FOLDER_VARIABLE, models_folder
+from relit_camera.stream.sinks.factory import published_label
 
 
 def examine(
@@ -52,7 +53,7 @@ def examine(
         lambda: check_models(settings),
         lambda: check_provider(settings),
         lambda: check_subject(settings),
-        lambda: check_webcam(settings.source, host, access, settings.output.label),
+        lambda: check_webcam(settings.source, host, access, published_label(settings.output, host.tree)),
         lambda: check_module(settings.output, host),
         lambda: check_boot(settings.output, host),
         lambda: check_virtual_camera(settings.output, host, access),

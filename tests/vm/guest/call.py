@@ -79,16 +79,32 @@ def main(label, out, seconds):
     )
     try:
         wait_for_driver()
-        page = Page(DRIVER_PORT)
-        page.open(f"http://localhost:{PAGE_PORT}/call.html")
-        found = page.run(f"return call({json.dumps(label)})")
-        print(json.dumps(found), flush=True)
-        if "label" in found:
-            hold(page, out, seconds)
-        page.close()
+        page = opened_page()
+        try:
+            found = page.run(f"return call({json.dumps(label)})")
+            print(json.dumps(found), flush=True)
+            if "label" in found:
+                hold(page, out, seconds)
+        finally:
+            page.close()
         return 0 if "label" in found else 1
     finally:
         driver.kill()
+
+
+def opened_page():
+    """Open the page; Chromium at times never does on a slow machine, and does when it is started again."""
+    for last_try in (False, True):
+        page = Page(DRIVER_PORT)
+        try:
+            page.open(f"http://localhost:{PAGE_PORT}/call.html")
+        except OSError:
+            page.close()
+            if last_try:
+                raise
+        else:
+            return page
+    return None
 
 
 def hold(page, out, seconds):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from relit_camera.config.settings import OutputSettings
@@ -27,8 +28,8 @@ def open_sink(settings: OutputSettings, tree: DeviceTree = SYSTEM) -> Sink:
         return NullSink(size)
     if text == "camera":
         return CameraSink(size, fps, settings.label, tree=tree)
-    if text.startswith(str(tree.dev / "video")):
-        return CameraSink(size, fps, settings.label, device=text, tree=tree)
+    if node := _node(text, tree):
+        return CameraSink(size, fps, settings.label, device=node, tree=tree)
     path = Path(text).expanduser()
     if path.suffix.lower() in VIDEO_SUFFIXES:
         return FileSink(path, size, fps)
@@ -39,4 +40,10 @@ def open_sink(settings: OutputSettings, tree: DeviceTree = SYSTEM) -> Sink:
 def published_label(settings: OutputSettings, tree: DeviceTree = SYSTEM) -> str:
     """Name the virtual camera that will be published to, which must not be taken as source: it would film itself."""
     labels = {camera.node: camera.label for camera in list_virtual_cameras(tree)}
-    return labels.get(settings.sink, settings.label)
+    return labels.get(_node(settings.sink, tree), settings.label)
+
+
+def _node(text: str, tree: DeviceTree) -> str:
+    """The device file that is named, itself or by a link of udev's; empty where none is."""
+    path = Path(text).resolve()
+    return str(path) if path.parent == tree.dev and re.fullmatch(r"video\d+", path.name) else ""
