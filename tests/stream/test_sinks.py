@@ -1,5 +1,6 @@
 import contextlib
 import errno
+import inspect
 from itertools import repeat
 from pathlib import Path
 from types import SimpleNamespace
@@ -161,6 +162,36 @@ def test_a_camera_that_cannot_be_opened_is_not_claimed(tree):
     with pytest.raises(DeviceError, match="something else"):
         CameraSink(SIZE, 30, tree=tree, open_output=Opener(OSError(errno.EIO, "something else")))
     CameraSink(SIZE, 30, tree=tree, open_output=Opener()).close()
+
+
+def test_elsewhere_pyvirtualcam_is_the_camera(monkeypatch):
+    import pyvirtualcam
+
+    calls = []
+
+    class Camera:
+        device = "OBS Virtual Camera"
+
+        def __init__(self, width, height, fps, device):
+            calls.append((width, height, fps, device))
+
+        def send(self, image):
+            calls.append(image)
+
+        def close(self):
+            calls.append("closed")
+
+    assert {"width", "height", "fps", "device"} <= set(inspect.signature(pyvirtualcam.Camera).parameters)
+    monkeypatch.setattr(pyvirtualcam, "Camera", Camera)
+    monkeypatch.setattr(camera_module.sys, "platform", "darwin")
+    sink = CameraSink(SIZE, 30)
+    image = draw_pattern(SIZE, 1)
+    sink.write(image)
+    sink.close()
+    assert sink.describe() == SinkInfo("camera", "OBS Virtual Camera", SIZE)
+    assert calls[0] == (*SIZE, 30, None)
+    assert (calls[1] == image).all()
+    assert calls[2] == "closed"
 
 
 def test_only_uint8_pictures_are_taken(tree):

@@ -40,7 +40,7 @@ class TestWhileItRuns:
         assert number is not None
         worst = difference(seen.image, draw_pattern(SIZE, number))
         saw(reader, f"{seen.format}; {FRAMES} pictures, colours within {worst} of 255")
-        assert worst <= 4
+        assert worst <= 6
 
     @NEWEST
     def test_a_second_camera_is_refused(self, camera, machine):
