@@ -203,10 +203,10 @@ def test_only_uint8_pictures_are_taken(tree):
 class FakeDevice:
     """Answers ioctl calls as a loopback device would."""
 
-    def __init__(self, monkeypatch, capabilities, kept=None):
+    def __init__(self, monkeypatch, capabilities, kept=None, refuses=False):
         import fcntl
 
-        self.capabilities, self.kept, self.calls = capabilities, kept, []
+        self.capabilities, self.kept, self.refuses, self.calls = capabilities, kept, refuses, []
         monkeypatch.setattr(fcntl, "ioctl", self.ioctl)
 
     def ioctl(self, device, request, argument):
@@ -215,8 +215,11 @@ class FakeDevice:
             assert len(argument) == 104
             argument[88:92] = self.capabilities.to_bytes(4, "little")
             return 0
-        if request == loopback.VIDIOC_S_FMT:
+        if request in (loopback.VIDIOC_S_FMT, loopback.VIDIOC_G_FMT):
             assert len(argument) == 208
+            asked = int.from_bytes(argument[8:12], "little"), int.from_bytes(argument[12:16], "little")
+            if self.refuses and request == loopback.VIDIOC_S_FMT and asked != self.kept[:2]:
+                raise OSError(errno.EBUSY, "Device or resource busy")
             if self.kept is not None:
                 width, height, layout = self.kept
                 argument[8:20] = width.to_bytes(4, "little") + height.to_bytes(4, "little") + layout
@@ -242,8 +245,9 @@ def test_a_device_is_written_to_as_i420(tree, monkeypatch):
     assert device.size == SIZE
 
 
-def test_a_device_says_which_size_it_kept(tree, monkeypatch):
-    FakeDevice(monkeypatch, OUTPUT, kept=(640, 360, b"YU12"))
+@pytest.mark.parametrize("refuses", [False, True])
+def test_a_device_says_which_size_it_kept(tree, monkeypatch, refuses):
+    FakeDevice(monkeypatch, OUTPUT, kept=(640, 360, b"YU12"), refuses=refuses)
     with contextlib.closing(loopback.LoopbackDevice(SIZE, str(tree.dev / "video10"))) as device:
         assert device.size == (640, 360)
 

@@ -23,6 +23,7 @@ from relit_camera.stream.sinks.i420 import i420
 
 # linux/videodev2.h
 VIDIOC_QUERYCAP = 0x80685600
+VIDIOC_G_FMT = 0xC0D05604
 VIDIOC_S_FMT = 0xC0D05605
 VIDIOC_STREAMON = 0x40045612
 CAPABILITY_BYTES, DEVICE_CAPS_OFFSET = 104, 88
@@ -33,6 +34,10 @@ YU12 = int.from_bytes(b"YU12", "little")
 FORMAT = struct.Struct("=I4x7I172x")
 """v4l2_format: the buffers' type, then of v4l2_pix_format width, height, layout, field, bytes a line and a picture,
 colour space; the rest is zero."""
+
+
+Format = tuple[tuple[int, int], int]
+"""Width and height, and the layout, such as `YU12`."""
 
 
 class NotFreeError(OSError):
@@ -58,25 +63,18 @@ class LoopbackDevice:
             NotFreeError: another program writes to it, or one still reads what another wrote in another layout.
             OSError: it cannot be opened, or is no such device.
         """
-        import fcntl
-
-        width, height = size
         self._descriptor = os.open(node, os.O_RDWR)
         try:
             if not _capabilities(self._descriptor) & CAP_VIDEO_OUTPUT:
                 raise NotFreeError(errno.EBUSY, "another program publishes to it, or still shows it")
-            asked = (BUF_TYPE_VIDEO_OUTPUT, width, height, YU12, FIELD_NONE, width, width * height * 3 // 2)
-            answer = bytearray(FORMAT.pack(*asked, COLORSPACE_SRGB))
-            fcntl.ioctl(self._descriptor, VIDIOC_S_FMT, answer)
+            actual, layout = self._agree(size)
+            if layout != YU12:
+                name = layout.to_bytes(4, "little").decode(errors="replace")
+                raise NotFreeError(errno.EBUSY, f"a program still shows it in the layout {name}")
         except BaseException:
             self.close()
             raise
-        _, actual_width, actual_height, layout, *_ = FORMAT.unpack(answer)
-        self.node, self.size = node, (actual_width, actual_height)
-        if layout != YU12:
-            self.close()
-            name = layout.to_bytes(4, "little").decode(errors="replace")
-            raise NotFreeError(errno.EBUSY, f"a program still shows it in the layout {name}")
+        self.node, self.size = node, actual
 
     def send(self, image: DisplayImage) -> None:
         """Show a picture of `size`, uint8 sRGB RGB.
@@ -94,6 +92,26 @@ class LoopbackDevice:
         descriptor, self._descriptor = self._descriptor, -1
         if descriptor >= 0:
             os.close(descriptor)
+
+    def _agree(self, size: tuple[int, int]) -> Format:
+        """Ask for a size. While a reader holds another, 0.12 and 0.15 answer with that, and 0.13 refuses."""
+        try:
+            return self._format(VIDIOC_S_FMT, size)
+        except OSError as error:
+            if error.errno != errno.EBUSY:
+                raise
+        kept, _ = self._format(VIDIOC_G_FMT, size)
+        return self._format(VIDIOC_S_FMT, kept)
+
+    def _format(self, request: int, size: tuple[int, int]) -> Format:
+        import fcntl
+
+        width, height = size
+        asked = (BUF_TYPE_VIDEO_OUTPUT, width, height, YU12, FIELD_NONE, width, width * height * 3 // 2)
+        answer = bytearray(FORMAT.pack(*asked, COLORSPACE_SRGB))
+        fcntl.ioctl(self._descriptor, request, answer)
+        _, actual_width, actual_height, layout, *_ = FORMAT.unpack(answer)
+        return (actual_width, actual_height), layout
 
 
 def revive(node: str, tree: DeviceTree) -> bool:
