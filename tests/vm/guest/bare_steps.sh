@@ -34,12 +34,23 @@ for round in first second; do
     sed -n '/^As root:/,/^$/s/^    //p' /tmp/doctor.txt >>/host/pasted.txt
     pasted=$(sed -n '/^As root:/,/^$/s/^    //p' /tmp/doctor.txt)
     [ -z "$pasted" ] || step "its lines for root, pasted" "$pasted"
+    # "Log in again": the groups of who is logged in, and of the user's systemd, stay as they were.
+    loginctl terminate-user you
+    while systemctl -q is-active user@1000; do sleep 1; done
 done
 step "doctor again" 'relit doctor || true'
-step "a browser" 'sudo DEBIAN_FRONTEND=noninteractive apt-get -qy install chromium chromium-driver'
 data=$(runuser -l you -c 'ls -d ~/.local/*/venvs/relit-camera/lib/python3*/site-packages/relit_camera/demo/data ~/.local/share/*/venvs/relit-camera/lib/python3*/site-packages/relit_camera/demo/data 2>/dev/null | head -n 1')
-step "the camera starts" "cp $data/adam.relit me.relit
-setsid relit run --source $data/clip.mp4 --subject me.relit --environment sunset --size 640x360 >camera.log 2>&1 </dev/null &
+loginctl enable-linger you
+step "as a service" "mkdir -p ~/.config/relit-camera
+export XDG_RUNTIME_DIR=/run/user/\$(id -u)
+cp $data/adam.relit me.relit
+printf 'source:\n  source: $data/clip.mp4\nsubject: /home/you/me.relit\noutput:\n  width: 640\n  height: 360\n' > ~/.config/relit-camera/config.yaml
+systemctl --user daemon-reload
+systemctl --user enable --now relit-camera
+systemctl --user --no-pager status relit-camera
+systemctl --user disable --now relit-camera"
+step "a browser" 'sudo DEBIAN_FRONTEND=noninteractive apt-get -qy install chromium chromium-driver'
+step "the camera starts" "setsid relit run --source $data/clip.mp4 --subject me.relit --environment sunset --size 640x360 >camera.log 2>&1 </dev/null &
 camera=\$!
 until curl=\$(python3 -c 'import urllib.request as u; print(u.urlopen(\"http://127.0.0.1:8470/api/v1/status\").read().decode())' 2>/dev/null) && echo \"\$curl\" | grep -qE '\"state\":\"(live|standing-in)\"'; do kill -0 \$camera; sleep 2; done
 echo \"\$curl\""
@@ -48,11 +59,4 @@ cp /tmp/call-page.png /tmp/call.jsonl /host/
 runuser -l you -c 'python3 -c "import urllib.request as u; print(u.urlopen(\"http://127.0.0.1:8470/api/v1/status\").read().decode())"; cat camera.log' >>/host/output.txt 2>&1
 pkill -INT -f "relit run"
 while pgrep -f "relit run" >/dev/null; do sleep 1; done
-loginctl enable-linger you
-step "as a service" "mkdir -p ~/.config/relit-camera
-export XDG_RUNTIME_DIR=/run/user/\$(id -u)
-printf 'source:\n  source: $data/clip.mp4\nsubject: /home/you/me.relit\noutput:\n  width: 640\n  height: 360\n' > ~/.config/relit-camera/config.yaml
-systemctl --user daemon-reload
-systemctl --user enable --now relit-camera
-systemctl --user --no-pager status relit-camera"
 printf '%s\t0\tall\t\n' "$(($(date +%s) - began))" >>/host/steps.tsv

@@ -29,7 +29,7 @@ FLAGS = [
     "--disable-sync",
     "--use-fake-ui-for-media-stream",
     "--autoplay-policy=no-user-gesture-required",
-    "--window-size=480,640",
+    "--window-size=640,603",
 ]
 START_S = 180
 
