@@ -12,7 +12,7 @@ flock 9
 recipe=$(sha256sum <"$here/bare.sh" | cut -c1-16)
 [ "$(cat "$cache/bare.recipe" 2>/dev/null)" != "$recipe" ] || exit 0
 
-export DEBIAN_FRONTEND=noninteractive LC_ALL=C
+export DEBIAN_FRONTEND=noninteractive LC_ALL=C PATH="$PATH:/usr/sbin:/sbin" # not everybody's has chroot and mke2fs
 cleanup() {
     awk -v under="$cache/work." 'index($2, under) == 1 {print $2}' /proc/mounts | sort -r | xargs -r umount -l || true
     rm -rf --one-file-system "$cache"/work.*

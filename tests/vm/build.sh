@@ -45,7 +45,7 @@ if [ "$(cat "$cache/recipe" 2>/dev/null)" = "$recipe" ]; then
     exit 0
 fi
 
-export DEBIAN_FRONTEND=noninteractive LC_ALL=C
+export DEBIAN_FRONTEND=noninteractive LC_ALL=C PATH="$PATH:/usr/sbin:/sbin" # not everybody's has chroot and mke2fs
 # Never delete through a mount that an interrupted mmdebstrap has left.
 cleanup() {
     awk -v under="$cache/work." 'index($2, under) == 1 {print $2}' /proc/mounts | sort -r | xargs -r umount -l || true

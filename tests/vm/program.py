@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
+import os
 import shutil
 import subprocess
 import sys
@@ -36,7 +37,9 @@ def program_disk(folder: Path) -> Path:
     image = folder / "program.img"
     used_mib = sum(path.stat().st_size for path in content.rglob("*") if path.is_file()) >> 20
     size = f"{used_mib * 5 // 4 + 64}M"
-    make = ["mke2fs", "-q", "-t", "ext4", "-O", "^has_journal", "-m", "0", "-d", str(content), str(image), size]
+    mke2fs = shutil.which("mke2fs", path=f"{os.environ['PATH']}:/usr/sbin:/sbin")
+    assert mke2fs is not None, "mke2fs is Debian's e2fsprogs"
+    make = [mke2fs, "-q", "-t", "ext4", "-O", "^has_journal", "-m", "0", "-d", str(content), str(image), size]
     subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
     shutil.rmtree(content)
     return image
