@@ -12,11 +12,14 @@ from relit_camera.stream.devices import load_command
 from tests.vm.machine import Machine, what_is_missing
 from tests.vm.program import program_disk
 
-VERSIONS = os.environ.get("RELIT_VM_VERSIONS", "0.12.7 0.15.0").split()
+CHOSEN = os.environ.get("RELIT_VM_VERSIONS", "").split()
+VERSIONS = CHOSEN or ["0.12.7", "0.15.0"]
 """Of Debian 12 and 13; `make test-vm` tries 0.13.2 too, of Debian 12's backports."""
 
 NEWEST = pytest.mark.parametrize("version", VERSIONS[-1:], indirect=True)
-"""For what does not depend on the version, or takes long."""
+"""For what does not depend on the version."""
+LONG = pytest.mark.parametrize("version", CHOSEN or VERSIONS[-1:], indirect=True)
+"""For what takes minutes: by itself with one version, with all of them where they are asked for."""
 
 ROWS: list[tuple[str, str, str]] = []
 

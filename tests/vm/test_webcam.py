@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.vm.camera import SIZE, running
+from tests.vm.conftest import LONG
 from tests.vm.readers import LABEL, Call, difference
 
 pytestmark = pytest.mark.timeout(900)
@@ -57,6 +58,7 @@ class Vivid:
         return bool(self._machine.run(find, check=False).output)
 
 
+@LONG
 def test_a_call_outlives_an_unplugged_webcam_and_the_webcam_is_held_only_while_somebody_looks(machine, webcam, saw):
     with running(machine, "webcam", more="--on-demand", state="released") as camera:
         assert not webcam.is_held()

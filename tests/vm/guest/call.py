@@ -93,13 +93,15 @@ def main(label, out, seconds):
 
 
 def opened_page():
-    """Open the page; Chromium at times never does on a slow machine, and does when it is started again."""
-    for last_try in (False, True):
-        page = Page(DRIVER_PORT)
+    """Open the page; Chromium at times does not on a slow machine, and does when it is started again."""
+    for last_try in (False, False, True):
+        page = None
         try:
+            page = Page(DRIVER_PORT)
             page.open(f"http://localhost:{PAGE_PORT}/call.html")
         except OSError:
-            page.close()
+            if page is not None:
+                page.close()
             if last_try:
                 raise
         else:
