@@ -110,7 +110,7 @@ def test_a_missing_camera_comes_with_its_command(tmp_path):
 @pytest.mark.parametrize(
     ("error", "message"),
     [
-        (loopback.NotFreeError(errno.EBUSY, "a program still shows it"), "is in use: a program still shows it; stop"),
+        (OSError(errno.EBUSY, "a program still shows it"), "is in use: a program still shows it; stop"),
         (OSError(errno.EBUSY, "Device or resource busy"), "is in use: Device or resource busy; stop that program"),
         (OSError(errno.ENOTTY, "Inappropriate ioctl for device"), "cannot be opened: Inappropriate ioctl for device"),
         (RuntimeError("no backend"), "there is no virtual camera: no backend; install OBS Studio"),
@@ -262,8 +262,9 @@ def test_a_device_says_which_size_it_kept(tree, monkeypatch, refuses):
 def test_a_device_that_is_not_free_is_let_go_at_once(tree, monkeypatch, capabilities, kept, message):
     FakeDevice(monkeypatch, capabilities, kept)
     before = len(list(Path("/proc/self/fd").iterdir()))
-    with pytest.raises(loopback.NotFreeError, match=message):
+    with pytest.raises(OSError, match=message) as raised:
         loopback.LoopbackDevice(SIZE, str(tree.dev / "video10"))
+    assert raised.value.errno == errno.EBUSY
     assert len(list(Path("/proc/self/fd").iterdir())) == before
 
 

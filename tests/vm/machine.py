@@ -12,6 +12,7 @@ import subprocess
 import tempfile
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as NoAnswer
 from contextlib import ExitStack, suppress
@@ -248,7 +249,7 @@ def by_user(command: str) -> str:
     return f"cd /tmp && exec {user} sh -c {shlex.quote(command)}"
 
 
-def wait_until(condition: Any, within_s: float, what: str) -> Any:
+def wait_until(condition: Callable[[], Any], within_s: float, what: str) -> Any:
     """Ask twice a second until the answer is true, and return it.
 
     Raises:

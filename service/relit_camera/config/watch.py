@@ -17,8 +17,8 @@ LOOK_EVERY_S = 1.0
 STOP_S = 1.0
 
 Load = Callable[[Path], RelitSettings]
-_Version = tuple[int, int, int] | None
 Apply = Callable[[RelitSettings, RelitSettings], RelitError | None]
+_Version = tuple[int, int, int] | None
 
 
 @contextmanager

@@ -13,16 +13,10 @@ import numpy as np
 from relit_camera.compose.background import cropped_to_fill
 from relit_camera.errors import DeviceError, InputError
 from relit_camera.space.images import DisplayImage, check_image
-from relit_camera.stream.devices import (
-    OWN_LABEL,
-    SYSTEM,
-    DeviceTree,
-    find_virtual_camera,
-    load_command,
-)
+from relit_camera.stream.devices import OWN_LABEL, SYSTEM, DeviceTree, find_virtual_camera, load_command
 from relit_camera.stream.sinks.base import SinkInfo
 from relit_camera.stream.sinks.claim import Claim
-from relit_camera.stream.sinks.loopback import LoopbackDevice, NotFreeError, revive
+from relit_camera.stream.sinks.loopback import LoopbackDevice, revive
 
 
 class Output(Protocol):
@@ -144,7 +138,7 @@ class CameraSink:
     def _explained(self, error: Exception, node: str) -> Exception:
         if isinstance(error, ImportError):
             return DeviceError(f"pyvirtualcam cannot be used: {error}", "run: pip install pyvirtualcam")
-        if isinstance(error, NotFreeError) or (isinstance(error, OSError) and error.errno == errno.EBUSY):
+        if isinstance(error, OSError) and error.errno == errno.EBUSY:
             what = f"{node} is in use: {error.strerror}"
             reload = f"sudo modprobe -r v4l2loopback && {load_command(self._label)}"
             return DeviceError(what, f"stop that program or switch its camera off; if there is none, run: {reload}")

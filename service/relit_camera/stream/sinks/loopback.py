@@ -40,10 +40,6 @@ Format = tuple[tuple[int, int], int]
 """Width and height, and the layout, such as `YU12`."""
 
 
-class NotFreeError(OSError):
-    """The device takes no writer now."""
-
-
 class LoopbackDevice:
     """Shows pictures through a device node, in I420.
 
@@ -60,17 +56,17 @@ class LoopbackDevice:
             node: such as /dev/video10.
 
         Raises:
-            NotFreeError: another program writes to it, or one still reads what another wrote in another layout.
-            OSError: it cannot be opened, or is no such device.
+            OSError: it cannot be opened, or is no such device; EBUSY: another program writes to it, or one still reads
+                what another wrote in another layout.
         """
         self._descriptor = os.open(node, os.O_RDWR)
         try:
             if not _capabilities(self._descriptor) & CAP_VIDEO_OUTPUT:
-                raise NotFreeError(errno.EBUSY, "another program publishes to it, or still shows it")
+                raise OSError(errno.EBUSY, "another program publishes to it, or still shows it")
             actual, layout = self._agree(size)
             if layout != YU12:
                 name = layout.to_bytes(4, "little").decode(errors="replace")
-                raise NotFreeError(errno.EBUSY, f"a program still shows it in the layout {name}")
+                raise OSError(errno.EBUSY, f"a program still shows it in the layout {name}")
         except BaseException:
             self.close()
             raise
