@@ -7,7 +7,7 @@ INSTALLED := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test check lint types floors scripts generated image-steps tool-install pytest vm test-vm vm-picture clean
+.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest vm test-vm vm-picture clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -23,7 +23,7 @@ demo: setup ## show the camera in a browser with a bundled person, until Ctrl-C;
 
 test: check ## all checks and tests, as CI runs them
 
-check: lint types floors scripts generated image-steps pytest ## the same
+check: lint types layers scripts generated image-steps pytest ## the same
 
 lint: setup ## style and formatting
 	$(BIN)/ruff check
@@ -32,13 +32,13 @@ lint: setup ## style and formatting
 types: setup ## static types
 	$(BIN)/mypy
 
-floors: setup ## which part may import which
+layers: setup ## which part may import which
 	$(BIN)/lint-imports --no-logo
 
 generated: setup ## files that are built from code are what the code builds
 	$(BIN)/python models/first_order_motion/build.py --check
 	@mkdir -p build
-	$(BIN)/python -m relit_camera.api.schema_file build/openapi.json
+	$(BIN)/python -m relit_camera.api.openapi.openapi_export build/openapi.json
 	cmp docs/openapi.json build/openapi.json
 
 scripts: setup ## shell scripts, Dockerfile and compose files

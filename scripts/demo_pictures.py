@@ -9,16 +9,16 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from relit_camera.compose.sheet import contact_sheet
-from relit_camera.config.look import EnvironmentBackground, Lighting, Look, Mode
-from relit_camera.config.settings import RelitSettings, TrackerSettings
-from relit_camera.demo import bundle
-from relit_camera.files import make_folder, write_atomic
-from relit_camera.space.images import DisplayImage
-from relit_camera.space.picture_files import encode_display
-from relit_camera.stream.assembly import make_pipeline, make_tracker
-from relit_camera.stream.director import Director
-from relit_camera.stream.replay import replay
+from relit_camera.app.demo import demo_files
+from relit_camera.app.video_replay import replay
+from relit_camera.app.wiring import make_pipeline, make_tracker
+from relit_camera.base.config.look import EnvironmentBackground, Lighting, Look, Mode
+from relit_camera.base.config.settings import RelitSettings, TrackerSettings
+from relit_camera.base.images.contact_sheet import contact_sheet
+from relit_camera.base.images.image_files import encode_display
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.live.scene.scene_controller import SceneController
 
 ENVIRONMENTS = ("studio", "window", "sunset", "night-street", "party", "overcast")
 SHEET_FRAMES = 12
@@ -45,14 +45,14 @@ def main() -> None:
 def relit(environment: str) -> tuple[list[DisplayImage], list[DisplayImage]]:
     """`SHEET_FRAMES` frames of the clip as they are, and under the environment, before it."""
     settings = RelitSettings(
-        subject=str(bundle.SUBJECT),
-        tracker=TrackerSettings(name=f"recorded:{bundle.TRACK}"),
-        matte=f"recorded:{bundle.MATTES}",
+        subject=str(demo_files.SUBJECT),
+        tracker=TrackerSettings(name=f"recorded:{demo_files.TRACK}"),
+        matte=f"recorded:{demo_files.MATTES}",
     )
-    director = Director(settings.storage)
-    director.set_subject(settings.subject)
+    scene_controller = SceneController(settings.storage)
+    scene_controller.set_subject(settings.subject)
     light = Lighting(environment=environment)
-    director.set_look(Look(mode=Mode.RATIO, lighting=light, background=EnvironmentBackground()))
+    scene_controller.set_look(Look(mode=Mode.RATIO, lighting=light, background=EnvironmentBackground()))
     tracker = make_tracker(settings)
     before, after = [], []
 
@@ -60,7 +60,13 @@ def relit(environment: str) -> tuple[list[DisplayImage], list[DisplayImage]]:
         before.append(live)
         after.append(shown)
 
-    replay(bundle.CLIP, None, lambda size: make_pipeline(settings, tracker, size), lambda _: director.scene, keep)
+    replay(
+        demo_files.CLIP,
+        None,
+        lambda size: make_pipeline(settings, tracker, size),
+        lambda _: scene_controller.scene,
+        keep,
+    )
     every = (len(after) - FADE_IN) / SHEET_FRAMES
     indices = [FADE_IN + int((index + 0.5) * every) for index in range(SHEET_FRAMES)]
     return [before[index] for index in indices], [after[index] for index in indices]

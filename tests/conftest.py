@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from tests.cli.relit_command import Material, write_material
+
 # A test's time depends on what else the machine does: pytest-timeout holds the whole, not each example.
 # The same examples on every run, so that a red run is of the change it tests; HYPOTHESIS_PROFILE=explore seeks others.
 settings.register_profile("relit", deadline=None, derandomize=True)
@@ -22,3 +24,9 @@ def shared() -> Path:
     if not (folder / "design.md").exists():
         pytest.skip(f"no shared data at {folder} (set RELIT_SHARED)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def material(tmp_path_factory: pytest.TempPathFactory) -> Material:
+    """A small subject, clip and track."""
+    return write_material(tmp_path_factory.mktemp("material"))

@@ -28,13 +28,13 @@ import httpx
 import numpy as np
 import yaml
 
-from relit_camera.api.presets import PresetStore
-from relit_camera.errors import RelitError
-from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
-from relit_camera.light.store import EnvironmentStore
-from relit_camera.stream.backgrounds import BackgroundStore
-from relit_camera.subject.file import read_subject, write_subject
-from relit_camera.subject.store import SubjectStore
+from relit_camera.base.config.preset_store import PresetStore
+from relit_camera.base.errors import RelitError
+from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.live.scene.background_store import BackgroundStore
+from relit_camera.subject.subject_file import read_subject, write_subject
+from relit_camera.subject.subject_store import SubjectStore
 from tests.cli.relit_command import environment, start, write_material
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.reflectance.samples import Samples
-from relit_camera.space.colour import srgb_encode
+from relit_camera.base.images.color import srgb_encode
+from relit_camera.capture.reflectance.samples import Samples
 
 
 def fibonacci_directions(count: int, lowest_z: float = -1.0) -> NDArray[np.float64]:

@@ -15,13 +15,13 @@ import yaml
 from pydantic import BaseModel
 
 import relit_camera
-from relit_camera.cli.main import GROUPS
-from relit_camera.config.load import load_settings
-from relit_camera.config.settings import RelitSettings
+from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.config.settings_loader import load_settings
+from relit_camera.cli.main import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[1]
 MAX_BYTES = 2_000_000
-DEMO = ROOT / "service/relit_camera/demo/data"
+DEMO = ROOT / "service/relit_camera/app/demo/data"
 """The one exception to "no generated data": what `relit demo` shows."""
 PICTURES = {".png", ".jpg", ".mp4", ".onnx", ".hdr", ".exr", ".npz", ".relit"}
 SEAMS = ("trackers", "methods", "relighters", "reenactors")
@@ -93,7 +93,7 @@ def test_pages_name_commands_that_exist() -> None:
         f"{page.relative_to(ROOT)}: relit {command}"
         for page in pages()
         for command in COMMAND.findall(_code(page.read_text()))
-        if command not in GROUPS
+        if command not in COMMANDS
     }
     assert unknown == set()
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from onnx import TensorProto, checker, helper, numpy_helper
 
-OUT = Path(__file__).resolve().parents[2] / "service/relit_camera/reenact/first_order_motion.onnx"
+OUT = Path(__file__).resolve().parents[2] / "service/relit_camera/live/reenactment/first_order_motion.onnx"
 OPSET = 17
 IR_VERSION = 9
 

@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from relit_camera.errors import RelitError
+from relit_camera.base.errors import RelitError
 from relit_studio.commands.bundle import bundle
 from relit_studio.commands.capture import capture
 from relit_studio.commands.check import check

@@ -9,22 +9,22 @@ from tempfile import TemporaryDirectory
 
 import cv2
 
-from relit_camera.capture.build import build_subject
-from relit_camera.capture.importing import import_samples
-from relit_camera.capture.landmarks_file import read_landmarks
-from relit_camera.compose.recorded_matte import write_mattes
-from relit_camera.demo import bundle
-from relit_camera.errors import InputError
-from relit_camera.face.track_file import read_track
-from relit_camera.files import make_folder, write_atomic
-from relit_camera.reflectance.method import DEFAULT_METHOD
-from relit_camera.space.images import Mask
-from relit_camera.subject.file import write_subject
-from relit_camera.subject.pack import packed
+from relit_camera.app.demo import demo_files
+from relit_camera.base.errors import InputError
+from relit_camera.base.images.image_types import Mask
+from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.capture.picture_import import import_samples
+from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD
+from relit_camera.capture.subject_builder import build_subject
+from relit_camera.capture.subject_landmarks import read_landmarks
+from relit_camera.face.tracking.track_recording import read_track
+from relit_camera.live.compositing.matting import write_mattes
+from relit_camera.subject.compression.webp_packing import pack_subject
+from relit_camera.subject.subject_file import write_subject
 from relit_studio.cycles.exr import read_rgba
 from relit_studio.progress import Progress, no_progress
 
-_MOST_BYTES = {bundle.SUBJECT.name: 8_000_000, bundle.CLIP.name: 4_000_000}
+_MOST_BYTES = {demo_files.SUBJECT.name: 8_000_000, demo_files.CLIP.name: 4_000_000}
 _MATTE_SHRINK = 2
 
 
@@ -44,7 +44,7 @@ def make_bundle(field: Path, clip: Path, out: Path, components: int, progress: P
         StorageError: a file cannot be written.
     """
     _check_same_person(field / "field.json", clip / "drive.json")
-    frames = _frames(clip, len(read_track(clip / bundle.TRACK.name).frames))
+    frames = _frames(clip, len(read_track(clip / demo_files.TRACK.name).frames))
     make_folder(out)
     with TemporaryDirectory(prefix=".bundle.", dir=out) as name:
         made = _write(field, clip, frames, Path(name), components, progress)
@@ -62,15 +62,18 @@ def _write(
     field: Path, clip: Path, frames: list[Path], folder: Path, components: int, progress: Progress
 ) -> list[Path]:
     """Write all files into `folder`."""
-    made = [folder / path.name for path in (bundle.SUBJECT, bundle.CLIP, bundle.TRACK, bundle.MATTES, bundle.CREDITS)]
+    made = [
+        folder / path.name
+        for path in (demo_files.SUBJECT, demo_files.CLIP, demo_files.TRACK, demo_files.MATTES, demo_files.CREDITS)
+    ]
     subject_file, clip_file, track_file, mattes_file, credits_file = made
     samples = import_samples(field / "lights.lp", "linear", progress)
     points = read_landmarks(field / "landmarks.json", required=True)
     subject = build_subject(samples, DEFAULT_METHOD, "lights.lp", "linear", points)
-    write_subject(subject_file, packed(subject, components), small=True)
-    shutil.copyfile(_existing(clip / bundle.CLIP.name), clip_file)
+    write_subject(subject_file, pack_subject(subject, components), small=True)
+    shutil.copyfile(_existing(clip / demo_files.CLIP.name), clip_file)
     # To a thousandth of a pixel, a degree, a centimetre.
-    text = (clip / bundle.TRACK.name).read_text(encoding="utf-8")
+    text = (clip / demo_files.TRACK.name).read_text(encoding="utf-8")
     track = json.loads(text, parse_float=lambda number: round(float(number), 3))
     write_atomic(track_file, json.dumps(track, separators=(",", ":")) + "\n")
     write_mattes(mattes_file, [_matte(path) for path in frames])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.space.images import Points
+from relit_camera.base.images.image_types import Points
 from relit_studio.pinhole import Pinhole
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from relit_camera.space.colour import luminance
-from relit_camera.space.images import LinearImage
+from relit_camera.base.images.color import luminance
+from relit_camera.base.images.image_types import LinearImage
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from relit_camera.face.detector import FaceDetector
-from relit_camera.face.schemes import landmark_scheme
-from relit_camera.face.state import FaceStatus, Tracker
-from relit_camera.face.still import look_at
-from relit_camera.space.images import DisplayImage
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.face.face_state import FaceStatus, Tracker
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.tracking.face_detector import FaceDetector
+from relit_camera.face.tracking.trackers import track_still
 from relit_studio.camera import Camera
 from relit_studio.people.geometry import Floats
 from relit_studio.people.landmarks import landmarks
@@ -61,7 +61,7 @@ def recognise(
         detected = bool(0 <= x <= found.box[2] and 0 <= y <= found.box[3])
     errors: dict[str, float | None] = {}
     for tracker in trackers:
-        state = look_at(picture, tracker)
+        state = track_still(picture, tracker)
         if state.status is FaceStatus.LOST:
             errors[tracker.name] = None
         else:

@@ -9,8 +9,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from relit_camera.space.images import DisplayImage, LinearImage, Mask
-from relit_camera.space.picture_files import write_display
+from relit_camera.base.images.image_files import write_display
+from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
 from relit_studio.camera import Camera
 from relit_studio.cycles.exr import read_rgba
 from relit_studio.cycles.figure import Figure

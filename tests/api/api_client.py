@@ -10,7 +10,7 @@ import httpx
 import numpy as np
 from fastapi import FastAPI
 
-from relit_camera.api.problems import MEDIA_TYPE
+from relit_camera.api.problem_details import MEDIA_TYPE
 
 BASE_URL = "http://127.0.0.1:8470"
 

@@ -9,8 +9,8 @@ import pytest
 from fastapi import FastAPI
 
 from relit_camera.api.app import create_app
-from relit_camera.api.server import ApiServer, serve
-from relit_camera.config.settings import RelitSettings, ServerSettings, StorageSettings
+from relit_camera.api.server.http_server import ApiServer, start_api_server
+from relit_camera.base.config.settings import RelitSettings, ServerSettings, StorageSettings
 from tests.api.api_client import Client
 from tests.api.fake_camera import FakeCamera
 
@@ -39,5 +39,5 @@ def client(app: FastAPI) -> Client:
 
 @pytest.fixture
 def server(app: FastAPI) -> Iterator[ApiServer]:
-    with serve(app, ServerSettings(port=0)) as server:
+    with start_api_server(app, ServerSettings(port=0)) as server:
         yield server

@@ -9,12 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.config.look import Look
-from relit_camera.config.settings import StorageSettings
-from relit_camera.space.images import DisplayImage
-from relit_camera.stream.director import Director
-from relit_camera.stream.events import EventHub
-from relit_camera.stream.status import (
+from relit_camera.base.config.look import Look
+from relit_camera.base.config.settings import StorageSettings
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.live.status.camera_status import (
     CameraState,
     CameraStatus,
     Degradation,
@@ -23,6 +22,7 @@ from relit_camera.stream.status import (
     Rates,
     TrackerStatus,
 )
+from relit_camera.live.status.event_hub import EventHub
 
 FPS = 30
 STATUS = CameraStatus(
@@ -43,11 +43,11 @@ STATUS = CameraStatus(
 
 
 class FakeCamera:
-    """Implements `stream.control.CameraControl` around a real director."""
+    """Implements `live.camera_control.CameraControl` around a real director."""
 
     def __init__(self, data_dir: Path, image: DisplayImage | None = None) -> None:
-        self.director = Director(StorageSettings(data_dir=data_dir))
-        self.director.set_look(Look())
+        self.scene_controller = SceneController(StorageSettings(data_dir=data_dir))
+        self.scene_controller.set_look(Look())
         self.events = EventHub()
         self.image = picture() if image is None else image
         self.publishing = True
@@ -58,7 +58,7 @@ class FakeCamera:
         self._stop = threading.Event()
 
     def status(self) -> CameraStatus:
-        scene = self.director.scene
+        scene = self.scene_controller.scene
         state = CameraState.FROZEN if scene.frozen else self.base.state
         return replace(
             self.base,

@@ -11,11 +11,11 @@ import httpx
 import pytest
 from pydantic import SecretStr
 
-from relit_camera.api.access import COOKIE
-from relit_camera.api.app import PANEL, create_app
-from relit_camera.api.server import ApiServer, listen, serve
-from relit_camera.config.settings import RelitSettings, ServerSettings
-from relit_camera.errors import ConfigError
+from relit_camera.api.app import PANEL_FOLDER, create_app
+from relit_camera.api.middleware.token_authentication import SESSION_COOKIE
+from relit_camera.api.server.http_server import ApiServer, open_listener, start_api_server
+from relit_camera.base.config.settings import RelitSettings, ServerSettings
+from relit_camera.base.errors import ConfigError
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera
 
@@ -44,26 +44,28 @@ def session(client: Client) -> dict[str, str]:
 
 def paths() -> list[tuple[str, str]]:
     """Every operation, the panel's parts, and what is not there."""
-    described = httpx.Response(200, text=(PANEL.parents[3] / "docs/openapi.json").read_text()).json()
+    described = httpx.Response(200, text=(PANEL_FOLDER.parents[3] / "docs/openapi.json").read_text()).json()
     operations = [
         (method.upper(), path.replace("{name}", "studio"))
         for path, methods in described["paths"].items()
         for method in methods
         if path != "/healthz"
     ]
-    files = [("GET", f"/panel/{file.name}") for file in PANEL.iterdir() if file.name not in ("panel.css", "icon.svg")]
+    files = [
+        ("GET", f"/panel/{file.name}") for file in PANEL_FOLDER.iterdir() if file.name not in ("panel.css", "icon.svg")
+    ]
     return [*operations, *files, ("GET", "/api/v1/openapi.json"), ("GET", "/nothing"), ("HEAD", "/api/v1/status")]
 
 
 @pytest.mark.parametrize(("method", "path"), paths())
 def test_nothing_is_to_be_had_without_it(guarded: Client, camera: FakeCamera, method: str, path: str) -> None:
-    before = camera.director.scene
+    before = camera.scene_controller.scene
     answer = guarded.request(method, path)
     assert answer.status_code == 401
     assert answer.headers["www-authenticate"] == "Bearer"
     if method != "HEAD":
         assert "Bearer" in check_problem(answer, 401)["cure"]
-    assert camera.director.scene is before
+    assert camera.scene_controller.scene is before
     assert camera.neutral_resets == 0
 
 
@@ -127,7 +129,7 @@ def test_a_browser_shows_it_once(guarded: Client) -> None:
     answer = login(guarded)
     assert (answer.status_code, answer.headers["location"]) == (303, "/")
     cookie = answer.headers["set-cookie"]
-    assert cookie.startswith(f"{COOKIE}=")
+    assert cookie.startswith(f"{SESSION_COOKIE}=")
     assert {"httponly", "samesite=strict", "path=/"} <= {part.strip().lower() for part in cookie.split(";")}
     assert "secure" not in cookie.lower()
     assert TOKEN not in cookie
@@ -220,11 +222,11 @@ def test_our_panel_may_change_things(guarded: Client, origin: str) -> None:
     ],
 )
 def test_other_pages_may_not_change_things(guarded: Client, camera: FakeCamera, origin: str) -> None:
-    before = camera.director.scene
+    before = camera.scene_controller.scene
     headers = {**session(guarded), "origin": origin}
     check_problem(guarded.put("/api/v1/mode", {"mode": "ratio"}, headers=headers), 403)
     check_problem(login(guarded, origin=origin), 403)
-    assert camera.director.scene is before
+    assert camera.scene_controller.scene is before
 
 
 @pytest.mark.parametrize("path", ["/api/v1/preview.mjpg", "/api/v1/snapshot.jpg", "/api/v1/events", "/api/v1/status"])
@@ -247,7 +249,9 @@ def everywhere(camera: FakeCamera, settings: RelitSettings, tmp_path: Path) -> I
     path.write_text(TOKEN)
     path.chmod(0o600)
     open_to_all = ServerSettings(host="0.0.0.0", port=0, token_file=path)
-    with serve(create_app(camera, settings.model_copy(update={"server": open_to_all})), open_to_all) as server:
+    with start_api_server(
+        create_app(camera, settings.model_copy(update={"server": open_to_all})), open_to_all
+    ) as server:
         yield server
 
 
@@ -291,4 +295,4 @@ def test_it_is_in_no_log_and_no_answer(everywhere: ApiServer, caplog: pytest.Log
 
 def test_a_server_that_others_can_reach_does_not_start_without_one() -> None:
     with pytest.raises(ConfigError, match="there is no token"):
-        listen(ServerSettings(host="0.0.0.0", port=0))
+        open_listener(ServerSettings(host="0.0.0.0", port=0))

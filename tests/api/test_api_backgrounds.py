@@ -41,10 +41,10 @@ def test_each_kind_takes_its_own_fields(client: Client, body: object, stands: ob
     ],
 )
 def test_bad_backgrounds_name_their_field(client: Client, camera: FakeCamera, body: object, field: str) -> None:
-    before = camera.director.scene
+    before = camera.scene_controller.scene
     problem = check_problem(client.put(BACKGROUND, body), 422)
     assert problem["errors"][0]["field"] == field
-    assert camera.director.scene is before
+    assert camera.scene_controller.scene is before
 
 
 def test_unknown_picture_is_not_found(client: Client) -> None:
@@ -70,8 +70,8 @@ def test_a_picture_is_stored_shown_and_deleted(client: Client, camera: FakeCamer
     assert (again.status_code, again.content) == (304, b"")
 
     assert client.put(BACKGROUND, {"kind": "image", "image": "my beach"}).status_code == 200
-    assert camera.director.scene.backdrop is not None
-    assert abs(int(camera.director.scene.backdrop.mean()) - 200) <= 1
+    assert camera.scene_controller.scene.backdrop is not None
+    assert abs(int(camera.scene_controller.scene.backdrop.mean()) - 200) <= 1
     problem = check_problem(client.delete("/api/v1/backgrounds/my beach"), 409)
     assert "in use" in problem["what"]
 

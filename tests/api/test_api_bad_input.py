@@ -10,8 +10,8 @@ from time import monotonic
 
 import pytest
 
-from relit_camera.api.bodies import MAX_UPLOAD_BYTES
-from relit_camera.api.server import ApiServer
+from relit_camera.api.middleware.body_limits import MAX_UPLOAD_BYTES
+from relit_camera.api.server.http_server import ApiServer
 from tests import bad_pictures as bad
 from tests.api.api_client import Client, check_problem, hdr, png
 from tests.api.fake_camera import FakeCamera
@@ -58,7 +58,7 @@ NAMES = ["..", ".", "", "/etc/passwd", "../evil", "..\\evil", "a/b", "a\\b", "a\
 
 
 def stored(camera: FakeCamera) -> set[str]:
-    folder = camera.director.environments.folder.parent
+    folder = camera.scene_controller.environments.folder.parent
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
@@ -106,7 +106,7 @@ def test_a_name_that_is_none(client: Client, camera: FakeCamera, collection: str
 @pytest.mark.parametrize("method", ["GET", "PUT", "DELETE"])
 def test_a_path_leads_nowhere_else(server: ApiServer, camera: FakeCamera, path: str, method: str, name: str) -> None:
     """Over a real connection: no client of ours tidies the path."""
-    outside = camera.director.environments.folder.parent.parent / "evil.yaml"
+    outside = camera.scene_controller.environments.folder.parent.parent / "evil.yaml"
     outside.write_text("{}")
     place = f"{server.address.host}:{server.address.port}"
     head = f"{method} /api/v1/{path}/{name} HTTP/1.1\r\nHost: {place}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
@@ -147,12 +147,12 @@ JSON = {
 @pytest.mark.parametrize(("method", "path"), [("PUT", "lighting"), ("PATCH", "lighting"), ("PUT", "presets/look")])
 def test_bad_json(client: Client, camera: FakeCamera, case: str, method: str, path: str) -> None:
     text, status = JSON[case]
-    before = camera.director.scene
+    before = camera.scene_controller.scene
     answer = client.request(method, f"/api/v1/{path}", content=text, headers={"content-type": "application/json"})
     assert answer.status_code in (status, 422)
     check_problem(answer, answer.status_code)
     assert len(answer.content) < 20_000
-    assert camera.director.scene is before
+    assert camera.scene_controller.scene is before
     assert stored(camera) == set()
 
 
@@ -172,7 +172,7 @@ PRESETS = {
 
 @pytest.mark.parametrize("case", PRESETS)
 def test_a_bad_preset_file(client: Client, camera: FakeCamera, case: str) -> None:
-    folder = camera.director.environments.folder.parent / "presets"
+    folder = camera.scene_controller.environments.folder.parent / "presets"
     folder.mkdir(parents=True)
     (folder / "look.yaml").write_text(PRESETS[case])
     began = monotonic()
@@ -194,7 +194,7 @@ def test_a_link_is_deleted_and_not_what_it_leads_to(
     ]
     outside = tmp_path / f"outside{suffix}"
     outside.write_bytes(data)
-    folder = camera.director.environments.folder.parent / collection
+    folder = camera.scene_controller.environments.folder.parent / collection
     folder.mkdir(parents=True)
     (folder / f"linked{suffix}").symlink_to(outside)
     assert "linked" in [item["name"] for item in client.get(f"/api/v1/{collection}").json()]

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 import pytest
 from fastapi import FastAPI
 
-from relit_camera.api import connections
 from relit_camera.api.app import create_app
-from relit_camera.api.server import ApiServer, serve
-from relit_camera.config.settings import RelitSettings, ServerSettings
+from relit_camera.api.server import connection_timeouts
+from relit_camera.api.server.http_server import ApiServer, start_api_server
+from relit_camera.base.config.settings import RelitSettings, ServerSettings
 from tests.api.fake_camera import FakeCamera
 
 SILENT_S = 0.4
@@ -21,13 +21,13 @@ TOKEN = "0123456789abcdef" * 2
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "SILENT_S", SILENT_S)
-    monkeypatch.setattr(connections, "STALLED_S", SILENT_S)
+    monkeypatch.setattr(connection_timeouts, "READ_TIMEOUT_S", SILENT_S)
+    monkeypatch.setattr(connection_timeouts, "WRITE_TIMEOUT_S", SILENT_S)
 
 
 @pytest.fixture
 def server(app: FastAPI) -> Iterator[ApiServer]:
-    with serve(app, ServerSettings(port=0)) as server:
+    with start_api_server(app, ServerSettings(port=0)) as server:
         yield server
 
 
@@ -91,13 +91,13 @@ def test_bytes_now_and_then_are_no_question(server: ApiServer) -> None:
 def test_a_body_that_does_not_come_is_not_waited_for(camera: FakeCamera, settings: RelitSettings, path: str) -> None:
     guarded = settings.model_copy(update={"server": ServerSettings(port=0, token=TOKEN)})
     headers = ("Content-Length: 100", "Content-Type: application/json", f"Authorization: Bearer {TOKEN}")
-    with serve(create_app(camera, guarded), guarded.server) as server, connect(server) as client:
+    with start_api_server(create_app(camera, guarded), guarded.server) as server, connect(server) as client:
         client.sendall(question(server, f"{'POST' if path == '/login' else 'PUT'} {path}", *headers) + b"t")
         assert is_cut_off(client)
 
 
 def test_a_body_that_comes_slowly_is_taken(server: ApiServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "BODY_BYTES", 10)
+    monkeypatch.setattr(connection_timeouts, "MIN_BODY_BYTES_PER_TIMEOUT", 10)
     body = b'{"name": null}' + b" " * 200
     with connect(server) as client:
         headers = (f"Content-Length: {len(body)}", "Content-Type: application/json")

@@ -12,13 +12,13 @@ def test_mode_is_changed_and_told(client: Client, camera: FakeCamera) -> None:
     assert client.get("/api/v1/mode").json() == {"mode": "reenact"}
     assert client.put("/api/v1/mode", {"mode": "ratio"}).json() == {"mode": "ratio"}
     assert client.get("/api/v1/mode").json() == {"mode": "ratio"}
-    assert camera.director.scene.look.mode == "ratio"
+    assert camera.scene_controller.scene.look.mode == "ratio"
 
 
 def test_freeze_is_changed_and_told(client: Client, camera: FakeCamera) -> None:
     assert client.get("/api/v1/freeze").json() == {"frozen": False}
     assert client.put("/api/v1/freeze", {"frozen": True}).json() == {"frozen": True}
-    assert camera.director.scene.frozen
+    assert camera.scene_controller.scene.frozen
     assert client.get("/api/v1/status").json()["state"] == "frozen"
     assert client.put("/api/v1/freeze", {"frozen": False}).json() == {"frozen": False}
 
@@ -48,10 +48,10 @@ def test_bad_bodies_name_their_field(client: Client, path: str, body: object, fi
     "path", ["mode", "freeze", "lighting", "status", "environments", "neutral-pose", "presets/x/apply"]
 )
 def test_reading_changes_nothing(client: Client, camera: FakeCamera, path: str) -> None:
-    before = camera.director.scene
+    before = camera.scene_controller.scene
     client.get(f"/api/v1/{path}")
     client.request("HEAD", f"/api/v1/{path}")
-    assert camera.director.scene is before
+    assert camera.scene_controller.scene is before
     assert camera.neutral_resets == 0
 
 

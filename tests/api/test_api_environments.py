@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
+from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
 from tests.api.api_client import Client, check_problem, hdr, png
 from tests.api.fake_camera import FakeCamera
 
@@ -31,8 +31,8 @@ def test_a_panorama_is_stored_used_and_deleted(client: Client, camera: FakeCamer
     assert client.get(ENVIRONMENTS).json()[-1]["name"] == "my room"
 
     assert client.patch("/api/v1/lighting", {"environment": "my room"}).status_code == 200
-    assert camera.director.scene.environment is not None
-    assert camera.director.scene.environment.name == "my room"
+    assert camera.scene_controller.scene.environment is not None
+    assert camera.scene_controller.scene.environment.name == "my room"
     check_problem(client.delete(f"{ENVIRONMENTS}/my room"), 409)
 
     client.patch("/api/v1/lighting", {"environment": None})
@@ -62,7 +62,7 @@ def test_thumbnails_are_kept_by_clients(client: Client) -> None:
 def test_a_file_of_this_run_is_listed_but_not_stored(client: Client, camera: FakeCamera, tmp_path: Path) -> None:
     path = tmp_path / "guest room.hdr"
     path.write_bytes(hdr())
-    name = camera.director.admit_environment(str(path))
+    name = camera.scene_controller.register_temporary_environment(str(path))
     item = client.get(ENVIRONMENTS).json()[-1]
     assert (item["name"], item["temporary"], item["builtin"]) == (name, True, False)
     assert client.get(item["thumbnail"]).headers["content-type"] == "image/jpeg"

@@ -10,9 +10,9 @@ from typing import Any
 import httpx
 import pytest
 
-from relit_camera.api.routes import events
-from relit_camera.api.server import ApiServer
-from relit_camera.config.look import Lighting, Look
+from relit_camera.api.routes import server_sent_events
+from relit_camera.api.server.http_server import ApiServer
+from relit_camera.base.config.look import Lighting, Look
 from tests.api.api_client import Client, hdr, png
 from tests.api.fake_camera import FakeCamera
 
@@ -59,7 +59,7 @@ def test_a_listener_first_gets_what_stands(listener: Listener, camera: FakeCamer
     kind, scene = next(stream)
     assert kind == "scene"
     assert scene == {
-        "revision": camera.director.scene.revision,
+        "revision": camera.scene_controller.scene.revision,
         "lighting": Lighting().model_dump(mode="json"),
         "background": {"kind": "none"},
         "mode": "reenact",
@@ -85,9 +85,9 @@ def test_two_listeners_hear_a_change_at_once(server: ApiServer, listener: Listen
 
 def test_changes_that_did_not_come_over_the_api_are_heard_too(listener: Listener, camera: FakeCamera) -> None:
     listener.wait_for("status")
-    camera.director.set_look(Look(lighting=Lighting(blend=0.25)))
+    camera.scene_controller.set_look(Look(lighting=Lighting(blend=0.25)))
     assert listener.wait_for("scene")["lighting"]["blend"] == 0.25
-    camera.director.set_frozen(True)
+    camera.scene_controller.set_frozen(True)
     assert listener.wait_for("scene")["frozen"] is True
 
 
@@ -120,11 +120,11 @@ def test_status_comes_every_second(listener: Listener, monkeypatch: pytest.Monke
     listener.wait_for("status")
     started = time.monotonic()
     listener.wait_for("status")
-    assert time.monotonic() - started == pytest.approx(events.STATUS_EVERY_S, abs=0.4)
+    assert time.monotonic() - started == pytest.approx(server_sent_events.STATUS_INTERVAL_S, abs=0.4)
 
 
 def test_the_heart_beats(server: ApiServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(events, "HEARTBEAT_S", 0.2)
+    monkeypatch.setattr(server_sent_events, "HEARTBEAT_INTERVAL_S", 0.2)
     with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
         listener = Listener(body)
         listener.wait_for("status")

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from relit_camera.config.look import Lighting
+from relit_camera.base.config.look import Lighting
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera
 
@@ -23,7 +23,7 @@ def test_put_takes_defaults_for_fields_left_out(client: Client, camera: FakeCame
     answer = client.put(LIGHTING, {"exposure_ev": -1})
     assert answer.status_code == 200
     assert answer.json() == Lighting(exposure_ev=-1).model_dump(mode="json")
-    assert camera.director.scene.look.lighting == Lighting(exposure_ev=-1)
+    assert camera.scene_controller.scene.look.lighting == Lighting(exposure_ev=-1)
 
 
 def test_patch_changes_only_what_is_given(client: Client) -> None:
@@ -46,22 +46,22 @@ def test_patch_replaces_lamps_as_a_whole(client: Client) -> None:
 
 def test_null_environment_is_lamps_only(client: Client, camera: FakeCamera) -> None:
     assert client.patch(LIGHTING, {"environment": None}).json()["environment"] is None
-    assert camera.director.scene.environment is None
+    assert camera.scene_controller.scene.environment is None
 
 
 def test_changing_another_field_keeps_the_environment_that_was_read(client: Client, camera: FakeCamera) -> None:
-    before = camera.director.scene.environment
+    before = camera.scene_controller.scene.environment
     client.patch(LIGHTING, {"yaw_deg": 10})
-    assert camera.director.scene.environment is before is not None
+    assert camera.scene_controller.scene.environment is before is not None
 
 
 @pytest.mark.parametrize("method", ["PUT", "PATCH"])
 def test_unknown_environment_is_not_found_and_changes_nothing(client: Client, camera: FakeCamera, method: str) -> None:
-    before = camera.director.scene
+    before = camera.scene_controller.scene
     body = check_problem(client.request(method, LIGHTING, json={"environment": "sunzet", "yaw_deg": 5}), 404)
     assert "sunzet" in body["what"]
     assert "sunset" in body["cure"]
-    assert camera.director.scene is before
+    assert camera.scene_controller.scene is before
 
 
 @pytest.mark.parametrize(
@@ -79,11 +79,11 @@ def test_unknown_environment_is_not_found_and_changes_nothing(client: Client, ca
 )
 @pytest.mark.parametrize("method", ["PUT", "PATCH"])
 def test_bad_values_name_their_field(client: Client, camera: FakeCamera, method: str, body: object, field: str) -> None:
-    before = camera.director.scene
+    before = camera.scene_controller.scene
     problem = check_problem(client.request(method, LIGHTING, json=body), 422)
     assert problem["errors"][0]["field"] == field
     assert field in problem["what"]
-    assert camera.director.scene is before
+    assert camera.scene_controller.scene is before
 
 
 def test_not_a_number_is_refused(client: Client) -> None:
@@ -107,7 +107,7 @@ def test_lit_by_a_background_that_cannot_light_is_refused(client: Client) -> Non
 
 def test_concurrent_changes_lose_nothing_and_mix_nothing(client: Client, camera: FakeCamera) -> None:
     """Twenty lightings, each with yaw = 10·exposure, race with changes of other parts."""
-    first = camera.director.scene.revision
+    first = camera.scene_controller.scene.revision
 
     def change(number: int) -> None:
         if number % 4 == 0:
@@ -117,12 +117,12 @@ def test_concurrent_changes_lose_nothing_and_mix_nothing(client: Client, camera:
         else:
             exposure = number % 8
             client.put(LIGHTING, {"exposure_ev": exposure, "yaw_deg": 10 * exposure})
-        look = camera.director.scene.look
+        look = camera.scene_controller.scene.look
         assert look.lighting.yaw_deg == 10 * look.lighting.exposure_ev
 
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(change, range(40)))
-    look = camera.director.scene.look
-    assert camera.director.scene.revision == first + 40
+    look = camera.scene_controller.scene.look
+    assert camera.scene_controller.scene.revision == first + 40
     assert look.mode == "ratio"
     assert look.background.kind == "blur"

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from relit_camera.api.problems import MEDIA_TYPE
-from relit_camera.api.schema_file import schema_text
+from relit_camera.api.openapi.openapi_export import openapi_text
+from relit_camera.api.problem_details import MEDIA_TYPE
 from tests.api.api_client import Client
 
 KEPT = Path(__file__).resolve().parents[2] / "docs" / "openapi.json"
@@ -39,7 +39,7 @@ FIXED = {  # what the design promises
 
 @pytest.fixture(scope="module")
 def described() -> dict[str, Any]:
-    document: dict[str, Any] = json.loads(schema_text())
+    document: dict[str, Any] = json.loads(openapi_text())
     return document
 
 
@@ -48,7 +48,7 @@ def operations(document: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]
 
 
 def test_the_kept_description_is_the_code_s(described: dict[str, Any]) -> None:
-    cure = "write it again: python -m relit_camera.api.schema_file"
+    cure = "write it again: python -m relit_camera.api.openapi.openapi_export"
     assert json.loads(KEPT.read_text(encoding="utf-8")) == described, cure
 
 
@@ -92,6 +92,6 @@ def test_fields_are_snake_case_and_explained(described: dict[str, Any]) -> None:
 
 def test_the_command_writes_it(tmp_path: Path) -> None:
     target = tmp_path / "openapi.json"
-    command = [sys.executable, "-W", "error", "-m", "relit_camera.api.schema_file", str(target)]
+    command = [sys.executable, "-W", "error", "-m", "relit_camera.api.openapi.openapi_export", str(target)]
     subprocess.run(command, check=True, timeout=60)
-    assert target.read_text(encoding="utf-8") == schema_text()
+    assert target.read_text(encoding="utf-8") == openapi_text()

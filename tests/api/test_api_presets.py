@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from relit_camera.api.presets import PresetStore
-from relit_camera.config.look import ColorBackground, Lamp, Lighting, Look, Mode
-from relit_camera.errors import InputError, NotFoundError
+from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
+from relit_camera.base.config.preset_store import PresetStore
+from relit_camera.base.errors import InputError, NotFoundError
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera
 
@@ -30,16 +30,16 @@ def test_a_look_is_stored_listed_applied_and_deleted(client: Client, camera: Fak
     assert client.get(f"{PRESETS}/Late evening").json() == body
 
     assert client.post(f"{PRESETS}/Late evening/apply").json() == body
-    assert camera.director.scene.look == LOOK
+    assert camera.scene_controller.scene.look == LOOK
 
     assert client.delete(f"{PRESETS}/Late evening").status_code == 204
     assert client.get(PRESETS).json() == []
 
 
 def test_without_a_body_the_present_look_is_stored(client: Client, camera: FakeCamera) -> None:
-    camera.director.set_look(LOOK)
+    camera.scene_controller.set_look(LOOK)
     assert client.request("PUT", f"{PRESETS}/now").json() == LOOK.model_dump(mode="json")
-    assert PresetStore(camera.director.backgrounds.folder.parent / "presets").load("now") == LOOK
+    assert PresetStore(camera.scene_controller.backgrounds.folder.parent / "presets").load("now") == LOOK
 
 
 @pytest.mark.parametrize(("method", "path"), [("GET", ""), ("DELETE", ""), ("POST", "/apply")])
@@ -51,9 +51,9 @@ def test_unknown_names_are_not_found(client: Client, method: str, path: str) -> 
 
 def test_a_preset_of_what_is_gone_changes_nothing(client: Client, camera: FakeCamera) -> None:
     client.put(f"{PRESETS}/gone", {"lighting": {"environment": "gone"}})
-    before = camera.director.scene
+    before = camera.scene_controller.scene
     check_problem(client.post(f"{PRESETS}/gone/apply"), 404)
-    assert camera.director.scene is before
+    assert camera.scene_controller.scene is before
 
 
 @pytest.mark.parametrize("body", [{"lighting": {"blend": 2}}, {"light": {}}, {"mode": "disco"}])

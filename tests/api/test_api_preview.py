@@ -15,10 +15,17 @@ import pytest
 from anyio import CapacityLimiter
 from fastapi import FastAPI
 
-from relit_camera.api import preview as module
-from relit_camera.api.preview import MAX_VARIANTS, Channel, Encoded, PreviewFeed, Variant, encode
-from relit_camera.api.server import ApiServer
-from relit_camera.space.images import DisplayImage
+from relit_camera.api import preview_stream as module
+from relit_camera.api.preview_stream import (
+    MAX_VARIANTS,
+    EncodedFrame,
+    PreviewBroadcaster,
+    PreviewStream,
+    PreviewVariant,
+    encode_preview,
+)
+from relit_camera.api.server.http_server import ApiServer
+from relit_camera.base.images.image_types import DisplayImage
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FPS, FakeCamera
 
@@ -62,19 +69,19 @@ def wait_until(holds: Callable[[], bool], timeout_s: float = 3.0) -> bool:
 
 
 def test_a_picture_is_scaled_and_mirrored(camera: FakeCamera) -> None:
-    whole = decoded(encode(camera.image, Variant()))
+    whole = decoded(encode_preview(camera.image, PreviewVariant()))
     assert whole.shape == (180, 320, 3)
     assert np.abs(whole.astype(int) - camera.image).mean() < 3
-    small = decoded(encode(camera.image, Variant(width=160, mirror=True)))
+    small = decoded(encode_preview(camera.image, PreviewVariant(width=160, mirror=True)))
     assert small.shape == (90, 160, 3)
     assert small[:, 0, 0].mean() > 230
     assert small[:, -1, 0].mean() < 25
-    assert decoded(encode(camera.image, Variant(width=4000))).shape == (180, 320, 3)
+    assert decoded(encode_preview(camera.image, PreviewVariant(width=4000))).shape == (180, 320, 3)
 
 
-async def see(channel: Channel, count: int, timeout_s: float = 2.0) -> list[Encoded]:
+async def see(channel: PreviewStream, count: int, timeout_s: float = 2.0) -> list[EncodedFrame]:
     """The next pictures of a channel."""
-    seen = [Encoded(-1, b"")]
+    seen = [EncodedFrame(-1, b"")]
     for _ in range(count):
         picture = await channel.next(seen[-1].count, timeout_s)
         assert picture is not None
@@ -86,18 +93,18 @@ async def see(channel: Channel, count: int, timeout_s: float = 2.0) -> list[Enco
 def test_viewers_of_one_variant_share_each_encoding(camera: FakeCamera, monkeypatch: pytest.MonkeyPatch) -> None:
     encodings = []
 
-    def counted(picture: DisplayImage, variant: Variant) -> bytes:
+    def counted(picture: DisplayImage, variant: PreviewVariant) -> bytes:
         encodings.append(variant)
-        return encode(picture, variant)
+        return encode_preview(picture, variant)
 
-    monkeypatch.setattr(module, "encode", counted)
+    monkeypatch.setattr(module, "encode_preview", counted)
 
-    async def view(feed: PreviewFeed) -> list[Encoded]:
-        with feed.watch(Variant()) as channel:
+    async def view(feed: PreviewBroadcaster) -> list[EncodedFrame]:
+        with feed.subscribe(PreviewVariant()) as channel:
             return await see(channel, 8)
 
-    async def all_view() -> list[list[Encoded]]:
-        feed = PreviewFeed(camera)
+    async def all_view() -> list[list[EncodedFrame]]:
+        feed = PreviewBroadcaster(camera)
         return await asyncio.gather(*(view(feed) for _ in range(40)))
 
     views = asyncio.run(all_view())
@@ -110,8 +117,8 @@ def test_viewers_of_one_variant_share_each_encoding(camera: FakeCamera, monkeypa
 
 def test_a_slow_viewer_skips_pictures_and_delays_nobody(camera: FakeCamera) -> None:
     async def view() -> tuple[list[int], list[int]]:
-        feed = PreviewFeed(camera)
-        with feed.watch(Variant()) as channel, feed.watch(Variant()) as same:
+        feed = PreviewBroadcaster(camera)
+        with feed.subscribe(PreviewVariant()) as channel, feed.subscribe(PreviewVariant()) as same:
             slow: list[int] = [-1]
 
             async def dawdle() -> None:
@@ -130,7 +137,7 @@ def test_a_slow_viewer_skips_pictures_and_delays_nobody(camera: FakeCamera) -> N
     assert all(later - earlier >= 4 for earlier, later in pairwise(slow))
 
 
-async def made(channel: Channel, count: int) -> list[tuple[float, Encoded]]:
+async def made(channel: PreviewStream, count: int) -> list[tuple[float, EncodedFrame]]:
     """The next pictures of a channel that nobody else watches, each with when it came."""
     task = asyncio.create_task(channel.run(CapacityLimiter(1)))
     seen, last = [], -1
@@ -144,23 +151,23 @@ async def made(channel: Channel, count: int) -> list[tuple[float, Encoded]]:
 
 
 def test_a_rate_limit_is_kept(camera: FakeCamera) -> None:
-    times = [at for at, _ in asyncio.run(made(Channel(camera, Variant(fps=10)), 8))]
+    times = [at for at, _ in asyncio.run(made(PreviewStream(camera, PreviewVariant(fps=10)), 8))]
     assert (times[-1] - times[0]) / 7 == pytest.approx(0.1, abs=0.025)
     assert all(later - earlier > 0.05 for earlier, later in pairwise(times[1:]))
 
 
 def test_a_limit_at_the_camera_s_rate_drops_no_picture(camera: FakeCamera) -> None:
-    counts = [picture.count for _, picture in asyncio.run(made(Channel(camera, Variant(fps=FPS)), 20))]
+    counts = [picture.count for _, picture in asyncio.run(made(PreviewStream(camera, PreviewVariant(fps=FPS)), 20))]
     assert counts[-1] - counts[0] <= 19 + 3  # a busy machine may miss one now and then, not every other
 
 
 def test_many_viewers_share_what_may_be_sent(camera: FakeCamera, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "SENT_PER_S", 40)
+    monkeypatch.setattr(module, "MAX_FRAMES_SENT_PER_S", 40)
 
     async def rate() -> float:
-        feed = PreviewFeed(camera)
+        feed = PreviewBroadcaster(camera)
         with contextlib.ExitStack() as stack:
-            channels = [stack.enter_context(feed.watch(Variant())) for _ in range(4)]
+            channels = [stack.enter_context(feed.subscribe(PreviewVariant())) for _ in range(4)]
             await see(channels[0], 1)
             began = time.monotonic()
             await see(channels[0], 6)
@@ -173,7 +180,7 @@ def test_waiting_ends_when_time_is_up(camera: FakeCamera) -> None:
     camera.publishing = False
 
     async def wait() -> float:
-        with PreviewFeed(camera).watch(Variant()) as channel:
+        with PreviewBroadcaster(camera).subscribe(PreviewVariant()) as channel:
             started = time.monotonic()
             assert await channel.next(-1, 0.1) is None
             return time.monotonic() - started
@@ -187,10 +194,10 @@ def test_a_preview_that_fails_ends_and_says_so(
     def fail(*_: object) -> bytes:
         raise MemoryError("no room")
 
-    monkeypatch.setattr(module, "encode", fail)
+    monkeypatch.setattr(module, "encode_preview", fail)
 
     async def look() -> bool:
-        with PreviewFeed(camera).watch(Variant()) as channel:
+        with PreviewBroadcaster(camera).subscribe(PreviewVariant()) as channel:
             assert await channel.next(-1, 2.0) is None
             return channel.ended
 
@@ -200,8 +207,12 @@ def test_a_preview_that_fails_ends_and_says_so(
 
 def test_channels_last_as_long_as_somebody_watches(camera: FakeCamera) -> None:
     async def look() -> None:
-        feed = PreviewFeed(camera)
-        with feed.watch(Variant()) as one, feed.watch(Variant()) as same, feed.watch(Variant(mirror=True)) as other:
+        feed = PreviewBroadcaster(camera)
+        with (
+            feed.subscribe(PreviewVariant()) as one,
+            feed.subscribe(PreviewVariant()) as same,
+            feed.subscribe(PreviewVariant(mirror=True)) as other,
+        ):
             assert one is same is not other
             assert feed.viewers == 3
             await asyncio.gather(see(one, 1), see(other, 1))
@@ -223,7 +234,7 @@ def test_snapshot_is_the_newest_picture_whole(client: Client, camera: FakeCamera
 def test_no_snapshot_before_the_first_picture(
     client: Client, camera: FakeCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("relit_camera.api.routes.preview.FIRST_PICTURE_S", 0.05)
+    monkeypatch.setattr("relit_camera.api.routes.preview.FIRST_FRAME_TIMEOUT_S", 0.05)
     camera.publishing = False
     assert check_problem(client.get("/api/v1/snapshot.jpg"), 503)["cure"]
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from fastapi import FastAPI
 
-from relit_camera.api.bodies import MAX_FORM_BYTES, MAX_JSON_BYTES
-from relit_camera.api.problems import ConflictError, problem_of, status_of, without_folders
-from relit_camera.errors import DeviceError, ImageError, NotFoundError, RelitError, StorageError
+from relit_camera.api.middleware.body_limits import MAX_JSON_BYTES, MAX_UPLOAD_FORM_BYTES
+from relit_camera.api.problem_details import ConflictError, problem_response_from, redact_folders, status_for_error
+from relit_camera.base.errors import DeviceError, ImageError, NotFoundError, RelitError, StorageError
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera
 
@@ -64,8 +64,8 @@ def test_a_fault_of_ours_tells_nothing_of_itself(
     ],
 )
 def test_every_kind_of_error_has_its_status(error: RelitError, status: int) -> None:
-    assert status_of(error) == status
-    assert problem_of(error).status_code == status
+    assert status_for_error(error) == status
+    assert problem_response_from(error).status_code == status
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_every_kind_of_error_has_its_status(error: RelitError, status: int) -> N
     ],
 )
 def test_folders_of_this_machine_are_taken_out(text: str, shown: str) -> None:
-    assert without_folders(text) == shown
+    assert redact_folders(text) == shown
 
 
 def test_a_long_body_is_refused_before_it_is_read(client: Client) -> None:
@@ -92,7 +92,7 @@ def test_a_long_body_is_refused_before_it_is_read(client: Client) -> None:
 
     headers = {"content-type": "application/json", "content-length": str(MAX_JSON_BYTES + 1)}
     check_problem(client.request("PUT", "/api/v1/lighting", content=never(), headers=headers), 413)
-    headers = {"content-type": "multipart/form-data; boundary=x", "content-length": str(MAX_FORM_BYTES + 1)}
+    headers = {"content-type": "multipart/form-data; boundary=x", "content-length": str(MAX_UPLOAD_FORM_BYTES + 1)}
     problem = check_problem(client.request("POST", "/api/v1/environments", content=never(), headers=headers), 413)
     assert "67 MB" in problem["what"]
 

@@ -6,12 +6,12 @@ import re
 
 import pytest
 
-from relit_camera.api.app import PANEL
-from relit_camera.api.security import OurNames, Place
+from relit_camera.api.app import PANEL_FOLDER
+from relit_camera.api.middleware.same_origin import AllowedHosts, ServerEndpoint
 from tests.api.api_client import BASE_URL, Client, check_problem
 from tests.api.fake_camera import FakeCamera
 
-PAGES = [f"/panel/{path.name}" for path in sorted(PANEL.iterdir())]
+PAGES = [f"/panel/{path.name}" for path in sorted(PANEL_FOLDER.iterdir())]
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8470", "localhost:8470", "LOCALHOST:8470", "[::1]:8470"])
@@ -43,10 +43,10 @@ def test_other_hosts_are_refused(client: Client, host: str, path: str) -> None:
 
 
 def test_port_80_need_not_be_named() -> None:
-    names = OurNames()
-    assert names.include("localhost", Place("127.0.0.1", 80))
-    assert not names.include("localhost", Place("127.0.0.1", 8470))
-    assert not names.include("localhost:80", Place("", None))
+    names = AllowedHosts()
+    assert names.allows_host("localhost", ServerEndpoint("127.0.0.1", 80))
+    assert not names.allows_host("localhost", ServerEndpoint("127.0.0.1", 8470))
+    assert not names.allows_host("localhost:80", ServerEndpoint("", None))
 
 
 @pytest.mark.parametrize("origin", [BASE_URL, "http://localhost:8470", "http://[::1]:8470"])
@@ -68,10 +68,10 @@ def test_our_panel_may_change_things(client: Client, origin: str) -> None:
 )
 @pytest.mark.parametrize(("method", "path"), [("PUT", "mode"), ("POST", "neutral-pose"), ("DELETE", "presets/x")])
 def test_other_origins_may_not(client: Client, camera: FakeCamera, origin: str, method: str, path: str) -> None:
-    before = camera.director.scene
+    before = camera.scene_controller.scene
     options = {"json": {"mode": "ratio"}} if method == "PUT" else {}
     check_problem(client.request(method, f"/api/v1/{path}", headers={"origin": origin}, **options), 403)
-    assert camera.director.scene is before
+    assert camera.scene_controller.scene is before
     assert camera.neutral_resets == 0
 
 

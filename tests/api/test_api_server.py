@@ -15,9 +15,9 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from relit_camera.api.server import Address, ApiServer, listen, serve
-from relit_camera.config.settings import ServerSettings
-from relit_camera.errors import ConfigError, PortInUseError
+from relit_camera.api.server.http_server import ApiServer, ServerAddress, open_listener, start_api_server
+from relit_camera.base.config.settings import ServerSettings
+from relit_camera.base.errors import ConfigError, PortInUseError
 from tests.api.fake_camera import FakeCamera
 
 
@@ -28,7 +28,7 @@ def free_port() -> int:
 
 
 def test_port_0_picks_one_and_says_which(app: FastAPI) -> None:
-    with serve(app, ServerSettings(port=0)) as server:
+    with start_api_server(app, ServerSettings(port=0)) as server:
         assert server.address.port > 0
         assert server.address.url == f"http://127.0.0.1:{server.address.port}/"
         assert httpx.get(f"{server.address.url}healthz").json() == {"status": "alive"}
@@ -36,34 +36,34 @@ def test_port_0_picks_one_and_says_which(app: FastAPI) -> None:
 
 def test_the_port_asked_for_is_the_port(app: FastAPI) -> None:
     port = free_port()
-    with serve(app, ServerSettings(port=port)) as server:
+    with start_api_server(app, ServerSettings(port=port)) as server:
         assert server.address.port == port
 
 
 def test_an_ipv6_address_is_written_in_brackets() -> None:
-    assert Address("::1", 8470).url == "http://[::1]:8470/"
+    assert ServerAddress("::1", 8470).url == "http://[::1]:8470/"
 
 
 def test_a_port_in_use_is_named_with_a_cure(server: ApiServer, app: FastAPI) -> None:
     port = server.address.port
     with pytest.raises(PortInUseError, match=rf"port {port} on 127\.0\.0\.1 is in use") as caught:
-        serve(app, ServerSettings(port=port))
+        start_api_server(app, ServerSettings(port=port))
     assert "--port 0" in caught.value.cure
 
 
 def test_a_port_can_be_taken_early(app: FastAPI) -> None:
     settings = ServerSettings(port=free_port())
-    listener = listen(settings)
+    listener = open_listener(settings)
     with pytest.raises(PortInUseError):
-        listen(settings)
-    with serve(app, settings, listener=listener) as server:
+        open_listener(settings)
+    with start_api_server(app, settings, listener=listener) as server:
         assert server.address.port == settings.port
 
 
 def test_the_port_is_free_again_after_the_end(app: FastAPI) -> None:
-    with serve(app, ServerSettings(port=0)) as server:
+    with start_api_server(app, ServerSettings(port=0)) as server:
         httpx.get(f"{server.address.url}healthz")
-    listen(ServerSettings(port=server.address.port)).close()
+    open_listener(ServerSettings(port=server.address.port)).close()
 
 
 def test_an_address_that_cannot_be_used_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,12 +72,12 @@ def test_an_address_that_cannot_be_used_is_said(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(socket, "create_server", refuse)
     with pytest.raises(ConfigError, match=r"port 80 on 127\.0\.0\.1 cannot be used: Permission denied"):
-        listen(ServerSettings(port=80))
+        open_listener(ServerSettings(port=80))
 
 
 def test_it_ends_within_a_second_with_streams_open(app: FastAPI) -> None:
     """The camera does not say that it stops here: the server alone must end its streams."""
-    server = serve(app, ServerSettings(port=0))
+    server = start_api_server(app, ServerSettings(port=0))
     opened = threading.Barrier(4)
     ended: list[str] = []
 
@@ -114,7 +114,7 @@ def test_an_answer_that_takes_too_long_is_a_503_not_a_traceback(
 
     monkeypatch.setattr(camera, "reset_neutral_pose", slow)
     answers: list[httpx.Response] = []
-    server = serve(app, ServerSettings(port=0))
+    server = start_api_server(app, ServerSettings(port=0))
     url = f"{server.address.url}api/v1/neutral-pose"
     asking = threading.Thread(target=lambda: answers.append(httpx.post(url, timeout=10)))
     asking.start()
@@ -136,8 +136,8 @@ from pathlib import Path
 import cv2, numpy as np
 from tests.api.fake_camera import FakeCamera
 from relit_camera.api.app import create_app
-from relit_camera.api.server import serve
-from relit_camera.config.settings import RelitSettings, ServerSettings, StorageSettings
+from relit_camera.api.server.http_server import start_api_server
+from relit_camera.base.config.settings import RelitSettings, ServerSettings, StorageSettings
 
 def work_in_opencv():
     picture = np.zeros((720, 1280, 3), np.float32)
@@ -153,7 +153,7 @@ for number in (signal.SIGTERM, signal.SIGINT):
 camera = FakeCamera(folder)
 camera.reset_neutral_pose = work_in_opencv
 app = create_app(camera, RelitSettings(storage=StorageSettings(data_dir=folder)))
-with serve(app, ServerSettings(port=0)) as server:
+with start_api_server(app, ServerSettings(port=0)) as server:
     print(server.address.url, flush=True)
     while not stop.wait(0.1):
         pass

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from prometheus_client.parser import text_string_to_metric_families
 
-from relit_camera.stream.status import CameraState, Degradation, Percentiles
+from relit_camera.live.status.camera_status import CameraState, Degradation, Percentiles
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import STATUS, FakeCamera
 

@@ -10,10 +10,10 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.subject.field import TEXELS
-from relit_camera.subject.file import MAX_HELD_BYTES, write_subject
-from relit_camera.subject.local_basis import whole_basis
+from relit_camera.subject.compression.local_basis import global_basis
+from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.subject import Subject, SubjectMetadata
+from relit_camera.subject.subject_file import MAX_IN_MEMORY_BYTES, write_subject
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera
 
@@ -21,7 +21,7 @@ from tests.api.fake_camera import FakeCamera
 @pytest.fixture
 def stored(camera: FakeCamera) -> Path:
     """The folder of subjects, with one called ada."""
-    folder = camera.director.subjects.folder
+    folder = camera.scene_controller.subjects.folder
     folder.mkdir(parents=True)
     write_subject(folder / "ada.relit", small_subject())
     return folder
@@ -42,7 +42,7 @@ def small_subject() -> Subject:
             created_by="test",
             created_at="2026-01-01",
         ),
-        basis=whole_basis(np.ones((3, 1, 24, 16), np.float16), matte),
+        basis=global_basis(np.ones((3, 1, 24, 16), np.float16), matte),
         coefficients=np.ones((1, TEXELS), np.float32),
         light_directions=np.array([[0, 0, 1], [1, 0, 0]], np.float32),
         light_coefficients=np.ones((1, 2), np.float32),
@@ -66,11 +66,11 @@ def test_a_subject_is_listed_chosen_and_deleted(client: Client, camera: FakeCame
     assert client.put("/api/v1/subject", {"name": "ada"}).json() == {"name": "ada"}
     assert client.get("/api/v1/subject").json() == {"name": "ada"}
     assert client.get("/api/v1/status").json()["subject"] == "ada"
-    assert camera.director.scene.subject is not None
+    assert camera.scene_controller.scene.subject is not None
     check_problem(client.delete("/api/v1/subjects/ada"), 409)
 
     assert client.put("/api/v1/subject", {"name": None}).json() == {"name": None}
-    assert camera.director.scene.subject is None
+    assert camera.scene_controller.scene.subject is None
     assert client.delete("/api/v1/subjects/ada").status_code == 204
     assert not (stored / "ada.relit").exists()
     check_problem(client.delete("/api/v1/subjects/ada"), 404)
@@ -88,7 +88,7 @@ def test_unknown_subjects_are_not_found(client: Client, camera: FakeCamera, stor
     assert "'ada'" in problem["cure"]
     check_problem(client.get("/api/v1/subjects/bob"), 404)
     check_problem(client.get("/api/v1/subjects/bob/thumbnail.jpg"), 404)
-    assert camera.director.scene.subject_name is None
+    assert camera.scene_controller.scene.subject_name is None
 
 
 def test_a_path_is_no_name(client: Client, camera: FakeCamera, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -96,7 +96,7 @@ def test_a_path_is_no_name(client: Client, camera: FakeCamera, stored: Path, mon
     monkeypatch.chdir(stored)
     check_problem(client.put("/api/v1/subject", {"name": str(stored / "ada.relit")}), 422)
     check_problem(client.put("/api/v1/subject", {"name": "ada.relit"}), 404)
-    assert camera.director.scene.subject is None
+    assert camera.scene_controller.scene.subject is None
 
 
 def test_a_damaged_subject_is_said_without_its_place(client: Client, camera: FakeCamera, stored: Path) -> None:
@@ -105,7 +105,7 @@ def test_a_damaged_subject_is_said_without_its_place(client: Client, camera: Fak
     problem = check_problem(answer, 422)
     assert "broken.relit" in problem["what"]
     assert str(stored) not in answer.text
-    assert camera.director.scene.subject is None
+    assert camera.scene_controller.scene.subject is None
     assert [item["name"] for item in client.get("/api/v1/subjects").json()] == ["ada", "broken"]
 
 
@@ -114,7 +114,7 @@ def test_what_is_too_large_to_be_shown_is_told_and_seen(client: Client, camera: 
     path = stored / "ada.relit"
     data = path.read_bytes()
     start = 8 + int.from_bytes(data[:8], "little")
-    header, size = json.loads(data[8:start]), MAX_HELD_BYTES
+    header, size = json.loads(data[8:start]), MAX_IN_MEMORY_BYTES
     header["more"] = {"dtype": "U8", "shape": [size], "data_offsets": [len(data) - start, len(data) - start + size]}
     text = json.dumps(header).encode()
     path.write_bytes(len(text).to_bytes(8, "little") + text + data[start:])
@@ -123,7 +123,7 @@ def test_what_is_too_large_to_be_shown_is_told_and_seen(client: Client, camera: 
 
     problem = check_problem(client.put("/api/v1/subject", {"name": "ada"}), 422)
     assert "larger than 1 GiB" in problem["what"]
-    assert camera.director.scene.subject is None
+    assert camera.scene_controller.scene.subject is None
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     assert client.get("/api/v1/subjects/ada").json()["metadata"]["method"] == "nearest"
     assert client.get("/api/v1/subjects/ada/thumbnail.jpg").status_code == 200

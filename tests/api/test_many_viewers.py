@@ -15,14 +15,14 @@ import numpy as np
 import psutil
 import pytest
 
-from relit_camera.api import connections
 from relit_camera.api.app import create_app
-from relit_camera.api.server import serve
-from relit_camera.config.settings import RelitSettings, ServerSettings
+from relit_camera.api.server import connection_timeouts
+from relit_camera.api.server.http_server import start_api_server
+from relit_camera.base.config.settings import RelitSettings, ServerSettings
 from tests.api.fake_camera import FakeCamera
 from tests.api.many_viewers import connect
 from tests.cli.relit_command import start, write_material
-from tests.stream.small_camera import FPS, Camera, running_camera, wait_until
+from tests.small_camera import FPS, Camera, running_camera, wait_until
 
 VIEWERS = 200
 ROOT = Path(__file__).parents[2]
@@ -120,10 +120,10 @@ def test_it_ends_in_time_with_all_of_them_open(tmp_path: Path) -> None:
 def test_who_takes_nothing_is_cut_off(
     tmp_path: Path, settings: RelitSettings, monkeypatch: pytest.MonkeyPatch, path: str
 ) -> None:
-    monkeypatch.setattr(connections, "STALLED_S", 0.5)
+    monkeypatch.setattr(connection_timeouts, "WRITE_TIMEOUT_S", 0.5)
     noise = np.random.default_rng(1).integers(0, 256, (720, 1280, 3), np.uint8)
     camera = FakeCamera(tmp_path, noise)
-    with serve(create_app(camera, settings), ServerSettings(port=0)) as server:
+    with start_api_server(create_app(camera, settings), ServerSettings(port=0)) as server:
         before = psutil.Process().num_fds()
         url = f"{server.address.url}api/v1/{path}?"
         with connect(url, 4096), connect(url, 4096):
@@ -133,9 +133,9 @@ def test_who_takes_nothing_is_cut_off(
 
 
 def test_who_asks_nothing_is_cut_off(tmp_path: Path, settings: RelitSettings, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connections, "SILENT_S", 0.3)
+    monkeypatch.setattr(connection_timeouts, "READ_TIMEOUT_S", 0.3)
     camera = FakeCamera(tmp_path)
-    with serve(create_app(camera, settings), ServerSettings(port=0)) as server:
+    with start_api_server(create_app(camera, settings), ServerSettings(port=0)) as server:
         for said in (b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127"):
             with socket.create_connection((server.address.host, server.address.port), 5) as client:
                 client.sendall(said)

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from relit_camera.capture.landmarks_file import read_landmarks
-from relit_camera.errors import LightsError, NotFoundError
+from relit_camera.base.errors import LightsError, NotFoundError
+from relit_camera.capture.subject_landmarks import read_landmarks
 
 POINTS = np.random.default_rng(3).uniform(0, 200, (66, 2)).round(2)
 

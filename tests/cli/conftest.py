@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.relit_command import Material, write_material
-
 
 @pytest.fixture(autouse=True)
 def own_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -15,9 +13,3 @@ def own_data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "user-data"
     monkeypatch.setenv("RELIT_STORAGE__DATA_DIR", str(folder))
     return folder
-
-
-@pytest.fixture(scope="session")
-def material(tmp_path_factory: pytest.TempPathFactory) -> Material:
-    """A small subject, clip and track."""
-    return write_material(tmp_path_factory.mktemp("material"))

@@ -15,14 +15,14 @@ from unittest.mock import patch
 
 import numpy as np
 
-from relit_camera.bench.live import NoddingTracker
-from relit_camera.bench.sample_subject import sample_subject
+from relit_camera.base.images.image_types import Frame
+from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.cli.main import run
-from relit_camera.face.track_file import TrackRecorder
-from relit_camera.space.images import Frame
-from relit_camera.subject.file import write_subject
+from relit_camera.face.tracking.track_recording import TrackRecorder
+from relit_camera.lab.bench.live_benchmark import SyntheticTracker
+from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.subject.subject import Subject
-from relit_camera.video.writer import VideoWriter
+from relit_camera.subject.subject_file import write_subject
 
 COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'relit'; from relit_camera.cli.main import run; run()"]
 CLIP_SIZE, CLIP_FPS = (128, 96), 20.0
@@ -101,7 +101,7 @@ def files(folder: Path) -> set[str]:
 
 @cache
 def small_subject() -> Subject:
-    return sample_subject(64, 80)
+    return synthetic_subject(64, 80)
 
 
 @dataclass(frozen=True)
@@ -122,12 +122,12 @@ def write_material(folder: Path, frames: int = 40) -> Material:
     """Write what a replay or a run needs, without any model."""
     material = Material(folder / "small.relit", folder / "clip.mp4", folder / "track.json")
     write_subject(material.subject, small_subject())
-    recorder = TrackRecorder(NoddingTracker(), CLIP_SIZE, CLIP_FPS)
+    recorder = TrackRecorder(SyntheticTracker(), CLIP_SIZE, CLIP_FPS)
     with VideoWriter(material.clip, CLIP_SIZE, CLIP_FPS) as video:
         for index in range(frames):
             picture = np.full((CLIP_SIZE[1], CLIP_SIZE[0], 3), 90 + index % 20, np.uint8)
             video.write(picture)
             time_s = index / CLIP_FPS
-            recorder.add(NoddingTracker().track(Frame(picture, index, 0.0, time_s)), time_s)
+            recorder.add(SyntheticTracker().track(Frame(picture, index, 0.0, time_s)), time_s)
     recorder.write(material.track)
     return material

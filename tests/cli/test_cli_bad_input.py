@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.face.state import FaceStatus
-from relit_camera.face.track_file import Track, TrackFrame, read_track
-from relit_camera.space.picture_files import write_linear
+from relit_camera.base.images.image_files import write_linear
+from relit_camera.face.face_state import FaceStatus
+from relit_camera.face.tracking.track_recording import Track, TrackFrame, read_track
 from tests.cli.relit_command import (
     COMMAND,
     Answer,

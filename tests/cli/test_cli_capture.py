@@ -12,12 +12,17 @@ import numpy as np
 import pytest
 from safetensors import safe_open
 
-from relit_camera.capture.chain.checkpoint import FILE, Checkpoint, CheckpointFolder, origin
-from relit_camera.capture.chain.options import CaptureOptions
-from relit_camera.errors import CaptureError
-from relit_camera.subject.file import HEADER_KEY, read_subject
-from tests.capture.chain import spoilt_films as films
-from tests.capture.film import write_film
+from relit_camera.base.errors import CaptureError
+from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
+from relit_camera.capture.film.pipeline.checkpoint import (
+    SAMPLES_FILE_NAME,
+    Checkpoint,
+    CheckpointFolder,
+    input_fingerprint,
+)
+from relit_camera.subject.subject_file import HEADER_KEY, read_subject
+from tests.capture.film.generated_film import write_film
+from tests.capture.film.pipeline import unusable_films as films
 from tests.cli.relit_command import Answer, call, files, finish, start
 from tests.synthetic import sphere_samples
 
@@ -87,7 +92,7 @@ def test_options_are_followed_and_told(built: Built) -> None:
 def test_a_build_that_is_killed_goes_on_to_the_same_subject(built: Built, tmp_path: Path) -> None:
     process = start(*command(built.film, tmp_path, *KNOWN), folder=built.film.parent)
     patience = time.monotonic() + PATIENCE_S
-    while not (tmp_path / "me.relit.partial" / FILE).exists():
+    while not (tmp_path / "me.relit.partial" / SAMPLES_FILE_NAME).exists():
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < patience
         time.sleep(0.01)
@@ -111,9 +116,9 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def refuse(*_: object) -> None:
         raise CaptureError("no flash found", "let a light blink")
 
-    monkeypatch.setattr("relit_camera.capture.chain.samples.build_samples", refuse)
+    monkeypatch.setattr("relit_camera.capture.film.pipeline.film_capture.build_samples", refuse)
     film = write_film(tmp_path / "film.mp4", np.zeros((12, 64, 64, 3), np.uint8))
-    folder = CheckpointFolder(tmp_path / "me.relit", origin(film, CaptureOptions()), print)
+    folder = CheckpointFolder(tmp_path / "me.relit", input_fingerprint(film, CaptureOptions()), print)
     folder.write(Checkpoint(sphere_samples(40, 24), {"warnings": ["a guess"], "light": {"frames": 77}}))
     return film
 
@@ -142,4 +147,4 @@ def test_it_starts_over_and_a_refusal_leaves_nothing(option: str, told: list[str
 
 def test_a_film_that_is_not_there_costs_nothing_that_was_kept(kept: Path) -> None:
     call(*command(kept.parent / "fim.mp4", kept.parent)).complains("no video at", "check the path")
-    assert files(kept.parent) == {"film.mp4", "me.relit.partial", f"me.relit.partial/{FILE}"}
+    assert files(kept.parent) == {"film.mp4", "me.relit.partial", f"me.relit.partial/{SAMPLES_FILE_NAME}"}

@@ -13,11 +13,11 @@ import httpx
 import numpy as np
 import pytest
 
-from relit_camera.cli.demo import opens_in_browser
-from relit_camera.demo import bundle
-from relit_camera.face.track_file import read_track
-from relit_camera.subject.file import read_subject
-from relit_camera.video.reader import VideoReader, probe
+from relit_camera.app.demo import demo_files
+from relit_camera.base.video.video_readers import VideoReader, probe_video
+from relit_camera.cli.commands.demo import opens_in_browser
+from relit_camera.face.tracking.track_recording import read_track
+from relit_camera.subject.subject_file import read_subject
 from tests.cli.relit_command import call, start
 
 START_S = 60.0
@@ -105,13 +105,13 @@ def test_it_ends_by_itself_when_told_to(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_the_clip_its_track_and_its_mattes_are_of_one_length_and_large_enough() -> None:
-    info = probe(bundle.CLIP)
-    track = read_track(bundle.TRACK)
+    info = probe_video(demo_files.CLIP)
+    track = read_track(demo_files.TRACK)
     assert min(info.width, info.height) >= 512
     assert info.fps >= 24
     assert info.frames == len(track.frames)
     assert track.size == (info.width, info.height)
-    with np.load(bundle.MATTES) as kept:
+    with np.load(demo_files.MATTES) as kept:
         assert len(kept["alpha"]) == info.frames
     yaws = [frame.pose.yaw for frame in track.frames if frame.pose]
     assert max(yaws) > 20
@@ -122,22 +122,22 @@ def test_the_clip_its_track_and_its_mattes_are_of_one_length_and_large_enough() 
 
 def test_the_clip_does_not_flicker() -> None:
     """The wall behind is still: what it changes from frame to frame is what the codec and noise do."""
-    with VideoReader(bundle.CLIP) as video:
+    with VideoReader(demo_files.CLIP) as video:
         walls = np.stack([frame.image[:80, -200:].astype(np.float32) for frame in video])
     assert np.abs(np.diff(walls, axis=0)).mean() < 0.5
 
 
 def test_credits_are_with_the_person() -> None:
-    text = bundle.CREDITS.read_text(encoding="utf-8")
+    text = demo_files.CREDITS.read_text(encoding="utf-8")
     assert "Lee Perry-Smith" in text
     assert "CC-BY 3.0" in text
     assert "ICT-FaceKit" in text
 
 
 def test_the_bundled_subject_is_as_any_other() -> None:
-    subject = read_subject(bundle.SUBJECT)
+    subject = read_subject(demo_files.SUBJECT)
     assert "mesh478" in subject.landmarks
-    answer = call("subject", "info", bundle.SUBJECT)
+    answer = call("subject", "info", demo_files.SUBJECT)
     assert answer.code == 0
     assert "adam" in answer.out
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.reflectance.method import method_names
-from relit_camera.video.writer import VideoWriter
+from relit_camera.base.video.video_writer import VideoWriter
+from relit_camera.capture.reflectance.method_registry import method_names
 from tests.cli.relit_command import Answer, call, files
-from tests.evaluate.ball import cap, grid, lambert
-from tests.evaluate.capture_documents import documents
+from tests.lab.capture_documents import documents
+from tests.lab.lit_sphere import cap, grid, lambert
 from tests.synthetic import write_lights
 
 PARTY = ("--environment", "party")

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.errors import SubjectError
-from relit_camera.subject.file import HEADER_KEY, read_subject
-from relit_camera.subject.pack import decode_basis
+from relit_camera.base.errors import SubjectError
+from relit_camera.subject.compression.webp_packing import decode_basis
+from relit_camera.subject.subject_file import HEADER_KEY, read_subject
 from tests import bad_pictures as bad
 from tests.cli.relit_command import call
 

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from relit_camera.base.config.look import EnvironmentBackground
+from relit_camera.base.images.image_files import read_display, read_linear, read_mask, write_display, write_linear
+from relit_camera.base.images.image_quality import psnr
+from relit_camera.base.images.image_types import Mask
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.capture.lights_file import read_lights
-from relit_camera.compose.view import EnvironmentView
-from relit_camera.config.look import EnvironmentBackground
-from relit_camera.light.panorama import read_panorama
-from relit_camera.reflectance.method import open_method
-from relit_camera.space.directions import texel_directions, texel_solid_angles
-from relit_camera.space.images import Mask
-from relit_camera.space.picture_files import read_display, read_linear, read_mask, write_display, write_linear
-from relit_camera.space.quality import psnr
-from relit_camera.space.rotation import rotation_from_angles
-from relit_camera.video.reader import VideoReader
+from relit_camera.capture.reflectance.method_registry import open_method
+from relit_camera.light.directions import texel_directions, texel_solid_angles
+from relit_camera.light.environment_panorama import read_panorama
+from relit_camera.live.compositing.environment_view import EnvironmentView
 from tests.cli.relit_command import Answer, Material, call
 from tests.replay.materials import subject_file
 from tests.synthetic import render_sphere, sphere_samples, sphere_surface, write_lights

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.cli.main import GROUPS
-from relit_camera.space.picture_files import read_display
-from relit_camera.video.reader import VideoReader
+from relit_camera.base.images.image_files import read_display
+from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.cli.main import COMMANDS
 from tests.cli.relit_command import CLIP_FPS, CLIP_SIZE, Answer, Material, call, files, finish
 from tests.synthetic import sphere_samples, write_lights
 
@@ -84,7 +84,7 @@ def test_a_subject_is_packed_and_asking_for_too_much_leaves_nothing(tmp_path: Pa
     assert json.loads(done(call("subject", "info", small, "--json")).out)["components"] == 12
 
 
-@pytest.mark.parametrize("command", GROUPS)
+@pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_help(command: str) -> None:
     answer = call(command, "--help")
     assert answer.code == 0, answer.err
@@ -93,7 +93,7 @@ def test_every_command_has_help(command: str) -> None:
 
 def test_help_lists_every_command_and_a_process_says_the_same(tmp_path: Path) -> None:
     answer = done(call("--help"))
-    assert all(name in answer.out for name in GROUPS)
+    assert all(name in answer.out for name in COMMANDS)
     assert done(finish("--help", folder=tmp_path)).out.split()[:3] == ["Usage:", "relit", "[OPTIONS]"]
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from relit_camera.config.load import load_settings
-from relit_camera.config.settings import RelitSettings
+from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.config.settings_loader import load_settings
 from tests.cli.relit_command import call
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from relit_camera.doctor.findings import Finding, State
-from relit_camera.doctor.host import SECURE_BOOT, Host
-from relit_camera.stream.holders import Holder
-from tests.stream.fake_devices import FakeTree
+from relit_camera.devices.device_users import DeviceUser
+from relit_camera.doctor.host import SECURE_BOOT_VARIABLE, Host
+from relit_camera.doctor.report import Finding, Severity
+from tests.devices.fake_devices import FakeTree
 
 RELEASE = "6.1.0-56-amd64"
 DISTRIBUTIONS = {
@@ -26,7 +26,7 @@ class FakeMachine:
     def __init__(self, root: Path, distribution: str = "debian", is_linux: bool = True) -> None:
         self.root = root
         self.tree = FakeTree(root)
-        self.users: dict[str, list[Holder]] = {}
+        self.users: dict[str, list[DeviceUser]] = {}
         self.write("etc/os-release", DISTRIBUTIONS[distribution])
         self.add_kernel(RELEASE)
         self.host = Host(root, self.tree, RELEASE, is_linux, lambda node: self.users.get(node, []))
@@ -52,17 +52,17 @@ class FakeMachine:
         self.write(f"etc/modules-load.d/{file}", "v4l2loopback\n")
 
     def set_secure_boot(self, on: bool) -> None:
-        file = self.root / SECURE_BOOT
+        file = self.root / SECURE_BOOT_VARIABLE
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(b"\6\0\0\0" + bytes([on]))
 
-    def open_by(self, node: str, *users: Holder) -> None:
+    def open_by(self, node: str, *users: DeviceUser) -> None:
         self.users[node] = list(users)
 
 
 OPTIONS = 'devices=1 video_nr=10 exclusive_caps=1 card_label="{}"'
-FIREFOX = Holder(30, "firefox", ("/usr/bin/firefox",))
-RELIT = Holder(40, "python3", ("/venv/bin/python3", "/venv/bin/relit", "run"))
+FIREFOX = DeviceUser(30, "firefox", ("/usr/bin/firefox",))
+RELIT = DeviceUser(40, "python3", ("/venv/bin/python3", "/venv/bin/relit", "run"))
 
 
 def nobody_may(path, mode):
@@ -73,10 +73,10 @@ def everybody_may(path, mode):
     return True
 
 
-def expect(finding: Finding, state: State, *words: str):
+def expect(finding: Finding, state: Severity, *words: str):
     """Of that state; the words are in what was seen or its cure. What is not ok has a cure, what is ok has none."""
     assert finding.state is state, finding
     for word in words:
         assert word in f"{finding.seen} → {finding.cure}", finding
-    assert bool(finding.cure) == (state is not State.OK), finding
+    assert bool(finding.cure) == (state is not Severity.OK), finding
     assert "\n" not in finding.seen + finding.cure

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from relit_camera.doctor.browsers import check_browsers
-from relit_camera.doctor.findings import State
+from relit_camera.doctor.camera_access import check_browsers
+from relit_camera.doctor.report import Severity
 from tests.doctor.fake_host import expect
 
 CHROME = "com.google.Chrome"
@@ -17,15 +17,15 @@ def flatpak(machine, app, devices, folder="var/lib/flatpak"):
 
 
 def test_none_is_fine(machine, tmp_path):
-    expect(check_browsers(machine.host, tmp_path), State.OK, "none in a sandbox")
+    expect(check_browsers(machine.host, tmp_path), Severity.OK, "none in a sandbox")
 
 
 def test_a_flatpak_with_all_devices_is_fine_and_one_without_is_named(machine, tmp_path):
     flatpak(machine, "org.mozilla.firefox", "dri;all;")
-    expect(check_browsers(machine.host, tmp_path), State.OK)
+    expect(check_browsers(machine.host, tmp_path), Severity.OK)
     flatpak(machine, CHROME, "dri;")
     finding = check_browsers(machine.host, tmp_path)
-    expect(finding, State.WARNING, f"flatpak override --user --device=all {CHROME}")
+    expect(finding, Severity.WARNING, f"flatpak override --user --device=all {CHROME}")
     assert "firefox" not in finding.seen
 
 
@@ -34,16 +34,16 @@ def test_an_override_opens_it(machine, tmp_path, name):
     home = machine.root / "home/me"
     flatpak(machine, CHROME, "dri;", "home/me/.local/share/flatpak")
     home = home.relative_to(machine.root)
-    expect(check_browsers(machine.host, home), State.WARNING, CHROME)
+    expect(check_browsers(machine.host, home), Severity.WARNING, CHROME)
     machine.write(f"home/me/.local/share/flatpak/overrides/{name}", "[Context]\ndevices=all;\n")
-    expect(check_browsers(machine.host, home), State.OK)
+    expect(check_browsers(machine.host, home), Severity.OK)
 
 
 def test_a_damaged_file_is_as_none(machine, tmp_path):
     machine.write(f"var/lib/flatpak/{METADATA.format(CHROME)}", "][")
-    expect(check_browsers(machine.host, tmp_path), State.WARNING, CHROME)
+    expect(check_browsers(machine.host, tmp_path), Severity.WARNING, CHROME)
 
 
 def test_snaps_are_a_hint(machine, tmp_path):
     (machine.root / "snap/chromium").mkdir(parents=True)
-    expect(check_browsers(machine.host, tmp_path), State.OK, "sudo snap connect chromium:camera")
+    expect(check_browsers(machine.host, tmp_path), Severity.OK, "sudo snap connect chromium:camera")

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from relit_camera.config.load import load_settings
-from relit_camera.config.settings import OutputSettings, RelitSettings
+from relit_camera.base.config.settings import OutputSettings, RelitSettings
+from relit_camera.base.config.settings_loader import load_settings
 from relit_camera.doctor import fix as fixing
-from relit_camera.doctor.examine import examine
-from relit_camera.doctor.findings import FileState, State
-from relit_camera.doctor.fix import fix, user_config
-from relit_camera.doctor.root_commands import root_commands
-from relit_camera.doctor.subject import check_subject
-from relit_camera.doctor.unit import check_service, is_ours, unit_path, unit_text
-from relit_camera.subject.file import write_subject
+from relit_camera.doctor.fix import apply_fixes, user_config_file
+from relit_camera.doctor.kernel_module import root_commands
+from relit_camera.doctor.models_and_subject import check_subject
+from relit_camera.doctor.report import FileOutcome, Severity
+from relit_camera.doctor.run_checks import run_checks
+from relit_camera.doctor.systemd_unit import check_service, is_unmodified, unit_path, unit_text
+from relit_camera.subject.subject_file import write_subject
 from tests.cli.relit_command import call, small_subject
 from tests.doctor.fake_host import RELEASE, FakeMachine, everybody_may, expect, nobody_may
 
@@ -43,95 +43,95 @@ def everything(folder):
 
 
 def test_what_is_missing_is_written_and_the_second_time_nothing(machine, settings, tmp_path):
-    first = fix(settings, machine.host, everybody_may)
+    first = apply_fixes(settings, machine.host, everybody_may)
     assert set(states(first)) == {
         "subjects", "environments", "backgrounds", "presets", "models", "config.yaml", "relit-camera.service",
     }  # fmt: skip
-    assert set(states(first).values()) == {FileState.WRITTEN}
+    assert set(states(first).values()) == {FileOutcome.WRITTEN}
     assert all(Path(file.path).exists() for file in first.files)
     before = everything(tmp_path)
-    second = fix(settings, machine.host, everybody_may)
-    assert set(states(second).values()) == {FileState.UNCHANGED}
+    second = apply_fixes(settings, machine.host, everybody_may)
+    assert set(states(second).values()) == {FileOutcome.UNCHANGED}
     assert everything(tmp_path) == before
 
 
 def test_the_configuration_that_it_writes_is_right_and_holds_the_defaults(machine, settings, monkeypatch):
-    fix(settings, machine.host, everybody_may)
+    apply_fixes(settings, machine.host, everybody_may)
     monkeypatch.delenv("RELIT_STORAGE__DATA_DIR")
     monkeypatch.delenv("RELIT_SERVER__PORT")
-    assert load_settings(user_config()).model_dump() == RelitSettings().model_dump()
+    assert load_settings(user_config_file()).model_dump() == RelitSettings().model_dump()
 
 
 def test_a_configuration_of_the_users_own_stays(machine, settings):
-    user_config().parent.mkdir(parents=True)
-    user_config().write_text("subject: me\n")
-    assert states(fix(settings, machine.host, everybody_may))["config.yaml"] is FileState.UNCHANGED
-    assert user_config().read_text() == "subject: me\n"
+    user_config_file().parent.mkdir(parents=True)
+    user_config_file().write_text("subject: me\n")
+    assert states(apply_fixes(settings, machine.host, everybody_may))["config.yaml"] is FileOutcome.UNCHANGED
+    assert user_config_file().read_text() == "subject: me\n"
 
 
 def test_an_old_unit_of_ours_is_renewed(machine, settings):
     unit_path().parent.mkdir(parents=True)
     unit_path().write_text(unit_text(Path("/old/place/relit")))
-    expect(check_service(machine.host), State.WARNING, "another installation", "--fix")
-    assert states(fix(settings, machine.host, everybody_may))["relit-camera.service"] is FileState.RENEWED
+    expect(check_service(machine.host), Severity.WARNING, "another installation", "--fix")
+    assert states(apply_fixes(settings, machine.host, everybody_may))["relit-camera.service"] is FileOutcome.RENEWED
     assert "/old/place" not in unit_path().read_text()
-    expect(check_service(machine.host), State.OK, str(unit_path()))
+    expect(check_service(machine.host), Severity.OK, str(unit_path()))
 
 
 def test_a_unit_that_a_person_changed_is_kept_and_the_difference_shown(machine, settings):
-    fix(settings, machine.host, everybody_may)
+    apply_fixes(settings, machine.host, everybody_may)
     mine = unit_path().read_text().replace("WatchdogSec=30", "WatchdogSec=90")
     unit_path().write_text(mine)
-    done = fix(settings, machine.host, everybody_may)
-    assert states(done)["relit-camera.service"] is FileState.KEPT
+    done = apply_fixes(settings, machine.host, everybody_may)
+    assert states(done)["relit-camera.service"] is FileOutcome.KEPT
     assert unit_path().read_text() == mine
-    note = next(file.note for file in done.files if file.state is FileState.KEPT)
+    note = next(file.note for file in done.files if file.state is FileOutcome.KEPT)
     assert "-WatchdogSec=90" in note
     assert "+WatchdogSec=30" in note
-    expect(check_service(machine.host), State.OK, "changed or written by you")
+    expect(check_service(machine.host), Severity.OK, "changed or written by you")
 
 
 def unit_after_fix(settings, machine):
-    return next(f for f in fix(settings, machine.host, everybody_may).files if f.path == str(unit_path()))
+    return next(f for f in apply_fixes(settings, machine.host, everybody_may).files if f.path == str(unit_path()))
 
 
 def test_a_folder_in_the_units_place_is_said(machine, settings):
     unit_path().mkdir(parents=True)
     found = unit_after_fix(settings, machine)
-    assert found.state is FileState.FAILED
+    assert found.state is FileOutcome.FAILED
     assert "Is a directory" in found.note
-    expect(check_service(machine.host), State.WARNING, "cannot be read: Is a directory", "move it away")
+    expect(check_service(machine.host), Severity.WARNING, "cannot be read: Is a directory", "move it away")
 
 
 def test_a_unit_that_cannot_be_read_is_said(machine, settings, monkeypatch):
-    fix(settings, machine.host, everybody_may)
+    apply_fixes(settings, machine.host, everybody_may)
 
     def refuse(path, *_, **__):
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr(Path, "read_text", refuse)
     found = unit_after_fix(settings, machine)
-    assert found.state is FileState.FAILED
+    assert found.state is FileOutcome.FAILED
     assert "Permission denied" in found.note
 
 
 def test_a_unit_that_is_no_text_is_the_users_own(machine, settings):
     unit_path().parent.mkdir(parents=True)
     unit_path().write_bytes(b"\xff\xfe[Unit]")
-    assert unit_after_fix(settings, machine).state is FileState.KEPT
-    expect(check_service(machine.host), State.OK, "changed or written by you")
+    assert unit_after_fix(settings, machine).state is FileOutcome.KEPT
+    expect(check_service(machine.host), Severity.OK, "changed or written by you")
 
 
 def test_links_that_lead_nowhere_are_the_users_own(machine, settings, tmp_path):
-    for path in (unit_path(), user_config()):
+    for path in (unit_path(), user_config_file()):
         path.parent.mkdir(parents=True)
         path.symlink_to(tmp_path / "away")
-    done = fix(settings, machine.host, everybody_may)
-    assert states(done)["config.yaml"] is FileState.UNCHANGED
-    assert states(done)["relit-camera.service"] is FileState.KEPT
+    done = apply_fixes(settings, machine.host, everybody_may)
+    assert states(done)["config.yaml"] is FileOutcome.UNCHANGED
+    assert states(done)["relit-camera.service"] is FileOutcome.KEPT
     assert "away" in unit_after_fix(settings, machine).note
     assert unit_path().is_symlink()
-    assert user_config().is_symlink()
+    assert user_config_file().is_symlink()
     assert not (tmp_path / "away").exists()
 
 
@@ -139,29 +139,29 @@ def test_with_a_faulty_configuration_no_folders_are_made(machine, tmp_path):
     path = tmp_path / "mine.yaml"
     path.write_text("look: [")
     before = {each for each in tmp_path.rglob("*") if each.is_dir()}
-    report = examine(path, machine.host, everybody_may, with_fix=True)
+    report = run_checks(path, machine.host, everybody_may, with_fix=True)
     assert report.fix is not None
     assert set(states(report.fix)) == {"config.yaml", "relit-camera.service"}
     made = {each for each in tmp_path.rglob("*") if each.is_dir()} - before
-    assert made <= {*user_config().parents, *unit_path().parents}
+    assert made <= {*user_config_file().parents, *unit_path().parents}
 
 
 def test_what_cannot_be_written_is_said_and_the_rest_goes_on(machine, settings, tmp_path):
     (tmp_path / "config").write_text("a file where the folder should be")
-    found = states(fix(settings, machine.host, everybody_may))
-    assert found["config.yaml"] is found["relit-camera.service"] is FileState.FAILED
-    assert found["subjects"] is FileState.WRITTEN
+    found = states(apply_fixes(settings, machine.host, everybody_may))
+    assert found["config.yaml"] is found["relit-camera.service"] is FileOutcome.FAILED
+    assert found["subjects"] is FileOutcome.WRITTEN
 
 
 def test_elsewhere_there_is_no_unit(settings, tmp_path):
-    done = fix(settings, FakeMachine(tmp_path / "mac", is_linux=False).host, everybody_may)
+    done = apply_fixes(settings, FakeMachine(tmp_path / "mac", is_linux=False).host, everybody_may)
     assert "relit-camera.service" not in states(done)
     assert done.root_commands == ()
     assert done.user_commands == ("relit models pull",)
 
 
 def test_models_are_offered_not_pulled(machine, settings, monkeypatch):
-    done = fix(settings, machine.host, everybody_may)
+    done = apply_fixes(settings, machine.host, everybody_may)
     assert done.user_commands == (
         "relit models pull",
         "systemctl --user daemon-reload && systemctl --user enable --now relit-camera",
@@ -219,10 +219,10 @@ def test_another_programs_options_are_left_to_the_person(bare):
 
 
 def test_groups_are_those_of_the_nodes(machine, settings):
-    lines = fix(settings, machine.host, nobody_may).root_commands
+    lines = apply_fixes(settings, machine.host, nobody_may).root_commands
     assert [line for line in lines if "usermod" in line]
     no_camera = RelitSettings(output={"sink": "null"}, storage=settings.storage.model_dump())
-    assert fix(no_camera, machine.host, nobody_may).root_commands == ()
+    assert apply_fixes(no_camera, machine.host, nobody_may).root_commands == ()
 
 
 # The unit.
@@ -230,10 +230,10 @@ def test_groups_are_those_of_the_nodes(machine, settings):
 
 def test_a_stamp_tells_a_changed_unit():
     text = unit_text(Path("/home/me/.local/bin/relit"))
-    assert is_ours(text)
-    assert not is_ours(text.replace("RestartSec=10", "RestartSec=4"))
-    assert not is_ours("[Unit]\n")
-    assert not is_ours("")
+    assert is_unmodified(text)
+    assert not is_unmodified(text.replace("RestartSec=10", "RestartSec=4"))
+    assert not is_unmodified("[Unit]\n")
+    assert not is_unmodified("")
 
 
 def test_systemd_never_gives_up_starting_it():
@@ -273,21 +273,24 @@ def test_systemd_finds_no_fault_with_the_unit(tmp_path):
 
 
 def test_the_subject_is_looked_at(settings, tmp_path):
-    expect(check_subject(settings), State.WARNING, "none is chosen", "relit capture build")
+    expect(check_subject(settings), Severity.WARNING, "none is chosen", "relit capture build")
     settings.storage.subjects.mkdir(parents=True)
     write_subject(settings.storage.subjects / "me.relit", small_subject())
-    expect(check_subject(settings), State.WARNING, "stored are: me")
-    expect(check_subject(settings.model_copy(update={"subject": "me"})), State.OK, "me, 64x80")
+    expect(check_subject(settings), Severity.WARNING, "stored are: me")
+    expect(check_subject(settings.model_copy(update={"subject": "me"})), Severity.OK, "me, 64x80")
     expect(
-        check_subject(settings.model_copy(update={"subject": "you"})), State.PROBLEM, "no subject 'you'", "stored are"
+        check_subject(settings.model_copy(update={"subject": "you"})),
+        Severity.PROBLEM,
+        "no subject 'you'",
+        "stored are",
     )
     (tmp_path / "half.relit").write_bytes(b"half")
     broken = settings.model_copy(update={"subject": str(tmp_path / "half.relit")})
-    expect(check_subject(broken), State.PROBLEM, "half.relit")
+    expect(check_subject(broken), Severity.PROBLEM, "half.relit")
 
 
 def test_the_command_fixes_and_says_so_in_text_and_json(monkeypatch, machine):
-    monkeypatch.setattr("relit_camera.doctor.examine.Host", lambda: machine.host)
+    monkeypatch.setattr("relit_camera.doctor.run_checks.Host", lambda: machine.host)
     text = call("doctor", "--fix").out
     assert "written    " in text
     assert str(unit_path()) in text
@@ -298,8 +301,8 @@ def test_the_command_fixes_and_says_so_in_text_and_json(monkeypatch, machine):
 
 
 def test_without_fix_nothing_is_written(machine, monkeypatch, tmp_path):
-    monkeypatch.setattr("relit_camera.doctor.examine.Host", lambda: machine.host)
-    monkeypatch.setattr(fixing, "fix", lambda *_: pytest.fail("not asked for"))
+    monkeypatch.setattr("relit_camera.doctor.run_checks.Host", lambda: machine.host)
+    monkeypatch.setattr(fixing, "apply_fixes", lambda *_: pytest.fail("not asked for"))
     before = everything(tmp_path)
     call("doctor")
     assert everything(tmp_path) == before

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.models.registry import FOLDER_VARIABLE, Registry
+from relit_camera.base.models.model_store import FOLDER_VARIABLE, ModelStore
 
 FACE_MODELS = ("face_mesh", "face_blendshapes", "face_detector_yunet", "openseeface")
 
@@ -17,7 +17,7 @@ FACE_MODELS = ("face_mesh", "face_blendshapes", "face_detector_yunet", "openseef
 def pulled_face_models(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the face models, converted from the local mirror."""
     folder = tmp_path_factory.mktemp("models")
-    Registry(folder).pull(FACE_MODELS, mirror=shared / "models")
+    ModelStore(folder).pull(FACE_MODELS, mirror=shared / "models")
     return folder
 
 

@@ -4,25 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_camera.face.landmarks import Scheme
-from relit_camera.face.pose import project
-from relit_camera.face.schemes import landmark_scheme
-from relit_camera.face.state import FaceState, FaceStatus, HeadPose
-from relit_camera.space.rotation import rotation_from_angles
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.face.face_state import FaceState, FaceStatus, HeadPose
+from relit_camera.face.head_pose import project
+from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 
 SIZE = (640, 480)
 RATE = 30.0
 SCHEME = landmark_scheme("openseeface66")
 
 
-def open_mouth(scheme: Scheme, gap_cm: float) -> np.ndarray:
+def open_mouth(scheme: LandmarkScheme, gap_cm: float) -> np.ndarray:
     """The canonical head with the lower lip `gap_cm` lower."""
     points = scheme.canonical.copy()
     points[[*scheme.lower_lip_inner[1:-1], *scheme.lower_lip_outer[1:-1]], 1] -= gap_cm
     return points
 
 
-def shut_eyes(scheme: Scheme) -> np.ndarray:
+def shut_eyes(scheme: LandmarkScheme) -> np.ndarray:
     """The canonical head with both upper lids on the lower ones."""
     points = scheme.canonical.copy()
     for eye in (scheme.right_eye, scheme.left_eye):

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from relit_camera.face.crop import Crop, bounds
-from relit_camera.face.detector import Detection
-from relit_camera.face.landmark_tracker import LandmarkTracker, Reading
-from relit_camera.face.state import LOST, FaceStatus
-from relit_camera.space.images import Frame
+from relit_camera.base.images.image_types import Frame
+from relit_camera.face.face_state import LOST, FaceStatus
+from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
+from relit_camera.face.tracking.face_detector import Detection
+from relit_camera.face.tracking.landmark_tracker import LandmarkPrediction, LandmarkTracker
 from tests.face.faces import SCHEME, SIZE, face
 
 FACE = face(at=(0, 0, -80)).landmarks
@@ -40,18 +40,18 @@ class FakeNetwork:
         return Crop((x + width / 2, y + height / 2), width, height)
 
     def crop_from_points(self, points: np.ndarray) -> Crop:
-        x, y, width, height = bounds(points)
+        x, y, width, height = bounding_box(points)
         return Crop((x + width / 2, y + height / 2), width, height)
 
-    def read(self, image: np.ndarray, crop: Crop) -> Reading:
+    def read(self, image: np.ndarray, crop: Crop) -> LandmarkPrediction:
         self.reads += 1
         truth = self.world.points
         if truth is None:
-            return Reading(FACE, 0.01)
-        off = np.array(crop.centre) - np.array(self.crop_from_points(truth).centre)
+            return LandmarkPrediction(FACE, 0.01)
+        off = np.array(crop.center) - np.array(self.crop_from_points(truth).center)
         reach = 0.5 * EYE_SPAN
         error = off if np.linalg.norm(off) > reach else np.zeros(2)
-        return Reading((truth + error).astype(np.float32), 0.99)
+        return LandmarkPrediction((truth + error).astype(np.float32), 0.99)
 
     def blendshapes(self, points: np.ndarray) -> Mapping[str, float]:
         return {"jawOpen": 0.25}
@@ -66,7 +66,7 @@ class FakeDetector:
         self.calls += 1
         if self.world.points is None or not self.world.detectable:
             return None
-        return Detection(bounds(self.world.points), SCHEME.eye_centres(self.world.points), 0.9)
+        return Detection(bounding_box(self.world.points), SCHEME.eye_centers(self.world.points), 0.9)
 
 
 class Rig:
@@ -159,7 +159,7 @@ def test_another_face_is_taken_over_only_when_the_first_stays_away():
     rig.step()
     other = FACE + np.array([4 * EYE_SPAN, 0], np.float32)
     rig.detector.detect = lambda image, near=None: Detection(  # type: ignore[method-assign]
-        bounds(other), SCHEME.eye_centres(other), 0.9
+        bounding_box(other), SCHEME.eye_centers(other), 0.9
     )
     statuses = [rig.step()[0] for _ in range(8)]
     assert statuses == [FaceStatus.UNCERTAIN] * 8
@@ -205,7 +205,7 @@ def test_eyes_are_not_compared_under_a_large_roll():
     detect = rig.detector.detect
     # YuNet's eyes are wrong there by more than the tolerance.
     rig.detector.detect = lambda image, near=None: Detection(  # type: ignore[method-assign]
-        detect(image, near).box, SCHEME.eye_centres(rolled) + np.float32(0.7 * EYE_SPAN), 0.9
+        detect(image, near).box, SCHEME.eye_centers(rolled) + np.float32(0.7 * EYE_SPAN), 0.9
     )
     reads = rig.network.reads
     assert rig.step()[0] is FaceStatus.FOUND

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from relit_camera.face.one_euro import OneEuroFilter, RotationOneEuroFilter, Smoothing
-from relit_camera.space.rotation import angles_from_rotation, rotation_from_angles
+from relit_camera.base.rotations import angles_from_rotation, rotation_from_angles
+from relit_camera.face.motion.motion_smoothing import OneEuroFilter, OneEuroParameters, RotationOneEuroFilter
 
 RATE = 30.0
 
@@ -39,21 +39,21 @@ class ReferenceOneEuro:
 def test_it_is_the_filter_of_the_paper():
     values = np.cumsum(np.random.default_rng(3).normal(0, 1, 80))
     reference = ReferenceOneEuro(1.2, 0.3, 0.8)
-    ours = OneEuroFilter(Smoothing(min_cutoff_hz=1.2, beta=0.3, speed_cutoff_hz=0.8))
+    ours = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1.2, beta=0.3, speed_cutoff_hz=0.8))
     for index, value in enumerate(values):
         got = ours(np.array([value]), index / RATE)
         assert got[0] == pytest.approx(reference(value), abs=1e-9)
 
 
 def test_a_constant_passes_unchanged():
-    smooth = OneEuroFilter(Smoothing(min_cutoff_hz=1.0, beta=0.1))
+    smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1.0, beta=0.1))
     for index in range(5):
         np.testing.assert_allclose(smooth(np.array([[1.0, 2.0]]), index / RATE), [[1, 2]])
 
 
 def test_a_quick_move_is_followed_quicker_than_a_slow_one():
     def lag(speed: float) -> float:
-        smooth = OneEuroFilter(Smoothing(min_cutoff_hz=1.0, beta=0.5))
+        smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1.0, beta=0.5))
         for index in range(60):
             value = np.array([speed * index / RATE])
             late = (value - smooth(value, index / RATE))[0]
@@ -63,7 +63,7 @@ def test_a_quick_move_is_followed_quicker_than_a_slow_one():
 
 
 def test_a_vector_is_filtered_alike_in_every_direction():
-    settings = Smoothing(min_cutoff_hz=1.0, beta=0.5, dead_band=0.1)
+    settings = OneEuroParameters(min_cutoff_hz=1.0, beta=0.5, dead_band=0.1)
     along, across = OneEuroFilter(settings), OneEuroFilter(settings)
     turn = rotation_from_angles(30, 20, 10)
     for index, step in enumerate(np.random.default_rng(1).normal(0, 1, (40, 3))):
@@ -73,10 +73,10 @@ def test_a_vector_is_filtered_alike_in_every_direction():
 
 def test_each_vector_has_its_own_settings():
     cutoffs = np.array([[1.0], [8.0]])
-    both = OneEuroFilter(Smoothing(min_cutoff_hz=cutoffs))
+    both = OneEuroFilter(OneEuroParameters(min_cutoff_hz=cutoffs))
     for index, value in enumerate(np.random.default_rng(2).normal(0, 1, 20)):
         out = both(np.array([[value], [value]]), index / RATE)
-    alone = OneEuroFilter(Smoothing(min_cutoff_hz=8.0))
+    alone = OneEuroFilter(OneEuroParameters(min_cutoff_hz=8.0))
     for index, value in enumerate(np.random.default_rng(2).normal(0, 1, 20)):
         expected = alone(np.array([[value]]), index / RATE)
     assert out[1] == pytest.approx(expected[0])
@@ -84,7 +84,7 @@ def test_each_vector_has_its_own_settings():
 
 
 def test_within_the_dead_band_the_output_is_exactly_still():
-    smooth = OneEuroFilter(Smoothing(min_cutoff_hz=2.0, beta=0.1, dead_band=0.5))
+    smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=2.0, beta=0.1, dead_band=0.5))
     noise = np.random.default_rng(5).normal(0, 0.1, (300, 4, 2))
     outputs = [smooth(step, index / RATE) for index, step in enumerate(noise)]
     assert all(np.array_equal(output, outputs[0]) for output in outputs)
@@ -92,7 +92,7 @@ def test_within_the_dead_band_the_output_is_exactly_still():
 
 def test_leaving_the_dead_band_makes_no_step():
     band = 0.5
-    banded = OneEuroFilter(Smoothing(min_cutoff_hz=1000.0, dead_band=band))
+    banded = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1000.0, dead_band=band))
     outputs = np.array([banded(np.array([0.01 * index]), index / RATE)[0] for index in range(400)])
     steps = np.diff(outputs)
     assert outputs[49] == 0  # the input has moved by 0.49
@@ -102,13 +102,13 @@ def test_leaving_the_dead_band_makes_no_step():
 
 
 def test_a_fast_move_leaves_the_dead_band_behind():
-    banded = OneEuroFilter(Smoothing(min_cutoff_hz=1000.0, dead_band=0.5))
+    banded = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1000.0, dead_band=0.5))
     banded(np.array([0.0]), 0.0)
     assert banded(np.array([10.0]), 1 / RATE)[0] == pytest.approx(10, abs=0.1)
 
 
 def test_noise_widens_the_dead_band():
-    smooth = OneEuroFilter(Smoothing(min_cutoff_hz=1000.0, dead_band=0.1))
+    smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1000.0, dead_band=0.1))
     smooth(np.zeros((2, 1)), 0.0, noise=5.0)
     moved = smooth(np.full((2, 1), 0.4), 0.1, noise=np.array([[5.0], [1.0]]))
     assert moved[0, 0] == 0
@@ -116,14 +116,14 @@ def test_noise_widens_the_dead_band():
 
 
 def test_time_that_stands_still_changes_nothing_and_time_that_goes_back_begins_anew():
-    smooth = OneEuroFilter(Smoothing(min_cutoff_hz=1.0))
+    smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1.0))
     smooth(np.array([0.0]), 1.0)
     assert smooth(np.array([5.0]), 1.0)[0] == 0
     assert smooth(np.array([7.0]), 0.0)[0] == 7
 
 
 def test_reset_forgets():
-    smooth = OneEuroFilter(Smoothing(min_cutoff_hz=0.1))
+    smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=0.1))
     smooth(np.array([0.0]), 0.0)
     smooth.reset()
     assert smooth(np.array([9.0]), 0.1)[0] == 9
@@ -131,7 +131,7 @@ def test_reset_forgets():
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_turn_about_one_axis_is_filtered_as_its_angle(axis: int):
-    settings = Smoothing(min_cutoff_hz=1.5, beta=0.2, dead_band=0.3)
+    settings = OneEuroParameters(min_cutoff_hz=1.5, beta=0.2, dead_band=0.3)
     turns, numbers = RotationOneEuroFilter(settings), OneEuroFilter(settings)
     for index, angle in enumerate(np.cumsum(np.random.default_rng(7).normal(0, 1.0, 60))):
         angles = [0.0, 0.0, 0.0]
@@ -141,6 +141,6 @@ def test_a_turn_about_one_axis_is_filtered_as_its_angle(axis: int):
 
 
 def test_a_turn_goes_the_short_way():
-    smooth = RotationOneEuroFilter(Smoothing(min_cutoff_hz=1.0))
+    smooth = RotationOneEuroFilter(OneEuroParameters(min_cutoff_hz=1.0))
     smooth(rotation_from_angles(179), 0.0)
     assert abs(angles_from_rotation(smooth(rotation_from_angles(-179), 1 / RATE)).yaw) > 178.9

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from tests.faults.watched import LONGEST_GAP_S, Survived, Watched
+from tests.faults.watched_camera import LONGEST_GAP_S, Survived, Watched
 
 ROWS: list[tuple[str, float, float]] = []
 

@@ -10,28 +10,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.config.look import Look, Mode
-from relit_camera.config.settings import Fallback
-from relit_camera.errors import TrackError
-from relit_camera.face.follow import FaceMotion
-from relit_camera.face.state import FaceState
-from relit_camera.models.session import Session
-from relit_camera.reenact.first_order import FirstOrderReenactor
-from relit_camera.reenact.reenactor import Move
-from relit_camera.relight.basis import BasisRelighter
-from relit_camera.space.images import Frame, LinearImage
-from relit_camera.stream import line as line_module
-from relit_camera.stream.placeholder import placeholder
-from tests.faults.watched import Survived, watched_camera
-from tests.stream.small_camera import SIZE, SteadyTracker, difference, grey, memory_source, wait_until
+from relit_camera.base.config.look import Look, Mode
+from relit_camera.base.config.settings import Fallback
+from relit_camera.base.errors import TrackError
+from relit_camera.base.images.image_types import Frame, LinearImage
+from relit_camera.base.models.session_with_fallback import Session
+from relit_camera.face.face_state import FaceState
+from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.live.publishing.placeholder_image import placeholder
+from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
+from relit_camera.live.reenactment.reenactor import WarpTask
+from relit_camera.live.supervision import pipeline_supervisor as line_module
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from tests.faults.watched_camera import Survived, watched_camera
+from tests.small_camera import SIZE, SteadyTracker, difference, grey, memory_source, wait_until
 
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """What takes seconds in life takes tenths here."""
     monkeypatch.setattr(line_module, "RETRY_S", 0.1)
-    monkeypatch.setattr(line_module, "STUCK_S", 0.4)
-    monkeypatch.setattr(line_module, "GIVE_UP_S", 1.0)
+    monkeypatch.setattr(line_module, "HANG_TIMEOUT_S", 0.4)
+    monkeypatch.setattr(line_module, "ABANDON_TIMEOUT_S", 1.0)
 
 
 class FaultyTracker(SteadyTracker):
@@ -101,9 +101,9 @@ def test_a_tracker_that_hangs_for_ever_is_replaced(tracker: FaultyTracker, tmp_p
 def test_trackers_that_all_hang_leave_the_still(tracker: FaultyTracker, tmp_path: Path, survived: Survived) -> None:
     with watched_camera(tmp_path, tracker=tracker) as watched:
         tracker.release.clear()
-        wait_until(lambda: tracker.hanging == line_module.MOST_LEFT_BEHIND)
+        wait_until(lambda: tracker.hanging == line_module.MAX_ABANDONED_WORKERS)
         time.sleep(2)
-        assert tracker.hanging == line_module.MOST_LEFT_BEHIND  # and no more
+        assert tracker.hanging == line_module.MAX_ABANDONED_WORKERS  # and no more
         assert watched.camera.status()["state"] == "standing-in"
         tracker.release.set()
         watched.recovers()
@@ -117,10 +117,10 @@ def test_thousands_of_errors_in_a_row(
     with watched_camera(tmp_path, tracker=tracker) as watched:
         tracker.error = TrackError("a track that ends")
         watched.told("a track that ends")
-        keeper = watched.camera.daemon._lines
-        keeper._errors = 5000  # a night of them
+        keeper = watched.camera.daemon._supervisor
+        keeper._error_count = 5000  # a night of them
         watched.goes_on(20)
-        assert keeper._errors > 5000
+        assert keeper._error_count > 5000
         tracker.error = None
         watched.recovers()
         survived("5000 errors in a row", watched)
@@ -162,13 +162,13 @@ def test_it_stops_in_time_while_a_tracker_hangs(tracker: FaultyTracker, tmp_path
         began = time.monotonic()
         watched.camera.daemon.stop()
         assert time.monotonic() - began < 3
-        assert watched.camera.daemon.left_behind
+        assert watched.camera.daemon.hung_threads
 
 
 @pytest.mark.parametrize("half", ["follow", "move"])
 @pytest.mark.parametrize("how", ["raises", "hangs"])
 def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, monkeypatch: pytest.MonkeyPatch) -> None:
-    healthy = FirstOrderReenactor.follow
+    healthy = FirstOrderReenactor.plan_warp
     fault = threading.Event()
     released = threading.Event()
 
@@ -178,7 +178,7 @@ def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, mo
                 raise FloatingPointError("a bug in the warp")
             released.wait(60)
 
-    def follow(self: FirstOrderReenactor, motion: FaceMotion, frame: Frame) -> Move:
+    def plan_warp(self: FirstOrderReenactor, motion: FaceMotion, frame: Frame) -> WarpTask:
         if half == "follow":
             fail()
         move = healthy(self, motion, frame)
@@ -189,7 +189,7 @@ def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, mo
 
         return faulty if half == "move" else move
 
-    monkeypatch.setattr(FirstOrderReenactor, "follow", follow)
+    monkeypatch.setattr(FirstOrderReenactor, "plan_warp", plan_warp)
     with watched_camera(tmp_path) as watched:
         fault.set()
         watched.told("a bug in the warp" if how == "raises" else f"in: {half}")

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.space.images import DisplayImage
-from relit_camera.stream.placeholder import placeholder
-from relit_camera.stream.sources import webcam
-from relit_camera.stream.sources.webcam import WebcamSource
-from tests.faults.watched import Survived, Watched, watched_camera
-from tests.stream.fake_devices import FakeCapture, FakeTree
-from tests.stream.small_camera import SIZE, difference, wait_until
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.devices.sources import webcam_source
+from relit_camera.devices.sources.webcam_source import WebcamSource
+from relit_camera.live.publishing.placeholder_image import placeholder
+from tests.devices.fake_devices import FakeCapture, FakeTree
+from tests.faults.watched_camera import Survived, Watched, watched_camera
+from tests.small_camera import SIZE, difference, wait_until
 
 STALL_S = float(os.environ.get("FAULT_STALL_S", "6"))
 """The table of docs/reliability.md is made with 30."""
@@ -26,8 +26,8 @@ STALL_S = float(os.environ.get("FAULT_STALL_S", "6"))
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """What takes seconds in life takes tenths here."""
-    monkeypatch.setattr(webcam, "FIRST_FRAME_S", 0.5)
-    monkeypatch.setattr(webcam, "BACK_OFF_S", (0.1, 0.2))
+    monkeypatch.setattr(webcam_source, "FIRST_FRAME_TIMEOUT_S", 0.5)
+    monkeypatch.setattr(webcam_source, "BACKOFF_S", (0.1, 0.2))
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ class Cameras:
 
 
 def watched_webcam(tmp_path: Path, tree: FakeTree, cameras: Cameras):  # type: ignore[no-untyped-def]
-    source = WebcamSource("webcam", SIZE, 30, tree=tree, open_capture=cameras, patience_s=0.5)
+    source = WebcamSource("webcam", SIZE, 30, tree=tree, open_capture=cameras, stall_timeout_s=0.5)
     return watched_camera(tmp_path / "data", source=source)
 
 
@@ -99,13 +99,13 @@ def test_it_stops_in_time_while_the_webcam_hangs(tmp_path: Path, tree: FakeTree)
         hanging.mode = "stuck"
         time.sleep(0.2)
         daemon, began = watched.camera.daemon, time.monotonic()
-        daemon.begin_stop()
+        daemon.request_stop()
         time.sleep(2.2)  # what else ends meanwhile
         daemon.stop()
         assert time.monotonic() - began < 3
-        assert [name for name in daemon.left_behind if name.startswith("source-")]
+        assert [name for name in daemon.hung_threads if name.startswith("source-")]
         hanging.unstick.set()
-        wait_until(lambda: daemon.left_behind == [])
+        wait_until(lambda: daemon.hung_threads == [])
 
 
 class Odd(FakeCapture):

@@ -11,17 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.errors import DeviceError, StorageError
-from relit_camera.face.state import FaceState
-from relit_camera.space.images import DisplayImage, Frame
-from relit_camera.stream import daemon as daemon_module
-from relit_camera.stream.placeholder import placeholder
-from relit_camera.stream.sinks.base import SinkInfo
-from relit_camera.stream.sources.base import SourceInfo
-from relit_camera.stream.sources.playback import Playback, Timed
-from relit_camera.subject.file import write_subject
-from tests.faults.watched import Survived, TimedSink, watched_camera
-from tests.stream.small_camera import (
+from relit_camera.app import camera_service as daemon_module
+from relit_camera.base.errors import DeviceError, StorageError
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.devices.sinks.sink import SinkInfo
+from relit_camera.devices.sources.playback_source import PlaybackSource, TimedImage
+from relit_camera.devices.sources.source import SourceInfo
+from relit_camera.face.face_state import FaceState
+from relit_camera.live.publishing.placeholder_image import placeholder
+from relit_camera.subject.subject_file import write_subject
+from tests.faults.watched_camera import Survived, TimedSink, watched_camera
+from tests.small_camera import (
     FPS,
     SIZE,
     SteadyTracker,
@@ -60,7 +60,7 @@ def test_a_subject_file_is_spoilt_while_in_use(
     file = tmp_path / "me.relit"
     write_subject(file, small_subject())
     with watched_camera(tmp_path / "data") as watched:
-        watched.camera.director.set_subject(str(file))
+        watched.camera.scene_controller.set_subject(str(file))
         watched.goes_on(20)
         watched.begin()
         spoil(file)
@@ -122,7 +122,7 @@ def test_it_stops_in_time_while_the_driver_hangs(tmp_path: Path) -> None:
         began = time.monotonic()
         camera.daemon.stop()
         assert time.monotonic() - began < 3
-        assert camera.daemon.left_behind == ["publisher"]
+        assert camera.daemon.hung_threads == ["publisher"]
         sink.release.set()
 
 
@@ -134,7 +134,7 @@ def test_the_end_of_a_recording_is_waited_for(tmp_path: Path, monkeypatch: pytes
             return SinkInfo("file", "rec.mp4", SIZE)
 
     for seconds, lost in ((1.5, False), (60.0, True)):
-        monkeypatch.setattr(daemon_module, "DISK_S", 2.0)
+        monkeypatch.setattr(daemon_module, "DISK_TIMEOUT_S", 2.0)
         sink = Recording()
         with ExitStack() as ended:
             if lost:
@@ -177,12 +177,12 @@ def test_a_late_picture_does_not_take_the_placeholders_place(tmp_path: Path, mon
     waiting = placeholder(SIZE, "waiting for the camera")
     tracker, more = LateTracker(), threading.Event()
 
-    def play() -> Iterator[Timed]:
+    def play() -> Iterator[TimedImage]:
         yield grey(), 0.0
         more.wait(60)
         yield grey(), 1 / FPS
 
-    source = Playback(SourceInfo("still", "memory", SIZE, FPS), play())
+    source = PlaybackSource(SourceInfo("still", "memory", SIZE, FPS), play())
     with running_camera(tmp_path, source=source, tracker=tracker) as camera:
         wait_until(lambda: camera.status()["state"] == "live")
         tracker.release.clear()
@@ -199,7 +199,7 @@ def test_a_late_picture_does_not_take_the_placeholders_place(tmp_path: Path, mon
 
 def test_a_tracker_made_anew_may_fail_too(tmp_path: Path, survived: Survived) -> None:
     """Its model was deleted meanwhile: the still goes on, and says why."""
-    from relit_camera.errors import ModelError
+    from relit_camera.base.errors import ModelError
 
     class Broken(SteadyTracker):
         def track(self, frame: object) -> object:  # type: ignore[override]

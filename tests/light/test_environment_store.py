@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.errors import InputError, NotFoundError, PanoramaError, StorageError
-from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
-from relit_camera.light.maps import total
-from relit_camera.light.panorama import read_panorama
-from relit_camera.light.store import EnvironmentStore
+from relit_camera.base.errors import InputError, NotFoundError, PanoramaError, StorageError
+from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environment_panorama import read_panorama
+from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.light_map_rotation import total
 
 
 @pytest.fixture

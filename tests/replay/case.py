@@ -8,8 +8,8 @@ from typing import Annotated
 import yaml
 from pydantic import Field, ValidationError, model_validator
 
-from relit_camera.config.look import Mode, Settings
-from relit_camera.space.rotation import Angles
+from relit_camera.base.config.look import Mode, SettingsModel
+from relit_camera.base.rotations import Angles
 
 CASES = Path(__file__).parent / "cases"
 FILE = "case.yaml"
@@ -26,7 +26,7 @@ class CaseError(Exception):
     """A case's folder cannot be used; the message names the file and the field."""
 
 
-class Bounds(Settings):
+class Bounds(SettingsModel):
     """Between which angles, in degrees, the pose of every frame must lie; an angle left out is not looked at."""
 
     yaw: tuple[Angle, Angle] | None = None
@@ -42,7 +42,7 @@ class Bounds(Settings):
         return self
 
 
-class Pose(Settings):
+class Pose(SettingsModel):
     """What the head's pose relative to neutral must be."""
 
     track: str | None = None
@@ -54,7 +54,7 @@ class Pose(Settings):
     """The most that an angle's second difference from frame to frame may be in the median frame."""
 
 
-class Pictures(Settings):
+class Pictures(SettingsModel):
     """Which relit frames are kept, as `expected/NNNN.jpg`, and how alike a new run's must be."""
 
     frames: Annotated[tuple[FrameNumber, ...], Field(min_length=1)]
@@ -62,7 +62,7 @@ class Pictures(Settings):
     """In linear light over the whole frame, the expected frame's 99.5th percentile being 1."""
 
 
-class Colours(Settings):
+class Colours(SettingsModel):
     """What mean colour parts of the relit frames have: for cases whose pictures may not be kept here."""
 
     track: str
@@ -73,7 +73,7 @@ class Colours(Settings):
     """By how much red, green and blue may differ, in linear light, white being 1."""
 
 
-class Expected(Settings):
+class Expected(SettingsModel):
     """What must come out."""
 
     found: Share = 1.0
@@ -85,7 +85,7 @@ class Expected(Settings):
     colours: Colours | None = None
 
 
-class Case(Settings):
+class Case(SettingsModel):
     """What to replay. Places are relative to the case's folder, or `shared:PATH`, or `generated:mannequin`."""
 
     description: str

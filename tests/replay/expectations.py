@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.files import write_atomic
-from relit_camera.space.colour import linear_from_uint8
-from relit_camera.space.images import DisplayImage
-from relit_camera.space.picture_files import encode_display, read_display
-from relit_camera.space.quality import psnr
-from relit_camera.space.rotation import Angles
+from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.images.image_files import encode_display, read_display
+from relit_camera.base.images.image_quality import psnr
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.rotations import Angles
+from relit_camera.base.storage import write_atomic
 from tests.replay.case import Case, CaseError, Colours, Pictures, Pose
 from tests.replay.play import Played
 

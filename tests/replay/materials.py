@@ -7,12 +7,12 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from relit_camera.capture.build import build_subject
-from relit_camera.capture.importing import import_samples
-from relit_camera.capture.landmarks_file import read_landmarks
-from relit_camera.models.registry import FOLDER_VARIABLE, Registry, State
-from relit_camera.space.colour import parse_gamma
-from relit_camera.subject.file import SUFFIX, write_subject
+from relit_camera.base.images.color import parse_gamma
+from relit_camera.base.models.model_store import FOLDER_VARIABLE, ModelState, ModelStore
+from relit_camera.capture.picture_import import import_samples
+from relit_camera.capture.subject_builder import build_subject
+from relit_camera.capture.subject_landmarks import read_landmarks
+from relit_camera.subject.subject_file import SUFFIX, write_subject
 from relit_studio.mannequin.__main__ import generate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -55,15 +55,15 @@ def models() -> Path:
     Raises:
         UnavailableError: they are in neither place.
     """
-    own = Registry()
-    if all(own.state(name) is State.PULLED for name in MODELS):
+    own = ModelStore()
+    if all(own.state(name) is ModelState.PULLED for name in MODELS):
         return own.folder
     try:
         mirror = shared_folder() / "models"
     except UnavailableError as error:
         raise UnavailableError(f"the public models are not pulled (relit models pull), and {error}") from error
     folder = Path(_scratch.name) / "models"
-    Registry(folder).pull(MODELS, mirror)
+    ModelStore(folder).pull(MODELS, mirror)
     return folder
 
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from relit_camera.cli.parse import background
-from relit_camera.config.look import Lighting, Look
-from relit_camera.config.settings import RelitSettings, StorageSettings
-from relit_camera.face.state import FaceStatus
-from relit_camera.space.images import DisplayImage
-from relit_camera.space.rotation import Angles
-from relit_camera.stream.assembly import make_pipeline, make_tracker
-from relit_camera.stream.director import Director
-from relit_camera.stream.pipeline import Pipeline
-from relit_camera.stream.replay import ReplayedFrame, replay
-from relit_camera.stream.status import Degradation
+from relit_camera.app.video_replay import ReplayedFrame, replay
+from relit_camera.app.wiring import make_pipeline, make_tracker
+from relit_camera.base.config.look import Lighting, Look
+from relit_camera.base.config.settings import RelitSettings, StorageSettings
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.rotations import Angles
+from relit_camera.cli.arguments import parse_background
+from relit_camera.face.face_state import FaceStatus
+from relit_camera.live.pipeline import Pipeline
+from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.live.status.camera_status import Degradation
 from tests.replay.case import Case
 from tests.replay.materials import find, subject_file, use_models
 
@@ -69,12 +69,12 @@ def play(case: Case, folder: Path) -> Played:
     else:
         use_models()
     settings = RelitSettings(storage=StorageSettings(data_dir=folder / "data"), tracker={"name": tracker}, subject=None)
-    director = Director(settings.storage)
-    director.set_subject(str(subject_file(lights, case.gamma)))
-    named = case.environment if case.environment in director.environments.names() else None
-    environment = director.admit_environment(named or str(find(case.environment, folder, "")))
+    scene_controller = SceneController(settings.storage)
+    scene_controller.set_subject(str(subject_file(lights, case.gamma)))
+    named = case.environment if case.environment in scene_controller.environments.names() else None
+    environment = scene_controller.register_temporary_environment(named or str(find(case.environment, folder, "")))
     lighting = Lighting(environment=environment, yaw_deg=case.yaw_deg)
-    director.set_look(Look(lighting=lighting, background=background(case.background), mode=case.mode))
+    scene_controller.set_look(Look(lighting=lighting, background=parse_background(case.background), mode=case.mode))
     live: list[DisplayImage] = []
     relit: list[DisplayImage] = []
     pipelines: list[Pipeline] = []
@@ -87,5 +87,5 @@ def play(case: Case, folder: Path) -> Played:
         live.append(before)
         relit.append(after)
 
-    frames = replay(clip, None, pipeline_for, lambda _: director.scene, watch)
+    frames = replay(clip, None, pipeline_for, lambda _: scene_controller.scene, watch)
     return Played(frames, live, relit, pipelines[0].troubles)

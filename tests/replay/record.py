@@ -7,9 +7,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from relit_camera.compose.sheet import contact_sheet
-from relit_camera.errors import RelitError
-from relit_camera.space.picture_files import write_display
+from relit_camera.base.errors import RelitError
+from relit_camera.base.images.contact_sheet import contact_sheet
+from relit_camera.base.images.image_files import write_display
 from tests.replay.case import CASES, CaseError, case_folders, read_case
 from tests.replay.expectations import record
 from tests.replay.failures import FAILURES

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from relit_camera.config.settings import RelitSettings
-from relit_camera.face.state import FaceState
-from relit_camera.face.trackers import TrackerOptions, open_tracker
-from relit_camera.space.images import DisplayImage, Frame
-from relit_camera.space.rotation import angles_from_rotation
+from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.rotations import angles_from_rotation
+from relit_camera.face.face_state import FaceState
+from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
 from tests.replay.case import CASES, read_case
 from tests.replay.materials import UnavailableError
 from tests.replay.play import Played, play

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from relit_camera.errors import NotFoundError, StorageError
+from relit_camera.base.errors import NotFoundError, StorageError
 from relit_studio.assets.manifest import Manifest, manifest
 from relit_studio.assets.store import asset, assets_folder, fetch_assets
 

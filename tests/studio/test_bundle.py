@@ -10,11 +10,11 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from relit_camera.compose.recorded_matte import RecordedMatte
-from relit_camera.errors import InputError
-from relit_camera.face.track_file import read_track
-from relit_camera.space.images import Frame
-from relit_camera.subject.file import read_subject
+from relit_camera.base.errors import InputError
+from relit_camera.base.images.image_types import Frame
+from relit_camera.face.tracking.track_recording import read_track
+from relit_camera.live.compositing.matting import RecordedMatting
+from relit_camera.subject.subject_file import read_subject
 from relit_studio import bundle as bundle_module
 from relit_studio.bundle import make_bundle
 
@@ -49,7 +49,7 @@ def test_the_demo_has_all_it_needs(rendered: tuple[Path, Path], tmp_path: Path) 
     given, kept = read_track(rendered[1] / "track.json"), read_track(tmp_path / "out" / "track.json")
     for before, after in zip(given.frames, kept.frames, strict=True):
         np.testing.assert_allclose(after.landmarks, before.landmarks, atol=5.1e-4)
-    mattes = RecordedMatte(tmp_path / "out" / "mattes.npz")
+    mattes = RecordedMatting(tmp_path / "out" / "mattes.npz")
     for index in range(3):
         found = mattes.matte(Frame(np.zeros((SIDE, SIDE, 3), np.uint8), index, 0.0, 0.0))
         assert found[: 18 + 8 * index].max() == 0

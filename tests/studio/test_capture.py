@@ -14,11 +14,11 @@ import typer
 from scipy.ndimage import map_coordinates
 from typer.testing import CliRunner
 
-from relit_camera.errors import LightsError
-from relit_camera.light.store import EnvironmentStore
-from relit_camera.space.quality import psnr
-from relit_camera.space.rotation import Angles
-from relit_camera.video.reader import VideoReader
+from relit_camera.base.errors import LightsError
+from relit_camera.base.images.image_quality import psnr
+from relit_camera.base.rotations import Angles
+from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.light.environment_store import EnvironmentStore
 from relit_studio.capture.field_person import FieldPerson
 from relit_studio.capture.head_motion import REST, HeadMotion, Motion
 from relit_studio.capture.mannequin_person import MannequinPerson, phone_camera

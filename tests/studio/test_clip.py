@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.errors import ImageError
-from relit_camera.face.recorded import RecordedTracker
-from relit_camera.face.schemes import landmark_scheme
-from relit_camera.face.trackers import TrackerOptions
-from relit_camera.space.rotation import angles_from_rotation
-from relit_camera.video.reader import VideoReader
+from relit_camera.base.errors import ImageError
+from relit_camera.base.rotations import angles_from_rotation
+from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.tracking.track_recording import RecordedTracker
+from relit_camera.face.tracking.trackers import TrackerOptions
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.clip import render_clip, true_state
 from relit_studio.mannequin.lights import room

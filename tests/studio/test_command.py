@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.capture.importing import import_samples
+from relit_camera.capture.picture_import import import_samples
 from relit_studio.mannequin.__main__ import main
 
 ARGUMENTS = ["--size", "96", "--lights", "12", "--frames", "3"]

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.errors import InputError
-from relit_camera.space.directions import fibonacci_directions
-from relit_camera.space.picture_files import write_linear
+from relit_camera.base.errors import InputError
+from relit_camera.base.images.image_files import write_linear
+from relit_camera.light.directions import fibonacci_directions
 from relit_studio.cycles.job import Mesh
 from relit_studio.field.compare import compare_fields
 from relit_studio.field.solver import BELOW_AXIS_CM, DISTANCE_CM, SolverSettings, solver_camera

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.face.pose import fit_pose, project
-from relit_camera.face.schemes import landmark_scheme
-from relit_camera.face.track_file import TrackRecorder, read_track
-from relit_camera.light.exposure import display_scale
-from relit_camera.light.maps import irradiance
-from relit_camera.light.store import EnvironmentStore
-from relit_camera.space.images import Frame
-from relit_camera.space.rotation import Angles
+from relit_camera.base.images.image_types import Frame
+from relit_camera.base.rotations import Angles
+from relit_camera.face.head_pose import fit_pose, project
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.tracking.track_recording import TrackRecorder, read_track
+from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.exposure import auto_exposure_scale
+from relit_camera.light.light_map_rotation import irradiance
 from relit_studio.camera import Camera
 from relit_studio.drive.performance import FPS, Moment
 from relit_studio.drive.performances.away import AWAY
@@ -174,5 +174,5 @@ def test_a_turned_room_lights_from_where_it_is_seen() -> None:
     straight = Room(environment).light_map
     # A quarter turn to the right: what came from the front comes from the right.
     np.testing.assert_allclose(irradiance(room.light_map, (1, 0, 0)), irradiance(straight, (0, 0, 1)), rtol=0.02)
-    assert room.scale == display_scale(room.light_map)
+    assert room.scale == auto_exposure_scale(room.light_map)
     assert room.backdrop(Camera(64)).shape == (64, 64, 3)

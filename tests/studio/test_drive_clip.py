@@ -10,9 +10,9 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from relit_camera.space.colour import linear_from_uint8
-from relit_camera.space.display import linear_from_display
-from relit_camera.video.reader import VideoReader
+from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.images.tone_mapping import linear_from_display
+from relit_camera.base.video.video_readers import VideoReader
 from relit_studio.camera import Camera
 from relit_studio.drive.clip import write_clip
 from relit_studio.drive.performances.away import AWAY

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.face.pose import fit_pose, project
-from relit_camera.face.schemes import landmark_scheme
-from relit_camera.space.colour import luminance
-from relit_camera.space.rotation import Angles, angles_from_rotation
+from relit_camera.base.images.color import luminance
+from relit_camera.base.rotations import Angles, angles_from_rotation
+from relit_camera.face.head_pose import fit_pose, project
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.expression import Expression
 from relit_studio.mannequin.figure import Posture, mannequin

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from relit_camera.space.directions import texel_directions
+from relit_camera.light.directions import texel_directions
 from relit_studio.capture.mirror_ball import MirrorBall
 from relit_studio.capture.mirror_image import Room, highlight_px, room_in_ball, torch_in_ball
 from relit_studio.capture.torch import RADIUS_CM, Torch

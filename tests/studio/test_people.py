@@ -7,11 +7,11 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from relit_camera.errors import NotFoundError
+from relit_camera.base.errors import NotFoundError
 from relit_studio.people.cast import CAST, find_traits
-from relit_studio.people.chance import PIGMENTS, SKINS, random_traits
 from relit_studio.people.identity import identity_weights, neutral_face, proportion_shapes
 from relit_studio.people.person import Person
+from relit_studio.people.random_traits import PIGMENTS, SKINS, random_traits
 from relit_studio.people.traits import BeardStyle, HairStyle, LensShape, Neckline, Proportions, Resting, Traits
 
 CROWD = [random_traits(seed) for seed in range(200)]

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from relit_camera.errors import NotFoundError
+from relit_camera.base.errors import NotFoundError
 from relit_studio.drive.performance import FPS, Moment, Performance, frame_times
 from relit_studio.drive.performances.catalogue import PERFORMANCES, find_performance
 from relit_studio.people.expressions import NEUTRAL

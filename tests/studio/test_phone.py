@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.errors import StorageError
-from relit_camera.space.colour import linear_from_uint8
-from relit_camera.video.reader import VideoReader
+from relit_camera.base.errors import StorageError
+from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.video.video_readers import VideoReader
 from relit_studio.capture.lossless import LosslessWriter
 from relit_studio.capture.phone import SENSOR, Phone, Stages
 from relit_studio.processing import Gains

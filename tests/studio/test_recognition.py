@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from relit_camera.face.detector import Detection
-from relit_camera.face.state import LOST, FaceState, FaceStatus
-from relit_camera.space.images import DisplayImage, Frame
-from relit_camera.space.rotation import Angles
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.rotations import Angles
+from relit_camera.face.face_state import LOST, FaceState, FaceStatus
+from relit_camera.face.tracking.face_detector import Detection
 from relit_studio.camera import Camera
 from relit_studio.people.landmarks import landmarks
 from relit_studio.people.person import Person

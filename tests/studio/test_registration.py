@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from relit_camera.errors import InputError
+from relit_camera.base.errors import InputError
 from relit_studio.people.face_model import IDENTITIES, Part, read_face_model
 from relit_studio.people.geometry import Floats, Indices, Similarity, areas, scatter, vertex_normals
 from relit_studio.people.mesh478 import nearest_on_surface

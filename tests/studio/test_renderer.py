@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.space.colour import luminance
-from relit_camera.space.directions import direction_from_degrees, fibonacci_directions
-from relit_camera.space.quality import psnr
+from relit_camera.base.images.color import luminance
+from relit_camera.base.images.image_quality import psnr
+from relit_camera.light.directions import direction_from_degrees, fibonacci_directions
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Posture
 from relit_studio.mannequin.lights import DistantLights, lights_from_map

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.light.maps import irradiance
-from relit_camera.space.directions import direction_from_degrees
+from relit_camera.light.directions import direction_from_degrees
+from relit_camera.light.light_map_rotation import irradiance
 from relit_studio.drive.room import Room
 from relit_studio.drive.rooms import ROOMS, paint_room
 

@@ -3,11 +3,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.config.look import Lamp
-from relit_camera.errors import ImageError
-from relit_camera.light.lamps import lamp_map
-from relit_camera.light.maps import irradiance, total
-from relit_camera.space.directions import direction_from_degrees, fibonacci_directions
+from relit_camera.base.config.look import Lamp
+from relit_camera.base.errors import ImageError
+from relit_camera.light.directions import direction_from_degrees, fibonacci_directions
+from relit_camera.light.light_map_rotation import irradiance, total
+from relit_camera.light.scene_light import lamp_light_map
 from relit_studio.mannequin.lights import lights_from_map, room
 from relit_studio.mannequin.mesh import grid_triangles
 from relit_studio.mannequin.shading import ShadowMap, Surface, reflected
@@ -83,7 +83,7 @@ def test_lights_of_a_map_keep_its_energy_and_light_walls_as_it_does() -> None:
 
 
 def test_a_lamp_alone_becomes_lights_where_it_stands() -> None:
-    lights = lights_from_map(lamp_map([Lamp(azimuth_deg=70, elevation_deg=20, size_deg=8)]), 16)
+    lights = lights_from_map(lamp_light_map([Lamp(azimuth_deg=70, elevation_deg=20, size_deg=8)]), 16)
     middle = lights.irradiance[:, 1] @ lights.directions
     assert middle / np.linalg.norm(middle) @ direction_from_degrees(70, 20) > np.cos(np.radians(1))
 

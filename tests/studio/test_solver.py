@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.capture.importing import import_samples
-from relit_camera.space.directions import direction_from_degrees, texel_directions, texel_solid_angles
+from relit_camera.capture.picture_import import import_samples
+from relit_camera.light.directions import direction_from_degrees, texel_directions, texel_solid_angles
 from relit_studio.field.solver import SolverSettings, solve, write_solver_field
 from relit_studio.field.solver_gloss import glossy
 from relit_studio.field.solver_scene import Surfaces

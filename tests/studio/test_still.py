@@ -9,9 +9,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from relit_camera.space.images import DisplayImage
-from relit_camera.space.picture_files import read_display, write_display
-from relit_camera.space.rotation import Angles
+from relit_camera.base.images.image_files import read_display, write_display
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.rotations import Angles
 from relit_studio import still
 from relit_studio.camera import Camera
 from relit_studio.cycles.job import Quality

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from relit_camera.face.pose import project
-from relit_camera.face.state import HeadPose
+from relit_camera.face.face_state import HeadPose
+from relit_camera.face.head_pose import project
 from relit_studio.camera import Camera
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from relit_camera.capture.importing import import_samples
-from relit_camera.errors import InputError, StorageError
+from relit_camera.base.errors import InputError, StorageError
+from relit_camera.capture.picture_import import import_samples
 from relit_studio.__main__ import app
 from relit_studio.field.solver import SolverSettings
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.space.directions import spherical_from_direction
+from relit_camera.light.directions import spherical_from_direction
 from relit_studio.capture.point_shadow import PointShadow
 from relit_studio.capture.torch import REFERENCE_CM, HandPath, Torch
 from relit_studio.mannequin.mesh import grid_triangles

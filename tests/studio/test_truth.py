@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.capture.importing import import_samples
-from relit_camera.light.builtin.catalogue import builtin_environment
-from relit_camera.light.exposure import display_scale
-from relit_camera.space.directions import texel_directions
-from relit_camera.space.display import linear_from_display
-from relit_camera.video.reader import VideoReader
+from relit_camera.base.images.tone_mapping import linear_from_display
+from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.capture.picture_import import import_samples
+from relit_camera.light.builtin.builtin_environments import builtin_environment
+from relit_camera.light.directions import texel_directions
+from relit_camera.light.exposure import auto_exposure_scale
 from relit_studio.mannequin.__main__ import main
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.clip import CLIP_SIZE, render_clip
@@ -43,7 +43,7 @@ def test_the_relit_video_is_the_clip_under_that_light(made: Path) -> None:
         frames = [frame.image for frame in relit]
         mattes = [frame.image[..., 0] > 250 for frame in outline]
     assert len(frames) == len(mattes) == 2
-    expected = next(render_clip(light_map, Camera(CLIP_SIZE), [0.0])) * np.float32(display_scale(light_map))
+    expected = next(render_clip(light_map, Camera(CLIP_SIZE), [0.0])) * np.float32(auto_exposure_scale(light_map))
     inside = mattes[0]
     assert 0.3 < inside.mean() < 0.8
     # H.264 halves the resolution of colour.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.space.colour import linear_from_uint8, luminance
+from relit_camera.base.images.color import linear_from_uint8, luminance
 from relit_studio.drive.webcam import SENSOR, Webcam
 from relit_studio.processing import Gains
 

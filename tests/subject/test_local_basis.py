@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from relit_camera.subject.local_basis import LocalBasis, whole_basis
-from tests.subject.by_hand import rows_by_hand
+from relit_camera.subject.compression.local_basis import LocalBasis, global_basis
+from tests.subject.handmade_basis import rows_by_hand
 
 PIXELS = 30
 
@@ -47,7 +47,7 @@ def test_inner_products_of_the_shared_pictures(basis: LocalBasis) -> None:
 def test_a_whole_basis_is_the_pictures_inside_the_matte() -> None:
     pictures = np.random.default_rng(5).normal(size=(3, 4, 6, 5)).astype(np.float16)
     matte = (np.random.default_rng(6).random((6, 5)) < 0.6).astype(np.float32)
-    rows = rows_by_hand(whole_basis(pictures, matte), 30).reshape(6, 5, 3, 4)
+    rows = rows_by_hand(global_basis(pictures, matte), 30).reshape(6, 5, 3, 4)
     np.testing.assert_array_equal(rows, pictures.transpose(2, 3, 0, 1) * matte[..., None, None])
 
 

@@ -12,20 +12,20 @@ import pytest
 from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
-from relit_camera.capture.build import build_subject
-from relit_camera.demo import bundle
-from relit_camera.errors import NotFoundError, StorageError, SubjectError
-from relit_camera.subject.file import (
+from relit_camera.app.demo import demo_files
+from relit_camera.base.errors import NotFoundError, StorageError, SubjectError
+from relit_camera.capture.subject_builder import build_subject
+from relit_camera.subject.compression.webp_packing import decode_basis
+from relit_camera.subject.subject import Subject
+from relit_camera.subject.subject_file import (
     HEADER_KEY,
-    MAX_HELD_BYTES,
+    MAX_IN_MEMORY_BYTES,
     read_metadata,
     read_neutral,
     read_subject,
     write_subject,
 )
-from relit_camera.subject.pack import decode_basis
-from relit_camera.subject.store import SubjectStore
-from relit_camera.subject.subject import Subject
+from relit_camera.subject.subject_store import SubjectStore
 from tests.synthetic import sphere_samples
 
 
@@ -115,12 +115,12 @@ def test_wrong_tensors_are_refused(path: Path, change: dict[str, np.ndarray]) ->
 
 
 def test_what_is_held_in_memory_may_be_less_than_what_is_mapped(path: Path) -> None:
-    held = read_subject(path, held=True)
-    np.testing.assert_array_equal(held.coefficients, read_subject(path).coefficients)
+    in_memory = read_subject(path, in_memory=True)
+    np.testing.assert_array_equal(in_memory.coefficients, read_subject(path).coefficients)
     with path.open("ab") as file:
-        file.truncate(MAX_HELD_BYTES + 1)  # takes no room
+        file.truncate(MAX_IN_MEMORY_BYTES + 1)  # takes no room
     with pytest.raises(SubjectError, match="larger than 1 GiB; build it again at a smaller size"):
-        read_subject(path, held=True)
+        read_subject(path, in_memory=True)
     with pytest.raises(SubjectError, match="not a usable subject"):
         read_subject(path)
 
@@ -200,9 +200,9 @@ def test_a_file_of_version_1_is_read(subject: Subject, path: Path) -> None:
 
 def test_the_demonstration_is_read_as_it_was_shipped() -> None:
     """Format version 1, its principal pictures as WebP: what it showed before, it shows."""
-    read = read_subject(bundle.SUBJECT)
+    read = read_subject(demo_files.SUBJECT)
     assert read.metadata.format_version == 1
-    with safe_open(bundle.SUBJECT, framework="numpy") as file:
+    with safe_open(demo_files.SUBJECT, framework="numpy") as file:
         encoded = file.get_tensor("basis_webp")
     height, width = read.matte.shape
     pictures = decode_basis(encoded, (3, read.metadata.components, height, width)).astype(np.float32)

@@ -19,7 +19,7 @@ FPS = 10
 START_S = 240.0
 """Thirteen seconds on an idle machine."""
 ADDRESS = "http://127.0.0.1:8470/api/v1"
-TRACK = f"{GUEST_PROGRAM}/relit_camera/demo/data/track.json"
+TRACK = f"{GUEST_PROGRAM}/relit_camera/app/demo/data/track.json"
 EXPECTED = ("the live picture is shown as it is",)
 """What every camera here says, for it has no subject."""
 ROOM = "room.hdr"

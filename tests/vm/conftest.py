@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from relit_camera.stream.devices import load_command
+from relit_camera.devices.video_devices import modprobe_command
 from tests.vm.machine import Machine, what_is_missing
 from tests.vm.program import program_disk
 
@@ -51,7 +51,7 @@ def booted(program: Path, version: str) -> Iterator[Machine]:
 @pytest.fixture(scope="session")
 def machine(booted: Machine) -> Machine:
     """A machine with the virtual camera, made by the command that we tell people."""
-    booted.load(load_command().removeprefix("sudo modprobe "))
+    booted.load(modprobe_command().removeprefix("sudo modprobe "))
     return booted
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import cv2
 
-from relit_camera.stream.devices import load_command
+from relit_camera.devices.video_devices import modprobe_command
 from tests.vm.camera import running
 from tests.vm.machine import GUEST_PROGRAM, Machine
 from tests.vm.program import program_disk
 from tests.vm.readers import Call
 
-DATA = f"{GUEST_PROGRAM}/relit_camera/demo/data"
+DATA = f"{GUEST_PROGRAM}/relit_camera/app/demo/data"
 SIZE = (640, 360)
 QUALITY = 88
 
@@ -26,7 +26,7 @@ def main() -> None:
     parser.add_argument("--environment", default="sunset")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, Machine(program_disk(Path(folder))) as machine:
-        machine.load(load_command().removeprefix("sudo modprobe "))
+        machine.load(modprobe_command().removeprefix("sudo modprobe "))
         more = f"--subject {DATA}/adam.relit --environment {given.environment}"
         with running(machine, f"{DATA}/clip.mp4", SIZE, more) as camera:
             camera.wait_for("live")

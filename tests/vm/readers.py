@@ -13,7 +13,7 @@ from typing import Any, Self
 import cv2
 import numpy as np
 
-from relit_camera.space.images import DisplayImage
+from relit_camera.base.images.image_types import DisplayImage
 from tests.vm.camera import START_S, started
 from tests.vm.machine import Command, Machine, MachineError, by_user, wait_until
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from relit_camera.stream.sources.pattern import draw_pattern, read_number
+from relit_camera.devices.sources.pattern_source import draw_pattern, read_number
 from tests.vm.camera import SIZE, relit, running, without_models
 from tests.vm.conftest import NEWEST
 from tests.vm.machine import MachineError

@@ -1,4 +1,4 @@
-"""Bodies of requests and answers that `config.look` and `stream.status` do not have."""
+"""Bodies of requests and answers that `base.config.look` and `live.status.camera_status` do not have."""
 
 from __future__ import annotations
 
@@ -6,43 +6,43 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from relit_camera.config.look import Background, Lighting, Mode, Name
+from relit_camera.base.config.look import Background, Lighting, Mode, StoredName
 from relit_camera.subject.subject import SubjectMetadata
 
 
-class Body(BaseModel):
+class ApiModel(BaseModel):
     """Base of the bodies here: immutable, unknown keys refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
-class ModeBody(Body):
+class ModeBody(ApiModel):
     """How the relit face reaches the picture."""
 
     mode: Mode
 
 
-class FreezeBody(Body):
+class FreezeBody(ApiModel):
     """Whether the published picture stands still."""
 
     frozen: bool
 
 
-class SubjectChoice(Body):
+class SubjectChoice(ApiModel):
     """Who is shown."""
 
-    name: Name | None
+    name: StoredName | None
     """A stored subject, or null for nobody: then the live picture passes through unlit."""
 
 
-class CurrentSubject(Body):
+class CurrentSubject(ApiModel):
     """Who is shown now."""
 
     name: str | None
     """The subject's name, which may be that of a file given on the command line; null for nobody."""
 
 
-class SubjectItem(Body):
+class SubjectItem(ApiModel):
     """A stored subject."""
 
     name: str
@@ -57,7 +57,7 @@ class SubjectDetails(SubjectItem):
     metadata: SubjectMetadata
 
 
-class EnvironmentItem(Body):
+class EnvironmentItem(ApiModel):
     """A stored environment."""
 
     name: str
@@ -80,7 +80,7 @@ class EnvironmentDetails(EnvironmentItem):
     notes: list[str]
 
 
-class BackgroundPicture(Body):
+class BackgroundPicture(ApiModel):
     """A stored background picture."""
 
     name: str
@@ -89,13 +89,13 @@ class BackgroundPicture(Body):
     """Path of a JPEG picture."""
 
 
-class PresetItem(Body):
+class PresetItem(ApiModel):
     """A stored preset."""
 
     name: str
 
 
-class SceneBody(Body):
+class SceneBody(ApiModel):
     """Everything that can be changed while the camera runs, as it now stands: the `scene` event."""
 
     revision: int
@@ -107,13 +107,13 @@ class SceneBody(Body):
     frozen: bool
 
 
-class Health(Body):
+class Health(ApiModel):
     """The process answers."""
 
     status: Literal["alive"] = "alive"
 
 
-class Readiness(Body):
+class Readiness(ApiModel):
     """Pictures are being published."""
 
     status: Literal["ready"] = "ready"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.errors import LightsError
+from relit_camera.base.errors import LightsError
 
 NORM_TOLERANCE = 0.01
 MIN_LIGHTS = 4

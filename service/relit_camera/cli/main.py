@@ -14,22 +14,31 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from relit_camera.errors import RelitError
+from relit_camera.base.errors import RelitError
 
-GROUPS = {
-    "demo": ("relit_camera.cli.demo", "Show a bundled person in one place after another, in a page of its own."),
-    "run": ("relit_camera.cli.run", "Run the camera: webcam in, relit virtual camera out, REST API and panel."),
-    "replay": ("relit_camera.cli.replay", "Relight a recorded video into another video."),
-    "track": ("relit_camera.cli.track", "Follow the face in a video and write what was seen as JSON."),
-    "relight": ("relit_camera.cli.relight", "Relight a subject's still."),
-    "capture": ("relit_camera.cli.capture", "Build a subject from pictures or video."),
-    "subject": ("relit_camera.cli.subject", "Look into subject files."),
-    "models": ("relit_camera.cli.models", "List, pull and verify the public models."),
-    "devices": ("relit_camera.cli.devices", "List cameras and virtual cameras."),
-    "config": ("relit_camera.cli.config", "Check and show the configuration."),
-    "bench": ("relit_camera.cli.bench", "Measure relighting and the live chain on this machine."),
-    "evaluate": ("relit_camera.cli.evaluate", "Measure fields and relit videos against truth; writes reports."),
-    "doctor": ("relit_camera.cli.doctor", "Find out what keeps the camera from working, and the cure."),
+COMMANDS = {
+    "demo": (
+        "relit_camera.cli.commands.demo",
+        "Show a bundled person in one place after another, in a page of its own.",
+    ),
+    "run": (
+        "relit_camera.cli.commands.run",
+        "Run the camera: webcam in, relit virtual camera out, REST API and panel.",
+    ),
+    "replay": ("relit_camera.cli.commands.replay", "Relight a recorded video into another video."),
+    "track": ("relit_camera.cli.commands.track", "Follow the face in a video and write what was seen as JSON."),
+    "relight": ("relit_camera.cli.commands.relight", "Relight a subject's still."),
+    "capture": ("relit_camera.cli.commands.capture", "Build a subject from pictures or video."),
+    "subject": ("relit_camera.cli.commands.subject", "Look into subject files."),
+    "models": ("relit_camera.cli.commands.models", "List, pull and verify the public models."),
+    "devices": ("relit_camera.cli.commands.devices", "List cameras and virtual cameras."),
+    "config": ("relit_camera.cli.commands.config", "Check and show the configuration."),
+    "bench": ("relit_camera.cli.commands.bench", "Measure relighting and the live chain on this machine."),
+    "evaluate": (
+        "relit_camera.cli.commands.evaluate",
+        "Measure fields and relit videos against truth; writes reports.",
+    ),
+    "doctor": ("relit_camera.cli.commands.doctor", "Find out what keeps the camera from working, and the cure."),
 }
 """Command → module with a typer `app`, and its help. A module is imported when its command is called."""
 
@@ -53,16 +62,16 @@ class _LazyGroup(TyperGroup):
         super().format_help(ctx, formatter)
 
     def list_commands(self, ctx: Any) -> list[str]:
-        return list(GROUPS)
+        return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        if cmd_name not in GROUPS:
+        if cmd_name not in COMMANDS:
             return None
         if self._listing:
-            return typer.core.TyperCommand(cmd_name, callback=lambda: None, help=GROUPS[cmd_name][1])
-        command = typer.main.get_command(import_module(GROUPS[cmd_name][0]).app)
+            return typer.core.TyperCommand(cmd_name, callback=lambda: None, help=COMMANDS[cmd_name][1])
+        command = typer.main.get_command(import_module(COMMANDS[cmd_name][0]).app)
         command.name = cmd_name
-        command.help = command.help or GROUPS[cmd_name][1]
+        command.help = command.help or COMMANDS[cmd_name][1]
         return command
 
 

@@ -14,7 +14,7 @@ def progress_bar() -> Progress:
     return Progress(console=console, transient=True, disable=not console.is_terminal)
 
 
-def stages(progress: Progress) -> Callable[[str, int, int | None], None]:
+def stage_reporter(progress: Progress) -> Callable[[str, int, int | None], None]:
     """A function that is told stage, done and total, and shows each stage as a line of its own."""
     lines: dict[str, TaskID] = {}
 

@@ -13,19 +13,18 @@ from pathlib import Path
 
 from platformdirs import user_config_path
 
-from relit_camera.config.settings import RelitSettings
-from relit_camera.doctor.cameras import Access, groups_to_join
-from relit_camera.doctor.findings import FileState, Fix, FixedFile
+from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.errors import StorageError
+from relit_camera.base.models.model_store import models_folder
+from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.doctor.camera_access import AccessCheck, groups_to_join
 from relit_camera.doctor.host import Host
-from relit_camera.doctor.inference import check_models
-from relit_camera.doctor.kernel import needs_module
-from relit_camera.doctor.root_commands import root_commands
-from relit_camera.doctor.unit import is_ours, relit_command, unit_path, unit_text
-from relit_camera.errors import StorageError
-from relit_camera.files import make_folder, write_atomic
-from relit_camera.models.registry import models_folder
+from relit_camera.doctor.kernel_module import needs_module, root_commands
+from relit_camera.doctor.models_and_subject import check_models
+from relit_camera.doctor.report import FileOutcome, FixedFile, FixResult
+from relit_camera.doctor.systemd_unit import is_unmodified, relit_command, unit_path, unit_text
 
-CONFIG_TEXT = """\
+DEFAULT_CONFIG_TEXT = """\
 # Relit Camera's settings; what is not here has its default. `relit config schema` lists all of them, `relit config
 # check` tells whether this file is right, `relit config show` what is in force.
 
@@ -42,12 +41,14 @@ look:
 """
 
 
-def user_config() -> Path:
+def user_config_file() -> Path:
     """The user's configuration file, which holds for the service too."""
     return user_config_path("relit-camera", appauthor=False) / "config.yaml"
 
 
-def fix(settings: RelitSettings, host: Host, access: Access = os.access, with_folders: bool = True) -> Fix:
+def apply_fixes(
+    settings: RelitSettings, host: Host, access: AccessCheck = os.access, with_folders: bool = True
+) -> FixResult:
     """Write the missing files and folders of the user.
 
     Args:
@@ -58,58 +59,60 @@ def fix(settings: RelitSettings, host: Host, access: Access = os.access, with_fo
     """
     storage = settings.storage
     folders = [storage.subjects, storage.environments, storage.backgrounds, storage.presets, models_folder()]
-    files = [*map(_folder, folders if with_folders else []), _config(user_config())]
+    files = [*map(_fix_folder, folders if with_folders else []), _fix_config(user_config_file())]
     user_commands = [] if check_models(settings).state == "ok" else ["relit models pull"]
     if host.is_linux:
-        files.append(_unit(unit_path()))
+        files.append(_fix_unit(unit_path()))
         user_commands.append("systemctl --user daemon-reload && systemctl --user enable --now relit-camera")
     lines = root_commands(settings.output, host, groups_to_join(host.tree, access))
-    return Fix(
+    return FixResult(
         files=tuple(files),
         root_commands=lines if needs_module(settings.output, host) else (),
         user_commands=tuple(user_commands),
     )
 
 
-def _folder(path: Path) -> FixedFile:
-    with suppress(OSError):  # where one may not look one may not write, which `_attempt` says
+def _fix_folder(path: Path) -> FixedFile:
+    with suppress(OSError):  # where one may not look one may not write, which `_create` says
         if path.is_dir():
-            return FixedFile(path=str(path), state=FileState.UNCHANGED)
-    return _attempt(path, FileState.WRITTEN, None)
+            return FixedFile(path=str(path), state=FileOutcome.UNCHANGED)
+    return _create(path, FileOutcome.WRITTEN, None)
 
 
-def _config(path: Path) -> FixedFile:
+def _fix_config(path: Path) -> FixedFile:
     if os.path.lexists(path):  # it is there to be changed; a link that leads nowhere is the user's too
-        return FixedFile(path=str(path), state=FileState.UNCHANGED)
-    return _attempt(path, FileState.WRITTEN, CONFIG_TEXT)
+        return FixedFile(path=str(path), state=FileOutcome.UNCHANGED)
+    return _create(path, FileOutcome.WRITTEN, DEFAULT_CONFIG_TEXT)
 
 
-def _unit(path: Path) -> FixedFile:
+def _fix_unit(path: Path) -> FixedFile:
     wanted = unit_text(relit_command())
     if not os.path.lexists(path):
-        return _attempt(path, FileState.WRITTEN, wanted)
+        return _create(path, FileOutcome.WRITTEN, wanted)
     try:
         found = path.read_text(encoding="utf-8", errors="replace")
     except FileNotFoundError:
-        return FixedFile(path=str(path), state=FileState.KEPT, note=f"a link to {path.readlink()}, which is not there")
+        return FixedFile(
+            path=str(path), state=FileOutcome.KEPT, note=f"a link to {path.readlink()}, which is not there"
+        )
     except OSError as error:
-        return FixedFile(path=str(path), state=FileState.FAILED, note=f"cannot read {path}: {error.strerror}")
+        return FixedFile(path=str(path), state=FileOutcome.FAILED, note=f"cannot read {path}: {error.strerror}")
     if found == wanted:
-        return FixedFile(path=str(path), state=FileState.UNCHANGED)
-    if not is_ours(found):
+        return FixedFile(path=str(path), state=FileOutcome.UNCHANGED)
+    if not is_unmodified(found):
         diff = difflib.unified_diff(
             found.splitlines(), wanted.splitlines(), str(path), "what --fix would write", "", "", 1, ""
         )
-        return FixedFile(path=str(path), state=FileState.KEPT, note="\n".join(diff))
-    return _attempt(path, FileState.RENEWED, wanted)
+        return FixedFile(path=str(path), state=FileOutcome.KEPT, note="\n".join(diff))
+    return _create(path, FileOutcome.RENEWED, wanted)
 
 
-def _attempt(path: Path, state: FileState, text: str | None) -> FixedFile:
+def _create(path: Path, state: FileOutcome, text: str | None) -> FixedFile:
     """Make a folder, or write a file and the folders above it."""
     try:
         make_folder(path if text is None else path.parent)
         if text is not None:
             write_atomic(path, text)
     except StorageError as error:
-        return FixedFile(path=str(path), state=FileState.FAILED, note=str(error))
+        return FixedFile(path=str(path), state=FileOutcome.FAILED, note=str(error))
     return FixedFile(path=str(path), state=state)

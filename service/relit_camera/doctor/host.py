@@ -8,11 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from relit_camera.stream.devices import SYSTEM, DeviceTree
-from relit_camera.stream.holders import Holder, holders
+from relit_camera.devices.device_users import DeviceUser, find_device_users
+from relit_camera.devices.video_devices import SYSTEM_TREE, DeviceTree
 
-SECURE_BOOT = "sys/firmware/efi/efivars/SecureBoot-8be4df61-93ca-11d2-aa0d-00e098032b8c"
-MODULE = "v4l2loopback"
+SECURE_BOOT_VARIABLE = "sys/firmware/efi/efivars/SecureBoot-8be4df61-93ca-11d2-aa0d-00e098032b8c"
+KERNEL_MODULE = "v4l2loopback"
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,14 @@ class Host:
         tree: its devices.
         release: of the kernel that runs, such as 6.1.0-56-amd64.
         is_linux: whether it has v4l2loopback at all.
-        holders: who else has a device node open.
+        find_device_users: who else has a device node open.
     """
 
     root: Path = Path("/")
-    tree: DeviceTree = SYSTEM
+    tree: DeviceTree = SYSTEM_TREE
     release: str = field(default_factory=platform.release)
     is_linux: bool = field(default_factory=lambda: platform.system() == "Linux")
-    holders: Callable[[str], list[Holder]] = holders
+    find_device_users: Callable[[str], list[DeviceUser]] = find_device_users
 
     def read(self, path: str) -> str:
         """Text of a file below the root; empty where it cannot be read."""
@@ -49,30 +49,30 @@ class Host:
     def secure_boot(self) -> bool:
         """Whether the firmware says that Secure Boot is on: then the kernel takes signed modules only."""
         try:
-            return (self.root / SECURE_BOOT).read_bytes()[4:5] == b"\1"  # after four bytes of attributes
+            return (self.root / SECURE_BOOT_VARIABLE).read_bytes()[4:5] == b"\1"  # after four bytes of attributes
         except OSError:
             return False
 
     @property
     def module_loaded(self) -> bool:
         """Whether v4l2loopback is in the running kernel."""
-        return (self.tree.sys / "module" / MODULE).is_dir()
+        return (self.tree.sys / "module" / KERNEL_MODULE).is_dir()
 
     @property
     def module_version(self) -> str:
         """Of the loaded module; empty for 0.12, which does not tell."""
-        return self.tree.read(self.tree.sys / "module" / MODULE / "version")
+        return self.tree.read(self.tree.sys / "module" / KERNEL_MODULE / "version")
 
     @property
     def kernels_with_module(self) -> list[str]:
         """Releases of the installed kernels for which modprobe knows the module."""
         found = (self.root / "lib/modules").glob("*/modules.dep")
-        return sorted(path.parent.name for path in found if f"/{MODULE}.ko" in self.tree.read(path))
+        return sorted(path.parent.name for path in found if f"/{KERNEL_MODULE}.ko" in self.tree.read(path))
 
     @property
     def module_built_by_dkms(self) -> bool:
         """Whether DKMS has the module's source, built or not."""
-        return (self.root / "var/lib/dkms" / MODULE).is_dir()
+        return (self.root / "var/lib/dkms" / KERNEL_MODULE).is_dir()
 
     def configured(self, folder: str, words: str) -> list[Path]:
         """Files of a folder such as etc/modprobe.d with a line that begins with these words, comments left out."""

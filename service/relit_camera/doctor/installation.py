@@ -15,46 +15,46 @@ import psutil
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-from relit_camera.config.settings import RelitSettings
-from relit_camera.doctor.findings import Finding, fine, problem, warning
+from relit_camera.base.config.settings import RelitSettings
+from relit_camera.doctor.report import Finding, ok, problem, warning
 
-PACKAGE = "relit-camera"
-REPLACEMENTS = {
+PACKAGE_NAME = "relit-camera"
+EQUIVALENT_PACKAGES = {
     "onnxruntime": ("onnxruntime-gpu", "onnxruntime-directml", "onnxruntime-openvino"),
     "opencv-contrib-python-headless": ("opencv-contrib-python",),
 }
 """Packages that bring the same module as the one that is asked for."""
-LITTLE_SPACE, TOO_LITTLE_SPACE = 1 << 30, 50 << 20
+LOW_DISK_BYTES, MIN_DISK_BYTES = 1 << 30, 50 << 20
 """Bytes: a subject of the default size has some 20 MB, the models 12 MB."""
-ENOUGH_CORES = 2
+MIN_CORES = 2
 
 
 def check_python() -> Finding:
     """The interpreter's version."""
     found, needed = platform.python_version(), _needed_python()
     if needed.contains(found, prereleases=True):
-        return fine("python", f"{found} at {sys.executable}")
+        return ok("python", f"{found} at {sys.executable}")
     return problem("python", f"{found} at {sys.executable}, not {needed}", "install a newer Python")
 
 
 def check_packages() -> Finding:
     """Every package that we depend on, in a version that we take."""
     try:
-        wanted = [Requirement(text) for text in metadata.requires(PACKAGE) or []]
+        wanted = [Requirement(text) for text in metadata.requires(PACKAGE_NAME) or []]
     except metadata.PackageNotFoundError:
-        return problem("packages", f"{PACKAGE} is not installed", "run: pip install -e . in its folder")
+        return problem("packages", f"{PACKAGE_NAME} is not installed", "run: pip install -e . in its folder")
     needed = [
         requirement for requirement in wanted if not requirement.marker or requirement.marker.evaluate({"extra": ""})
     ]
-    wrong = [text for text in map(_fault, needed) if text]
-    twice = next((names for names in map(_installed_names, REPLACEMENTS) if len(names) > 1), ())
+    wrong = [text for text in map(_package_error, needed) if text]
+    twice = next((names for names in map(_installed_names, EQUIVALENT_PACKAGES) if len(names) > 1), ())
     if not wrong and twice:
         # Their files lie in one folder: whichever came last works, and a GPU may be left unused without a word.
         seen = f"{' and '.join(twice)} are both installed and own the same folder"
         return warning("packages", seen, f"run: pip uninstall {' '.join(twice)}, then install the one that you want")
     if not wrong:
-        return fine("packages", f"{len(needed)} packages, {', '.join(map(_shown, ('onnxruntime', 'numpy')))}")
-    return problem("packages", "; ".join(wrong), f"run: pip install --upgrade {PACKAGE}")
+        return ok("packages", f"{len(needed)} packages, {', '.join(map(_name_and_version, ('onnxruntime', 'numpy')))}")
+    return problem("packages", "; ".join(wrong), f"run: pip install --upgrade {PACKAGE_NAME}")
 
 
 def check_cores(settings: RelitSettings) -> Finding:
@@ -64,11 +64,11 @@ def check_cores(settings: RelitSettings) -> Finding:
     threads = settings.inference.threads
     free = f"{memory.available >> 20} of {memory.total >> 20} MB memory free"
     seen = f"{cores} cores, {free}, inference.threads is {threads}"
-    if cores < ENOUGH_CORES:
+    if cores < MIN_CORES:
         return warning("cores", seen, "give it two cores: with one the picture will not keep up with the camera")
     if threads > cores:
         return warning("cores", seen, f"set it to at most {cores}")
-    return fine("cores", seen)
+    return ok("cores", seen)
 
 
 def check_folder(topic: str, folder: Path, cure: str) -> Finding:
@@ -83,21 +83,21 @@ def check_folder(topic: str, folder: Path, cure: str) -> Finding:
     except OSError as error:
         return problem(topic, f"{folder} cannot be written to: {error.strerror}", cure)
     seen = f"{folder}{'' if folder.exists() else ' (will be made)'}, {free >> 20} MB free"
-    if free < TOO_LITTLE_SPACE:
+    if free < MIN_DISK_BYTES:
         return problem(topic, seen, "free some space on the disk")
-    if free < LITTLE_SPACE:
+    if free < LOW_DISK_BYTES:
         return warning(topic, seen, "free some space on the disk")
-    return fine(topic, seen)
+    return ok(topic, seen)
 
 
 def _needed_python() -> SpecifierSet:
     try:
-        return SpecifierSet(metadata.metadata(PACKAGE)["Requires-Python"])
+        return SpecifierSet(metadata.metadata(PACKAGE_NAME)["Requires-Python"])
     except metadata.PackageNotFoundError:
         return SpecifierSet(">=3.11")
 
 
-def _fault(requirement: Requirement) -> str:
+def _package_error(requirement: Requirement) -> str:
     """What is wrong with an installed package, or ""."""
     name, version = _installed(requirement.name)
     if version is None:
@@ -117,12 +117,12 @@ def _installed(name: str) -> tuple[str, str | None]:
 def _installed_names(name: str) -> list[str]:
     """Of a package and those that bring the same module: the installed ones."""
     found = []
-    for candidate in (name, *REPLACEMENTS.get(name, ())):
+    for candidate in (name, *EQUIVALENT_PACKAGES.get(name, ())):
         with contextlib.suppress(metadata.PackageNotFoundError):
             metadata.version(candidate)
             found.append(candidate)
     return found
 
 
-def _shown(name: str) -> str:
+def _name_and_version(name: str) -> str:
     return " ".join(filter(None, _installed(name)))

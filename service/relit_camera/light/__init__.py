@@ -1,6 +1,6 @@
 """Light: panorama files, light maps, lamps, and the store of named environments.
 
-A light map is float32 (32, 64, 3), linear RGB radiance in map axes (`space.directions`). A panorama is the same light
+A light map is float32 (32, 64, 3), linear RGB radiance in map axes (`light.directions`). A panorama is the same light
 at a file's resolution. Energy Σ E·ω is kept: by resampling exactly, by rotation within 1 % for any lamp.
 
     panorama.py    files in, checked and turned into map axes

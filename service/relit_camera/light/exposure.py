@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from relit_camera.light.maps import LightMap, irradiance, total
-from relit_camera.space.colour import LUMINANCE
+from relit_camera.base.images.color import LUMINANCE
+from relit_camera.light.light_map_rotation import LightMap, irradiance, total
 
-WHITE_BALL_READING = 0.8
+WHITE_BALL_LUMINANCE = 0.8
 """What a white diffuse ball reads, in luminance, at the point that faces the camera."""
-_FLOOR = 0.2
+_MIN_FRONT_FRACTION = 0.2
 """Least share of the mean over the ball's whole surface that its facing point is taken to receive."""
 
 
-def display_scale(light_map: LightMap) -> float:
+def auto_exposure_scale(light_map: LightMap) -> float:
     """The factor by which linear pictures under `light_map` are multiplied to be shown; 1 for no light at all.
 
     With it the point of a white diffuse ball that faces the camera, irradiance Σ E·ω·max(0, z), has luminance 0.8, in
@@ -23,5 +23,5 @@ def display_scale(light_map: LightMap) -> float:
     """
     facing = float(irradiance(light_map, (0.0, 0.0, 1.0)) @ LUMINANCE)
     mean = float(total(light_map) @ LUMINANCE) / 4
-    reference = max(facing, _FLOOR * mean)
-    return WHITE_BALL_READING / reference if reference > 0 else 1.0
+    reference = max(facing, _MIN_FRONT_FRACTION * mean)
+    return WHITE_BALL_LUMINANCE / reference if reference > 0 else 1.0

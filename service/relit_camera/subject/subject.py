@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from relit_camera.space.images import DisplayImage, Mask, Points
-from relit_camera.subject.field import TEXELS
-from relit_camera.subject.local_basis import LocalBasis
+from relit_camera.base.images.image_types import DisplayImage, Mask, Points
+from relit_camera.subject.compression.local_basis import LocalBasis
+from relit_camera.subject.reflectance_field import TEXELS
 
 FORMAT_VERSION: Literal[2] = 2
-LEAST_SIDE, LARGEST_SIDE = 8, 8192
+MIN_SIDE_PX, MAX_SIDE_PX = 8, 8192
 """Of the picture, in pixels."""
-HORIZON_STEP = np.pi / 255
+HORIZON_STEP_RAD = np.pi / 255
 """A horizon's code v of 0..255 stands for the height v · this − π/2, in radians."""
 
 
@@ -28,8 +28,8 @@ class SubjectMetadata(BaseModel):
 
     format_version: Literal[1, 2] = FORMAT_VERSION
     """1: one set of principal pictures for all pixels, as small subjects have it; 2: local bases."""
-    width: Annotated[int, Field(ge=LEAST_SIDE, le=LARGEST_SIDE)]
-    height: Annotated[int, Field(ge=LEAST_SIDE, le=LARGEST_SIDE)]
+    width: Annotated[int, Field(ge=MIN_SIDE_PX, le=MAX_SIDE_PX)]
+    height: Annotated[int, Field(ge=MIN_SIDE_PX, le=MAX_SIDE_PX)]
     light_map: tuple[int, int] = (64, 32)
     """Width and height of the light maps that it answers to."""
     method: str
@@ -73,8 +73,9 @@ class Subject:
         normals: (height, width, 3) float16 unit vectors, (0, 0, 1) outside of the matte; or None.
         albedo: (height, width, 3) float16 linear, 0 outside; or None.
         depth: (height, width) float32 in pixels toward the camera, mean 0, 0 outside; or None.
-        horizons: (height, width, sectors) uint8, what the rest of the surface hides (`geometry.horizon`), in steps of
-            `HORIZON_STEP`; or None.
+        horizons: (height, width, sectors) uint8, what the rest of the surface hides (`capture.geometry.horizon_map`),
+            in steps of
+            `HORIZON_STEP_RAD`; or None.
     """
 
     metadata: SubjectMetadata

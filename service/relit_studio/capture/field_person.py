@@ -18,13 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from relit_camera.capture.importing import import_samples
-from relit_camera.errors import LightsError
-from relit_camera.light.maps import LightMap, rotate
-from relit_camera.reflectance.barycentric import SphericalBarycentric, spherical_barycentric, spherical_delaunay
-from relit_camera.space.colour import Gamma
-from relit_camera.space.directions import texel_directions, texel_solid_angles
-from relit_camera.space.images import LinearImage
+from relit_camera.base.errors import LightsError
+from relit_camera.base.images.color import Gamma
+from relit_camera.base.images.image_types import LinearImage
+from relit_camera.capture.picture_import import import_samples
+from relit_camera.capture.reflectance.delaunay_barycentric import (
+    SphericalBarycentric,
+    spherical_barycentric,
+    spherical_delaunay,
+)
+from relit_camera.light.directions import texel_directions, texel_solid_angles
+from relit_camera.light.light_map_rotation import LightMap, rotate_light_map
 from relit_studio.capture.head_motion import Motion
 from relit_studio.capture.person import FACE_REACH_CM, Layers
 from relit_studio.capture.torch import Torch
@@ -94,7 +98,7 @@ class FieldPerson:
 
     def _ambient(self, motion: Motion) -> LinearImage:
         """The field under the room's light as the turned head sees it."""
-        light = rotate(self._room, motion.rotation) * texel_solid_angles()[..., None]
+        light = rotate_light_map(self._room, motion.rotation) * texel_solid_angles()[..., None]
         power = self._light_of_texel @ light.reshape(-1, 3).astype(np.float32)
         return np.asarray(np.einsum("lhwc,lc->hwc", self._pictures, power, optimize=True))
 

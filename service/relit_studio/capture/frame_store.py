@@ -9,9 +9,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from relit_camera.files import make_folder, write_atomic
-from relit_camera.space.images import DisplayImage
-from relit_camera.space.picture_files import read_display, write_display
+from relit_camera.base.images.image_files import read_display, write_display
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.storage import make_folder, write_atomic
 from relit_studio.processing import Gains
 
 

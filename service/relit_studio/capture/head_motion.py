@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from relit_camera.space.rotation import Angles, rotation_from_angles
+from relit_camera.base.rotations import Angles, rotation_from_angles
 from relit_studio.mannequin.figure import PIVOT
-from relit_studio.wander import Wander
+from relit_studio.random_walk import RandomWalk
 
 _ANGLES_DEG = np.array([0.7, 0.5, 0.35])
 """RMS of yaw, pitch and roll."""
@@ -24,7 +24,7 @@ class Motion:
     """How far the head is from rest: turned about its pivot in the neck, then moved.
 
     Attributes:
-        angles: degrees, see `space.rotation`.
+        angles: degrees, see `base.rotations`.
         translation_cm: (3,).
     """
 
@@ -56,7 +56,7 @@ class HeadMotion:
     def __init__(self, seed: int, amount: float = 1.0) -> None:
         rng = np.random.default_rng([seed, 2])
         self._amount = amount
-        self._wander = Wander(rng, 6, 0.04, 0.5)
+        self._wander = RandomWalk(rng, 6, 0.04, 0.5)
         self._breath_phase = rng.uniform(0, 2 * np.pi)
 
     def at(self, time_s: float) -> Motion:

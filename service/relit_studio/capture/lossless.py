@@ -9,9 +9,9 @@ from typing import Self
 import av
 import numpy as np
 
-from relit_camera.files import atomic_path, storage_error
-from relit_camera.space.images import DisplayImage, check_image
-from relit_camera.video.writer import rational_rate
+from relit_camera.base.images.image_types import DisplayImage, check_image
+from relit_camera.base.storage import atomic_path, storage_error
+from relit_camera.base.video.video_writer import rational_rate
 
 
 class LosslessWriter:

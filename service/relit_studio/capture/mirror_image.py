@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from relit_camera.space.directions import map_position_from_direction
-from relit_camera.space.images import LinearImage, Mask
+from relit_camera.base.images.image_types import LinearImage, Mask
+from relit_camera.light.directions import map_position_from_direction
 from relit_studio.capture.mirror_ball import MirrorBall
 from relit_studio.capture.torch import RADIUS_CM, Torch
 from relit_studio.mannequin.shading import axes_along

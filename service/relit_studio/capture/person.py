@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.space.images import LinearImage, Mask
+from relit_camera.base.images.image_types import LinearImage, Mask
 from relit_studio.capture.head_motion import Motion
 from relit_studio.capture.torch import Torch
 from relit_studio.pinhole import Pinhole

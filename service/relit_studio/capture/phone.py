@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.space.colour import uint8_from_linear
-from relit_camera.space.images import DisplayImage, LinearImage
+from relit_camera.base.images.color import uint8_from_linear
+from relit_camera.base.images.image_types import DisplayImage, LinearImage
 from relit_studio.processing import Automatics, Gains, Sensor
 
 SENSOR = Sensor(white=0.85, shot=1.5e-4, read=1.2e-3)

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.compose.sheet import contact_sheet
-from relit_camera.files import make_folder, write_atomic
-from relit_camera.space.images import DisplayImage
-from relit_camera.space.picture_files import write_display
-from relit_camera.video.writer import VideoWriter
+from relit_camera.base.images.contact_sheet import contact_sheet
+from relit_camera.base.images.image_files import write_display
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.base.video.video_writer import VideoWriter
 from relit_studio.capture.frame_store import Done, FrameStore
 from relit_studio.capture.lossless import LosslessWriter
 from relit_studio.capture.mirror_ball import MirrorBall

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.light.environment import Environment
-from relit_camera.light.exposure import WHITE_BALL_READING, display_scale
-from relit_camera.light.maps import LightMap
-from relit_camera.space.images import LinearImage
+from relit_camera.base.images.image_types import LinearImage
+from relit_camera.light.environment_panorama import Environment
+from relit_camera.light.exposure import WHITE_BALL_LUMINANCE, auto_exposure_scale
+from relit_camera.light.light_map_rotation import LightMap
 from relit_studio.capture.flash import FlashSchedule, RollingShutter
 from relit_studio.capture.head_motion import HeadMotion, Motion
 from relit_studio.capture.mirror_ball import MirrorBall
@@ -157,7 +157,7 @@ def dimmed(environment: Environment, ambient: float) -> tuple[Room, LightMap]:
 
     The torch gives 1 at its reference distance.
     """
-    scale = np.float32(display_scale(environment.light_map) * ambient / WHITE_BALL_READING)
+    scale = np.float32(auto_exposure_scale(environment.light_map) * ambient / WHITE_BALL_LUMINANCE)
     return Room(environment.panorama.radiance * scale), environment.light_map * scale
 
 

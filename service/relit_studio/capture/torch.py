@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from relit_camera.space.directions import direction_from_degrees
-from relit_studio.wander import Wander
+from relit_camera.light.directions import direction_from_degrees
+from relit_studio.random_walk import RandomWalk
 
 Vector = NDArray[np.float64]
 
@@ -70,8 +70,8 @@ class HandPath:
         self._target = np.asarray(target, np.float64)
         self._seconds, self._distance_cm = seconds, distance_cm
         self._sweeps = max(1.5, seconds / _SWEEP_S)
-        self._place = Wander(rng, 3, 0.1, 0.7)
-        self._aim = Wander(rng, 2, 0.2, 1.5)
+        self._place = RandomWalk(rng, 3, 0.1, 0.7)
+        self._aim = RandomWalk(rng, 2, 0.2, 1.5)
         count = int(seconds / _LAPSE_EVERY_S + rng.uniform())
         self._lapses_s = rng.uniform(0, seconds, count)
         self._lapse_sides = rng.uniform(0, 2 * np.pi, count)

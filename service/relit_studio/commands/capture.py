@@ -33,7 +33,7 @@ def capture(
     plain: Annotated[bool, typer.Option("--plain", help="No processing at all: linear, exact, lossless.")] = False,
 ) -> None:
     """Film a person under a blinking hand-held torch, a mirror ball beside them. Run it again to go on."""
-    from relit_camera.cli.parse import size as parse_size
+    from relit_camera.cli.arguments import parse_size
     from relit_studio.capture.field_person import FieldPerson
     from relit_studio.capture.mannequin_person import MannequinPerson, phone_camera
     from relit_studio.capture.person import Person

@@ -9,14 +9,13 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from relit_camera.cli.parse import numbers
-from relit_camera.face.detector import FaceDetector
-from relit_camera.face.trackers import TrackerOptions, open_tracker
-from relit_camera.files import write_atomic
-from relit_camera.models.registry import model_path
-from relit_camera.space.picture_files import read_display
-from relit_camera.space.rotation import Angles
-from relit_studio.begun import keep_settings
+from relit_camera.base.images.image_files import read_display
+from relit_camera.base.models.model_store import model_path
+from relit_camera.base.rotations import Angles
+from relit_camera.base.storage import write_atomic
+from relit_camera.cli.arguments import parse_numbers
+from relit_camera.face.tracking.face_detector import FaceDetector
+from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
 from relit_studio.camera import Camera
 from relit_studio.commands.options import (
     Environment,
@@ -31,6 +30,7 @@ from relit_studio.commands.options import (
 )
 from relit_studio.people.posture import Posture
 from relit_studio.recognition import recognise, recognised_table
+from relit_studio.resume import keep_settings
 from relit_studio.still import finish_stills
 
 _TRACKERS = ("mesh", "openseeface")
@@ -38,7 +38,9 @@ _TRACKERS = ("mesh", "openseeface")
 
 def check(
     out: Out,
-    people: Annotated[str, typer.Option(help="Names and numbers, with commas between.")] = "adam,bea,cem,1,2,3,4,5",
+    people: Annotated[
+        str, typer.Option(help="Names and parse_numbers, with commas between.")
+    ] = "adam,bea,cem,1,2,3,4,5",
     yaws: Annotated[str, typer.Option(help="Degrees, with commas between.")] = "-45,-30,-15,0,15,30,45",
     pitches: Annotated[str, typer.Option(help="Degrees, with commas between.")] = "0",
     environment: Environment = "soft",
@@ -54,8 +56,8 @@ def check(
     trackers = [open_tracker(name, TrackerOptions(blendshapes=False)) for name in _TRACKERS]
     turns = [
         Angles(yaw, pitch, 0.0)
-        for pitch in numbers(pitches, pitches.count(",") + 1, "--pitches")
-        for yaw in numbers(yaws, yaws.count(",") + 1, "--yaws")
+        for pitch in parse_numbers(pitches, pitches.count(",") + 1, "--pitches")
+        for yaw in parse_numbers(yaws, yaws.count(",") + 1, "--yaws")
     ]
     camera, room, quality = Camera(size), load_room(environment, 0.0), quality_of(False, samples, threads)
     keep_settings(out, "settings.json", {"environment": environment, "size": size, "samples": quality.samples})

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from relit_camera.cli.parse import size as parse_size
+from relit_camera.cli.arguments import parse_size
 from relit_studio.commands.options import (
     Environment,
     Out,

@@ -6,11 +6,10 @@ from typing import Annotated
 
 import typer
 
-from relit_camera.cli.parse import numbers
-from relit_camera.compose.sheet import contact_sheet
-from relit_camera.space.picture_files import read_display, write_display
-from relit_camera.space.rotation import Angles
-from relit_studio.begun import keep_settings
+from relit_camera.base.images.contact_sheet import contact_sheet
+from relit_camera.base.images.image_files import read_display, write_display
+from relit_camera.base.rotations import Angles
+from relit_camera.cli.arguments import parse_numbers
 from relit_studio.camera import Camera
 from relit_studio.commands.options import (
     Environment,
@@ -26,12 +25,13 @@ from relit_studio.commands.options import (
 )
 from relit_studio.people.expressions import find_expression
 from relit_studio.people.posture import Posture
+from relit_studio.resume import keep_settings
 from relit_studio.still import finish_stills
 
 
 def sheet(
     out: Out,
-    people: Annotated[str, typer.Option(help="Names and numbers, with commas between.")] = "adam,bea,cem",
+    people: Annotated[str, typer.Option(help="Names and parse_numbers, with commas between.")] = "adam,bea,cem",
     expressions: Annotated[str, typer.Option(help="One cell a person and expression.")] = "neutral",
     yaws: Annotated[str, typer.Option(help="Degrees, with commas between; one cell each.")] = "0",
     columns: Annotated[int, typer.Option(min=1, max=24)] = 6,
@@ -44,7 +44,9 @@ def sheet(
     """Render people into DIR, one picture each, and lay them out in DIR/sheet.png; finished pictures are left."""
     camera, room = Camera(size), load_room(environment, turn)
     quality = quality_of(False, samples, threads)
-    looks = [(name, yaw) for name in expressions.split(",") for yaw in numbers(yaws, yaws.count(",") + 1, "--yaws")]
+    looks = [
+        (name, yaw) for name in expressions.split(",") for yaw in parse_numbers(yaws, yaws.count(",") + 1, "--yaws")
+    ]
     postures = [Posture(Angles(yaw, 0.0, 0.0), find_expression(name)) for name, yaw in looks]
     keep_settings(
         out, "sheet.json", {"environment": environment, "turn": turn, "size": size, "samples": quality.samples}

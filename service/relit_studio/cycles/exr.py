@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.errors import ImageError
-from relit_camera.space.images import LinearImage, Mask
+from relit_camera.base.errors import ImageError
+from relit_camera.base.images.image_types import LinearImage, Mask
 
 Planes = dict[str, NDArray[np.float32]]
 

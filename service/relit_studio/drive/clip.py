@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from relit_camera.face.track_file import TrackRecorder
-from relit_camera.files import write_atomic
-from relit_camera.space.images import DisplayImage, Frame, LinearImage, Mask
-from relit_camera.video.writer import VideoWriter
+from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask
+from relit_camera.base.storage import write_atomic
+from relit_camera.base.video.video_writer import VideoWriter
+from relit_camera.face.tracking.track_recording import TrackRecorder
 from relit_studio.assets.manifest import manifest
 from relit_studio.cycles.exr import read_rgba
 from relit_studio.drive.performance import FPS

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from relit_camera.files import make_folder
-from relit_studio.begun import keep_settings
+from relit_camera.base.storage import make_folder
 from relit_studio.camera import Camera
 from relit_studio.cycles.job import Picture, Quality
 from relit_studio.cycles.runner import render
@@ -17,6 +16,7 @@ from relit_studio.drive.room import Room
 from relit_studio.drive.take import Take
 from relit_studio.people.person import Person
 from relit_studio.progress import Progress, no_progress
+from relit_studio.resume import keep_settings
 
 _CHUNK = 12
 """Frames whose shapes are written before they are rendered."""

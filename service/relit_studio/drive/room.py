@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.compose.composite import over, straight
-from relit_camera.compose.view import EnvironmentView
-from relit_camera.light.environment import Environment
-from relit_camera.light.exposure import display_scale
-from relit_camera.light.maps import rotate
-from relit_camera.space.display import display_from_linear, linear_from_display
-from relit_camera.space.images import DisplayImage, LinearImage, Mask
-from relit_camera.space.picture_files import write_linear
-from relit_camera.space.rotation import rotation_from_angles
+from relit_camera.base.images.image_files import write_linear
+from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
+from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.light.environment_panorama import Environment
+from relit_camera.light.exposure import auto_exposure_scale
+from relit_camera.light.light_map_rotation import rotate_light_map
+from relit_camera.live.compositing.alpha_compositing import over, unpremultiply
+from relit_camera.live.compositing.environment_view import EnvironmentView
 from relit_studio.camera import Camera
 from relit_studio.cycles.job import PanoramaLight
 
@@ -34,12 +34,12 @@ class Room:
     @cached_property
     def scale(self) -> float:
         """The exposure: a white ball that faces the camera reads 0.8."""
-        return display_scale(self.light_map)
+        return auto_exposure_scale(self.light_map)
 
     @cached_property
     def light_map(self) -> LinearImage:
         """The light about the person, (32, 64, 3)."""
-        return rotate(self.environment.light_map, rotation_from_angles(self.yaw_deg).inv())
+        return rotate_light_map(self.environment.light_map, rotation_from_angles(self.yaw_deg).inv())
 
     def light(self, folder: Path) -> PanoramaLight:
         """The light for Cycles; the panorama, turned, is written into `folder`.
@@ -67,5 +67,5 @@ class Room:
 
     def shown(self, picture: LinearImage, alpha: Mask, backdrop: DisplayImage) -> DisplayImage:
         """A rendered picture (h, w, 3), premultiplied, over the backdrop, as the webcam gives it."""
-        colours = straight(picture, alpha) * np.float32(self.scale)
+        colours = unpremultiply(picture, alpha) * np.float32(self.scale)
         return over(display_from_linear(colours), np.clip(alpha, 0, 1), backdrop)

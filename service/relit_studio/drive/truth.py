@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from relit_camera.face.schemes import landmark_scheme
-from relit_camera.face.state import LOST, FaceState, FaceStatus, HeadPose
-from relit_camera.space.images import Frame
+from relit_camera.base.images.image_types import Frame
+from relit_camera.face.face_state import LOST, FaceState, FaceStatus, HeadPose
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_studio.camera import Camera
 from relit_studio.drive.performance import Moment
 from relit_studio.drive.take import Take

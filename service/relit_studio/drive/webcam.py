@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.space.colour import luminance, uint8_from_linear
-from relit_camera.space.images import DisplayImage, LinearImage
+from relit_camera.base.images.color import luminance, uint8_from_linear
+from relit_camera.base.images.image_types import DisplayImage, LinearImage
 from relit_studio.processing import Automatics, Gains, Sensor
-from relit_studio.wander import Wander
+from relit_studio.random_walk import RandomWalk
 
 SENSOR = Sensor(white=0.25, shot=3e-4, read=1.2e-3)
 """Made for a room by day: in a dark one the gain, and with it the noise, goes up."""
@@ -34,7 +34,7 @@ class Webcam:
     def __init__(self, seed: int, light: LinearImage) -> None:
         """Switch it on before scene light (h, w, 3), in the unit of rendered pictures; `seed` is of noise and drift."""
         self._seed = seed
-        self._drift = Wander(np.random.default_rng([seed, 1]), 2, *_DRIFT_HZ)
+        self._drift = RandomWalk(np.random.default_rng([seed, 1]), 2, *_DRIFT_HZ)
         self._tint = np.asarray(self._mean(light) / luminance(self._mean(light)))
         self.gains = Gains()
         self.follow(light, _WARM_FRAMES)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.capture.importing import import_samples
-from relit_camera.errors import InputError
-from relit_camera.space.quality import psnr
+from relit_camera.base.errors import InputError
+from relit_camera.base.images.image_quality import psnr
+from relit_camera.capture.picture_import import import_samples
 
 
 @dataclass(frozen=True)

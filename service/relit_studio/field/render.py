@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.files import atomic_path, write_atomic
-from relit_camera.space.colour import uint8_from_linear
-from relit_camera.space.directions import fibonacci_directions
-from relit_camera.space.picture_files import write_display
+from relit_camera.base.images.color import uint8_from_linear
+from relit_camera.base.images.image_files import write_display
+from relit_camera.base.storage import atomic_path, write_atomic
+from relit_camera.light.directions import fibonacci_directions
 from relit_studio.assets.manifest import manifest
-from relit_studio.begun import keep_settings
 from relit_studio.camera import Camera
 from relit_studio.cycles.exr import Passes, read_passes
 from relit_studio.cycles.figure import Figure
@@ -25,6 +24,7 @@ from relit_studio.people.landmarks import canonical_origin, landmarks
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 from relit_studio.progress import Progress, no_progress
+from relit_studio.resume import keep_settings
 
 _PASSES = "passes.exr"
 _PASSES_SAMPLES = 96

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from relit_camera.files import atomic_path, write_atomic
-from relit_camera.space.directions import texel_directions
-from relit_camera.space.images import LinearImage, Mask
-from relit_camera.space.picture_files import write_display, write_linear
-from relit_studio.begun import keep_settings
+from relit_camera.base.images.image_files import write_display, write_linear
+from relit_camera.base.images.image_types import LinearImage, Mask
+from relit_camera.base.storage import atomic_path, write_atomic
+from relit_camera.light.directions import texel_directions
 from relit_studio.field.solver_gloss import gloss_albedo, glossy
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
 from relit_studio.field.solver_transport import Transport, bounced, transport
@@ -30,6 +29,7 @@ from relit_studio.mannequin.raster import Hits, rasterise
 from relit_studio.mannequin.shading import ShadowMap
 from relit_studio.pinhole import Pinhole
 from relit_studio.progress import Progress, no_progress
+from relit_studio.resume import keep_settings
 
 Values = NDArray[np.float32]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
-from relit_camera.space.directions import fibonacci_directions
+from relit_camera.light.directions import fibonacci_directions
 
 Values = NDArray[np.float32]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from relit_camera.space.directions import fibonacci_directions
+from relit_camera.light.directions import fibonacci_directions
 from relit_studio.mannequin.mesh import Triangles
 from relit_studio.mannequin.raster import fragments
 from relit_studio.mannequin.shading import axes_along

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.files import write_atomic
-from relit_camera.space.directions import texel_directions
-from relit_studio.begun import keep_settings
+from relit_camera.base.storage import write_atomic
+from relit_camera.light.directions import texel_directions
 from relit_studio.camera import Camera
 from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene
 from relit_studio.cycles.runner import render
@@ -17,6 +16,7 @@ from relit_studio.field.solver import BELOW_AXIS_CM, DISTANCE_CM, HEIGHT_CM, Sol
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
 from relit_studio.mannequin.olat import light_names, lights_text
 from relit_studio.progress import Progress, no_progress
+from relit_studio.resume import keep_settings
 
 
 def surfaces_scene(surfaces: Surfaces) -> Scene:

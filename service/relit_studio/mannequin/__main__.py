@@ -24,13 +24,13 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from relit_camera.compose.sheet import contact_sheet
-from relit_camera.errors import RelitError, StorageError
-from relit_camera.files import make_folder, write_atomic
-from relit_camera.light.builtin.catalogue import BUILTIN_NAMES, builtin_environment
-from relit_camera.space.images import DisplayImage
-from relit_camera.space.picture_files import read_display, write_display
-from relit_camera.video.reader import VideoReader
+from relit_camera.base.errors import RelitError, StorageError
+from relit_camera.base.images.contact_sheet import contact_sheet
+from relit_camera.base.images.image_files import read_display, write_display
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_studio.mannequin.clip import CLIP_SIZE, write_clip
 from relit_studio.mannequin.field import write_field
 from relit_studio.mannequin.lights import room

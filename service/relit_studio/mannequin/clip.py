@@ -8,15 +8,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from relit_camera.face.schemes import landmark_scheme
-from relit_camera.face.state import FaceState, FaceStatus
-from relit_camera.face.track_file import TrackRecorder
-from relit_camera.light.exposure import display_scale
-from relit_camera.light.maps import LightMap
-from relit_camera.light.sphere import extend, positions
-from relit_camera.space.colour import uint8_from_linear
-from relit_camera.space.images import Frame, LinearImage
-from relit_camera.video.writer import VideoWriter
+from relit_camera.base.images.color import uint8_from_linear
+from relit_camera.base.images.image_types import Frame, LinearImage
+from relit_camera.base.video.video_writer import VideoWriter
+from relit_camera.face.face_state import FaceState, FaceStatus
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.tracking.track_recording import TrackRecorder
+from relit_camera.light.exposure import auto_exposure_scale
+from relit_camera.light.light_map_rotation import LightMap, pad_poles, padded_positions
 from relit_studio.mannequin.camera import DISTANCE_CM, VIEW_CM, Camera
 from relit_studio.mannequin.figure import Posture
 from relit_studio.mannequin.lights import lights_from_map
@@ -99,8 +98,8 @@ def backdrop(light_map: LightMap, camera: Camera) -> LinearImage:
     across = (np.arange(camera.size) + 0.5 - camera.size / 2) / camera.size * VIEW_CM / DISTANCE_CM
     x, y = np.meshgrid(across, -across)
     length = np.sqrt(x * x + y * y + 1)
-    row, column = positions(x / length, y / length, -1 / length)
-    return np.asarray(np.pi * cv2.remap(extend(light_map), column, row, cv2.INTER_LINEAR), np.float32)
+    row, column = padded_positions(x / length, y / length, -1 / length)
+    return np.asarray(np.pi * cv2.remap(pad_poles(light_map), column, row, cv2.INTER_LINEAR), np.float32)
 
 
 def write_clip(
@@ -113,7 +112,7 @@ def write_clip(
         StorageError: a file cannot be written.
     """
     camera, times = Camera(CLIP_SIZE), frame_times(frames)
-    scale = np.float32(display_scale(light_map))
+    scale = np.float32(auto_exposure_scale(light_map))
     tracker = TruthTracker(camera)
     recorder = TrackRecorder(tracker, (camera.size, camera.size), FPS)
     with VideoWriter(video, (camera.size, camera.size), FPS) as writer:

@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from relit_camera.face.landmarks import Eye
-from relit_camera.space.rotation import rotation_from_angles
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks
 from relit_studio.mannequin.head import (
     EYE_RADIUS,
     FACE_COUNT,
@@ -129,13 +129,13 @@ def _still(points: Floats, middle: Floats, radius: float, *but: int) -> dict[int
     return {int(index): np.zeros(3) for index in far if index not in but}
 
 
-def _lid_pairs(eye: Eye) -> list[tuple[int, int]]:
+def _lid_pairs(eye: EyeLandmarks) -> list[tuple[int, int]]:
     """(upper, lower) lid points, from the outer to the inner corner, corners left out."""
     upper, lower = eye.lids[1:8], eye.lids[:8:-1]
     return list(zip(upper, lower, strict=True))
 
 
-def _blink(points: Floats, eye: Eye, upper_share: float) -> Floats:
+def _blink(points: Floats, eye: EyeLandmarks, upper_share: float) -> Floats:
     middle = points[list(eye.lids)].mean(axis=0)
     fixed = _still(points, middle, 2.3, *eye.lids)
     fixed |= {eye.outer: np.zeros(3), eye.inner: np.zeros(3)}
@@ -145,7 +145,7 @@ def _blink(points: Floats, eye: Eye, upper_share: float) -> Floats:
     return _spread(fixed)
 
 
-def _keep_outside_eyeball(vertices: Floats, eye: Eye) -> None:
+def _keep_outside_eyeball(vertices: Floats, eye: EyeLandmarks) -> None:
     centre = eye_centre(eye)
     near = np.linalg.norm(vertices[:FACE_COUNT] - centre, axis=1) < EYE_RADIUS + 0.6
     indices = np.flatnonzero(near)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_camera.face.landmarks import Eye
+from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks
 from relit_studio.mannequin.head import EYE_RADIUS
 from relit_studio.mannequin.mesh import Floats
 from relit_studio.mannequin.paint import IRIS_SHARE, SKIN_TONE, eye_paint_position
@@ -13,7 +13,7 @@ from relit_studio.mannequin.part import EYE, SKIN, TOOTH, Part, grid_part
 _CORNEA_BULGE = 0.06
 
 
-def eyeball(eye: Eye, name: str) -> Part:
+def eyeball(eye: EyeLandmarks, name: str) -> Part:
     """An eyeball about its own centre, looking along +Z."""
     polar, around = np.radians(np.linspace(0, 100, 27)), np.linspace(0, 2 * np.pi, 36, endpoint=False)
     directions = np.stack(

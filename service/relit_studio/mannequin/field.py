@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from relit_camera.files import write_atomic
-from relit_camera.space.directions import texel_directions
-from relit_camera.space.picture_files import write_display, write_linear
+from relit_camera.base.images.image_files import write_display, write_linear
+from relit_camera.base.storage import write_atomic
+from relit_camera.light.directions import texel_directions
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Posture
 from relit_studio.mannequin.olat import grey, landmarks_px, lights_text

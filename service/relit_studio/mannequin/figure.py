@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
-from relit_camera.space.rotation import Angles, rotation_from_angles
+from relit_camera.base.rotations import Angles, rotation_from_angles
 from relit_studio.mannequin import features
 from relit_studio.mannequin.bust import base, neck, pullover
 from relit_studio.mannequin.expression import Expression, control_vertices, gaze_rotation, jaw_motion
@@ -29,7 +29,7 @@ _NECK_TURNS = (-13.0, -5.5)
 
 @dataclass(frozen=True)
 class Posture:
-    """How the head stands relative to the room (degrees, see `space.rotation`), and its expression."""
+    """How the head stands relative to the room (degrees, see `base.rotations`), and its expression."""
 
     angles: Angles = field(default_factory=lambda: Angles(0.0, 0.0, 0.0))
     expression: Expression = field(default_factory=Expression)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, PchipInterpolator
 
-from relit_camera.space.rotation import rotation_from_angles
+from relit_camera.base.rotations import rotation_from_angles
 from relit_studio.mannequin.head import SKULL_CENTRE
 from relit_studio.mannequin.mesh import Floats
 from relit_studio.mannequin.paint import SKIN_TONE

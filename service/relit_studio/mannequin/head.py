@@ -12,9 +12,8 @@ from functools import lru_cache
 import numpy as np
 from scipy import sparse
 
-from relit_camera.face.canonical import canonical_face
-from relit_camera.face.landmarks import Eye
-from relit_camera.face.schemes import landmark_scheme
+from relit_camera.face.landmarks.canonical_face import canonical_face
+from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks, landmark_scheme
 from relit_studio.mannequin.mesh import Floats, Mesh, Triangles, extrude, loop_subdivision
 
 SCHEME = landmark_scheme("mesh478")
@@ -78,7 +77,7 @@ def control_head() -> ControlHead:
     )
 
 
-def eye_centre(eye: Eye) -> Floats:
+def eye_centre(eye: EyeLandmarks) -> Floats:
     """Centre (3,) of the eyeball, so that its front touches the lids from behind."""
     lids = canonical_face().vertices[list(eye.lids)]
     middle = lids.mean(axis=0)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.config.look import Lamp
-from relit_camera.light.lamps import lamp_map
-from relit_camera.light.maps import LightMap, check_light_map
-from relit_camera.space.colour import LUMINANCE
-from relit_camera.space.directions import texel_directions, texel_solid_angles
+from relit_camera.base.config.look import Lamp
+from relit_camera.base.images.color import LUMINANCE
+from relit_camera.light.directions import texel_directions, texel_solid_angles
+from relit_camera.light.light_map_rotation import LightMap, check_light_map
+from relit_camera.light.scene_light import lamp_light_map
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ def room() -> LightMap:
     )
     height = texel_directions()[..., 1:2]
     walls = 0.16 + 0.06 * np.clip(height, -1, 1)
-    return np.asarray(lamp_map(lamps) + walls * np.array([1.0, 0.96, 0.9]), np.float32)
+    return np.asarray(lamp_light_map(lamps) + walls * np.array([1.0, 0.96, 0.9]), np.float32)
 
 
 def lights_from_map(light_map: LightMap, count: int) -> DistantLights:

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.files import atomic_path, write_atomic
-from relit_camera.space.colour import uint8_from_linear
-from relit_camera.space.directions import fibonacci_directions
-from relit_camera.space.images import Mask
-from relit_camera.space.picture_files import write_display
+from relit_camera.base.images.color import uint8_from_linear
+from relit_camera.base.images.image_files import write_display
+from relit_camera.base.images.image_types import Mask
+from relit_camera.base.storage import atomic_path, write_atomic
+from relit_camera.light.directions import fibonacci_directions
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Posture, mannequin
 from relit_studio.mannequin.renderer import View

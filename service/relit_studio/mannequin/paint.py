@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter
 
-from relit_camera.face.landmarks import Eye
+from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks
 from relit_studio.mannequin.expression import Expression, control_vertices
 from relit_studio.mannequin.head import SCHEME, control_head
 from relit_studio.mannequin.mesh import Floats
@@ -96,7 +96,7 @@ def _face() -> Albedo:
     return np.asarray(face)
 
 
-def _paint_eye(face: Albedo, points: Floats, eye: Eye) -> None:
+def _paint_eye(face: Albedo, points: Floats, eye: EyeLandmarks) -> None:
     upper = points[list(eye.lids[:9])]
     lower = points[[eye.outer, *eye.lids[:8:-1], eye.inner]]
     shape = face.shape[:2]

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.light.exposure import display_scale
-from relit_camera.light.maps import LightMap
-from relit_camera.space.display import display_from_linear
-from relit_camera.video.writer import VideoWriter
+from relit_camera.base.images.tone_mapping import display_from_linear
+from relit_camera.base.video.video_writer import VideoWriter
+from relit_camera.light.exposure import auto_exposure_scale
+from relit_camera.light.light_map_rotation import LightMap
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.clip import CLIP_LIGHTS, CLIP_SIZE
 from relit_studio.mannequin.lights import lights_from_map
@@ -32,7 +32,7 @@ def write_relit(
         StorageError: a file cannot be written.
     """
     camera, size = Camera(CLIP_SIZE), (CLIP_SIZE, CLIP_SIZE)
-    lights, scale = lights_from_map(light_map, CLIP_LIGHTS), np.float32(display_scale(light_map))
+    lights, scale = lights_from_map(light_map, CLIP_LIGHTS), np.float32(auto_exposure_scale(light_map))
     with VideoWriter(video, size, FPS) as person, VideoWriter(matte, size, FPS) as outline:
         for index, time_s in enumerate(frame_times(frames).tolist()):
             view = View(posture_at(time_s), camera)

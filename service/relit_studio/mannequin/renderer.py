@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from relit_camera.space.images import LinearImage, Mask
+from relit_camera.base.images.image_types import LinearImage, Mask
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Figure, Posture, mannequin
 from relit_studio.mannequin.lights import DistantLights

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from relit_camera.errors import NotFoundError
-from relit_studio.people.chance import random_traits
+from relit_camera.base.errors import NotFoundError
+from relit_studio.people.random_traits import random_traits
 from relit_studio.people.traits import BrowTraits, Resting, Traits
 
 CAST = {

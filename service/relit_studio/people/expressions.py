@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from relit_camera.errors import NotFoundError
+from relit_camera.base.errors import NotFoundError
 
 Expression = Mapping[str, float]
 """Weights by the face model's names."""

@@ -11,7 +11,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.errors import InputError
+from relit_camera.base.errors import InputError
 from relit_studio.people.geometry import Floats, Indices, triangles_of
 
 IDENTITIES = 100

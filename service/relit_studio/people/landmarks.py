@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from relit_camera.face.schemes import landmark_scheme
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_studio.people.eyes import LIMBUS_CM, VIEW_CM, eye_map
 from relit_studio.people.face_model import CORNEA_MATERIALS, FaceModel, Part
 from relit_studio.people.geometry import Floats, SurfacePoints, triangles_of

@@ -14,7 +14,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from relit_camera.face.schemes import VERTICES_66, landmark_scheme
+from relit_camera.face.landmarks.landmark_schemes import VERTICES_66, landmark_scheme
 from relit_studio.people.face_model import FaceModel, Part
 from relit_studio.people.geometry import Floats, Indices, SurfacePoints, edges_of, find_nearest
 

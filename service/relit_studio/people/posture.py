@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from relit_camera.space.rotation import Angles, rotation_from_angles
+from relit_camera.base.rotations import Angles, rotation_from_angles
 from relit_studio.people.expressions import NEUTRAL, Expression
 from relit_studio.people.geometry import Floats, smoothstep
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.errors import InputError
+from relit_camera.base.errors import InputError
 from relit_studio.people.geometry import Floats, Indices
 
 _TYPES = {5126: np.float32, 5123: np.uint16}

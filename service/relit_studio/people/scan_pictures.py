@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.errors import ImageError
-from relit_camera.space.images import DisplayImage
-from relit_camera.space.picture_files import read_display
+from relit_camera.base.errors import ImageError
+from relit_camera.base.images.image_files import read_display
+from relit_camera.base.images.image_types import DisplayImage
 
 Picture = NDArray[np.float32]
 

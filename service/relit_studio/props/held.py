@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from relit_camera.space.rotation import rotation_from_angles
+from relit_camera.base.rotations import rotation_from_angles
 from relit_studio.cycles.job import Material, Mesh
 from relit_studio.people.geometry import Floats
 from relit_studio.people.person import Person

@@ -39,7 +39,7 @@ for round in first second; do
     while systemctl -q is-active user@1000; do sleep 1; done
 done
 step "doctor again" 'relit doctor || true'
-data=$(runuser -l you -c 'ls -d ~/.local/*/venvs/relit-camera/lib/python3*/site-packages/relit_camera/demo/data ~/.local/share/*/venvs/relit-camera/lib/python3*/site-packages/relit_camera/demo/data 2>/dev/null | head -n 1')
+data=$(runuser -l you -c 'ls -d ~/.local/*/venvs/relit-camera/lib/python3*/site-packages/relit_camera/app/demo/data ~/.local/share/*/venvs/relit-camera/lib/python3*/site-packages/relit_camera/app/demo/data 2>/dev/null | head -n 1')
 loginctl enable-linger you
 step "as a service" "mkdir -p ~/.config/relit-camera
 export XDG_RUNTIME_DIR=/run/user/\$(id -u)

@@ -8,73 +8,73 @@ from typing import Annotated
 from fastapi import APIRouter, Body, Form, Request, UploadFile
 from starlette.responses import Response
 
-from relit_camera.api.context import ApiContext, Context
-from relit_camera.api.pictures import JPEG_RESPONSE, jpeg_answer, thumbnail, thumbnail_path
-from relit_camera.api.problems import ConflictError, responses
+from relit_camera.api.dependencies import ApiContext, ApiContextDep
+from relit_camera.api.jpeg_responses import JPEG_RESPONSE, encode_thumbnail, jpeg_response, thumbnail_url_path
+from relit_camera.api.middleware.body_limits import read_upload
+from relit_camera.api.problem_details import ConflictError, error_responses
 from relit_camera.api.schemas import BackgroundPicture
-from relit_camera.api.uploads import read_upload
-from relit_camera.config.look import Background, ImageBackground, Name
+from relit_camera.base.config.look import Background, ImageBackground, StoredName
 
 router = APIRouter(tags=["background"])
 
 
 @router.get("/background")
-def get_background(api: Context) -> Background:
+def get_background(api: ApiContextDep) -> Background:
     """The background as it now stands."""
-    return api.camera.director.scene.look.background
+    return api.camera.scene_controller.scene.look.background
 
 
-@router.put("/background", responses=responses(404, 422))
-def set_background(api: Context, background: Annotated[Background, Body()]) -> Background:
+@router.put("/background", responses=error_responses(404, 422))
+def set_background(api: ApiContextDep, background: Annotated[Background, Body()]) -> Background:
     """Replace the background. Fields left out take the defaults of its kind."""
-    scene = api.camera.director.update_look(lambda look: look.model_copy(update={"background": background}))
+    scene = api.camera.scene_controller.update_look(lambda look: look.model_copy(update={"background": background}))
     return scene.look.background
 
 
 @router.get("/backgrounds")
-def list_backgrounds(api: Context) -> list[BackgroundPicture]:
+def list_backgrounds(api: ApiContextDep) -> list[BackgroundPicture]:
     """The stored background pictures."""
-    return [_item(api, name) for name in api.camera.director.backgrounds.names()]
+    return [_item(api, name) for name in api.camera.scene_controller.backgrounds.names()]
 
 
-@router.post("/backgrounds", status_code=HTTPStatus.CREATED, responses=responses(409, 413, 422, 503, 507))
-def add_background(api: Context, name: Annotated[Name, Form()], file: UploadFile) -> BackgroundPicture:
+@router.post("/backgrounds", status_code=HTTPStatus.CREATED, responses=error_responses(409, 413, 422, 503, 507))
+def add_background(api: ApiContextDep, name: Annotated[StoredName, Form()], file: UploadFile) -> BackgroundPicture:
     """Store a picture (.jpg, .png, .webp …) to be used as background."""
-    director, data = api.camera.director, read_upload(file)
-    with api.slow_work():  # the check too: of two at a time with one name, one must hear of the other
-        if name in director.background_names():
+    scene_controller, data = api.camera.scene_controller, read_upload(file)
+    with api.exclusive_image_work():  # the check too: of two at a time with one name, one must hear of the other
+        if name in scene_controller.background_names():
             raise ConflictError(f"a background or environment '{name}' is stored already", "choose another name")
-        director.backgrounds.add(name, data)
-    api.changed("backgrounds")
+        scene_controller.backgrounds.add(name, data)
+    api.publish_collection_changed("backgrounds")
     return _item(api, name)
 
 
-@router.delete("/backgrounds/{name}", status_code=HTTPStatus.NO_CONTENT, responses=responses(404, 409, 422))
-def delete_background(api: Context, name: Name) -> None:
+@router.delete("/backgrounds/{name}", status_code=HTTPStatus.NO_CONTENT, responses=error_responses(404, 409, 422))
+def delete_background(api: ApiContextDep, name: StoredName) -> None:
     """Delete a stored background picture that is not in use."""
     if _is_current(api, name):
         raise ConflictError(f"background '{name}' is in use", "choose another background first")
-    api.camera.director.backgrounds.remove(name)
-    api.changed("backgrounds")
+    api.camera.scene_controller.backgrounds.remove(name)
+    api.publish_collection_changed("backgrounds")
 
 
 @router.get(
     "/backgrounds/{name}/thumbnail.jpg",
     response_class=Response,
-    responses=JPEG_RESPONSE | responses(404, 422, 503),
+    responses=JPEG_RESPONSE | error_responses(404, 422, 503),
 )
-def get_background_thumbnail(api: Context, request: Request, name: Name) -> Response:
+def get_background_thumbnail(api: ApiContextDep, request: Request, name: StoredName) -> Response:
     """A small picture of a stored background."""
-    with api.slow_work():
-        jpeg = thumbnail(api.camera.director.backgrounds.load(name))
-    return jpeg_answer(request, jpeg)
+    with api.exclusive_image_work():
+        jpeg = encode_thumbnail(api.camera.scene_controller.backgrounds.load(name))
+    return jpeg_response(request, jpeg)
 
 
 def _item(api: ApiContext, name: str) -> BackgroundPicture:
-    path = thumbnail_path("backgrounds", name)
+    path = thumbnail_url_path("backgrounds", name)
     return BackgroundPicture(name=name, is_current=_is_current(api, name), thumbnail=path)
 
 
 def _is_current(api: ApiContext, name: str) -> bool:
-    background = api.camera.director.scene.look.background
+    background = api.camera.scene_controller.scene.look.background
     return isinstance(background, ImageBackground) and background.image == name

@@ -9,82 +9,88 @@ from typing import Annotated
 from fastapi import APIRouter, Form, Request, UploadFile
 from starlette.responses import Response
 
-from relit_camera.api.context import ApiContext, Context
-from relit_camera.api.pictures import JPEG_RESPONSE, jpeg_answer, thumbnail_path
-from relit_camera.api.problems import ConflictError, responses
+from relit_camera.api.dependencies import ApiContext, ApiContextDep
+from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response, thumbnail_url_path
+from relit_camera.api.middleware.body_limits import read_upload
+from relit_camera.api.problem_details import ConflictError, error_responses
 from relit_camera.api.schemas import EnvironmentDetails, EnvironmentItem
-from relit_camera.api.uploads import read_upload
-from relit_camera.config.look import ImageBackground, Name
-from relit_camera.light.builtin.catalogue import BUILTIN_NAMES
-from relit_camera.light.store import RESERVED_NAMES
-from relit_camera.light.tone import thumbnail_image
-from relit_camera.space.picture_files import encode_display
+from relit_camera.base.config.look import ImageBackground, StoredName
+from relit_camera.base.images.image_files import encode_display
+from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environment_store import RESERVED_NAMES
+from relit_camera.light.environment_thumbnail import thumbnail_image
 
 router = APIRouter(prefix="/environments", tags=["environments"])
 
 
 @router.get("")
-def list_environments(api: Context) -> list[EnvironmentItem]:
+def list_environments(api: ApiContextDep) -> list[EnvironmentItem]:
     """The built-in and the stored environments, and one from a file named on the command line."""
-    director = api.camera.director
+    scene_controller = api.camera.scene_controller
     return [
-        _item(api, name) for name in dict.fromkeys([*director.environments.names(), *director.guest_environments()])
+        _item(api, name)
+        for name in dict.fromkeys([*scene_controller.environments.names(), *scene_controller.temporary_environments()])
     ]
 
 
-@router.post("", status_code=HTTPStatus.CREATED, responses=responses(409, 413, 422, 503, 507))
-def add_environment(api: Context, name: Annotated[Name, Form()], file: UploadFile) -> EnvironmentDetails:
+@router.post("", status_code=HTTPStatus.CREATED, responses=error_responses(409, 413, 422, 503, 507))
+def add_environment(api: ApiContextDep, name: Annotated[StoredName, Form()], file: UploadFile) -> EnvironmentDetails:
     """Store a 360° panorama (.hdr, .exr, .png or .jpg, twice as wide as high), as seen from inside."""
-    director, data = api.camera.director, read_upload(file)
-    with api.slow_work():  # the check too: of two at a time with one name, one must hear of the other
-        if name in RESERVED_NAMES or name in {*director.background_names(), *director.guest_environments()}:
+    scene_controller, data = api.camera.scene_controller, read_upload(file)
+    with api.exclusive_image_work():  # the check too: of two at a time with one name, one must hear of the other
+        if name in RESERVED_NAMES or name in {
+            *scene_controller.background_names(),
+            *scene_controller.temporary_environments(),
+        }:
             raise ConflictError(f"an environment or background '{name}' exists already", "choose another name")
-        director.environments.add_upload(name, data, PurePath(file.filename or "").suffix)
-    api.changed("environments")
+        scene_controller.environments.add_upload(name, data, PurePath(file.filename or "").suffix)
+    api.publish_collection_changed("environments")
     return _details(api, name)
 
 
-@router.get("/{name}", responses=responses(404, 422, 503))
-def get_environment(api: Context, name: Name) -> EnvironmentDetails:
+@router.get("/{name}", responses=error_responses(404, 422, 503))
+def get_environment(api: ApiContextDep, name: StoredName) -> EnvironmentDetails:
     """One environment and what is to be known of it."""
     return _details(api, name)
 
 
-@router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT, responses=responses(404, 409, 422))
-def delete_environment(api: Context, name: Name) -> None:
+@router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT, responses=error_responses(404, 409, 422))
+def delete_environment(api: ApiContextDep, name: StoredName) -> None:
     """Delete a stored environment that is neither built in nor in use."""
     if name in BUILTIN_NAMES:
         raise ConflictError(f"environment '{name}' is built in", "only environments of your own can be deleted")
     if _is_current(api, name):
         raise ConflictError(f"environment '{name}' is in use", "choose another environment first")
-    api.camera.director.environments.remove(name)
-    api.changed("environments")
+    api.camera.scene_controller.environments.remove(name)
+    api.publish_collection_changed("environments")
 
 
-@router.get("/{name}/thumbnail.jpg", response_class=Response, responses=JPEG_RESPONSE | responses(404, 422, 503))
-def get_environment_thumbnail(api: Context, request: Request, name: Name) -> Response:
+@router.get("/{name}/thumbnail.jpg", response_class=Response, responses=JPEG_RESPONSE | error_responses(404, 422, 503))
+def get_environment_thumbnail(api: ApiContextDep, request: Request, name: StoredName) -> Response:
     """A small picture of an environment as seen from inside, in an exposure that suits it."""
-    with api.slow_work():
-        director = api.camera.director
-        guest = director.guest_environments().get(name)
-        jpeg = encode_display(thumbnail_image(guest.panorama)) if guest else director.environments.thumbnail(name)
-    return jpeg_answer(request, jpeg)
+    with api.exclusive_image_work():
+        scene_controller = api.camera.scene_controller
+        guest = scene_controller.temporary_environments().get(name)
+        jpeg = (
+            encode_display(thumbnail_image(guest.panorama)) if guest else scene_controller.environments.thumbnail(name)
+        )
+    return jpeg_response(request, jpeg)
 
 
 def _item(api: ApiContext, name: str) -> EnvironmentItem:
     return EnvironmentItem(
         name=name,
         builtin=name in BUILTIN_NAMES,
-        temporary=name in api.camera.director.guest_environments(),
+        temporary=name in api.camera.scene_controller.temporary_environments(),
         is_current=_is_current(api, name),
-        thumbnail=thumbnail_path("environments", name),
+        thumbnail=thumbnail_url_path("environments", name),
     )
 
 
 def _details(api: ApiContext, name: str) -> EnvironmentDetails:
-    with api.slow_work():
-        director = api.camera.director
-        environment = director.guest_environments().get(name) or director.environments.load(name)
+    with api.exclusive_image_work():
+        scene_controller = api.camera.scene_controller
+        environment = scene_controller.temporary_environments().get(name) or scene_controller.environments.load(name)
     height, width = environment.panorama.radiance.shape[:2]
     return EnvironmentDetails(
         **dict(_item(api, name)),
@@ -96,6 +102,6 @@ def _details(api: ApiContext, name: str) -> EnvironmentDetails:
 
 
 def _is_current(api: ApiContext, name: str) -> bool:
-    look = api.camera.director.scene.look
+    look = api.camera.scene_controller.scene.look
     in_background = isinstance(look.background, ImageBackground) and look.background.image == name
     return in_background or look.lighting.environment == name

@@ -7,47 +7,47 @@ from http import HTTPStatus
 from fastapi import APIRouter
 from starlette.responses import Response
 
-from relit_camera.api.context import Context
-from relit_camera.api.problems import responses
+from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.problem_details import error_responses
 from relit_camera.api.schemas import PresetItem
-from relit_camera.config.look import Look, Name
+from relit_camera.base.config.look import Look, StoredName
 
 router = APIRouter(prefix="/presets", tags=["presets"])
 
 
 @router.get("")
-def list_presets(api: Context) -> list[PresetItem]:
+def list_presets(api: ApiContextDep) -> list[PresetItem]:
     """The stored presets."""
     return [PresetItem(name=name) for name in api.presets.names()]
 
 
-@router.get("/{name}", responses=responses(404, 422))
-def get_preset(api: Context, name: Name) -> Look:
+@router.get("/{name}", responses=error_responses(404, 422))
+def get_preset(api: ApiContextDep, name: StoredName) -> Look:
     """One preset's look."""
     return api.presets.load(name)
 
 
 @router.put(
     "/{name}",
-    responses=responses(422, 507) | {HTTPStatus.CREATED.value: {"model": Look, "description": "A new preset"}},
+    responses=error_responses(422, 507) | {HTTPStatus.CREATED.value: {"model": Look, "description": "A new preset"}},
 )
-def save_preset(api: Context, response: Response, name: Name, look: Look | None = None) -> Look:
+def save_preset(api: ApiContextDep, response: Response, name: StoredName, look: Look | None = None) -> Look:
     """Store a look under a name, in place of one of that name. Without a body: the look as it now stands."""
-    look = look or api.camera.director.scene.look
+    look = look or api.camera.scene_controller.scene.look
     if api.presets.save(name, look):
         response.status_code = HTTPStatus.CREATED
-    api.changed("presets")
+    api.publish_collection_changed("presets")
     return look
 
 
-@router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT, responses=responses(404, 422))
-def delete_preset(api: Context, name: Name) -> None:
+@router.delete("/{name}", status_code=HTTPStatus.NO_CONTENT, responses=error_responses(404, 422))
+def delete_preset(api: ApiContextDep, name: StoredName) -> None:
     """Delete a preset."""
     api.presets.remove(name)
-    api.changed("presets")
+    api.publish_collection_changed("presets")
 
 
-@router.post("/{name}/apply", responses=responses(404, 422))
-def apply_preset(api: Context, name: Name) -> Look:
+@router.post("/{name}/apply", responses=error_responses(404, 422))
+def apply_preset(api: ApiContextDep, name: StoredName) -> Look:
     """Show a preset's look. The answer is the look as it now stands."""
-    return api.camera.director.set_look(api.presets.load(name)).look
+    return api.camera.scene_controller.set_look(api.presets.load(name)).look

@@ -9,20 +9,20 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query
 from starlette.responses import Response, StreamingResponse
 
-from relit_camera.api.context import ApiContext, Context
-from relit_camera.api.pictures import JPEG_RESPONSE
-from relit_camera.api.preview import WAIT_S, Variant
-from relit_camera.api.problems import NotReadyError, responses
-from relit_camera.space.picture_files import encode_display
+from relit_camera.api.dependencies import ApiContext, ApiContextDep
+from relit_camera.api.jpeg_responses import JPEG_RESPONSE
+from relit_camera.api.preview_stream import FRAME_WAIT_S, PreviewVariant
+from relit_camera.api.problem_details import NotReadyError, error_responses
+from relit_camera.base.images.image_files import encode_display
 
 router = APIRouter(tags=["preview"])
 
-BOUNDARY = "picture"
-FIRST_PICTURE_S = 2.0
+MULTIPART_BOUNDARY = "picture"
+FIRST_FRAME_TIMEOUT_S = 2.0
 STREAM_RESPONSE: dict[int | str, dict[str, Any]] = {
     200: {
         "description": "JPEG pictures without end, until the viewer leaves or the camera stops",
-        "content": {f"multipart/x-mixed-replace; boundary={BOUNDARY}": {"schema": {"type": "string"}}},
+        "content": {f"multipart/x-mixed-replace; boundary={MULTIPART_BOUNDARY}": {"schema": {"type": "string"}}},
     }
 }
 
@@ -31,36 +31,40 @@ Mirror = Annotated[bool, Query(description="Left and right exchanged, as in a mi
 Fps = Annotated[float, Query(ge=0.1, le=60, allow_inf_nan=False, description="At most so many pictures a second")]
 
 
-@router.get("/snapshot.jpg", response_class=Response, responses=JPEG_RESPONSE | responses(422, 503))
-def get_snapshot(api: Context) -> Response:
+@router.get("/snapshot.jpg", response_class=Response, responses=JPEG_RESPONSE | error_responses(422, 503))
+def get_snapshot(api: ApiContextDep) -> Response:
     """The newest published picture, full size."""
-    published = api.camera.picture(-1, FIRST_PICTURE_S)
+    published = api.camera.picture(-1, FIRST_FRAME_TIMEOUT_S)
     if published is None:
         raise NotReadyError("no picture has been published yet", "try again when /readyz says ready")
     return Response(encode_display(published[1], ".jpg", 95), media_type="image/jpeg")
 
 
-@router.get("/preview.mjpg", response_class=StreamingResponse, responses=STREAM_RESPONSE | responses(422, 503))
-async def get_preview(api: Context, width: Width = None, mirror: Mirror = False, fps: Fps = 30.0) -> StreamingResponse:
+@router.get("/preview.mjpg", response_class=StreamingResponse, responses=STREAM_RESPONSE | error_responses(422, 503))
+async def get_preview(
+    api: ApiContextDep, width: Width = None, mirror: Mirror = False, fps: Fps = 30.0
+) -> StreamingResponse:
     """The published pictures as motion JPEG, for an `<img>`."""
-    variant = Variant(width, mirror, fps)
-    api.preview.check_room(variant)
-    return StreamingResponse(motion_jpeg(api, variant), media_type=f"multipart/x-mixed-replace; boundary={BOUNDARY}")
+    variant = PreviewVariant(width, mirror, fps)
+    api.preview.check_capacity(variant)
+    return StreamingResponse(
+        motion_jpeg(api, variant), media_type=f"multipart/x-mixed-replace; boundary={MULTIPART_BOUNDARY}"
+    )
 
 
-async def motion_jpeg(api: ApiContext, variant: Variant) -> AsyncIterator[bytes]:
+async def motion_jpeg(api: ApiContext, variant: PreviewVariant) -> AsyncIterator[bytes]:
     """The parts of a multipart/x-mixed-replace body (the server-push type of Netscape, kept by browsers).
 
     Each part is followed at once by the next boundary: browsers show a part when they see its end. Cancelling it, which
     is what happens when the client leaves, frees the viewer's place.
     """
-    with suppress(NotReadyError), api.preview.watch(variant) as channel:  # the last place may be taken by now
+    with suppress(NotReadyError), api.preview.subscribe(variant) as channel:  # the last place may be taken by now
         count = -1
-        yield f"--{BOUNDARY}\r\n".encode()
-        while not api.ending() and not channel.ended:
-            picture = await channel.next(count, WAIT_S)
+        yield f"--{MULTIPART_BOUNDARY}\r\n".encode()
+        while not api.is_stopping() and not channel.ended:
+            picture = await channel.next(count, FRAME_WAIT_S)
             if picture is None:
                 continue
             count = picture.count
             head = f"Content-Type: image/jpeg\r\nContent-Length: {len(picture.jpeg)}\r\n\r\n"
-            yield b"".join((head.encode(), picture.jpeg, f"\r\n--{BOUNDARY}\r\n".encode()))
+            yield b"".join((head.encode(), picture.jpeg, f"\r\n--{MULTIPART_BOUNDARY}\r\n".encode()))

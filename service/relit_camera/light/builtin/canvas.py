@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.space.colour import srgb_decode
-from relit_camera.space.directions import direction_from_degrees
+from relit_camera.base.images.color import srgb_decode
+from relit_camera.light.directions import direction_from_degrees
 
 HEIGHT, WIDTH = 512, 1024
 Canvas = NDArray[np.float32]
@@ -38,30 +38,30 @@ def directions() -> Canvas:
     return direction_from_degrees(180 - bearing, elevation).astype(np.float32)
 
 
-def map_axes(canvas: Canvas) -> Canvas:
+def to_map_axes(canvas: Canvas) -> Canvas:
     """A canvas as a map: mirrored, with the camera's side in the middle."""
     return np.ascontiguousarray(np.roll(canvas[:, ::-1], WIDTH // 2, axis=1))
 
 
-def colour(code: str, strength: float = 1.0) -> NDArray[np.float32]:
+def color(code: str, strength: float = 1.0) -> NDArray[np.float32]:
     """Linear RGB (3,) of a web colour such as "#ff8800", times `strength`."""
     encoded = np.array([int(code[k : k + 2], 16) for k in (1, 3, 5)], np.float32) / 255
     return srgb_decode(encoded) * np.float32(strength)
 
 
-def step(low: float, high: float, value: NDArray) -> Canvas:
+def smoothstep(low: float, high: float, value: NDArray) -> Canvas:
     """0 below `low`, 1 above `high` (or the other way round where low > high), smooth between (Hermite)."""
     t = np.clip((value - low) / (high - low), 0, 1)
     return np.asarray(t * t * (3 - 2 * t), np.float32)
 
 
-def ramp(value: NDArray, stops: Sequence[float], colours: list[NDArray[np.float32]]) -> Canvas:
+def color_ramp(value: NDArray, stops: Sequence[float], colours: list[NDArray[np.float32]]) -> Canvas:
     """Colours (..., 3) at `value` (...), linear between rising `stops`."""
     table = np.array(colours)
     return np.stack([np.interp(value, stops, table[:, k]) for k in range(3)], axis=-1).astype(np.float32)
 
 
-def over(canvas: Canvas, mask: Canvas, paint: NDArray[np.float32]) -> Canvas:
+def blend_over(canvas: Canvas, mask: Canvas, paint: NDArray[np.float32]) -> Canvas:
     """`paint` (3,) or (512, 1024, 3) laid over the canvas where the mask (512, 1024) is 1."""
     return np.asarray(canvas + mask[..., None] * (paint - canvas), np.float32)
 
@@ -72,12 +72,12 @@ def angle_from(azimuth_deg: float, elevation_deg: float) -> Canvas:
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1, 1))), np.float32)
 
 
-def glow(azimuth_deg: float, elevation_deg: float, size_deg: float) -> Canvas:
+def gaussian_glow(azimuth_deg: float, elevation_deg: float, size_deg: float) -> Canvas:
     """1 toward AZ, EL, falling off as a Gaussian with a sigma of `size_deg`."""
     return np.asarray(np.exp(-0.5 * (angle_from(azimuth_deg, elevation_deg) / size_deg) ** 2), np.float32)
 
 
-def panel(
+def panel_mask(
     azimuth_deg: float, elevation_deg: float, width_deg: float, height_deg: float, soft_deg: float = 1.5
 ) -> Canvas:
     """Mask of an upright rectangle of light that faces the head, centred at AZ, EL, of these full angles."""
@@ -86,13 +86,15 @@ def panel(
     axes = np.stack([right, np.cross(facing, right), facing]).astype(np.float32)
     u, v, depth = np.moveaxis(directions() @ axes.T, -1, 0)
     inside = [
-        step(size / 2 + soft_deg, size / 2 - soft_deg, np.abs(np.degrees(np.arctan2(offset, np.maximum(depth, 1e-6)))))
+        smoothstep(
+            size / 2 + soft_deg, size / 2 - soft_deg, np.abs(np.degrees(np.arctan2(offset, np.maximum(depth, 1e-6))))
+        )
         for offset, size in ((u, width_deg), (v, height_deg))
     ]
     return np.where(depth > 0, inside[0] * inside[1], 0).astype(np.float32)
 
 
-def noise(u: NDArray, v: NDArray, seed: int, octaves: int = 5) -> Canvas:
+def fractal_noise(u: NDArray, v: NDArray, seed: int, octaves: int = 5) -> Canvas:
     """Fractal noise, about −1 to 1, of the shape of u and v; its coarsest grain has a size of 1, its period is 64."""
     tile = np.random.default_rng(seed).standard_normal((64, 64)).astype(np.float32)
     total = np.zeros(np.shape(u), np.float32)
@@ -103,7 +105,9 @@ def noise(u: NDArray, v: NDArray, seed: int, octaves: int = 5) -> Canvas:
     return np.asarray(total / 1.6, np.float32)
 
 
-def stamp(canvas: Canvas, bearing: float, elevation: float, radius_deg: float, light: NDArray[np.float32]) -> None:
+def add_bokeh_disc(
+    canvas: Canvas, bearing: float, elevation: float, radius_deg: float, light: NDArray[np.float32]
+) -> None:
     """Add a disc out of focus, evenly bright with a soft edge and a brighter rim, near the horizon. In place."""
     scale = WIDTH / 360
     x, y, radius = (bearing + 180) * scale - 0.5, (90 - elevation) * scale - 0.5, radius_deg * scale

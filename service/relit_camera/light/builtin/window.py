@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_camera.light.builtin.canvas import Canvas, blur, colour, directions, noise, over, ramp, step
+from relit_camera.light.builtin.canvas import (
+    Canvas,
+    blend_over,
+    blur,
+    color,
+    color_ramp,
+    directions,
+    fractal_noise,
+    smoothstep,
+)
 
 LEFT, RIGHT, BACK, FRONT, FLOOR, CEILING = -2.3, 2.9, -4.6, 3.4, -1.25, 1.75
 """Walls of the room in metres from the head, in the project's axes."""
@@ -28,7 +37,7 @@ def paint() -> Canvas:
     wall = np.argmin(reach, axis=-1)
     point = (direction * np.min(reach, axis=-1, keepdims=True)).astype(np.float32)
     back = (wall == 2) & (direction[..., 2] < 0)
-    canvas = _surfaces(point, wall, back) * _daylight(point, wall)[..., None] * colour("#f2f5ff")
+    canvas = _surfaces(point, wall, back) * _daylight(point, wall)[..., None] * color("#f2f5ff")
     canvas = canvas + _lamp_light(point, wall)
     x, y, z = np.moveaxis(point, -1, 0)
     for span in SIDE_WINDOWS:
@@ -61,33 +70,33 @@ def _daylight(point: Canvas, wall: np.ndarray) -> Canvas:
 def _surfaces(point: Canvas, wall: np.ndarray, back: np.ndarray) -> Canvas:
     """Albedo (512, 1024, 3) of walls, ceiling, planks, rug, skirting and the picture."""
     x, y, z = np.moveaxis(point, -1, 0)
-    paint = np.where(back[..., None], colour("#c3cbc9"), colour("#d9cfc1"))
-    paint = paint * (1 + 0.02 * noise(3 * (x + z), 3 * y, 60, 3))[..., None]
-    paint = over(paint, step(FLOOR + 0.13, FLOOR + 0.11, y), colour("#e8e4dc"))
+    paint = np.where(back[..., None], color("#c3cbc9"), color("#d9cfc1"))
+    paint = paint * (1 + 0.02 * fractal_noise(3 * (x + z), 3 * y, 60, 3))[..., None]
+    paint = blend_over(paint, smoothstep(FLOOR + 0.13, FLOOR + 0.11, y), color("#e8e4dc"))
     paint = _picture(paint, back, x, y)
     flat = wall == 1
-    paint = np.where((flat & (y > 0))[..., None], colour("#ece8e0"), paint)
+    paint = np.where((flat & (y > 0))[..., None], color("#ece8e0"), paint)
     plank = np.floor(x / 0.16).astype(np.intp)
-    shade = np.random.default_rng(62).uniform(-0.5, 0.5, 64)[plank % 64] + 0.35 * noise(
+    shade = np.random.default_rng(62).uniform(-0.5, 0.5, 64)[plank % 64] + 0.35 * fractal_noise(
         14 * x, 1.2 * z + 5 * plank, 61, 4
     )
-    seam = 1 - 0.5 * step(0.44, 0.5, np.abs(x / 0.16 - plank - 0.5))
-    wood = ramp(shade, [-1, 0, 1], [colour("#6e4a2e"), colour("#94683f"), colour("#b98a58")]) * seam[..., None]
+    seam = 1 - 0.5 * smoothstep(0.44, 0.5, np.abs(x / 0.16 - plank - 0.5))
+    wood = color_ramp(shade, [-1, 0, 1], [color("#6e4a2e"), color("#94683f"), color("#b98a58")]) * seam[..., None]
     from_middle = np.hypot(x - 0.3, z + 2.4)
-    rug = colour("#8f4b3a") * (1 + 0.15 * np.tanh(4 * np.sin(from_middle * 14)))[..., None]
-    wood = over(wood, step(1.32, 1.28, from_middle), rug)
+    rug = color("#8f4b3a") * (1 + 0.15 * np.tanh(4 * np.sin(from_middle * 14)))[..., None]
+    wood = blend_over(wood, smoothstep(1.32, 1.28, from_middle), rug)
     return np.where((flat & (y < 0))[..., None], wood, paint).astype(np.float32)
 
 
 def _picture(paint: Canvas, back: np.ndarray, x: Canvas, y: Canvas) -> Canvas:
     """A framed landscape on the wall behind."""
     across, up = (x - 1.35) / 0.55, (y - 0.5) / 0.42
-    hills = ramp(up + 0.35 * noise(1.5 * across, 0.3 * up, 63, 4), [-1, -0.3, 0, 0.35, 1], [
-        colour("#23415a"), colour("#2f6d7c"), colour("#d98a53"), colour("#eec591"), colour("#a9c6cf"),
+    hills = color_ramp(up + 0.35 * fractal_noise(1.5 * across, 0.3 * up, 63, 4), [-1, -0.3, 0, 0.35, 1], [
+        color("#23415a"), color("#2f6d7c"), color("#d98a53"), color("#eec591"), color("#a9c6cf"),
     ])  # fmt: skip
-    for size, layer in ((1.12, colour("#2b2320")), (1.04, colour("#f1ede4")), (0.84, hills)):
+    for size, layer in ((1.12, color("#2b2320")), (1.04, color("#f1ede4")), (0.84, hills)):
         edge = np.maximum(np.abs(x - 1.35) - 0.55 * size, np.abs(y - 0.5) - 0.42 * size)
-        paint = over(paint, back * step(_SOFT, -_SOFT, edge), layer)
+        paint = blend_over(paint, back * smoothstep(_SOFT, -_SOFT, edge), layer)
     return paint
 
 
@@ -100,20 +109,22 @@ def _window(canvas: Canvas, wall: np.ndarray, along: Canvas, up: Canvas, span: t
         np.abs(along - middle), np.abs(np.abs(along - middle) - half),
         np.abs(np.mod(height * 3 + 0.5, 1) - 0.5) * (LINTEL - SILL) / 3,
     ])  # fmt: skip
-    outside = ramp(height + 0.10 * noise(5 * along, 4 * up, 64, 4), [0, 0.22, 0.34, 0.5, 1], [
-        colour("#5d7a4a", 0.3), colour("#86a06c", 0.4), colour("#d5e2e6", 0.8), colour("#e9f2fb", 1.0),
-        colour("#dcebff", 1.1),
+    outside = color_ramp(height + 0.10 * fractal_noise(5 * along, 4 * up, 64, 4), [0, 0.22, 0.34, 0.5, 1], [
+        color("#5d7a4a", 0.3), color("#86a06c", 0.4), color("#d5e2e6", 0.8), color("#e9f2fb", 1.0),
+        color("#dcebff", 1.1),
     ])  # fmt: skip
-    view = over(outside * np.float32(DAYLIGHT), step(0.025 + _SOFT, 0.025 - _SOFT, to_bar), colour("#e9e6df", 0.45))
-    canvas = over(canvas, wall * step(0.09 + _SOFT, 0.09 - _SOFT, edge), colour("#f4f1ea", 0.7))
-    return over(canvas, wall * step(_SOFT, -_SOFT, edge), view)
+    view = blend_over(
+        outside * np.float32(DAYLIGHT), smoothstep(0.025 + _SOFT, 0.025 - _SOFT, to_bar), color("#e9e6df", 0.45)
+    )
+    canvas = blend_over(canvas, wall * smoothstep(0.09 + _SOFT, 0.09 - _SOFT, edge), color("#f4f1ea", 0.7))
+    return blend_over(canvas, wall * smoothstep(_SOFT, -_SOFT, edge), view)
 
 
 def _lamp_light(point: Canvas, wall: np.ndarray) -> Canvas:
     """Warm light on the walls from the lamp in the corner, behind on the right."""
     squared = ((point - LAMP) ** 2).sum(axis=-1)
     warm = np.where(wall == 2, 0.10 / (0.12 + squared), 0.05 / (0.2 + squared))
-    return np.asarray(warm[..., None] * colour("#ffb56b", 1.6), np.float32)
+    return np.asarray(warm[..., None] * color("#ffb56b", 1.6), np.float32)
 
 
 def _lamp(canvas: Canvas) -> Canvas:
@@ -122,11 +133,11 @@ def _lamp(canvas: Canvas) -> Canvas:
     depth = LAMP[2] / np.minimum(direction[..., 2], -1e-3)
     across, up = direction[..., 0] * depth - LAMP[0], direction[..., 1] * depth - LAMP[1]
     ahead = direction[..., 2] < -0.1
-    pole = ahead * step(0.02 + _SOFT, 0.02 - _SOFT, np.abs(across)) * (up < 0) * (up > FLOOR - LAMP[1])
-    canvas = over(canvas, pole.astype(np.float32), colour("#1e1a18"))
+    pole = ahead * smoothstep(0.02 + _SOFT, 0.02 - _SOFT, np.abs(across)) * (up < 0) * (up > FLOOR - LAMP[1])
+    canvas = blend_over(canvas, pole.astype(np.float32), color("#1e1a18"))
     half = 0.24 - 0.25 * up
     edge = np.maximum(np.abs(across) - half, np.abs(up) - 0.18)
     inner = 1.0 + 0.8 * np.exp(-((up / 0.1) ** 2) - (across / 0.15) ** 2)
-    return over(
-        canvas, ahead * step(_SOFT, -_SOFT, edge), (inner[..., None] * colour("#ffc98a", 2.2)).astype(np.float32)
+    return blend_over(
+        canvas, ahead * smoothstep(_SOFT, -_SOFT, edge), (inner[..., None] * color("#ffc98a", 2.2)).astype(np.float32)
     )

@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from relit_camera.space.rotation import Angles
+from relit_camera.base.rotations import Angles
 from relit_studio.people.expressions import Expression
 from relit_studio.people.eyes import GAZE_DEG
 from relit_studio.people.geometry import smoothstep
 from relit_studio.people.posture import Posture
 
 Keys = tuple[tuple[float, float], ...]
-"""(seconds, value): held and eased between, by `space.easing.eased_value`."""
+"""(seconds, value): held and eased between, by `base.easing.interpolate_keyframes`."""
 Syllables = tuple[tuple[float, str], ...]
 """When (seconds) the mouth reaches which of the shapes `VISEMES`."""
 

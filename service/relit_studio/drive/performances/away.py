@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from relit_camera.space.easing import eased_value
+from relit_camera.base.easing import interpolate_keyframes
 from relit_studio.drive.performance import FPS, Moment, Performance
 from relit_studio.drive.performances.acting import Keys, Syllables, add, blink, look, speak, swaying
 from relit_studio.people.expressions import NEUTRAL
@@ -26,11 +26,11 @@ _SYLLABLES: Syllables = (
 def _away(time_s: float) -> Moment:
     expression = dict(NEUTRAL)
     speak(expression, _SYLLABLES, time_s)
-    add(expression, {"mouthSmile": 0.4, "cheekSquint": 0.4}, eased_value(time_s, _SMILE))
-    look(expression, eased_value(time_s, _LOOK_RIGHT_DEG), 0.0)
+    add(expression, {"mouthSmile": 0.4, "cheekSquint": 0.4}, interpolate_keyframes(time_s, _SMILE))
+    look(expression, interpolate_keyframes(time_s, _LOOK_RIGHT_DEG), 0.0)
     blink(expression, _BLINKS_S, time_s)
-    angles = [eased_value(time_s, keys) for keys in (_YAW, _PITCH, _ROLL)]
-    shift_cm = (eased_value(time_s, _RIGHT_CM), eased_value(time_s, _UP_CM), 0.0)
+    angles = [interpolate_keyframes(time_s, keys) for keys in (_YAW, _PITCH, _ROLL)]
+    shift_cm = (interpolate_keyframes(time_s, _RIGHT_CM), interpolate_keyframes(time_s, _UP_CM), 0.0)
     return Moment(swaying(angles, expression, time_s, FRAMES / FPS), shift_cm)
 
 

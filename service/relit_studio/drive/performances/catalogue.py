@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from relit_camera.errors import NotFoundError
+from relit_camera.base.errors import NotFoundError
 from relit_studio.drive.performance import Performance
 from relit_studio.drive.performances.away import AWAY
 from relit_studio.drive.performances.hands import HANDS

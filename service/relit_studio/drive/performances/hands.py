@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from relit_camera.space.easing import eased_value
+from relit_camera.base.easing import interpolate_keyframes
 from relit_studio.drive.performance import FPS, Moment, Performance
 from relit_studio.drive.performances.acting import Keys, Syllables, add, blink, look, speak, swaying
 from relit_studio.people.expressions import NEUTRAL
@@ -30,11 +30,13 @@ _SYLLABLES: Syllables = (
 def _hands(time_s: float) -> Moment:
     expression = dict(NEUTRAL)
     speak(expression, _SYLLABLES, time_s)
-    add(expression, {"mouthPucker": 0.25, "mouthFunnel": 0.2, "jawOpen": 0.05}, eased_value(time_s, _SIP))
-    look(expression, 0.0, eased_value(time_s, _LOOK_DOWN_DEG))
+    add(expression, {"mouthPucker": 0.25, "mouthFunnel": 0.2, "jawOpen": 0.05}, interpolate_keyframes(time_s, _SIP))
+    look(expression, 0.0, interpolate_keyframes(time_s, _LOOK_DOWN_DEG))
     blink(expression, _BLINKS_S, time_s)
-    angles = [eased_value(time_s, keys) for keys in (_YAW, _PITCH, _ROLL)]
-    mug, tilt_deg, hand, across_cm = (eased_value(time_s, keys) for keys in (_MUG, _TILT_DEG, _HAND, _ACROSS_CM))
+    angles = [interpolate_keyframes(time_s, keys) for keys in (_YAW, _PITCH, _ROLL)]
+    mug, tilt_deg, hand, across_cm = (
+        interpolate_keyframes(time_s, keys) for keys in (_MUG, _TILT_DEG, _HAND, _ACROSS_CM)
+    )
     gesture = Gesture(mug, tilt_deg, hand, across_cm)
     return Moment(swaying(angles, expression, time_s, FRAMES / FPS), gesture=gesture)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from relit_camera.space.easing import eased_value
+from relit_camera.base.easing import interpolate_keyframes
 from relit_studio.drive.performance import FPS, Moment, Performance
 from relit_studio.drive.performances.acting import Keys, Syllables, add, blink, look, speak, swaying
 from relit_studio.people.expressions import NEUTRAL
@@ -61,14 +61,14 @@ _SYLLABLES: Syllables = (
 def _talk(time_s: float) -> Moment:
     expression = dict(NEUTRAL)
     speak(expression, _SYLLABLES, time_s)
-    smile = eased_value(time_s, _SMILE)
+    smile = interpolate_keyframes(time_s, _SMILE)
     add(expression, {"mouthSmile": 0.45, "cheekSquint": 0.45, "eyeSquint": 0.2, "mouthUpperUp": 0.1}, smile)
-    brows = eased_value(time_s, _BROWS)
+    brows = interpolate_keyframes(time_s, _BROWS)
     add(expression, {"browInnerUp": 0.5, "browOuterUp": 0.35}, brows)
-    add(expression, {"browDown": 0.5}, eased_value(time_s, _FROWN))
-    look(expression, eased_value(time_s, _LOOK_RIGHT_DEG), eased_value(time_s, _LOOK_DOWN_DEG))
+    add(expression, {"browDown": 0.5}, interpolate_keyframes(time_s, _FROWN))
+    look(expression, interpolate_keyframes(time_s, _LOOK_RIGHT_DEG), interpolate_keyframes(time_s, _LOOK_DOWN_DEG))
     blink(expression, _BLINKS_S, time_s)
-    angles = [eased_value(time_s, keys) for keys in (_YAW, _PITCH, _ROLL)]
+    angles = [interpolate_keyframes(time_s, keys) for keys in (_YAW, _PITCH, _ROLL)]
     return Moment(swaying(angles, expression, time_s, FRAMES / FPS))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from relit_camera.space.easing import eased_value
+from relit_camera.base.easing import interpolate_keyframes
 from relit_studio.drive.performance import FPS, Moment, Performance
 from relit_studio.drive.performances.acting import Keys, blink, look, swaying
 from relit_studio.people.expressions import NEUTRAL
@@ -21,8 +21,8 @@ _EYES_LEAD_DEG = 12
 
 def _turn(time_s: float) -> Moment:
     expression = dict(NEUTRAL)
-    yaw, pitch = eased_value(time_s, _YAW), eased_value(time_s, _PITCH)
-    ahead_yaw, ahead_pitch = (eased_value(time_s + 0.25, keys) for keys in (_YAW, _PITCH))
+    yaw, pitch = interpolate_keyframes(time_s, _YAW), interpolate_keyframes(time_s, _PITCH)
+    ahead_yaw, ahead_pitch = (interpolate_keyframes(time_s + 0.25, keys) for keys in (_YAW, _PITCH))
     limit = _EYES_LEAD_DEG
     look(expression, min(max(ahead_yaw - yaw, -limit), limit), min(max(ahead_pitch - pitch, -limit), limit))
     blink(expression, _BLINKS_S, time_s)

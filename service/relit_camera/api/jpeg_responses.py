@@ -1,0 +1,50 @@
+"""Small pictures as answers, which browsers keep and only ask whether they are still the same."""
+
+from __future__ import annotations
+
+import hashlib
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import quote
+
+import cv2
+import numpy as np
+from fastapi import Request
+from starlette.responses import Response
+
+from relit_camera.base.images.image_files import encode_display
+from relit_camera.base.images.image_types import DisplayImage
+
+THUMBNAIL_WIDTH = 320
+THUMBNAIL_QUALITY = 88
+JPEG_RESPONSE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "A JPEG picture",
+        "content": {"image/jpeg": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+"""The OpenAPI entry of an operation that answers with a picture."""
+
+
+def thumbnail_url_path(collection: str, name: str) -> str:
+    """Where the small picture of a stored thing is to be had."""
+    return f"/api/v1/{collection}/{quote(name)}/thumbnail.jpg"
+
+
+def encode_thumbnail(picture: DisplayImage) -> bytes:
+    """A JPEG file of uint8 sRGB RGB (height, width, 3), scaled down to at most 320 pixels wide."""
+    height, width = picture.shape[:2]
+    if width > THUMBNAIL_WIDTH:
+        size = THUMBNAIL_WIDTH, max(1, round(height * THUMBNAIL_WIDTH / width))
+        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return encode_display(picture, ".jpg", THUMBNAIL_QUALITY)
+
+
+def jpeg_response(request: Request, jpeg: bytes) -> Response:
+    """The picture, or 304 to a client that has it."""
+    tag = f'"{hashlib.sha256(jpeg).hexdigest()[:32]}"'
+    headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
+    known = [known.strip().removeprefix("W/") for known in request.headers.get("if-none-match", "").split(",")]
+    if tag in known or known == ["*"]:
+        return Response(status_code=HTTPStatus.NOT_MODIFIED, headers=headers)
+    return Response(jpeg, media_type="image/jpeg", headers=headers)

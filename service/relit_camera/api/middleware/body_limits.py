@@ -1,0 +1,98 @@
+"""Small middleware about bodies: how long a request's may be, and that HEAD's answer has none.
+
+Files that clients send.
+"""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+
+from fastapi import UploadFile
+from starlette.datastructures import Headers
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from relit_camera.api.problem_details import TooLargeError, problem_response_from
+from relit_camera.base.errors import InputError
+
+MAX_UPLOAD_BYTES = 64 << 20
+MAX_UPLOAD_FORM_BYTES = MAX_UPLOAD_BYTES + (1 << 16)
+"""A file and the form around it."""
+MAX_JSON_BYTES = 1 << 20
+ENDLESS_PATHS = ("/api/v1/events", "/api/v1/preview.mjpg")
+"""Answers that do not end, which HEAD would wait for."""
+
+
+class BodyLimitMiddleware:
+    """ASGI middleware: 413 for a longer body, before it is read where its length is announced.
+
+    Starlette's own limit answers in plain text where the operation reads no body; ours is always a problem.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        headers = Headers(scope=scope)
+        is_form = headers.get("content-type", "").startswith("multipart/form-data")
+        limit = MAX_UPLOAD_FORM_BYTES if is_form else MAX_JSON_BYTES
+        announced = headers.get("content-length", "0")
+        if announced.isdecimal() and int(announced) > limit:
+            await problem_response_from(body_too_large(int(announced), limit))(scope, receive, send)
+            return
+        seen = 0
+
+        async def receive_counted() -> Message:
+            nonlocal seen
+            message = await receive()
+            seen += len(message.get("body", b""))
+            if seen > limit:
+                # FastAPI lets only this type through while it reads a body.
+                raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, body_too_large(seen, limit).what)
+            return message
+
+        await self.app(scope, receive_counted, send)
+
+
+def body_too_large(size: int, limit: int) -> TooLargeError:
+    """The error for a body of `size` bytes or more, where `limit` are taken."""
+    return TooLargeError(
+        f"the body has {size / 1e6:.1f} MB or more; {limit / 1e6:.0f} MB are taken", "send a smaller file"
+    )
+
+
+class HeadRequestMiddleware:
+    """ASGI middleware: answers HEAD as GET without the body. FastAPI's routes know no HEAD of their own."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        if scope["type"] != "http" or scope["method"] != "HEAD" or scope["path"] in ENDLESS_PATHS:
+            await self.app(scope, receive, send)
+            return
+
+        async def send_without_body(message: Message) -> None:
+            await send({**message, "body": b""} if message["type"] == "http.response.body" else message)
+
+        await self.app({**scope, "method": "GET"}, receive, send_without_body)
+
+
+def read_upload(file: UploadFile) -> bytes:
+    """The bytes of a file in a multipart form.
+
+    Raises:
+        TooLargeError: more than 64 MiB.
+        InputError: it is empty.
+    """
+    data = file.file.read(MAX_UPLOAD_BYTES + 1)
+    if len(data) > MAX_UPLOAD_BYTES:
+        raise body_too_large(len(data), MAX_UPLOAD_BYTES)
+    if not data:
+        raise InputError(f"the file '{file.filename}' is empty", "choose a picture file")
+    return data

@@ -1,0 +1,104 @@
+"""The token, where one is set: programs send it with each request, a browser shows it once at `/login`.
+
+Once shown, the browser keeps a cookie, which comes with the preview's `<img>` and with events too, where a page can set
+no header. It holds a secret that is made anew for each run, never the token; scripts cannot read it, and it is not sent
+from other sites' pages.
+"""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+from http import HTTPStatus
+from pathlib import Path
+from urllib.parse import parse_qs
+
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from relit_camera.api.problem_details import problem_response
+
+LOGIN_PATH = "/login"
+PUBLIC_PATHS = frozenset({"/healthz", LOGIN_PATH, "/panel/panel.css", "/panel/icon.svg"})
+"""Served without the token: that the process lives, and the page that asks for the token."""
+SESSION_COOKIE = "relit_session"
+MAX_LOGIN_FORM_BYTES = 4096
+ERROR_PLACEHOLDER = "<!-- wrong -->"
+
+_LOGIN_PAGE = Path(__file__).parents[1] / "panel" / "login.html"
+
+
+class TokenAuthMiddleware:
+    """ASGI middleware: answers 401, or shows the way to the login page, where the token is not shown."""
+
+    def __init__(self, app: ASGIApp, token: bytes) -> None:
+        self.app = app
+        self.token = token
+        self.session = secrets.token_urlsafe(32).encode()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        if scope["type"] == "http":
+            answer = await self._answer(Request(scope, receive))
+            if answer is not None:
+                await answer(scope, receive, send)
+                return
+        await self.app(scope, receive, send)
+
+    async def _answer(self, request: Request) -> Response | None:
+        """Our own answer, or None for a request that may go on."""
+        path = request.url.path
+        if path == LOGIN_PATH:
+            return await self._login(request)
+        if path in PUBLIC_PATHS or self._knows_token(request.headers) or self._has_session(request):
+            return None
+        if path == "/":
+            return RedirectResponse(LOGIN_PATH, HTTPStatus.SEE_OTHER)
+        return problem_response(
+            HTTPStatus.UNAUTHORIZED,
+            "the camera's token is needed",
+            f"send the header 'Authorization: Bearer TOKEN', or open {LOGIN_PATH} in a browser",
+            headers={"WWW-Authenticate": "Bearer"},
+        )
+
+    async def _login(self, request: Request) -> Response:
+        if request.method in ("GET", "HEAD"):
+            return _login_page()
+        if request.method != "POST":
+            allowed = "GET, POST"
+            what = f"{request.method} is not allowed at '{LOGIN_PATH}'"
+            return problem_response(
+                HTTPStatus.METHOD_NOT_ALLOWED, what, f"allowed are {allowed}", headers={"Allow": allowed}
+            )
+        if not hmac.compare_digest(await _token_in_form(request), self.token):
+            return _login_page(wrong=True)
+        answer = RedirectResponse("/", HTTPStatus.SEE_OTHER)
+        by_tls = request.headers.get("origin", "").startswith("https://")  # at a proxy, which speaks http to us
+        answer.set_cookie(SESSION_COOKIE, self.session.decode(), secure=by_tls, httponly=True, samesite="strict")
+        return answer
+
+    def _knows_token(self, headers: Headers) -> bool:
+        scheme, _, given = headers.get("authorization", "").partition(" ")
+        return scheme.lower() == "bearer" and hmac.compare_digest(given.strip().encode(), self.token)
+
+    def _has_session(self, request: Request) -> bool:
+        return hmac.compare_digest(request.cookies.get(SESSION_COOKIE, "").encode(), self.session)
+
+
+def _login_page(wrong: bool = False) -> Response:
+    text = _LOGIN_PAGE.read_text(encoding="utf-8")
+    said = '<p role="alert">This is not the camera’s token.</p>' if wrong else ""
+    return HTMLResponse(text.replace(ERROR_PLACEHOLDER, said), HTTPStatus.UNAUTHORIZED if wrong else HTTPStatus.OK)
+
+
+async def _token_in_form(request: Request) -> bytes:
+    """The field `token` of a form's body; empty where there is none, or the body is longer than any token's form."""
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > MAX_LOGIN_FORM_BYTES:
+            return b""
+    fields = parse_qs(body.decode("latin-1"))
+    return fields.get("token", [""])[0].strip().encode()

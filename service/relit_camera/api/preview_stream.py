@@ -1,0 +1,189 @@
+"""Preview pictures: each is scaled and encoded once, however many look on.
+
+All viewers who ask for the same size, mirroring and rate share one channel: one task takes the published pictures,
+encodes them in a thread, and wakes those who wait. A viewer has no thread and is sent the newest picture when it has
+taken the one before: a slow viewer skips pictures and delays nobody. All of this belongs to the server's event loop.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from anyio import CapacityLimiter, to_thread
+
+from relit_camera.api.problem_details import NotReadyError
+from relit_camera.base.images.image_files import encode_display
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.live.camera_control import CameraControl
+
+log = logging.getLogger(__name__)
+
+MAX_VARIANTS = 8
+"""Each is encoded for itself, in a thread."""
+MAX_VIEWERS = 256
+"""Each is an open connection, of the 1024 files that a process may usually have open."""
+MAX_FRAMES_SENT_PER_S = 1000
+"""Pictures sent a second to all viewers together: beyond that each gets fewer, so that the camera keeps its cores."""
+FRAME_WAIT_S = 0.25
+"""How long to wait for a picture before looking whether to end."""
+PREVIEW_JPEG_QUALITY = 82
+
+
+@dataclass(frozen=True)
+class PreviewVariant:
+    """How a viewer wants the pictures.
+
+    Attributes:
+        width: in pixels; never scaled up. None is as published.
+        mirror: left and right exchanged, as in a mirror.
+        fps: at most so many pictures a second.
+    """
+
+    width: int | None = None
+    mirror: bool = False
+    fps: float = 30.0
+
+
+@dataclass(frozen=True)
+class EncodedFrame:
+    """One JPEG file and the published picture's count."""
+
+    count: int
+    jpeg: bytes
+
+
+class PreviewStream:
+    """The pictures of one variant, while `run` makes them.
+
+    Attributes:
+        viewers: how many look on.
+        ended: `run` is over: no more pictures come.
+    """
+
+    def __init__(self, camera: CameraControl, variant: PreviewVariant, fps: Callable[[], float] | None = None) -> None:
+        """Set up.
+
+        Args:
+            camera: whose pictures they are.
+            variant: how they are wanted.
+            fps: pictures a second that may be made at present; the variant's if not given.
+        """
+        self.viewers = 0
+        self.ended = False
+        self._camera = camera
+        self._variant = variant
+        self._fps = fps or (lambda: variant.fps)
+        self._newest = EncodedFrame(-1, b"")
+        self._frame_arrived = asyncio.Event()
+
+    async def next(self, after: int, timeout_s: float) -> EncodedFrame | None:
+        """The newest picture whose count is above `after`, waiting up to `timeout_s` for one; None when time is up."""
+        if self._newest.count <= after and not self.ended:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(timeout_s):
+                    await self._frame_arrived.wait()
+        return self._newest if self._newest.count > after else None
+
+    async def run(self, limiter: CapacityLimiter) -> None:
+        """Make pictures until cancelled, each in a thread that `limiter` lends."""
+        due = 0.0
+        try:
+            while True:
+                await asyncio.sleep(max(0.0, due - time.monotonic()))
+                made = await to_thread.run_sync(self._make, limiter=limiter, abandon_on_cancel=True)
+                if made is None:
+                    continue
+                # From the last due time, not from now: else waking late would slow the rate, each time a little.
+                due = max(due + 1 / self._fps(), time.monotonic())
+                self._newest = made
+                self._wake()
+        except Exception:
+            log.exception("a preview has ended")
+        finally:
+            self.ended = True
+            self._wake()
+
+    def _make(self) -> EncodedFrame | None:
+        published = self._camera.picture(self._newest.count, FRAME_WAIT_S)
+        return None if published is None else EncodedFrame(published[0], encode_preview(published[1], self._variant))
+
+    def _wake(self) -> None:
+        self._frame_arrived.set()
+        self._frame_arrived = asyncio.Event()
+
+
+class PreviewBroadcaster:
+    """The channels that somebody looks at."""
+
+    def __init__(self, camera: CameraControl) -> None:
+        self._camera = camera
+        self._channels: dict[PreviewVariant, tuple[PreviewStream, asyncio.Task[None]]] = {}
+        self._limiter: CapacityLimiter | None = None
+
+    @property
+    def viewers(self) -> int:
+        """How many look on now."""
+        return sum(channel.viewers for channel, _ in list(self._channels.values()))
+
+    def check_capacity(self, variant: PreviewVariant) -> None:
+        """Check that one more may look on.
+
+        Raises:
+            NotReadyError: `MAX_VIEWERS` look on already, or at `MAX_VARIANTS` other variants.
+        """
+        if self.viewers >= MAX_VIEWERS:
+            raise NotReadyError(f"{MAX_VIEWERS} previews are open already", "close one of them")
+        if variant not in self._channels and len(self._channels) >= MAX_VARIANTS:
+            raise NotReadyError(
+                f"previews of {MAX_VARIANTS} sizes and rates are open already", "ask for one of those, or close one"
+            )
+
+    @contextmanager
+    def subscribe(self, variant: PreviewVariant) -> Iterator[PreviewStream]:
+        """The channel of a variant, inside the event loop; it lasts as long as somebody watches.
+
+        Raises:
+            NotReadyError: as `check_capacity`.
+        """
+        self.check_capacity(variant)
+        if self._limiter is None:  # its own threads: those of the other operations stay free
+            self._limiter = CapacityLimiter(MAX_VARIANTS)
+        if variant not in self._channels:
+            made = PreviewStream(
+                self._camera, variant, lambda: min(variant.fps, MAX_FRAMES_SENT_PER_S / max(1, self.viewers))
+            )
+            self._channels[variant] = made, asyncio.get_running_loop().create_task(made.run(self._limiter))
+        channel, task = self._channels[variant]
+        channel.viewers += 1
+        try:
+            yield channel
+        finally:
+            channel.viewers -= 1
+            if channel.viewers == 0:
+                del self._channels[variant]
+                task.cancel()
+
+
+def encode_preview(picture: DisplayImage, variant: PreviewVariant) -> bytes:
+    """The JPEG file of a published picture, uint8 sRGB RGB (height, width, 3), as a viewer wants it."""
+    if variant.width is not None and variant.width < picture.shape[1]:
+        picture = _downscale(picture, variant.width)
+    if variant.mirror:
+        picture = np.asarray(cv2.flip(picture, 1), dtype=np.uint8)
+    return encode_display(picture, ".jpg", PREVIEW_JPEG_QUALITY)
+
+
+def _downscale(picture: DisplayImage, width: int) -> DisplayImage:
+    """Halved as often as it goes, then bilinear: no jagged edges, at a tenth of INTER_AREA's time for odd ratios."""
+    height = max(1, round(picture.shape[0] * width / picture.shape[1]))
+    while picture.shape[1] >= 2 * width:
+        half = picture.shape[1] // 2, max(1, picture.shape[0] // 2)
+        picture = np.asarray(cv2.resize(picture, half, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_LINEAR), dtype=np.uint8)

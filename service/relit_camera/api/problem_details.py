@@ -1,0 +1,143 @@
+"""Every error answer: application/problem+json (RFC 9457), with what is wrong and what cures it."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict
+from starlette.responses import Response
+
+from relit_camera.base.errors import DeviceError, InputError, NotFoundError, RelitError, StorageError
+
+MEDIA_TYPE = "application/problem+json"
+
+
+class FieldProblem(BaseModel):
+    """One field of a request that is wrong."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    field: str
+    """Dotted path of the field, such as `lamps.0.kelvin`; empty for the body as a whole."""
+    message: str
+    """What is wrong with it."""
+
+
+class Problem(BaseModel):
+    """An error answer (RFC 9457)."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+    type: str
+    """Names the kind of problem, such as `urn:relit-camera:problem:not-found`."""
+    title: str
+    """The kind of problem in words."""
+    status: int
+    """The HTTP status."""
+    detail: str
+    """`what` and `cure` in one sentence."""
+    what: str
+    """What is wrong."""
+    cure: str = ""
+    """What to do about it."""
+    errors: list[FieldProblem] | None = None
+    """Every wrong field, where fields are at fault."""
+
+
+class ConflictError(RelitError):
+    """The thing is in use, built in, or of that name already."""
+
+
+class TooLargeError(RelitError):
+    """The request's body is larger than is taken."""
+
+
+class ForbiddenError(RelitError):
+    """The request came from another site."""
+
+
+class NotReadyError(RelitError):
+    """The camera cannot answer that now."""
+
+
+STATUS_BY_ERROR = {
+    NotFoundError: HTTPStatus.NOT_FOUND,
+    InputError: HTTPStatus.UNPROCESSABLE_ENTITY,
+    StorageError: HTTPStatus.INSUFFICIENT_STORAGE,
+    DeviceError: HTTPStatus.SERVICE_UNAVAILABLE,
+    ConflictError: HTTPStatus.CONFLICT,
+    TooLargeError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+    ForbiddenError: HTTPStatus.FORBIDDEN,
+    NotReadyError: HTTPStatus.SERVICE_UNAVAILABLE,
+}
+
+PROBLEM_TYPES = {
+    400: ("unreadable", "The request cannot be read"),
+    401: ("token-needed", "The token is needed"),
+    403: ("refused", "Refused"),
+    404: ("not-found", "Not found"),
+    405: ("method-not-allowed", "Method not allowed"),
+    409: ("conflict", "In conflict with what is there"),
+    413: ("too-large", "Too large"),
+    415: ("media-type", "Of a kind that is not taken"),
+    421: ("wrong-host", "Wrong host"),
+    422: ("invalid-input", "The input is at fault"),
+    500: ("fault", "A fault of the program"),
+    503: ("not-available", "Not available now"),
+    507: ("not-stored", "Could not be stored"),
+}
+"""Status → the last part of the problem's type, and its title."""
+
+# A path's folders tell of the person's machine: only the last part is shown. API paths are ours and stay.
+_FOLDER_PATTERN = re.compile(r"(?<![\w.:/\\])(?!/api/|/panel/)(?:[A-Za-z]:)?[/\\](?:[^\s/\\:'\",;]+[/\\])+")
+
+
+def status_for_error(error: RelitError) -> int:
+    """The HTTP status of an error: that of its nearest listed ancestor, else 500."""
+    return next(
+        (STATUS_BY_ERROR[kind] for kind in type(error).__mro__ if kind in STATUS_BY_ERROR),
+        HTTPStatus.INTERNAL_SERVER_ERROR,
+    )
+
+
+def problem_response(
+    status: int,
+    what: str,
+    cure: str = "",
+    errors: Sequence[FieldProblem] | None = None,
+    headers: Mapping[str, str] | None = None,
+) -> Response:
+    """The answer that says so."""
+    slug, title = PROBLEM_TYPES.get(status) or ("http", HTTPStatus(status).phrase)
+    body = Problem(
+        type=f"urn:relit-camera:problem:{slug}",
+        title=title,
+        status=status,
+        detail=f"{what}; {cure}" if cure else what,
+        what=what,
+        cure=cure,
+        errors=list(errors) if errors else None,
+    )
+    return Response(body.model_dump_json(exclude_none=True), status, headers, MEDIA_TYPE)
+
+
+def problem_response_from(error: RelitError) -> Response:
+    """The answer to one of our own errors, without the folders of this machine."""
+    return problem_response(status_for_error(error), redact_folders(error.what), redact_folders(error.cure))
+
+
+def redact_folders(text: str) -> str:
+    """`text` with every absolute path cut down to its last part."""
+    for folder in (Path.home(), Path(tempfile.gettempdir())):
+        text = text.replace(f"{folder}/", "/…/").replace(f"{folder}\\", "/…/")  # the home's own name may hold spaces
+    return _FOLDER_PATTERN.sub("", text)
+
+
+def error_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """The OpenAPI entries of the errors that an operation may answer with."""
+    return {status: {"model": Problem, "description": PROBLEM_TYPES[status][1]} for status in statuses}

@@ -1,0 +1,167 @@
+"""Runs the application in a thread of this process, on an address that is taken before anything else starts."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import os
+import socket
+import threading
+import time
+from dataclasses import dataclass
+from types import TracebackType
+
+import uvicorn
+from fastapi import FastAPI
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from relit_camera.api.problem_details import NotReadyError, problem_response_from
+from relit_camera.api.server.connection_timeouts import SEND_BUFFER_BYTES, TimeoutHttpProtocol
+from relit_camera.base.config.access_token import read_token
+from relit_camera.base.config.settings import ServerSettings
+from relit_camera.base.errors import ConfigError, PortInUseError, RelitError
+
+START_TIMEOUT_S = 10.0
+SHUTDOWN_GRACE_S = 1
+"""How long answers may take to end when the server stops, before they are cut off."""
+LISTEN_BACKLOG = 128
+
+
+@dataclass(frozen=True)
+class ServerAddress:
+    """Where the server listens."""
+
+    host: str
+    port: int
+
+    @property
+    def url(self) -> str:
+        """The panel's address."""
+        return f"http://[{self.host}]:{self.port}/" if ":" in self.host else f"http://{self.host}:{self.port}/"
+
+
+class ApiServer:
+    """A server that runs until `stop`, or until the `with` block ends."""
+
+    def __init__(self, app: FastAPI, listener: socket.socket) -> None:
+        host, port = listener.getsockname()[:2]
+        self.address = ServerAddress(host, port)
+        self._closing: threading.Event = app.state.context.closing
+        config = uvicorn.Config(
+            _ShutdownResponder(app, self._closing),
+            http=TimeoutHttpProtocol,
+            log_config=None,
+            access_log=False,
+            lifespan="off",
+            ws="none",
+            server_header=False,
+            proxy_headers=False,
+            timeout_graceful_shutdown=SHUTDOWN_GRACE_S,
+        )
+        self._server = uvicorn.Server(config)
+        # In a thread uvicorn leaves the signals to whoever owns the main thread. No daemon thread, nor are the workers
+        # that it starts: Python cuts those off inside C++ code when it exits, which aborts the process.
+        self._thread = threading.Thread(target=self._server.run, args=([listener],), name="api")
+
+    def start(self) -> None:
+        """Begin to answer; returns when it does.
+
+        Raises:
+            RelitError: it did not start within ten seconds.
+        """
+        self._thread.start()
+        deadline = time.monotonic() + START_TIMEOUT_S
+        while not self._server.started:
+            if not self._thread.is_alive() or time.monotonic() > deadline:
+                self.stop()  # its thread would keep the process from ending
+                raise RelitError(f"the server at {self.address.url} did not start", "see the log")
+            time.sleep(0.01)
+
+    def stop(self, timeout_s: float = 2.0) -> None:
+        """End: long answers end within a moment, others get a second. Returns when all have, or when time is up."""
+        self._closing.set()
+        self._server.should_exit = True
+        self._thread.join(timeout_s)
+
+    def __enter__(self) -> ApiServer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+class _ShutdownResponder:
+    """ASGI wrapper: an answer that is cut off because the server ends is a 503, not a traceback in the log."""
+
+    def __init__(self, app: ASGIApp, closing: threading.Event) -> None:
+        self.app = app
+        self.closing = closing
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        started = False
+
+        async def send_watched(message: Message) -> None:
+            nonlocal started
+            started = True
+            await send(message)
+
+        try:
+            await self.app(scope, receive, send_watched)
+        except asyncio.CancelledError:
+            if not self.closing.is_set():
+                raise
+            if not started:
+                await problem_response_from(NotReadyError("the camera is stopping", "start it again"))(
+                    scope, receive, send
+                )
+
+
+def open_listener(settings: ServerSettings) -> socket.socket:
+    """Take the address, so that nobody else can; answers begin with `start_api_server`. Port 0 takes any free one.
+
+    Raises:
+        PortInUseError: another program listens there.
+        ConfigError: the address does not exist on this machine, the port needs rights, or the address can be reached
+            from other machines and there is no token (`read_token`).
+    """
+    read_token(settings)
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    place = f"port {settings.port} on {settings.host}"
+    try:
+        listener = socket.create_server((settings.host, settings.port), family=family, backlog=LISTEN_BACKLOG)
+        listener.setsockopt(
+            socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES
+        )  # of the connections that it accepts
+        return listener
+    except OSError as error:
+        if error.errno == errno.EADDRINUSE:
+            cure = (
+                "another program listens there (an open Relit Camera?): end it, or choose another with --port; "
+                + _FREE_PORT_HINT
+            )
+            raise PortInUseError(f"{place} is in use", cure) from error
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise ConfigError(
+            f"{place} cannot be used: {reason}", f"choose another with --host and --port; {_FREE_PORT_HINT}"
+        ) from error
+
+
+_FREE_PORT_HINT = "--port 0 picks a free one"
+
+
+def start_api_server(app: FastAPI, settings: ServerSettings, listener: socket.socket | None = None) -> ApiServer:
+    """Run the application of `create_app` in a thread; returns when it answers.
+
+    Args:
+        app: from `create_app`.
+        settings: host and port, used where no listener is given.
+        listener: from `open_listener`, for a caller who wants to know early that the port is free.
+
+    Raises:
+        PortInUseError, ConfigError: as `open_listener`.
+    """
+    server = ApiServer(app, listener or open_listener(settings))
+    server.start()
+    return server

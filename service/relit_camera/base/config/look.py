@@ -1,0 +1,141 @@
+"""What a person changes while the camera runs: lighting, background, mode. API, presets and config.yaml share it."""
+
+from __future__ import annotations
+
+import re
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+ColorChannel = Annotated[float, Field(ge=0, le=100)]
+LinearRgb = tuple[ColorChannel, ColorChannel, ColorChannel]
+_RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9]) *(\..*)?", re.IGNORECASE)
+"""Names that stand for devices on Windows, in every folder and with every suffix."""
+
+
+def _reject_reserved_name(name: str) -> str:
+    if _RESERVED_NAMES.fullmatch(name):
+        raise ValueError(f"'{name}' is a device on Windows")
+    return name
+
+
+StoredName = Annotated[
+    str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9 _.-]{0,62}[A-Za-z0-9_-])?$"), AfterValidator(_reject_reserved_name)
+]
+"""A stored thing's name: letters, digits, space, dot, dash, underscore; no dot or space last, and no device of Windows,
+so that it is safe as a file name everywhere."""
+
+
+class SettingsModel(BaseModel):
+    """Base of every settings model: immutable, unknown keys refused, NaN and infinity refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+
+class Mode(StrEnum):
+    """How the relit face reaches the picture."""
+
+    REENACT = "reenact"
+    """The relit still of the subject, moved as the live face moves. The webcam's picture stays private."""
+    RATIO = "ratio"
+    """The live frame itself, multiplied by the ratio of target light to room light."""
+
+
+class Lamp(SettingsModel):
+    """A round lamp at infinity."""
+
+    azimuth_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    """0 is from the camera, 90 from the picture's right."""
+    elevation_deg: Annotated[float, Field(ge=-90, le=90)] = 30.0
+    size_deg: Annotated[float, Field(gt=0, le=180)] = 10.0
+    """Full angle of the disc."""
+    kelvin: Annotated[float, Field(ge=1667, le=25000)] | None = None
+    """Colour temperature; its colour has luminance 1. Give this or `color`, not both; neither is white."""
+    color: LinearRgb | None = None
+    """Linear RGB, multiplied by `intensity` as it is."""
+    intensity: Annotated[float, Field(ge=0, le=1000)] = 1.0
+    """Irradiance at the head, perpendicular to the lamp."""
+
+    @model_validator(mode="after")
+    def _kelvin_or_color(self) -> Lamp:
+        if self.kelvin is not None and self.color is not None:
+            raise ValueError("give kelvin or color, not both")
+        return self
+
+
+class Lighting(SettingsModel):
+    """The light that falls on the face."""
+
+    environment: StoredName | None = "studio"
+    """A stored environment, `background` to be lit by the virtual background, or null for lamps only."""
+    yaw_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    """Turns the environment: yaw > 0 moves a frontal light to the picture's right."""
+    pitch_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    roll_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    exposure_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
+    """Relative to a white ball facing the camera reading 0.8."""
+    saturation: Annotated[float, Field(ge=0, le=4)] = 1.0
+    """Of the light: 0 is grey light, 1 as it is."""
+    lamps: Annotated[tuple[Lamp, ...], Field(max_length=16)] = ()
+    face_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
+    background_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
+    blend: Annotated[float, Field(ge=0, le=1)] = 1.0
+    """0 the live picture (in reenact, where that stays private, the still as captured), 1 fully relit."""
+    split: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Before and after, in mode ratio: this share of the picture, from its left, is as filmed, room and all."""
+    transition_s: Annotated[float, Field(ge=0, le=60)] = 0.4
+    """Seconds over which a change is eased."""
+
+
+class NoBackground(SettingsModel):
+    """Reenact: a dark neutral. Ratio: the live room."""
+
+    kind: Literal["none"] = "none"
+
+
+class BlurBackground(SettingsModel):
+    """The live room, blurred."""
+
+    kind: Literal["blur"] = "blur"
+    strength: Annotated[float, Field(gt=0, le=1)] = 0.5
+    """1 blurs with a sigma of a tenth of the picture's height."""
+
+
+class ColorBackground(SettingsModel):
+    """One colour."""
+
+    kind: Literal["color"] = "color"
+    color: Annotated[str, Field(pattern=r"^#[0-9A-Fa-f]{6}$")] = "#202428"
+    """SRGB, as in a web page."""
+
+
+class ImageBackground(SettingsModel):
+    """A picture, cropped to fill."""
+
+    kind: Literal["image"] = "image"
+    image: StoredName
+    """A stored background picture or a stored environment's name."""
+
+
+class EnvironmentBackground(SettingsModel):
+    """The environment that lights the face, seen behind it and turned with it."""
+
+    kind: Literal["environment"] = "environment"
+    height_deg: Annotated[float, Field(ge=10, le=120)] = 35.0
+    """Vertical field of view."""
+    blur: Annotated[float, Field(ge=0, le=1)] = 0.15
+
+
+Background = Annotated[
+    NoBackground | BlurBackground | ColorBackground | ImageBackground | EnvironmentBackground,
+    Field(discriminator="kind"),
+]
+
+
+class Look(SettingsModel):
+    """Everything that a preset keeps."""
+
+    lighting: Lighting = Lighting()
+    background: Background = NoBackground()
+    mode: Mode = Mode.REENACT

@@ -1,0 +1,173 @@
+"""What is fixed for one run of the camera: where pictures come from and go to, models, server, folders."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from ipaddress import ip_address
+from pathlib import Path
+from typing import Annotated, Literal
+
+from platformdirs import user_data_path
+from pydantic import Field, SecretStr, field_validator
+from pydantic.json_schema import SkipJsonSchema
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from relit_camera.base.config.look import Look, SettingsModel
+
+EvenSize = Annotated[int, Field(ge=64, le=8192, multiple_of=2)]
+HostAndPort = Annotated[str, Field(pattern=r"^([a-z0-9.-]{1,253}|\[[0-9a-f:.]+\])(:[0-9]{1,5})?$")]
+"""A host as a browser names it: lower case, an IPv6 address in brackets, the port where it is not ours or the usual."""
+
+
+class SourceSettings(SettingsModel):
+    """Where live pictures come from."""
+
+    source: str = "webcam"
+    """`webcam`, a camera's id from `relit devices`, a video or picture file, or `pattern`."""
+    width: EvenSize = 1280
+    """Asked of a webcam; it may answer with another size."""
+    height: EvenSize = 720
+    fps: Annotated[float, Field(ge=1, le=240)] = 30.0
+    on_demand: bool = False
+    """Release the webcam while nobody reads the virtual camera or watches a preview (Linux)."""
+
+
+class Fallback(StrEnum):
+    """What is shown where not even the still can be relit."""
+
+    PLACEHOLDER = "placeholder"
+    LIVE = "live"
+    """The webcam's picture as it is: yourself and your room."""
+
+
+class OutputSettings(SettingsModel):
+    """Where relit pictures go."""
+
+    sink: str = "camera"
+    """`camera` (the virtual camera), a video file to write, or `null`."""
+    label: Annotated[str, Field(min_length=1, max_length=31)] = "Relit Camera"
+    """Name of the virtual camera device, as call apps show it."""
+    width: EvenSize = 1280
+    """Even, and fixed for the whole run: readers of the virtual camera break otherwise."""
+    height: EvenSize = 720
+    fps: Annotated[float, Field(ge=1, le=120)] = 30.0
+    placeholder: Path | None = None
+    """Picture shown while there is nothing else to show; ours if not given."""
+    fallback: Fallback = Fallback.PLACEHOLDER
+    """While pictures cannot be made the still is shown, relit; and where that cannot be either, this: `placeholder`, or
+    `live`, the webcam's picture as it is, room and all."""
+
+    @field_validator("sink", mode="before")
+    @classmethod
+    def _null_as_text(cls, sink: object) -> object:
+        return "null" if sink is None else sink  # YAML reads the bare word as no value
+
+
+class TrackerSettings(SettingsModel):
+    """How the face is followed."""
+
+    name: str = "mesh"
+    """`mesh`, `openseeface`, or `recorded:FILE.json`."""
+    dead_band_deg: Annotated[float, Field(ge=0, le=5)] = 0.3
+    """Head turns smaller than this do not move the light."""
+    reach_yaw_deg: Annotated[float, Field(ge=5, le=80)] = 40.0
+    """Beyond this turn the picture eases to neutral."""
+    reach_pitch_deg: Annotated[float, Field(ge=5, le=80)] = 30.0
+
+
+class ReenactSettings(SettingsModel):
+    """How the still is moved."""
+
+    model: Path | None = None
+    """An ONNX reenactor of your own (docs/reenactors.md); the built-in first-order motion if not given."""
+
+
+class InferenceSettings(SettingsModel):
+    """How ONNX Runtime runs."""
+
+    provider: Literal["auto", "cpu", "cuda", "tensorrt", "directml", "coreml", "openvino"] = "auto"
+    strict: bool = False
+    """Refuse to start when the provider is not really used, instead of falling back with a word."""
+    threads: Annotated[int, Field(ge=1, le=64)] = 1
+    """Threads of each model; the picture arithmetic has the other cores."""
+
+
+class ServerSettings(SettingsModel):
+    """The REST API and the panel."""
+
+    host: str = "127.0.0.1"
+    """Address to listen on. Any other than a loopback address needs a token: the preview shows your home."""
+    port: Annotated[int, Field(ge=0, le=65535)] = 8470
+    """0 picks a free port and prints it."""
+    token_file: Path | None = None
+    """A file with the token that clients must show, which other users of the machine may not read."""
+    token: SkipJsonSchema[Annotated[SecretStr | None, Field(exclude=True)]] = None
+    """The token itself, from the environment only: RELIT_SERVER__TOKEN."""
+    names: Annotated[tuple[HostAndPort, ...], Field(max_length=16)] = ()
+    """Other names by which clients reach the server, such as `camera.lan` or, behind a proxy, `camera.example:8443`."""
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only programs of this machine can reach the address."""
+        if self.host == "localhost":
+            return True
+        try:
+            return ip_address(self.host).is_loopback
+        except ValueError:
+            return False
+
+
+class StorageSettings(SettingsModel):
+    """Where environments, subjects, backgrounds and presets are kept."""
+
+    data_dir: Path = Field(default_factory=lambda: user_data_path("relit-camera", appauthor=False))
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """All of them."""
+        return self.environments, self.subjects, self.backgrounds, self.presets
+
+    @property
+    def environments(self) -> Path:
+        """Folder of stored environments."""
+        return self.data_dir / "environments"
+
+    @property
+    def subjects(self) -> Path:
+        """Folder of stored subjects."""
+        return self.data_dir / "subjects"
+
+    @property
+    def backgrounds(self) -> Path:
+        """Folder of stored background pictures."""
+        return self.data_dir / "backgrounds"
+
+    @property
+    def presets(self) -> Path:
+        """Folder of stored presets."""
+        return self.data_dir / "presets"
+
+
+class RelitSettings(BaseSettings):
+    """The whole configuration. Precedence: defaults < config.yaml < RELIT_* environment < command line.
+
+    In the environment a nested field is written with two underscores: RELIT_SERVER__PORT=9000.
+    """
+
+    model_config = SettingsConfigDict(
+        env_prefix="RELIT_", env_nested_delimiter="__", extra="forbid", frozen=True, use_attribute_docstrings=True
+    )
+
+    source: SourceSettings = SourceSettings()
+    output: OutputSettings = OutputSettings()
+    subject: str | None = None
+    """A stored subject's name, or the path of a .relit file."""
+    look: Look = Look()
+    tracker: TrackerSettings = TrackerSettings()
+    matte: str = "selfie"
+    """What finds the person in the live picture (mode ratio): `selfie`, or `recorded:FILE.npz`."""
+    reenact: ReenactSettings = ReenactSettings()
+    inference: InferenceSettings = InferenceSettings()
+    server: ServerSettings = ServerSettings()
+    storage: StorageSettings = StorageSettings()
+    log_level: Literal["debug", "info", "warning", "error"] = "info"

@@ -1,0 +1,249 @@
+"""The one place that opens ONNX Runtime sessions.
+
+Threads are explicit and never spin: several networks, OpenCV and BLAS share few cores. A provider counts only when it
+is proven: most of the graph's nodes were placed on it and a warm-up ran there. Otherwise the session says why not.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import weakref
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from numpy.typing import NDArray
+
+from relit_camera.base.errors import ConfigError, DeviceError, ModelError
+from relit_camera.base.models import provider_names
+from relit_camera.base.models.onnx_runtime import (
+    TensorSpec,
+    node_placement,
+    reason,
+    runtime_errors,
+    runtime_options,
+    tensor_specs,
+    warm_up,
+)
+
+if TYPE_CHECKING:
+    import onnxruntime
+
+log = logging.getLogger(__name__)
+
+_LOG_FATAL = 4
+"""The severity to log from. What ONNX Runtime would print below it reaches us as an exception or in the placement."""
+
+
+@dataclass(frozen=True)
+class SessionOptions:
+    """How to run a model.
+
+    Attributes:
+        provider: `auto`, `cpu`, `cuda` … (see `base.models.provider_names`).
+        threads: threads that work on one operator, at least 1; with 1 it runs in the caller's thread.
+        strict: fail rather than fall back to the CPU.
+    """
+
+    provider: str = provider_names.AUTO
+    threads: int = 1
+    strict: bool = False
+
+
+@dataclass(frozen=True)
+class SessionReport:
+    """What a person wants to know of an open session.
+
+    Attributes:
+        name: of the model.
+        requested: the provider asked for.
+        provider: the provider proven to run it.
+        why: why it is not the requested one, or "".
+        cure: what to do about that, or "".
+        threads: threads that work on one operator.
+        placement: number of the graph's nodes on each provider.
+        warm_up_ms: time of a run on zeros; None where the model's input shapes are open.
+    """
+
+    name: str
+    requested: str
+    provider: str
+    why: str
+    cure: str
+    threads: int
+    placement: Mapping[str, int]
+    warm_up_ms: float | None
+
+
+@dataclass(eq=False)
+class Session:
+    """An open model, with its inputs and outputs by name. `run` may be called from several threads.
+
+    Where an accelerator fails on the way (its driver is reset, its memory is gone) the model goes on on the CPU from
+    then on, and the report says why.
+    """
+
+    report: SessionReport
+    inputs: Mapping[str, TensorSpec]
+    outputs: Mapping[str, TensorSpec]
+    _runtime: onnxruntime.InferenceSession
+    _on_cpu: Callable[[str], Session] | None = None
+    _change: threading.Lock = field(default_factory=threading.Lock)
+
+    @property
+    def name(self) -> str:
+        """Name of the model."""
+        return self.report.name
+
+    @property
+    def requested(self) -> str:
+        """The provider asked for."""
+        return self.report.requested
+
+    @property
+    def provider(self) -> str:
+        """The provider proven to run it."""
+        return self.report.provider
+
+    @property
+    def why(self) -> str:
+        """Why `provider` is not the requested one, or ""."""
+        return self.report.why
+
+    def run(self, feeds: Mapping[str, NDArray]) -> dict[str, NDArray]:
+        """Run on one array for each input; returns all outputs by name.
+
+        Raises:
+            ModelError: an input is missing, has another shape or dtype, or the model fails on it.
+        """
+        try:
+            return self._run(feeds)
+        except runtime_errors() as error:
+            failures: tuple[type[Exception], ...] = (*runtime_errors(), ModelError)
+            try:
+                return self._run_on_cpu(feeds, reason(error))
+            except failures:
+                takes = ", ".join(f"{name} {spec}" for name, spec in self.inputs.items())
+                raise ModelError(f"model {self.name} failed: {reason(error)}", f"it takes {takes}") from error
+
+    def _run(self, feeds: Mapping[str, NDArray]) -> dict[str, NDArray]:
+        values = self._runtime.run(list(self.outputs), feeds)
+        return dict(zip(self.outputs, values, strict=True))
+
+    def _run_on_cpu(self, feeds: Mapping[str, NDArray], why: str) -> dict[str, NDArray]:
+        """Run on the CPU, and if that succeeds, stay there: then it was the accelerator that failed, not the feeds."""
+        with self._change:
+            if self._on_cpu is not None:
+                other = self._on_cpu(why)
+                result = other._run(feeds)
+                log.warning("model %s goes on on the CPU: %s failed: %s", self.name, self.provider, why)
+                self.report, self._runtime, self._on_cpu = other.report, other._runtime, None
+                return result
+        return self._run(feeds)  # it is on the CPU by now, or always was
+
+
+_open_sessions: weakref.WeakSet[Session] = weakref.WeakSet()
+_open_sessions_lock = threading.Lock()
+
+
+def session_report() -> list[SessionReport]:
+    """Report every session that is still open, by name."""
+    with _open_sessions_lock:
+        reports = [session.report for session in _open_sessions]
+    return sorted(reports, key=lambda report: report.name)
+
+
+def open_session(model: Path | bytes, name: str, options: SessionOptions | None = None) -> Session:
+    """Open an ONNX model (a file, or its bytes), prove its provider and warm it up.
+
+    A provider that is missing, does not load, or takes fewer than half of the nodes is replaced by the CPU, and the
+    session's `why` says so; with `options.strict` that is an error.
+
+    Raises:
+        ModelError: the model is missing, damaged, or cannot run.
+        DeviceError: strict, and the provider cannot run the model.
+        ConfigError: there is no such provider, or no thread.
+    """
+    options = options or SessionOptions()
+    if options.threads < 1:
+        raise ConfigError(f"a model cannot run on {options.threads} threads", "give it at least 1")
+    wanted = provider_names.choose_provider(options.provider)
+    try:
+        session = _open_verified(model, name, wanted, options)
+        if wanted != provider_names.CPU and not options.strict:
+            session._on_cpu = lambda why: _open_on_provider(
+                model,
+                name,
+                provider_names.CPU,
+                options,
+                f"{wanted} failed: {why}",
+                "restart the camera to try it again",
+            )
+    except _ProviderRejectedError as error:
+        cure = provider_names.provider_cure(wanted)
+        if options.strict:
+            raise DeviceError(f"model {name} cannot run on {wanted}: {error}", cure) from error
+        session = _open_on_provider(model, name, provider_names.CPU, options, why=f"{wanted}: {error}", cure=cure)
+    with _open_sessions_lock:
+        _open_sessions.add(session)
+    return session
+
+
+class _ProviderRejectedError(Exception):
+    """The provider does not run this model; the message is the reason."""
+
+
+def _open_verified(model: Path | bytes, name: str, provider: str, options: SessionOptions) -> Session:
+    if provider not in provider_names.available_providers():
+        raise _ProviderRejectedError("the installed ONNX Runtime was built without it")
+    missing = provider_names.preload(provider)
+    try:
+        session = _open_on_provider(model, name, provider, options)
+    except _ProviderRejectedError as error:
+        raise _ProviderRejectedError(missing or str(error)) from error
+    placement = session.report.placement
+    nodes, total = placement.get(provider, 0), sum(placement.values())
+    if nodes == 0 < total:
+        raise _ProviderRejectedError(
+            missing or "no node was placed there; its libraries did not load, or it has no device"
+        )
+    if 2 * nodes < total:
+        raise _ProviderRejectedError(f"only {nodes} of {total} nodes were placed there")
+    return session
+
+
+def _open_on_provider(
+    model: Path | bytes, name: str, provider: str, options: SessionOptions, why: str = "", cure: str = ""
+) -> Session:
+    import onnxruntime
+    from onnxruntime.capi.onnxruntime_pybind11_state import InvalidProtobuf, NoModel, NoSuchFile
+
+    source = f"model {name} ({model})" if isinstance(model, Path) else f"model {name}"
+    onnxruntime.set_default_logger_severity(_LOG_FATAL)
+    try:
+        runtime = onnxruntime.InferenceSession(
+            model,
+            runtime_options(options.threads),
+            providers=list(
+                dict.fromkeys([provider_names.full_name(provider), provider_names.full_name(provider_names.CPU)])
+            ),
+            enable_fallback=0,  # falling back is our decision, and never a silent one
+        )
+        runtime._model_bytes = (
+            None  # it would keep the bytes beside its own copy: hundreds of MB for a relighting graph
+        )
+        inputs, outputs = tensor_specs(runtime.get_inputs()), tensor_specs(runtime.get_outputs())
+        warm_up_ms = warm_up(runtime, inputs)
+    except NoSuchFile as error:
+        raise ModelError(f"{source} does not exist", "check the path, or get it with `relit models pull`") from error
+    except (InvalidProtobuf, NoModel) as error:
+        raise ModelError(f"{source} is no ONNX model, or a damaged one", "export or pull it again") from error
+    except runtime_errors() as error:
+        if provider != provider_names.CPU:
+            raise _ProviderRejectedError(reason(error)) from error
+        raise ModelError(f"{source} cannot be run: {reason(error)}", "export or pull it again") from error
+    placement = node_placement(runtime)
+    report = SessionReport(name, options.provider, provider, why, cure, options.threads, placement, warm_up_ms)
+    return Session(report, inputs, outputs, runtime)

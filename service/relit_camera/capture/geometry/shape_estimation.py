@@ -1,0 +1,72 @@
+"""What the shape of a person says about their light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.image_types import LinearImage, Mask
+from relit_camera.capture.geometry.horizon_map import HorizonMap, calibrate_horizon_map, compute_horizon_map
+from relit_camera.capture.geometry.normal_completion import complete_normals
+from relit_camera.capture.geometry.normal_integration import integrate_normals
+from relit_camera.capture.geometry.photometric_stereo import photometric_stereo
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Shape of a person, pixel by pixel.
+
+    Attributes:
+        normals: (height, width, 3) float32 unit vectors; (0, 0, 1) outside of the matte.
+        albedo: (height, width, 3) float32 linear, where a white wall has 1; 0 outside.
+        confidence: (height, width) float32, how far a pixel's own pictures tell its normal: 0 not at all, 1 surely.
+        depth: (height, width) float32 in pixels toward the camera, mean 0; NaN outside.
+        horizon: which light the rest of the surface hides.
+    """
+
+    normals: Floats
+    albedo: LinearImage
+    confidence: Mask
+    depth: Floats
+    horizon: HorizonMap
+
+    def cosines(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+        """n·l, negative behind the surface, of unit vectors (count, 3) at row-major pixels (some,): (some, count)."""
+        return self.normals.reshape(-1, 3)[pixels] @ directions.T.astype(np.float32)
+
+    def visible(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Whether light reaches pixels directly, neither hidden nor from behind the surface: (some, count)."""
+        return (self.horizon.margins(directions, pixels) > 0) & (self.cosines(directions, pixels) > 0)
+
+
+def estimate_geometry(
+    pictures: Floats, directions: NDArray[np.float64], matte: Mask, focal_px: float | None = None
+) -> Geometry:
+    """Normals and albedo by photometric stereo, depth by integration, visibility by horizons and observed shadows.
+
+    Args:
+        pictures: (lights, height, width, 3) linear, each under a distant light of unit irradiance.
+        directions: (lights, 3) unit vectors.
+        matte: (height, width) alpha of the person.
+        focal_px: focal length in pixels where it is known; the depth is then right in perspective.
+    """
+    shading = photometric_stereo(pictures, directions, matte)
+    normals = complete_normals(shading.normals, shading.confidence, matte)
+    depth = integrate_normals(normals, matte > 0.5, shading.confidence, focal_px)
+    horizon = calibrate_horizon_map(compute_horizon_map(depth), shading.lit, directions)
+    return Geometry(normals, shading.albedo, shading.confidence, depth, horizon)
+
+
+def pixels_per_cm(distance_px: float, distance_cm: float) -> float:
+    """Scale of a depth in pixels, by something in the picture whose size is known: eyes are 6.3 cm apart on average.
+
+    Raises:
+        ValueError: a distance is not positive.
+    """
+    if not (distance_px > 0 and distance_cm > 0):
+        raise ValueError(f"no scale in {distance_px} px for {distance_cm} cm")
+    return distance_px / distance_cm

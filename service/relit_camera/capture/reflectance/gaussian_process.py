@@ -1,0 +1,97 @@
+"""A Gaussian process over directions: how far a light's picture tells another's is learned from the pictures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, null_space
+from scipy.optimize import minimize
+
+from relit_camera.capture.reflectance.method_registry import factored_field
+from relit_camera.capture.reflectance.sampled_region import region_coverage
+from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.subject.reflectance_field import FactoredField
+
+Values = NDArray[np.float64]
+
+START_REACH, START_NOISE = np.radians(40.0), 1e-2
+REACH_BOUNDS = np.radians([3.0, 360.0])
+NOISE_BOUNDS = (1e-6, 1.0)
+
+
+@dataclass(frozen=True)
+class GaussianProcess:
+    """One kernel for all pixels, its parameters by their pooled marginal likelihood."""
+
+    def build(self, samples: Samples) -> FactoredField:
+        """The field; see `Method.build`."""
+        return factored_field(fit_kernel(samples), samples)
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """Covariance of a pixel's values under two lights, and its prediction (universal kriging; Matheron 1969).
+
+    Matérn with smoothness 3/2 over the distance of unit vectors, about a mean that is linear in the direction, as
+    Lambert's law is. Beyond the sampled region the prediction fades as over the thesis's black ring.
+
+    Attributes:
+        reach: distance over which values are alike.
+        noise: variance of what no other light explains, as a share.
+    """
+
+    reach: float
+    noise: float
+
+    def covariance(self, first: Values, second: Values) -> Values:
+        """Covariance (count, others) of unit vectors (count, 3) and (others, 3), 1 at no distance."""
+        apart = np.sqrt(np.maximum(2 - 2 * first @ second.T, 0)) * (np.sqrt(3) / self.reach)
+        return np.asarray((1 + apart) * np.exp(-apart))
+
+    def weights(self, directions: Values, queries: Values) -> NDArray[np.float32]:
+        """Weights (lights, queries); see `LinearMethod.weights`."""
+        share = region_coverage(directions, queries)
+        factor = cho_factor(self.covariance(directions, directions) + self.noise * np.eye(len(directions)))
+        trend, asked = _trend(directions), _trend(queries)
+        known = cho_solve(factor, self.covariance(directions, queries))
+        # What the mean's own estimate adds.
+        solved = cho_solve(factor, trend)
+        correction = np.linalg.lstsq(trend.T @ solved, asked.T - trend.T @ known, rcond=None)[0]
+        return np.asarray((known + solved @ correction) * share, np.float32)
+
+
+def fit_kernel(samples: Samples) -> Kernel:
+    """The kernel under which the pictures inside the matte are likeliest, whatever their mean (REML; Harville 1974).
+
+    All pixels and channels count as draws of one process, so the pictures enter by their products alone.
+
+    Raises:
+        LightsError: the directions span no region.
+    """
+    region_coverage(samples.directions, samples.directions[:1])
+    lights = len(samples.directions)
+    inside = np.flatnonzero(samples.matte.ravel() > 0.5)
+    values = samples.pictures.reshape(lights, -1, 3)[:, inside].reshape(lights, -1)
+    contrasts = null_space(_trend(samples.directions).T)
+    products = contrasts.T @ (values @ values.T).astype(np.float64) @ contrasts / values.shape[1]
+
+    def negative_log_likelihood(logarithms: Values) -> float:
+        reach, noise = np.exp(logarithms)
+        covariance = Kernel(reach, noise).covariance(samples.directions, samples.directions)
+        seen = contrasts.T @ (covariance + noise * np.eye(lights)) @ contrasts
+        factor = cho_factor(seen)
+        # The process's own variance at its best, given the two others.
+        variance = np.trace(cho_solve(factor, products)) / len(products)
+        return float(2 * np.log(np.diag(factor[0])).sum() + len(products) * np.log(max(variance, 1e-300)))
+
+    bounds = [tuple(np.log(REACH_BOUNDS)), tuple(np.log(NOISE_BOUNDS))]
+    found = minimize(negative_log_likelihood, np.log([START_REACH, START_NOISE]), method="Nelder-Mead", bounds=bounds)
+    reach, noise = np.exp(found.x)
+    return Kernel(float(reach), float(noise))
+
+
+def _trend(directions: Values) -> Values:
+    """1, x, y, z (count, 4)."""
+    return np.column_stack([np.ones(len(directions)), directions])

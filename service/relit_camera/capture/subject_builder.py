@@ -1,0 +1,134 @@
+"""Samples → subject: the field, compressed, with what trackers and people need to see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera import __version__
+from relit_camera.base.images.color import Gamma, luminance, uint8_from_linear
+from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask, Points
+from relit_camera.capture.geometry.shape_estimation import Geometry
+from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD, open_method
+from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.subject_landmarks import find_landmarks
+from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.directions import texel_directions, texel_solid_angles
+from relit_camera.subject.compression.compression_quality import CompressionTarget
+from relit_camera.subject.compression.field_compression import CompressedField, compress_field
+from relit_camera.subject.subject import HORIZON_STEP_RAD, Subject, SubjectMetadata
+
+MAX_SKIN_LUMINANCE = 0.45
+"""Luminance that three quarters of a face do not exceed under frontal light where a white wall reads 1."""
+TYPICAL_SKIN_LUMINANCE = 0.36
+"""The same of light skin."""
+
+
+def build_subject(
+    samples: Samples,
+    method: str,
+    source: str,
+    gamma: Gamma = "srgb",
+    landmarks: Mapping[str, Points] | None = None,
+    with_geometry: bool = True,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Subject:
+    """Build and compress the field of `samples`.
+
+    Args:
+        samples: aligned one-light pictures.
+        method: a name that `capture.reflectance.method_registry.open_method` knows.
+        source: file name that the header should tell.
+        gamma: the curve that the pictures were decoded with, for the header.
+        landmarks: known points of the face by scheme; where it is None, the
+            installed trackers look for them.
+        with_geometry: keep the person's shape in the subject.
+        progress: called with the count of parts of the field that are compressed, and the total.
+
+    Raises:
+        NotFoundError: no such method.
+        LightsError: the directions cannot carry a field.
+    """
+    method = DEFAULT_METHOD if method == "default" else method
+    field = open_method(method).build(samples)
+    maps = [builtin_environment(name).light_map for name in BUILTIN_NAMES]
+    compressed = compress_field(field, samples.pictures, samples.matte, CompressionTarget(maps=maps), progress)
+    reached = compressed.reached
+    frontal = frontal_picture(compressed, samples.matte)
+    still = neutral_picture(frontal, samples.matte)
+    lights, height, width = samples.pictures.shape[:3]
+    return Subject(
+        metadata=SubjectMetadata(
+            width=width,
+            height=height,
+            method=method,
+            lights=lights,
+            components=compressed.basis.components,
+            source=source,
+            psnr_db=reached.light_db,
+            texel_psnr_db=reached.texel_db,
+            map_psnr_db=reached.map_db,
+            bytes_share=reached.bytes_share,
+            gamma=str(gamma),
+            over_black=over_black(samples),
+            display_gain=display_gain(frontal, samples.matte),
+            created_by=f"relit-camera {__version__}",
+            created_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        ),
+        basis=compressed.basis,
+        coefficients=compressed.coefficients,
+        light_directions=samples.directions.astype(np.float32),
+        light_coefficients=compressed.light_coefficients,
+        matte=samples.matte,
+        neutral=still,
+        landmarks=find_landmarks(still) if landmarks is None else landmarks,
+        **(quantize_geometry(samples.geometry) if with_geometry else {}),
+    )
+
+
+def quantize_geometry(geometry: Geometry) -> dict[str, NDArray]:
+    """The shape as a subject keeps it: normals, albedo, depth, horizons (see `Subject`).
+
+    Half floats tell normals to 0.03° and albedo to 0.05 %, far below what photometric stereo knows; a horizon's 0.7° is
+    less than the light's own size.
+    """
+    horizons = np.rint((geometry.horizon.heights.astype(np.float32) + np.pi / 2) / HORIZON_STEP_RAD)
+    return {
+        "normals": geometry.normals.astype(np.float16),
+        "albedo": geometry.albedo.astype(np.float16),
+        "depth": np.nan_to_num(geometry.depth, nan=0.0),
+        "horizons": np.clip(horizons, 0, 255).astype(np.uint8),
+    }
+
+
+def frontal_picture(field: CompressedField, matte: Mask) -> LinearImage:
+    """The face under soft light from the front, a cosine lobe about the camera: a white wall facing it reads 1."""
+    lobe = np.maximum(texel_directions()[..., 2], 0) * texel_solid_angles()
+    lobe /= (lobe * np.maximum(texel_directions()[..., 2], 0)).sum()
+    amounts = field.coefficients @ lobe.ravel().astype(np.float32)
+    return field.basis.at(amounts[:, None], np.arange(matte.size)).reshape(*matte.shape, 3)
+
+
+def over_black(samples: Samples) -> bool:
+    """Whether everything outside the matte is black in every frame."""
+    outside = samples.matte == 0
+    return bool(outside.any() and samples.pictures[:, outside].max() < 0.02)
+
+
+def display_gain(frontal: LinearImage, matte: Mask) -> float:
+    """What the pictures are multiplied by to be shown: 1 for a calibrated capture.
+
+    No skin is nearly as bright as a white wall. Where the frames say so, their unit is another (a strobe of unknown
+    strength), and they are shown as bright as light skin is.
+    """
+    bright = float(np.percentile(luminance(frontal)[matte > 0.5], 75))
+    return 1.0 if bright <= MAX_SKIN_LUMINANCE else TYPICAL_SKIN_LUMINANCE / bright
+
+
+def neutral_picture(frontal: LinearImage, matte: Mask) -> DisplayImage:
+    """The face as trackers like to see it: softly lit from the front, well exposed."""
+    bright = float(np.percentile(frontal[matte > 0.5], 95))
+    return uint8_from_linear(frontal * np.float32(0.7 / bright if bright > 0 else 1.0))

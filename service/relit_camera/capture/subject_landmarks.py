@@ -1,0 +1,65 @@
+"""Finding the face in a new subject's still, so that it need not be found at every start.
+
+Known landmarks beside a set of one-light pictures: JSON {scheme: [[x, y], …]}, pixels, centres at integers + ½.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from relit_camera.base.errors import LightsError, ModelError
+from relit_camera.base.images.image_types import DisplayImage, Points
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker, track_still
+
+log = logging.getLogger(__name__)
+
+LANDMARK_TRACKERS = ("mesh", "openseeface")
+
+
+def find_landmarks(still: DisplayImage) -> Mapping[str, Points]:
+    """The face's landmarks (count, 2) in each scheme whose tracker is installed; empty where there is no face."""
+    found: dict[str, Points] = {}
+    for name in LANDMARK_TRACKERS:
+        try:
+            tracker = open_tracker(name, TrackerOptions(blendshapes=False))
+        except ModelError as error:
+            log.info("landmarks of tracker %s are left out: %s", name, error)
+            continue
+        state = track_still(still, tracker)
+        if state.visible:
+            found[state.scheme] = state.landmarks
+    return found
+
+
+MAX_BYTES = 16 << 20
+
+_Layout = TypeAdapter(dict[str, list[tuple[float, float]]])
+
+
+def read_landmarks(path: Path, required: bool) -> Mapping[str, Points]:
+    """Landmarks (count, 2) float32 by scheme; empty if the file is not there and not `required`.
+
+    Raises:
+        LightsError: required and missing, not in the layout, or not as many points as the scheme has.
+        NotFoundError: an unknown scheme.
+    """
+    if not path.is_file() and not required:
+        return {}
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ValueError(f"it is larger than {MAX_BYTES >> 20} MiB")
+        listed = _Layout.validate_json(path.read_bytes())
+    except (OSError, ValueError) as error:
+        cure = "it must be JSON {scheme: [[x, y], …]}"
+        raise LightsError(f"{path} holds no landmarks: {str(error).splitlines()[0]}", cure) from error
+    for scheme, points in listed.items():
+        if len(points) != (count := landmark_scheme(scheme).count):
+            cure = "write all of the scheme's points, in its order"
+            raise LightsError(f"{path} holds {len(points)} points of {scheme}, which has {count}", cure)
+    return {scheme: np.array(points, dtype=np.float32) for scheme, points in listed.items()}

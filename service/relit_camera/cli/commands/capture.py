@@ -1,0 +1,201 @@
+"""`relit capture`: from pictures to a subject."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(no_args_is_help=True)
+
+
+@app.callback()
+def group() -> None:
+    """Build a subject from pictures or video."""
+
+
+@app.command("import")
+def import_lights(
+    lights: Annotated[Path, typer.Argument(help="An RTI .lp file: a count, then 'file x y z' lines.")],
+    out: Annotated[Path, typer.Option(help="The subject file to write (.relit).")],
+    method: Annotated[str, typer.Option(help="Reflectance method.")] = "default",
+    gamma: Annotated[str, typer.Option(help="Curve of the pictures: srgb, linear, or an exponent.")] = "srgb",
+    landmarks: Annotated[
+        Path | None,
+        typer.Option(help="JSON of known landmarks: {scheme: [[x, y], …]}; landmarks.json is found by itself."),
+    ] = None,
+    align: Annotated[
+        bool | None,
+        typer.Option(
+            "--align/--as-is",
+            help="Undo small motions and the strobes' varying strength, leave corrupt pictures out; by itself, where "
+            "that helps.",
+        ),
+    ] = None,
+) -> None:
+    """Build a subject from pictures of one person who keeps still, each under one light whose direction is known."""
+    from relit_camera.base.images.color import parse_gamma
+    from relit_camera.capture.alignment.picture_set_alignment import align_if_better
+    from relit_camera.capture.lights_file import read_lights
+    from relit_camera.capture.picture_import import import_samples
+    from relit_camera.capture.reflectance.method_registry import open_method
+    from relit_camera.capture.subject_builder import build_subject
+    from relit_camera.capture.subject_landmarks import read_landmarks
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.subject.subject_file import write_subject
+
+    curve = parse_gamma(gamma)
+    open_method(method)
+    with progress_bar() as progress:
+        reading = progress.add_task("Reading pictures", total=None)
+        samples = import_samples(
+            lights, curve, lambda done, total: progress.update(reading, completed=done, total=total)
+        )
+        aligning = progress.add_task("Aligning them", total=None)
+        aligned = align_if_better(
+            samples,
+            [light.path.name for light in read_lights(lights)],
+            align,
+            lambda done, total: progress.update(aligning, completed=done, total=total),
+        )
+        building = progress.add_task("Building the field", total=None)
+        points = read_landmarks(landmarks or lights.parent / "landmarks.json", required=landmarks is not None)
+        subject = build_subject(
+            aligned.samples,
+            method,
+            lights.name,
+            curve,
+            points or None,
+            progress=lambda done, total: progress.update(building, completed=done, total=total),
+        )
+    write_subject(out, subject)
+    for line in aligned.told:
+        typer.echo(line)
+    meta = subject.metadata
+    typer.echo(
+        f"{out}: {meta.width}x{meta.height}, {meta.lights} lights, {meta.components} components, "
+        f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better, "
+        f"{100 * (meta.bytes_share or 0):.1f} % of the dense field"
+    )
+
+
+@app.command("build")
+def build(
+    video: Annotated[
+        Path, typer.Argument(help="A film of you, a mirror ball and a blinking lamp: see docs/capture.md.")
+    ],
+    out: Annotated[Path, typer.Option(help="The subject file to write (.relit).")],
+    report: Annotated[Path | None, typer.Option(help="JSON of all that was found on the way.")] = None,
+    focal_px: Annotated[
+        float | None, typer.Option(help="The camera's focal length in pixels of the upright video, where it is known.")
+    ] = None,
+    ball: Annotated[
+        str | None, typer.Option(help="X,Y,RADIUS of the mirror ball in those pixels; it is found by itself.")
+    ] = None,
+    balls: Annotated[
+        int, typer.Option(help="Mirror balls in the film: two of one size tell the lamp's distance.", min=1, max=2)
+    ] = 1,
+    second_ball: Annotated[
+        str | None, typer.Option(help="X,Y,RADIUS of the second ball; with --balls 2 it is found by itself.")
+    ] = None,
+    face: Annotated[
+        str | None, typer.Option(help="X,Y,RADIUS of the face, brow to chin; it is found by itself.")
+    ] = None,
+    ball_diameter_cm: Annotated[
+        float | None,
+        typer.Option(help="The ball's diameter; without, it is taken to be as far away as the head.", min=1),
+    ] = None,
+    light_distance_cm: Annotated[
+        float, typer.Option(help="From the lamp to the head, as far as two balls do not tell it.", min=20, max=1000)
+    ] = 100.0,
+    size: Annotated[int, typer.Option(help="Pixels a side, fewer where the video shows fewer.", min=64)] = 384,
+    method: Annotated[str, typer.Option(help="Reflectance method.")] = "default",
+    gamma: Annotated[str, typer.Option(help="Curve of the video: srgb, linear, or an exponent.")] = "srgb",
+    subtract_room: Annotated[
+        bool | None,
+        typer.Option("--subtract-room/--keep-room", help="Take the room's light off; by itself, where that helps."),
+    ] = None,
+    near_lamp: Annotated[
+        bool,
+        typer.Option(
+            "--near-lamp/--far-lamp",
+            help="Correct each pixel for the lamp's nearness; or leave that out, as for a lamp far away.",
+        ),
+    ] = True,
+    threads: Annotated[int, typer.Option(help="Of the decoder.", min=1)] = 2,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Start over, also where a build that was broken off could go on.")
+    ] = False,
+) -> None:
+    """Build a subject from a film of a person, a mirror ball beside them and a blinking lamp that goes around."""
+    import json
+    from contextlib import nullcontext
+    from functools import partial
+
+    from relit_camera.base.images.color import parse_gamma
+    from relit_camera.base.storage import atomic_path
+    from relit_camera.capture.film.ball.sphere_projection import BallOutline
+    from relit_camera.capture.film.face_circle import FaceCircle
+    from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
+    from relit_camera.capture.film.pipeline.checkpoint import Checkpoint, CheckpointFolder, input_fingerprint
+    from relit_camera.capture.film.pipeline.film_capture import build_samples
+    from relit_camera.capture.reflectance.method_registry import open_method
+    from relit_camera.capture.subject_builder import build_subject
+    from relit_camera.cli.progress import progress_bar, stage_reporter
+    from relit_camera.subject.subject_file import write_subject
+
+    options = CaptureOptions(
+        gamma=parse_gamma(gamma),
+        size=size,
+        focal_px=focal_px,
+        balls=2 if second_ball else balls,
+        second_ball=BallOutline(*_circle(second_ball, "--second-ball")) if second_ball else None,
+        ball=BallOutline(*_circle(ball, "--ball")) if ball else None,
+        face=FaceCircle(*_circle(face, "--face")) if face else None,
+        ball_diameter_cm=ball_diameter_cm,
+        light_distance_cm=light_distance_cm,
+        subtract_room=subtract_room,
+        near_field=near_lamp,
+        threads=threads,
+    )
+    open_method(method)
+    kept = CheckpointFolder(out, input_fingerprint(video, options), partial(typer.echo, err=True))
+    # Opened before the work, so that what cannot be written is said at once; both appear at its end or not at all.
+    with (
+        kept.keep_until_done(),
+        atomic_path(out) as subject_file,
+        atomic_path(report) if report else nullcontext() as report_file,
+    ):
+        if fresh:
+            kept.remove()
+        found = kept.read()
+        with progress_bar() as progress:
+            tell = stage_reporter(progress)
+            if found is None:
+                film = build_samples(video, options, tell)
+                found = Checkpoint(film.samples, film.findings.report())
+                kept.write(found)
+            tell("Building the field", 0, None)
+            subject = build_subject(
+                found.samples, method, video.name, options.gamma, progress=partial(tell, "Building the field")
+            )
+        write_subject(subject_file, subject)
+        if report_file:
+            report_file.write_text(json.dumps(found.report, indent=1), encoding="utf-8")
+    for warning in found.report["warnings"]:
+        typer.echo(f"warning: {warning}", err=True)
+    meta, flashes = subject.metadata, found.report["light"]["frames"]
+    typer.echo(
+        f"{out}: {meta.width}x{meta.height}, {meta.lights} lights of {flashes} flashes' frames, "
+        f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better"
+    )
+
+
+def _circle(text: str, option: str) -> tuple[float, float, float]:
+    from relit_camera.cli.arguments import parse_numbers
+
+    x, y, radius = parse_numbers(text, 3, option)
+    if not radius > 0:
+        raise typer.BadParameter(f"a radius of {radius:g} pixels", param_hint=option)
+    return x, y, radius

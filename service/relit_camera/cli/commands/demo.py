@@ -1,0 +1,101 @@
+"""`relit demo`: the product, shown with a bundled person; needs no webcam, network, download or virtual camera."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+app = typer.Typer()
+
+
+@app.command()
+def demo(
+    context: typer.Context,
+    headless: Annotated[bool, typer.Option("--headless", help="Do not open the page in a browser.")] = False,
+    seconds: Annotated[float | None, typer.Option(min=0, help="End after so long; until Ctrl-C if not given.")] = None,
+    host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback, or a token is set.")] = None,
+    port: Annotated[int | None, typer.Option(help="Port of API and panel; 0 picks one.")] = None,
+) -> None:
+    """Show a bundled person in one place after another; whoever touches the panel takes over."""
+    import time
+    from collections.abc import Iterator
+    from contextlib import contextmanager
+
+    import psutil
+
+    from relit_camera.app.camera_service import CameraService
+    from relit_camera.app.demo import demo_files
+    from relit_camera.app.demo.tour import DemoRunner, tour_at
+    from relit_camera.app.serve import run_camera
+    from relit_camera.base.config.settings import OutputSettings
+    from relit_camera.base.errors import DeviceError, ModelError
+    from relit_camera.base.models.model_store import model_path
+    from relit_camera.cli.arguments import load_command_settings
+    from relit_camera.devices.sinks.sink import NullSink, Sink
+    from relit_camera.devices.sinks.sink_factory import open_sink
+    from relit_camera.live.status.camera_status import CameraState
+
+    def installed(*models: str) -> bool:
+        try:
+            return all(model_path(name) for name in models)
+        except ModelError:
+            return False
+
+    def camera_or_nothing(output: OutputSettings) -> Sink:
+        try:
+            return open_sink(output)
+        except DeviceError as error:
+            typer.echo(f"No virtual camera, so the page alone shows it: {error.what} (relit doctor tells the cure)")
+            return NullSink((output.width, output.height))
+
+    tracker = "mesh" if installed("face_mesh", "face_detector_yunet") else f"recorded:{demo_files.TRACK}"
+    matte = "selfie" if installed("selfie_landscape", "selfie_square") else f"recorded:{demo_files.MATTES}"
+    if tracker != "mesh":
+        typer.echo("No public models (relit models pull gets them): the clip's own record tells where the face is")
+    settings = load_command_settings(
+        context,
+        source={"source": str(demo_files.CLIP)},
+        subject=str(demo_files.SUBJECT),
+        tracker={"name": tracker},
+        matte=matte,
+        server={"host": host, "port": port},
+    )
+    _, look = tour_at(0.0)
+    # In place of the user's own look, not over it: their colour is no part of another kind of background.
+    settings = settings.model_copy(update={"look": look})
+
+    @contextmanager
+    def demo_tour(camera_service: CameraService, url: str) -> Iterator[None]:
+        def live() -> bool:
+            if camera_service.status().state is not CameraState.LIVE:
+                return False
+            seconds_ago = time.time() - psutil.Process().create_time()
+            typer.echo(f"First picture {seconds_ago:.1f} s after the command; Ctrl-C ends it")
+            return True
+
+        demo_runner = DemoRunner(
+            camera_service.scene_controller,
+            live,
+            lambda caption: camera_service.events.publish("caption", text=caption),
+        )
+        demo_runner.start()
+        try:
+            if not headless and not opens_in_browser(url):
+                typer.echo(f"Open {url} in a browser to see it")
+            yield
+        finally:
+            demo_runner.stop()
+
+    run_camera(settings, side_task=demo_tour, seconds=seconds, sink_for=camera_or_nothing)
+
+
+def opens_in_browser(url: str) -> bool:
+    """Whether a window opens. A browser of the terminal's own would show no picture, and keep Ctrl-C to itself."""
+    import os
+    import sys
+    import webbrowser
+
+    if sys.platform == "linux" and not os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY", "BROWSER"}:
+        return False
+    return webbrowser.open(url)

@@ -1,0 +1,102 @@
+"""`relit replay`: a recorded video, relit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer()
+
+SHEET_FRAMES = 12
+"""A contact sheet has about so many frames, and fewer than twice as many."""
+
+
+@app.command()
+def replay(
+    context: typer.Context,
+    video: Annotated[Path, typer.Argument(help="The driving video.")],
+    subject: Annotated[str, typer.Option(help="A stored subject's name, or a .relit file.")],
+    environment: Annotated[str, typer.Option(help="A stored environment's name, or a panorama file.")],
+    out: Annotated[Path, typer.Option(help="Video to write: .mp4, .mkv or .mov, at the driving video's size.")],
+    report: Annotated[Path | None, typer.Option(help="JSON to write: state, pose and times of each frame.")] = None,
+    mode: Annotated[str, typer.Option(help="reenact or ratio.")] = "reenact",
+    tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
+    background: Annotated[str, typer.Option(help="none, blur, environment, or #RRGGBB.")] = "none",
+    rotate: Annotated[str, typer.Option(help="YAW,PITCH,ROLL of the environment, in degrees.")] = "0,0,0",
+    exposure_ev: Annotated[float, typer.Option(help="Brighter or darker.")] = 0.0,
+    contact_sheet: Annotated[Path | None, typer.Option(help="PNG or JPEG of some frames, live above relit.")] = None,
+) -> None:
+    """Relight a recorded video: the subject under the environment, moved as the face in the video moves."""
+    import json
+    import sys
+    from contextlib import ExitStack
+
+    from relit_camera.app.video_replay import replay as run_replay
+    from relit_camera.app.wiring import make_pipeline, make_tracker
+    from relit_camera.base.config.look import Look
+    from relit_camera.base.images.contact_sheet import contact_sheet as draw_sheet
+    from relit_camera.base.images.image_files import encode_display
+    from relit_camera.base.images.image_types import DisplayImage
+    from relit_camera.base.storage import atomic_path
+    from relit_camera.base.threads import limit_threads
+    from relit_camera.base.video.video_readers import probe_video
+    from relit_camera.cli.arguments import load_command_settings, parse_background, parse_lighting, parse_mode
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.live.scene.scene_controller import SceneController
+
+    if contact_sheet and contact_sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
+        raise typer.BadParameter(f"{contact_sheet} is neither .png nor .jpg", param_hint="--contact-sheet")
+    if video.resolve() == out.resolve():
+        raise typer.BadParameter(f"{out} is the driving video itself", param_hint="--out")
+    settings = load_command_settings(context, tracker={"name": tracker})
+    limit_threads()
+    chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
+    info = probe_video(video)
+    scene_controller = SceneController(settings.storage)
+    scene_controller.set_subject(subject)
+    lighting = parse_lighting(scene_controller.register_temporary_environment(environment), rotate, exposure_ev)
+    scene_controller.set_look(Look(lighting=lighting, background=chosen_background, mode=chosen_mode))
+    track = make_tracker(settings)
+    pipelines = []
+
+    def pipeline_for(size: tuple[int, int]):  # type: ignore[no-untyped-def]
+        pipelines.append(make_pipeline(settings, track, size))
+        return pipelines[0]
+
+    every = max((info.frames or 0) // SHEET_FRAMES, 1)
+    kept: list[tuple[int, DisplayImage, DisplayImage]] = []
+    with ExitStack() as results, progress_bar() as progress:
+        # Opened before the work, so that what cannot be written is said at once and leaves no video behind.
+        report_file = results.enter_context(atomic_path(report)) if report else None
+        sheet_file = results.enter_context(atomic_path(contact_sheet)) if contact_sheet else None
+        task = progress.add_task("Relighting", total=info.frames or None)
+
+        def watch(index: int, before: DisplayImage, after: DisplayImage) -> None:
+            nonlocal every
+            progress.update(task, completed=index + 1)
+            if sheet_file and index % every == 0:
+                kept.append((index, before, after))
+                if len(kept) == 2 * SHEET_FRAMES:  # a file that does not tell its length: keep every other one
+                    del kept[1::2]
+                    every *= 2
+
+        frames = run_replay(video, out, pipeline_for, lambda time_s: scene_controller.scene, watch)
+        if sheet_file:
+            indices, before, after = zip(*kept, strict=True)
+            sheet = draw_sheet([list(before), list(after)], ["live", "relit"], [str(index) for index in indices])
+            sheet_file.write_bytes(encode_display(sheet, sheet_file.suffix))
+        if report_file:
+            document = {
+                "video": video.name,
+                "tracker": track.name,
+                "mode": mode,
+                "degraded": [vars(trouble) for trouble in pipelines[0].troubles],
+                "frames": [frame.as_json() for frame in frames],
+            }
+            report_file.write_text(json.dumps(document, indent=1), encoding="utf-8")
+    for trouble in pipelines[0].troubles:
+        print(f"relit: {trouble.what}: {trouble.why}; {trouble.cure}", file=sys.stderr)
+    found = sum(1 for frame in frames if frame.motion and frame.motion.status == "found")
+    typer.echo(f"{out}: {len(frames)} frames, face found in {found}")

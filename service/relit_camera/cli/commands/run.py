@@ -1,0 +1,49 @@
+"""`relit run`: the camera."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+app = typer.Typer()
+
+
+@app.command()
+def run(
+    context: typer.Context,
+    source: Annotated[str | None, typer.Option(help="webcam, a camera's id, a video or picture file, pattern.")] = None,
+    sink: Annotated[str | None, typer.Option(help="camera, a video file, or null.")] = None,
+    subject: Annotated[str | None, typer.Option(help="A stored subject's name, or a .relit file.")] = None,
+    environment: Annotated[str | None, typer.Option(help="A stored environment's name, or a panorama file.")] = None,
+    mode: Annotated[str | None, typer.Option(help="reenact or ratio.")] = None,
+    tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
+    host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback, or a token is set.")] = None,
+    port: Annotated[int | None, typer.Option(help="Port of API and panel; 0 picks one.")] = None,
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT of the output.")] = None,
+    on_demand: Annotated[
+        bool | None, typer.Option("--on-demand/--always-on", help="Release the webcam while nobody looks (Linux).")
+    ] = None,
+) -> None:
+    """Run the camera until it is told to stop (Ctrl-C or SIGTERM)."""
+    from functools import partial
+
+    from relit_camera.app.serve import run_camera
+    from relit_camera.base.config.settings_loader import config_path, load_settings
+    from relit_camera.cli.arguments import load_command_settings, parse_mode, parse_size
+
+    width, height = parse_size(size) if size else (None, None)
+    given = {
+        "source": {"source": source, "on_demand": on_demand},
+        "output": {"sink": sink, "width": width, "height": height},
+        "subject": subject,
+        "look": {"mode": str(parse_mode(mode)) if mode else None},
+        "tracker": {"name": tracker},
+        "server": {"host": host, "port": port},
+    }
+    settings = load_command_settings(context, **given)
+    path = config_path((context.find_root().obj or {}).get("config"))
+    # The same file each time: where it is gone, another one must not be taken in its place.
+    load = partial(load_settings, overrides={"log_level": settings.log_level, **given})
+    reload = (path.absolute(), load) if path else None
+    run_camera(settings, environment, reload=reload)

@@ -1,0 +1,83 @@
+"""Which programs have a device open, as Linux tells in /proc."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+PROC = Path("/proc")
+
+
+@dataclass(frozen=True)
+class DeviceUser:
+    """A program that has a device open.
+
+    Attributes:
+        pid: its process.
+        name: its short name, such as `firefox`.
+        command: its arguments; empty where they may not be read.
+    """
+
+    pid: int
+    name: str
+    command: tuple[str, ...] = ()
+
+    @property
+    def is_relit(self) -> bool:
+        """Whether it is the command `relit`."""
+        return any(Path(part).name == "relit" for part in self.command[:2])
+
+    def __str__(self) -> str:
+        return f"{'relit' if self.is_relit else self.name} (process {self.pid})"
+
+
+def find_device_users(node: str, proc: Path = PROC) -> list[DeviceUser]:
+    """List who else has a device node open, by number of process.
+
+    Other users' programs are seen by root alone: /proc shows nobody else what they have open. psutil's `open_files`
+    names regular files only, no devices, so the links are read here.
+    """
+    return [_device_user(folder) for folder in _processes(proc) if _has_open(folder, node)]
+
+
+def has_mapped_buffers(holder: DeviceUser, node: str, proc: Path = PROC) -> bool:
+    """Whether a program has the device's buffers in its memory, as one that reads pictures from it has."""
+    try:
+        lines = (proc / str(holder.pid) / "maps").read_text(errors="replace").splitlines()
+    except OSError:  # ended meanwhile, or guarded
+        return False
+    return any(line.endswith(f" {node}") for line in lines)
+
+
+def _processes(proc: Path) -> Iterator[Path]:
+    try:
+        numbers = sorted(int(entry.name) for entry in proc.iterdir() if entry.name.isdigit())
+    except OSError:
+        return
+    yield from (proc / str(number) for number in numbers if number != os.getpid())
+
+
+def _has_open(folder: Path, node: str) -> bool:
+    try:
+        with os.scandir(folder / "fd") as links:
+            return any(_link_target(Path(link)) == node for link in links)
+    except OSError:  # ended meanwhile, or another user's
+        return False
+
+
+def _link_target(link: Path) -> str:
+    try:
+        return str(link.readlink())
+    except OSError:
+        return ""
+
+
+def _device_user(folder: Path) -> DeviceUser:
+    try:
+        name = (folder / "comm").read_text(errors="replace").strip()
+        command = (folder / "cmdline").read_text(errors="replace").rstrip("\0").split("\0")
+    except OSError:
+        name, command = "a program that has just ended", []
+    return DeviceUser(int(folder.name), name, tuple(command))

@@ -1,0 +1,80 @@
+"""The networks: are they there, and where do they really run.
+
+Who is shown.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.errors import RelitError
+from relit_camera.base.models.model_store import ModelState, ModelStore
+from relit_camera.base.models.provider_names import available_providers
+from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
+from relit_camera.doctor.report import Finding, ok, problem, problem_from_error, warning
+from relit_camera.subject.subject_store import SubjectStore
+
+REQUIRED_MODELS = {
+    "mesh": ("face_mesh", "face_detector_yunet"),
+    "openseeface": ("openseeface", "face_detector_yunet"),
+}
+"""Models without which a tracker does not open. `recorded` needs none; others' plug-ins know their own."""
+
+
+def check_models(settings: RelitSettings, registry: ModelStore | None = None) -> Finding:
+    """The public models, by their sha256."""
+    topic = "models"
+    try:
+        registry = registry or ModelStore()
+        states = {name: registry.state(name) for name in registry.names()}
+    except RelitError as error:
+        return problem_from_error(topic, error)
+    by_state = {state: [name for name, found in states.items() if found is state] for state in ModelState}
+    missing, damaged = by_state[ModelState.MISSING], by_state[ModelState.DAMAGED]
+    parts = [f"{len(by_state[ModelState.PULLED])} of {len(states)} in {registry.folder}"]
+    parts += [f"{word}: {', '.join(names)}" for word, names in (("missing", missing), ("damaged", damaged)) if names]
+    seen, cure = "; ".join(parts), "run: relit models pull"
+    tracker = settings.tracker.name.partition(":")[0]
+    lacking = [
+        name
+        for name in REQUIRED_MODELS.get(tracker, ())
+        if states.get(name, ModelState.PULLED) is not ModelState.PULLED
+    ]
+    if lacking:
+        return problem(topic, f"tracker {tracker} lacks {', '.join(lacking)}; {seen}", cure)
+    if missing or damaged:
+        return warning(topic, seen, cure)
+    return ok(topic, seen)
+
+
+def check_provider(settings: RelitSettings) -> Finding:
+    """Open the packaged motion graph with the configured provider, and see where its nodes were placed."""
+    topic, inference = "provider", settings.inference
+    graph = files("relit_camera.live.reenactment").joinpath("first_order_motion.onnx").read_bytes()
+    try:
+        session = open_session(
+            graph, "first_order_motion", SessionOptions(inference.provider, inference.threads, inference.strict)
+        )
+    except RelitError as error:
+        return problem_from_error(topic, error)
+    report = session.report
+    nodes = f"{report.placement.get(report.provider, 0)} of {sum(report.placement.values())} nodes"
+    seen = f"{report.provider} ({nodes}; asked for: {report.requested}; built in: {', '.join(available_providers())})"
+    return warning(topic, f"{seen}; {report.why}", report.cure) if report.why else ok(topic, seen)
+
+
+def check_subject(settings: RelitSettings) -> Finding:
+    """The subject that the settings name: there and whole. With none the live picture passes through."""
+    topic, store = "subject", SubjectStore(settings.storage.subjects, in_memory=True)  # as the camera does
+    stored = ", ".join(store.names())
+    if settings.subject is None:
+        cure = f"choose one by `subject:` in config.yaml or --subject; stored are: {stored}"
+        if not stored:
+            cure = "make one: relit capture build FILM --out me.relit; or see `relit demo`"
+        return warning(topic, "none is chosen: the live picture passes through", cure)
+    try:
+        name, subject = store.resolve(settings.subject)
+    except RelitError as error:
+        return problem_from_error(topic, error)
+    return ok(topic, f"{name}, {subject.metadata.width}x{subject.metadata.height}")

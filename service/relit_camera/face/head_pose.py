@@ -1,0 +1,81 @@
+"""Head pose: a rigid fit of the canonical face to landmarks, and the way between pixels and head-space points.
+
+Axes and projection are those of `face.face_state.HeadPose`. OpenCV's camera looks along +Z with Y down, so its frame is
+ours turned by 180° about X: x_cv = (x, −y, −z).
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from relit_camera.base.images.image_types import Points
+from relit_camera.face.face_state import HeadPose
+from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
+
+_CV_FROM_OURS = np.array([1.0, -1.0, -1.0])
+
+
+def guess_focal(size: tuple[int, int]) -> float:
+    """Focal length in pixels of a usual webcam: its longer side sees 53 degrees. `size` is (width, height)."""
+    return float(max(size))
+
+
+def fit_pose(
+    landmarks: Points, scheme: LandmarkScheme, size: tuple[int, int], focal_px: float | None = None
+) -> HeadPose | None:
+    """Fit the scheme's rigid points to `landmarks` (count, 2); None where no head before the camera fits.
+
+    SQPnP (Terzakis and Lourakis 2020) finds the global minimum of an algebraic error, Levenberg-Marquardt refines it
+    to the least squares in pixels. It has no memory, so a bad frame cannot spoil the next one.
+
+    Args:
+        landmarks: (count, 2) float32 pixels, pixel centres at integers + ½.
+        scheme: what the landmarks are.
+        size: width and height of the picture.
+        focal_px: focal length if known, else `guess_focal`.
+    """
+    focal = focal_px or guess_focal(size)
+    camera = np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1]])
+    rigid = list(scheme.rigid)
+    model = scheme.canonical[rigid] * _CV_FROM_OURS
+    pixels = landmarks[rigid].astype(np.float64)
+    if not np.isfinite(pixels).all():
+        return None
+    try:
+        found, turn, shift = cv2.solvePnP(model, pixels, camera, None, flags=cv2.SOLVEPNP_SQPNP)
+        if not found:
+            return None
+        turn, shift = cv2.solvePnPRefineLM(model, pixels, camera, None, turn, shift)
+    except cv2.error:  # OpenCV's answer to points that span nothing
+        return None
+    translation = shift.ravel() * _CV_FROM_OURS
+    if not (np.isfinite(translation).all() and np.isfinite(turn).all() and translation[2] < 0):
+        return None
+    # The rotation vector is an axis, and turns with the frame.
+    return HeadPose(Rotation.from_rotvec(turn.ravel() * _CV_FROM_OURS), translation, focal)
+
+
+def project(points: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]) -> Points:
+    """Pixels (count, 2) float32 of head-space points (count, 3) in centimetres under `pose`."""
+    camera_points = points @ pose.rotation.as_matrix().T + pose.translation
+    scale = pose.focal_px / -camera_points[:, 2]
+    x = size[0] / 2 + camera_points[:, 0] * scale
+    y = size[1] / 2 - camera_points[:, 1] * scale
+    return np.stack([x, y], axis=1).astype(np.float32)
+
+
+def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Head-space points (count, 3) in centimetres: each landmark's ray met at its canonical point's depth.
+
+    So depth is the mean face's, and what a landmark says beyond that lies in the picture plane. The inverse of
+    `project` for points at those depths.
+    """
+    camera_from_head = pose.rotation.as_matrix()
+    depth = -(scheme.canonical @ camera_from_head[2] + pose.translation[2])
+    x = (landmarks[:, 0] - size[0] / 2) * depth / pose.focal_px
+    y = (size[1] / 2 - landmarks[:, 1]) * depth / pose.focal_px
+    camera_points = np.stack([x, y, -depth], axis=1)
+    return np.asarray((camera_points - pose.translation) @ camera_from_head)

@@ -1,0 +1,54 @@
+"""Cutting a turned rectangle out of a picture, for networks that want the face upright and of one size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.image_types import DisplayImage, Points
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A rectangle in a picture.
+
+    Attributes:
+        center: (x, y) pixels, pixel centres at integers + ½.
+        width, height: its sides in pixels of the picture.
+        angle: clockwise in the picture, radians: the direction of its own x axis.
+    """
+
+    center: tuple[float, float]
+    width: float
+    height: float
+    angle: float = 0.0
+
+    def picture_from_pixels(self, columns: int, rows: int) -> NDArray[np.float64]:
+        """(2, 3) affine map from positions in a `columns` x `rows` cut of this crop to positions in the picture."""
+        cos, sin = np.cos(self.angle), np.sin(self.angle)
+        scale_x, scale_y = self.width / columns, self.height / rows
+        linear = np.array([[cos * scale_x, -sin * scale_y], [sin * scale_x, cos * scale_y]])
+        offset = np.array(self.center) - linear @ [columns / 2, rows / 2]
+        return np.column_stack([linear, offset])
+
+    def cut(self, image: DisplayImage, columns: int, rows: int) -> DisplayImage:
+        """Sample the crop to (rows, columns, 3), bilinear; black beyond the picture."""
+        affine = self.picture_from_pixels(columns, rows)
+        # OpenCV counts pixel centres at integers.
+        affine[:, 2] += affine[:, :2] @ [0.5, 0.5] - 0.5
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        return np.asarray(cv2.warpAffine(image, affine, (columns, rows), flags=flags))
+
+    def to_picture(self, points: NDArray[np.float32], columns: int, rows: int) -> Points:
+        """Positions (count, 2) in the picture of positions in a `columns` x `rows` cut of this crop."""
+        affine = self.picture_from_pixels(columns, rows)
+        return (points @ affine[:, :2].T + affine[:, 2]).astype(np.float32)
+
+
+def bounding_box(points: Points) -> tuple[float, float, float, float]:
+    """Give the box x, y, width, height around points (count, 2)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return float(low[0]), float(low[1]), float(high[0] - low[0]), float(high[1] - low[1])

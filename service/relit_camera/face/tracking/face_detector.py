@@ -1,0 +1,105 @@
+"""Finding a face in a whole picture with YuNet (Wu et al. 2023), through OpenCV."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.errors import ModelError
+from relit_camera.base.images.image_types import DisplayImage, Points
+
+Box = tuple[float, float, float, float]
+"""x, y, width, height in pixels."""
+
+_SAME_FACE_OVERLAP = 0.1
+_LOG_ERRORS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """A face as the detector sees it: good for seeds and checks, too coarse and jumpy for more.
+
+    Attributes:
+        box: around the face, brow to chin.
+        eyes: (2, 2) centre of the subject's right and left eye in pixels; wrong from about 45° of roll.
+        score: 0..1.
+    """
+
+    box: Box
+    eyes: Points
+    score: float
+
+
+class FaceDetector:
+    """YuNet on the picture scaled so that its longer side is `longer_side`. Not thread-safe."""
+
+    def __init__(self, model: Path, longer_side: int = 320, threshold: float = 0.7) -> None:
+        """Open the model.
+
+        Raises:
+            ModelError: the file is missing or is no YuNet model.
+        """
+        if not model.is_file():
+            raise ModelError(f"face detector {model} does not exist", "get it with `relit models pull`")
+        try:
+            with _quiet_opencv():
+                self._network = cv2.FaceDetectorYN.create(str(model), "", (longer_side, longer_side), threshold)
+        except cv2.error as error:
+            raise ModelError(f"face detector {model} is damaged", "get it again with `relit models pull`") from error
+        self._longer_side = longer_side
+
+    def detect(self, image: DisplayImage, near: Box | None = None) -> Detection | None:
+        """Find the face that overlaps `near` most, or else the largest; None where there is no face."""
+        height, width = image.shape[:2]
+        scale = self._longer_side / max(width, height)
+        small_size = (max(1, round(width * scale)), max(1, round(height * scale)))
+        small = cv2.resize(image, small_size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+        self._network.setInputSize(small_size)
+        rows = self._network.detect(cv2.cvtColor(small, cv2.COLOR_RGB2BGR))[1]
+        if rows is None:
+            return None
+        faces = [_detection(row, width / small_size[0], height / small_size[1]) for row in rows]
+        return max(faces, key=lambda face: _detection_priority(face.box, near))
+
+
+def intersection_over_union(first: Box, second: Box) -> float:
+    """Intersection over union of two boxes, 0..1."""
+    width = min(first[0] + first[2], second[0] + second[2]) - max(first[0], second[0])
+    height = min(first[1] + first[3], second[1] + second[3]) - max(first[1], second[1])
+    shared = max(width, 0.0) * max(height, 0.0)
+    union = first[2] * first[3] + second[2] * second[3] - shared
+    return shared / union if union > 0 else 0.0
+
+
+def is_same_face(first: Box, second: Box) -> bool:
+    """Whether two boxes overlap enough to be one face that moved a little."""
+    return intersection_over_union(first, second) > _SAME_FACE_OVERLAP
+
+
+@contextmanager
+def _quiet_opencv() -> Iterator[None]:
+    # OpenCV 5 warns that its new graph engine has no targets, which nobody asked for. It also moved these functions.
+    logging = getattr(cv2.utils, "logging", cv2)
+    level = logging.getLogLevel()
+    logging.setLogLevel(_LOG_ERRORS)
+    try:
+        yield
+    finally:
+        logging.setLogLevel(level)
+
+
+def _detection_priority(box: Box, near: Box | None) -> tuple[float, float]:
+    shared = intersection_over_union(box, near) if near else 0.0
+    return (shared if shared > _SAME_FACE_OVERLAP else 0.0), box[2] * box[3]
+
+
+def _detection(row: NDArray[np.float32], scale_x: float, scale_y: float) -> Detection:
+    scaled = row[:14].reshape(7, 2) * [scale_x, scale_y]
+    box = (float(scaled[0, 0]), float(scaled[0, 1]), float(scaled[1, 0]), float(scaled[1, 1]))
+    return Detection(box, scaled[2:4].astype(np.float32), float(row[14]))

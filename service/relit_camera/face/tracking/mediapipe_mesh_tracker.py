@@ -1,0 +1,116 @@
+"""Which points the blendshape network takes, and what its scores are called.
+
+The tracker `mesh`: the 478-point face mesh of MediaPipe's face landmarker, with irises and blendshapes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from relit_camera.base.images.image_types import DisplayImage, Points
+from relit_camera.base.models.model_store import model_path
+from relit_camera.base.models.session_with_fallback import Session, open_session
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
+from relit_camera.face.tracking.face_detector import Detection, FaceDetector
+from relit_camera.face.tracking.landmark_tracker import LandmarkPrediction, LandmarkTracker
+from relit_camera.face.tracking.trackers import TrackerOptions
+
+# fmt: off
+BLENDSHAPE_POINTS = (
+    0, 1, 4, 5, 6, 7, 8, 10, 13, 14, 17, 21, 33, 37, 39, 40, 46, 52, 53, 54, 55, 58, 61, 63, 65, 66, 67, 70, 78,
+    80, 81, 82, 84, 87, 88, 91, 93, 95, 103, 105, 107, 109, 127, 132, 133, 136, 144, 145, 146, 148, 149, 150,
+    152, 153, 154, 155, 157, 158, 159, 160, 161, 162, 163, 168, 172, 173, 176, 178, 181, 185, 191, 195, 197,
+    234, 246, 249, 251, 263, 267, 269, 270, 276, 282, 283, 284, 285, 288, 291, 293, 295, 296, 297, 300, 308,
+    310, 311, 312, 314, 317, 318, 321, 323, 324, 332, 334, 336, 338, 356, 361, 362, 365, 373, 374, 375, 377,
+    378, 379, 380, 381, 382, 384, 385, 386, 387, 388, 389, 390, 397, 398, 400, 402, 405, 409, 415, 454, 466,
+    468, 469, 470, 471, 472, 473, 474, 475, 476, 477,
+)
+"""The 146 points of `mesh478` that the network takes, in its order."""
+
+BLENDSHAPE_NAMES = (
+    "_neutral", "browDownLeft", "browDownRight", "browInnerUp", "browOuterUpLeft", "browOuterUpRight",
+    "cheekPuff", "cheekSquintLeft", "cheekSquintRight", "eyeBlinkLeft", "eyeBlinkRight", "eyeLookDownLeft",
+    "eyeLookDownRight", "eyeLookInLeft", "eyeLookInRight", "eyeLookOutLeft", "eyeLookOutRight", "eyeLookUpLeft",
+    "eyeLookUpRight", "eyeSquintLeft", "eyeSquintRight", "eyeWideLeft", "eyeWideRight", "jawForward", "jawLeft",
+    "jawOpen", "jawRight", "mouthClose", "mouthDimpleLeft", "mouthDimpleRight", "mouthFrownLeft",
+    "mouthFrownRight", "mouthFunnel", "mouthLeft", "mouthLowerDownLeft", "mouthLowerDownRight",
+    "mouthPressLeft", "mouthPressRight", "mouthPucker", "mouthRight", "mouthRollLower", "mouthRollUpper",
+    "mouthShrugLower", "mouthShrugUpper", "mouthSmileLeft", "mouthSmileRight", "mouthStretchLeft",
+    "mouthStretchRight", "mouthUpperUpLeft", "mouthUpperUpRight", "noseSneerLeft", "noseSneerRight",
+)
+"""The 52 scores in the network's order; "left" and "right" are the subject's."""
+# fmt: on
+
+
+_INPUT = 256
+_MARGIN = 1.5
+_RIGHT_EYE, _LEFT_EYE = 33, 263
+
+
+class MeshTracker(LandmarkTracker):
+    """478 points and, if asked for, 52 blendshapes; follows turns to about 50° and any roll."""
+
+    def __init__(self, options: TrackerOptions | None = None) -> None:
+        """Open the models.
+
+        Raises:
+            ModelError: a model is missing.
+            InputError: the options carry an argument.
+        """
+        options = options or TrackerOptions()
+        options.require_no_argument("mesh")
+        network = MeshNetwork(
+            open_session(model_path("face_mesh"), "face_mesh", options.session),
+            open_session(model_path("face_blendshapes"), "face_blendshapes", options.session)
+            if options.blendshapes
+            else None,
+        )
+        detector = FaceDetector(model_path("face_detector_yunet"))
+        super().__init__("mesh", network, detector, options.focal_px, options.check_every)
+
+
+class MeshNetwork:
+    """The mesh on a square crop, turned so that the eyes are level."""
+
+    threshold = 0.5
+
+    def __init__(self, mesh: Session, blendshapes: Session | None = None) -> None:
+        self.scheme = landmark_scheme("mesh478")
+        self._mesh = mesh
+        self._blendshapes = blendshapes
+
+    def crop_from_detection(self, detection: Detection) -> Crop:
+        """Give a square of 1.5 times the box's longer side about its centre."""
+        x, y, width, height = detection.box
+        side = _MARGIN * max(width, height)
+        across = detection.eyes[1] - detection.eyes[0]
+        return Crop((x + width / 2, y + height / 2), side, side, float(np.arctan2(across[1], across[0])))
+
+    def crop_from_points(self, points: Points) -> Crop:
+        """Give a square of 1.5 times the longer side of the box around the levelled points."""
+        across = points[_LEFT_EYE] - points[_RIGHT_EYE]
+        angle = float(np.arctan2(across[1], across[0]))
+        cos, sin = np.cos(angle), np.sin(angle)
+        picture_from_level = np.array([[cos, -sin], [sin, cos]], dtype=np.float32)
+        x, y, width, height = bounding_box(points @ picture_from_level)
+        center = picture_from_level @ np.array([x + width / 2, y + height / 2], dtype=np.float32)
+        side = _MARGIN * max(width, height, 1.0)
+        return Crop((float(center[0]), float(center[1])), side, side, angle)
+
+    def read(self, image: DisplayImage, crop: Crop) -> LandmarkPrediction:
+        """Place the 478 points; the confidence is the network's presence."""
+        pixels = np.multiply(crop.cut(image, _INPUT, _INPUT), np.float32(1 / 255), dtype=np.float32)
+        outputs = self._mesh.run({"image": pixels[None]})
+        points = outputs["landmarks"].reshape(-1, 3)[:, :2]
+        presence = 1 / (1 + np.exp(-float(outputs["presence_logit"].ravel()[0])))
+        return LandmarkPrediction(crop.to_picture(points, _INPUT, _INPUT), presence)
+
+    def blendshapes(self, points: Points) -> Mapping[str, float]:
+        """Scores 0..1 by ARKit name; {} without the blendshape model."""
+        if self._blendshapes is None:
+            return {}
+        scores = self._blendshapes.run({"points": points[list(BLENDSHAPE_POINTS)][None]})["scores"].ravel()
+        return dict(zip(BLENDSHAPE_NAMES, scores.tolist(), strict=True))

@@ -1,0 +1,97 @@
+"""The truth of a subject built from a rendered capture: the field that was filmed, as the capture cut it out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.errors import InputError
+from relit_camera.capture.alignment.rigid_transform import RigidTransform
+from relit_camera.capture.film.lamp.head_crop import HeadCrop
+from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.lab.evaluate.field.candidates import Candidate
+from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
+from relit_camera.lab.evaluate.json_records import Record, read_json_record
+
+
+class _Square(Record):
+    left: float
+    top: float
+    side: float
+    size: int
+
+
+class _Motion(Record):
+    reference: int
+
+
+class _Report(Record):
+    width_px: int
+    height_px: int
+    square: _Square
+    motion: _Motion
+
+
+class _ToRest(Record):
+    rotation_deg: float
+    translation_px: tuple[float, float]
+
+
+class _Head(Record):
+    to_rest: _ToRest
+
+
+class _Frame(Record):
+    head: _Head
+
+
+class _Truth(Record):
+    frames: list[_Frame]
+
+
+def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
+    """A field's pictures as they would be in the capture's reference frame, cut out as the capture did.
+
+    Args:
+        field: the pictures that were filmed (`python -m relit_studio field`), of the video's shape at any size.
+        report: of `relit capture build`.
+        truth: truth.json of the film.
+
+    Raises:
+        InputError: a file is missing or in another form, or they are not of one film.
+    """
+    found = read_json_record(report, _Report, "give a report of `relit capture build`")
+    known = read_json_record(truth, _Truth, "give the truth.json of a rendered capture")
+    if found.motion.reference >= len(known.frames):
+        raise InputError(
+            f"{report} tells of frame {found.motion.reference}, which {truth} has not", "give both of one film"
+        )
+    at_rest = known.frames[found.motion.reference].head.to_rest
+    transform = RigidTransform(at_rest.rotation_deg, *at_rest.translation_px).inverse()
+    size = (found.width_px, found.height_px)
+    square = HeadCrop(found.square.left, found.square.top, found.square.side, found.square.size, size)
+    pictures = np.stack([_cut(picture, square, transform) for picture in field.pictures])
+    matte = _cut(np.repeat(field.matte[..., None], 3, axis=2), square, transform)[..., 0]
+    return Samples(pictures, field.directions, np.clip(matte, 0, 1))
+
+
+def scale_to_truth(
+    candidate: Candidate, truth: GroundTruth, lights: NDArray[np.intp]
+) -> tuple[Candidate, NDArray[np.float64]]:
+    """A candidate in the truth's unit, and the gains (3,) that do it: a film does not tell how bright white is.
+
+    Least squares by channel over all pixels of the lights (some,).
+    """
+    seen, known = candidate.pictures_at(truth.directions[lights]), truth.colors[lights]
+    gains = np.einsum("lpc,lpc->c", seen, known) / np.maximum(np.einsum("lpc,lpc->c", seen, seen), 1e-12)
+    factor = gains.astype(np.float32)
+    return replace(candidate, predict=lambda directions, pixels: candidate.predict(directions, pixels) * factor), gains
+
+
+def _cut(picture: NDArray[np.float32], square: HeadCrop, transform: RigidTransform) -> NDArray[np.float32]:
+    large = cv2.resize(picture, square.picture, interpolation=cv2.INTER_CUBIC)
+    return np.maximum(square.cut(large, transform), 0)

@@ -1,0 +1,258 @@
+"""A field's evaluation as a report for people, and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+
+from relit_camera.base.images.color import luminance
+from relit_camera.base.images.contact_sheet import contact_sheet
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.capture.reflectance.sampled_region import ring_directions
+from relit_camera.lab.evaluate.field.candidates import BLACK_RING_METHOD
+from relit_camera.lab.evaluate.field.field_evaluation import PROFILE_BINS, FieldReport, pixel_positions
+from relit_camera.lab.evaluate.field.ghost_shadow_report import ghost_blocks
+from relit_camera.lab.evaluate.field.map_pictures import (
+    directions_picture,
+    heat_map_picture,
+    labeled_grid,
+    marked_picture,
+    reflectance_picture,
+    values_on_light_map,
+)
+from relit_camera.lab.evaluate.html_report import chart, heading, line_chart, page, paragraph, picture, table
+from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.spherical_harmonics import coefficient_count, project, reconstruct
+
+MAP_CAPTION = (
+    "The map's middle is the direction from the face to the camera, its right is light from the picture's right, its "
+    "top is light from above, both ends are light from behind."
+)
+
+
+def field_json(report: FieldReport) -> dict[str, object]:
+    """The report's figures; errors are the thesis's measure of linear colours, not multiplied by anything."""
+    return {
+        "captured_lights": len(report.captured),
+        "truth_lights": len(report.truth.directions),
+        "truth_lights_in_region": int(report.in_region.sum()),
+        "pixels": len(report.truth.inside),
+        "truth": {"mid_tone_share": report.truth_mid_tones},
+        "candidates": {
+            each.name: {
+                "error_whole": float(each.error_whole.mean()),
+                "error_in_region": float(each.error_region.mean()),
+                "sides_over_middle": report.sides_over_middle(each.error_whole),
+                "light_psnr_db": each.light_psnr_db,
+                "mid_tone_share": each.mid_tone_share,
+                "environment_psnr_db": each.psnr_db,
+                "environment_ssim": each.ssim,
+                "environments": {n: {"psnr_db": r.psnr_db, "ssim": r.ssim} for n, r in each.relit.items()},
+            }
+            for each in report.candidate_scores
+        },
+        "harmonics": {
+            name: {f"degree_{degree}_psnr_db": relit.psnr_db for degree, relit in by_degree.items()}
+            for name, by_degree in report.harmonics.items()
+        },
+    }
+
+
+def field_text(report: FieldReport) -> str:
+    """The most important figures as a few lines of text."""
+    lines = ["method                      error x1000: all  region   one light   environments   SSIM    mid-tones"]
+    lines += [
+        f"{each.name:<26} {each.error_whole.mean() * 1e3:17.3f} {each.error_region.mean() * 1e3:7.3f} "
+        f"{each.light_psnr_db:8.2f} dB {each.psnr_db:11.2f} dB {each.ssim:7.4f} {each.mid_tone_share:9.1%}"
+        for each in report.candidate_scores
+    ]
+    return "\n".join([*lines, f"{'truth':<26} {report.truth_mid_tones:64.1%}"])
+
+
+def field_page(report: FieldReport, title: str) -> str:
+    """The HTML document."""
+    parts = (_summary, _directions, _heat_maps, _sides, _light_directions, _maps, ghost_blocks, _relit, _harmonics)
+    return page(title, (block for part in parts for block in part(report)))
+
+
+def _summary(report: FieldReport) -> Iterator[str]:
+    yield paragraph(
+        "A person was photographed (or rendered) under single lamps from some directions. From these pictures each "
+        "method predicts the person under light from every other direction. Here the predictions are compared with "
+        f"pictures that were really taken there: {len(report.truth.directions)} directions, of which "
+        f"{int(report.in_region.sum())} lie inside the region that the {len(report.captured)} captured lights span."
+    )
+    rows = [
+        [
+            each.name,
+            each.error_whole.mean() * 1e3,
+            each.error_region.mean() * 1e3,
+            each.light_psnr_db,
+            each.psnr_db,
+            f"{each.ssim:.4f}",
+            f"{each.mid_tone_share:.1%}",
+        ]
+        for each in report.candidate_scores
+    ]
+    head = ["method", "error ×10³, all", "in region", "one light, dB", "environments, dB", "SSIM", "ghost mid-tones"]
+    yield table(
+        head,
+        rows,
+        "Best first. Error: mean squared colour distance of predicted and true reflectance maps, weighed by the cosine "
+        "of the elevation, over all directions and over those inside the sampled region (smaller is better). One "
+        "light: mean PSNR of the picture under a single lamp inside the region that was not captured. Environments: "
+        "mean PSNR and SSIM of the picture under whole surroundings (larger is better). Ghost mid-tones: see 'Ghost "
+        f"shadows'; in truth they are {report.truth_mid_tones:.1%}.",
+    )
+
+
+def _directions(report: FieldReport) -> Iterator[str]:
+    yield heading("Where the light was captured")
+    ring = np.zeros((0, 3))
+    if any(each.name == BLACK_RING_METHOD for each in report.candidate_scores):
+        ring = ring_directions(report.captured)
+    yield picture(
+        directions_picture(report.captured, ring),
+        "Green: captured lights, joined by triangles; between them the methods interpolate. Yellow: black samples that "
+        f"the method '{BLACK_RING_METHOD}' adds, so that its prediction fades outside instead of ending. "
+        "Dark: nothing is known. " + MAP_CAPTION,
+    )
+
+
+def _heat_maps(report: FieldReport) -> Iterator[str]:
+    yield heading("Where on the face the errors are")
+    truth = report.truth
+    rows, tops = [], []
+    for kind in ("error_whole", "error_region"):
+        values = [getattr(each, kind) for each in report.candidate_scores]
+        tops.append(float(np.median([np.percentile(each, 99.5) for each in values])))
+        rows.append([_over_nothing(report, heat_map_picture(truth.picture(each), tops[-1])) for each in values])
+    names = [each.name for each in report.candidate_scores]
+    yield picture(
+        contact_sheet(rows, ["all directions", "in region"], names, 210),
+        "Error of each pixel's reflectance map: black is none, pale yellow the most. Above, over light from all "
+        "directions: what was never sampled dominates, and it shows at the sides of the face, which side light and "
+        "back light reach. With the black ring the error there is lower. Below, over light inside the sampled "
+        "region only: what is left is the interpolation's own error, along the edges of shadows, which interpolation "
+        "cannot move: beside the nose, in the eye sockets, under the chin. Each row has its own scale: pale yellow is "
+        f"{tops[0]:.2g} above and {tops[1]:.2g} below.",
+    )
+
+
+def _sides(report: FieldReport) -> Iterator[str]:
+    x = (np.arange(PROFILE_BINS) + 0.5) / PROFILE_BINS * 2 - 1
+    lines = {each.name: report.across(each.error_whole) * 1e3 for each in report.candidate_scores}
+    ratios = ", ".join(
+        f"{each.name} {report.sides_over_middle(each.error_whole):.1f}" for each in report.candidate_scores
+    )
+    yield chart(
+        line_chart(x, lines, "place across the person: -1 left edge, 1 right edge", "error ×10³, all directions"),
+        "The same error from the left edge of the person to the right, averaged over the picture's rows. Where nothing "
+        "is predicted outside of the sampled region the curves rise toward both sides, which light from the side and "
+        f"from behind reaches. Outer sixths over middle third: {ratios}.",
+    )
+
+
+def _light_directions(report: FieldReport) -> Iterator[str]:
+    yield heading("From where the light is predicted badly")
+    values = [values_on_light_map(report.truth, each.error_of_light) for each in report.candidate_scores]
+    top = float(np.nanpercentile(np.stack(values), 99.5))
+    yield picture(
+        labeled_grid(
+            [heat_map_picture(each, top) for each in values], [each.name for each in report.candidate_scores], 3, 330
+        ),
+        "Error over the whole face for each direction of light. Dark where light was captured, bright outside of the "
+        f"sampled region; between captured lights it rises a little. Pale yellow is {top:.2g}. " + MAP_CAPTION,
+    )
+
+
+def _maps(report: FieldReport) -> Iterator[str]:
+    yield heading("Reflectance maps")
+    truth = report.truth
+    frontal = truth.picture(truth.colors[int(truth.directions[:, 2].argmax())])
+    yield picture(marked_picture(frontal, report.spots), "The spots whose reflectance maps follow.")
+    rows: list[list[DisplayImage]] = []
+    for index, place in enumerate(pixel_positions(report.spots, truth)):
+        known = values_on_light_map(truth, truth.colors[:, place])
+        peak = float(np.nanpercentile(known, 99.5))
+        shown = [reflectance_picture(each.maps[index].reshape(known.shape), peak) for each in report.candidate_scores]
+        rows.append([*shown, reflectance_picture(known, peak)])
+    names = [each.name for each in report.candidate_scores]
+    yield picture(
+        contact_sheet(rows, [spot.name for spot in report.spots], [*names, "truth"], 230),
+        "One map a spot and method: the colour of that spot under light from each direction. In truth (right) a map "
+        "ends in a hard edge where another part of the face blocks the light, for example the nose at the side of the "
+        "nose. Interpolation turns this edge into a slope, or into flat steps with the nearest light. Black beyond the "
+        "captured lights: nothing is known there. " + MAP_CAPTION,
+    )
+
+
+def _relit(report: FieldReport) -> Iterator[str]:
+    yield heading("Under whole surroundings")
+    names = list(report.environments)
+    rows = [[each.relit[name].picture for name in names] for each in report.candidate_scores]
+    rows.append([report.candidate_scores[0].relit[name].truth for name in names])
+    # The light last: every cell takes the shape of the first, which is to be the person's.
+    rows.append([light_picture(report.environments[name]) for name in names])
+    yield picture(
+        contact_sheet(rows, [*(each.name for each in report.candidate_scores), "truth", "light"], names, 160),
+        "The person under each environment by each method, in truth below, and the light itself in the last row. What "
+        "differs most is light from the side and from behind: predictions are darker at the sides of the head and the "
+        "hair, and miss the bright rim. Each column is scaled so that the brightest part of its truth is white. "
+        + MAP_CAPTION,
+        exact=False,
+    )
+    figures = [
+        [each.name, *(f"{each.relit[name].psnr_db:.1f} / {each.relit[name].ssim:.3f}" for name in names)]
+        for each in report.candidate_scores
+    ]
+    yield table(["method", *names], figures, "PSNR in dB (linear light, inside the matte) / SSIM against the truth.")
+
+
+def _harmonics(report: FieldReport) -> Iterator[str]:
+    yield heading("What spherical harmonics keep of the light")
+    names = list(report.environments)
+    degrees = list(next(iter(report.harmonics.values())))
+    rows: list[list[DisplayImage]] = []
+    for name in names:
+        light_map = report.environments[name]
+        peak = _bright(light_map)
+        lights = [light_map, *(reconstruct(project(light_map, degree)) for degree in degrees)]
+        relit = report.harmonics[name]
+        people = [relit[degrees[0]].truth, *(relit[degree].picture for degree in degrees)]
+        rows.append([_under(reflectance_picture(a, peak), b) for a, b in zip(lights, people, strict=True)])
+    columns = ["original", *(f"{coefficient_count(degree)} coefficients" for degree in degrees)]
+    yield picture(
+        contact_sheet(rows, names, columns, 210),
+        "Methods that learn relighting describe light by a few spherical harmonics, mostly 9. Each environment is put "
+        "through them and turned back into light; below it the person under that light, by the true pictures, so that "
+        "nothing but the light differs. Small lamps melt into a soft glow, shadows and highlights soften, and coloured "
+        "lamps mix.",
+        exact=False,
+    )
+    figures = [[name, *(report.harmonics[name][degree].psnr_db for degree in degrees)] for name in names]
+    yield table(["environment", *columns[1:]], figures, "PSNR in dB of the person under that light.", 1)
+
+
+def light_picture(light_map: LightMap) -> DisplayImage:
+    """A light map (32, 64, 3) as a picture, its bright parts as white."""
+    return reflectance_picture(light_map, _bright(light_map))
+
+
+def _bright(light_map: LightMap) -> float:
+    return float(np.percentile(luminance(light_map), 98)) or float(light_map.max())
+
+
+def _under(light: DisplayImage, person: DisplayImage) -> DisplayImage:
+    """A light map over the person it lights."""
+    width = person.shape[1]
+    above = cv2.resize(light, (width, width // 2), interpolation=cv2.INTER_NEAREST)
+    return np.concatenate([np.asarray(above, np.uint8), person])
+
+
+def _over_nothing(report: FieldReport, shown: DisplayImage) -> DisplayImage:
+    """Grey where there is no person."""
+    shown[report.truth.samples.matte <= 0.5] = 60
+    return shown

@@ -1,0 +1,91 @@
+"""What ways to follow a face are given of a capture's bright and dark frames: squares about it, and its landmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.image_types import Points
+from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.capture.alignment.rigid_transform import RigidTransform
+from relit_camera.capture.film.face_circle import FaceCircle
+from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass
+from relit_camera.capture.film.stabilization.face_crops import CropWindow
+from relit_camera.face.face_state import Tracker
+from relit_camera.lab.evaluate.stabilization.baseline_stabilizers import GrayImages
+
+_CROP_RADII = 2.0
+"""Of the squares, in radii of the face: how far a head may go."""
+_MAX_FACE_RADIUS_PX = 128.0
+"""A larger face is scaled down to this."""
+
+
+@dataclass(frozen=True, eq=False)
+class FaceCropSequence:
+    """The bright and dark frames of a capture.
+
+    Attributes:
+        index: (count,) growing, of the frames.
+        bright: (count,) which of them are.
+        squares: (count, side, side) uint8 grey, all cut at the same place.
+        landmarks: of each frame's face, in the video's pixels; (0, 2) where there is none, and without a tracker.
+        window, circle: of the squares and of the face, in a picture so many times (`scale`) as large as the video's.
+        scale: see there.
+    """
+
+    index: NDArray[np.intp]
+    bright: NDArray[np.bool_]
+    squares: GrayImages
+    landmarks: Sequence[Points]
+    window: CropWindow
+    circle: FaceCircle
+    scale: float
+
+    @property
+    def circle_in_square(self) -> FaceCircle:
+        """The face's circle, in the squares' pixels."""
+        return self.circle.moved(-self.window.left, -self.window.top)
+
+    def in_video(self, transform: RigidTransform | None) -> RigidTransform | None:
+        """A transform about a square's centre as one about the centre of the video's picture."""
+        return transform and self.window.in_picture(transform).scaled(1 / self.scale)
+
+
+def read_face_crops(
+    path: Path, flashes: Flashes, circle: FaceCircle, tracker: Tracker | None, progress: Callable[[int], None]
+) -> FaceCropSequence:
+    """Read a video's bright and dark frames.
+
+    Args:
+        path: the video.
+        flashes: what its frames are.
+        circle: of the face, in the video's pixels.
+        tracker: of landmarks; it sees every frame, as it is made to.
+        progress: called with the number of frames looked at.
+
+    Raises:
+        VideoError: the video cannot be read.
+    """
+    scale = min(1.0, _MAX_FACE_RADIUS_PX / circle.radius)
+    small = circle.scaled(scale)
+    index, bright, squares, landmarks = [], [], [], []
+    with VideoReader(path, accurate=False) as video:
+        size = (round(video.info.width * scale), round(video.info.height * scale))
+        window = CropWindow.about(small, _CROP_RADII, size)
+        for frame in video:
+            state = tracker.track(frame) if tracker else None
+            kind = flashes.frames[frame.index].kind
+            if kind in (FrameClass.BRIGHT, FrameClass.DARK):
+                grey = cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY)
+                picture = cv2.resize(grey, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+                index.append(frame.index)
+                bright.append(kind is FrameClass.BRIGHT)
+                squares.append(np.clip(window.cut(picture, RigidTransform()), 0, 255).astype(np.uint8))
+                landmarks.append(state.landmarks if state else np.zeros((0, 2), np.float32))
+            progress(frame.index + 1)
+    return FaceCropSequence(np.array(index), np.array(bright), np.stack(squares), landmarks, window, small, scale)

@@ -1,0 +1,25 @@
+"""The built-in environments by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from importlib import import_module
+
+from relit_camera.light.builtin.canvas import Canvas, to_map_axes
+from relit_camera.light.environment_panorama import Environment, environment_from_panorama, panorama_from_radiance
+
+BUILTIN_NAMES = ("studio", "window", "sunset", "night-street", "party", "overcast")
+
+
+@lru_cache(maxsize=len(BUILTIN_NAMES))
+def builtin_environment(name: str) -> Environment:
+    """The built-in environment of that name, painted on first use (a few tenths of a second).
+
+    Raises:
+        KeyError: `name` is none of `BUILTIN_NAMES`.
+    """
+    if name not in BUILTIN_NAMES:
+        raise KeyError(name)
+    paint: Callable[[], Canvas] = import_module(f"relit_camera.light.builtin.{name.replace('-', '_')}").paint
+    return environment_from_panorama(name, panorama_from_radiance(to_map_axes(paint()), name))

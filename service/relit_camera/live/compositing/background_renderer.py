@@ -1,0 +1,232 @@
+"""The live room behind the person, out of focus.
+
+What stands behind the person.
+
+Where the webcam's picture stays private (mode reenact), there is no live room: `none` is then a dark neutral, and
+`blur` blurs the environment that lights the face. Without an environment both, and `environment`, are the neutral.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+
+from relit_camera.base.config.look import (
+    Background,
+    BlurBackground,
+    ColorBackground,
+    EnvironmentBackground,
+    ImageBackground,
+    Lighting,
+    NoBackground,
+)
+from relit_camera.base.easing import ease_out_cubic
+from relit_camera.base.images.color import linear_from_uint8, srgb_encode, uint8_from_linear
+from relit_camera.base.images.image_types import DisplayImage, Mask
+from relit_camera.base.images.resize import crop_to_fill
+from relit_camera.base.images.tone_mapping import inverse_tone_curve, tone_curve
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.light.environment_panorama import Environment, Panorama
+from relit_camera.light.exposure import auto_exposure_scale
+from relit_camera.light.scene_light import scene_light_map
+from relit_camera.live.compositing.environment_view import BLUR_SIGMA, EnvironmentView
+
+_WORKING_SIGMA = 1.5
+"""The room is reduced as far as the blur's sigma stays this many pixels."""
+
+_REDUCTION_RANGE = (3, 8)
+"""Least and greatest whole factor: less is slow, and more shows when it is enlarged again."""
+
+_EPSILON = np.float32(1e-4)
+
+
+@dataclass(frozen=True)
+class MattedFrame:
+    """A live picture and where the person is in it.
+
+    Attributes:
+        image: uint8 sRGB (height, width, 3).
+        person: alpha of the person, (height, width) of the image.
+    """
+
+    image: DisplayImage
+    person: Mask
+
+
+def blur_background(room: MattedFrame, strength: float) -> DisplayImage:
+    """The room without the person, blurred in linear light with a sigma of `strength` tenths of the height; uint8 sRGB.
+
+    Normalised convolution: the person's pixels have no weight, so nothing of them bleeds into the room around them, and
+    behind them the room is continued (Knutsson and Westin 1993).
+    """
+    height, width = room.person.shape
+    sigma = BLUR_SIGMA * strength * height
+    reduce = int(np.clip(sigma / _WORKING_SIGMA, *_REDUCTION_RANGE))
+    size = (max(1, width // reduce), max(1, height // reduce))
+    # Averaged as light: of codes, small lamps would come out too dark.
+    light = cv2.resize(linear_from_uint8(room.image), size, interpolation=cv2.INTER_AREA)
+    # So high a power that a pixel counts only when it is all but surely room.
+    weight = ((1 - cv2.resize(room.person, size, interpolation=cv2.INTER_AREA)) ** 16)[..., np.newaxis]
+    # Averaging r pixels to one and enlarging linearly blurs too, with a variance of r²/12 + r²/6.
+    working_sigma = max((sigma / reduce) ** 2 - 1 / 4, 0.01) ** 0.5
+    weighted = cv2.GaussianBlur(np.dstack([light * weight, weight]), (0, 0), working_sigma)
+    # Deep behind the person, where no room is near, the constant brings in the room's mean.
+    mean = (light * weight).mean(axis=(0, 1)) / max(float(weight.mean()), 1e-6)
+    filled = (weighted[..., :3] + _EPSILON * mean) / (weighted[..., 3:] + _EPSILON)
+    enlarged: DisplayImage = cv2.resize(uint8_from_linear(filled), (width, height), interpolation=cv2.INTER_LINEAR)
+    return enlarged
+
+
+_NEUTRAL_LIGHT = (0.030, 0.032, 0.036)
+"""Linear light of the dark neutral where it is brightest, behind the head; a trace of blue lets skin look warm."""
+
+_NEUTRAL_EDGE = 0.25
+"""Its share of that light far from there."""
+
+
+_VIEW_FIELDS = ("yaw_deg", "pitch_deg", "roll_deg", "exposure_ev", "saturation", "background_gain_ev")
+"""Fields of the lighting that change how an environment looks."""
+
+
+@dataclass(frozen=True, eq=False)
+class BackgroundRequest:
+    """What a background is made from.
+
+    Attributes:
+        background: its settings.
+        lighting: settings of the light: an environment is seen turned and exposed as it lights the face.
+        environment: what lights the face, or None.
+        image: uint8 sRGB picture of an `image` background, else None.
+    """
+
+    background: Background
+    lighting: Lighting
+    environment: Environment | None = None
+    image: DisplayImage | None = None
+
+    def same_image(self, other: BackgroundRequest) -> bool:
+        """Whether both give the same picture without a live room: equal settings, identical sources."""
+        if self.background != other.background or self.image is not other.image:
+            return False
+        if isinstance(self.background, EnvironmentBackground | BlurBackground):
+            same = all(getattr(self.lighting, name) == getattr(other.lighting, name) for name in _VIEW_FIELDS)
+            return same and self.environment is other.environment
+        return self.lighting.background_gain_ev == other.lighting.background_gain_ev
+
+
+def needs_matte(background: Background, lighting: Lighting) -> bool:
+    """Whether a live picture has to be parted into person and room: not while it is shown as it is."""
+    return not isinstance(background, NoBackground) or lighting.background_gain_ev != 0
+
+
+class BackgroundRenderer:
+    """Makes backgrounds of one size. A still one is made once and kept; a change is faded in. Not thread-safe."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        """`size` is (width, height)."""
+        self._size = size
+        self._request: BackgroundRequest | None = None
+        self._goal = self._shown = self._previous = neutral_background(size)
+        self._changed_at = self._last = 0.0
+        self._view: tuple[Panorama, float, float, EnvironmentView] | None = None
+
+    def still(self, request: BackgroundRequest, now: float) -> DisplayImage:
+        """The background at `now` seconds, without any live picture; uint8 sRGB of the backdrop's size.
+
+        It is eased over the lighting's `transition_s` from the one before, and must not be written to.
+
+        Raises:
+            ValueError: `request` has an `image` background and no image.
+        """
+        if self._request is None:
+            self._goal = self._shown = self._previous = self._render(request)
+        elif not request.same_image(self._request):
+            # The change began after the last picture: this one shows its first step already.
+            self._previous, self._goal, self._changed_at = self._shown, self._render(request), min(self._last, now)
+        self._request, self._last = request, now
+        share = ease_out_cubic(now - self._changed_at, request.lighting.transition_s)
+        self._shown = crossfade(self._previous, self._goal, share)
+        return self._shown
+
+    def live(self, request: BackgroundRequest, room: MattedFrame, now: float) -> DisplayImage:
+        """The background of a live picture of the backdrop's size: its room for `none` and `blur`, else as `still`.
+
+        Between room and still there is a cut: no trace of the room stays where it shall not be seen.
+        """
+        match request.background:
+            case NoBackground():
+                image = room.image
+            case BlurBackground() as blur:
+                image = blur_background(room, blur.strength)
+            case _:
+                return self.still(request, now)
+        self._request = None
+        return apply_exposure(image, request.lighting.background_gain_ev)
+
+    def _render(self, request: BackgroundRequest) -> DisplayImage:
+        background, gain_ev = request.background, request.lighting.background_gain_ev
+        match background:
+            case ColorBackground():
+                return apply_exposure(solid_color(background.color, self._size), gain_ev)
+            case ImageBackground():
+                if request.image is None:
+                    raise ValueError(f"the picture of the background '{background.image}' was not given")
+                return apply_exposure(crop_to_fill(request.image, self._size), gain_ev)
+            case EnvironmentBackground() if request.environment is not None:
+                return self._environment(request.environment, request.lighting, background.height_deg, background.blur)
+            case BlurBackground() if request.environment is not None:
+                height_deg = EnvironmentBackground().height_deg
+                return self._environment(request.environment, request.lighting, height_deg, background.strength)
+        return apply_exposure(neutral_background(self._size), gain_ev)
+
+    def _environment(
+        self, environment: Environment, lighting: Lighting, height_deg: float, blur: float
+    ) -> DisplayImage:
+        panorama = environment.panorama
+        if self._view is None or self._view[0] is not panorama or self._view[1:3] != (height_deg, blur):
+            self._view = (panorama, height_deg, blur, EnvironmentView(panorama, self._size, height_deg, blur))
+        rotation = rotation_from_angles(lighting.yaw_deg, lighting.pitch_deg, lighting.roll_deg)
+        surround = scene_light_map(environment, lighting.model_copy(update={"lamps": ()}))
+        gain_ev = lighting.exposure_ev + lighting.background_gain_ev
+        return self._view[3].picture(rotation, auto_exposure_scale(surround) * 2**gain_ev)
+
+
+@lru_cache(maxsize=2)
+def neutral_background(size: tuple[int, int]) -> DisplayImage:
+    """A dark neutral of `size` (width, height), lighter behind the head; dithered, since 8 bits would show as bands.
+
+    It is made once, and must not be written to.
+    """
+    width, height = size
+    x = (np.arange(width) + 0.5 - width / 2) / height
+    y = (np.arange(height)[:, np.newaxis] + 0.5 - 0.45 * height) / height
+    falloff = np.exp(-(x**2 + y**2) / (2 * 0.45**2))
+    light = np.multiply.outer(_NEUTRAL_EDGE + (1 - _NEUTRAL_EDGE) * falloff, _NEUTRAL_LIGHT)
+    noise = np.random.default_rng(0).random((height, width, 1))
+    return np.floor(srgb_encode(light) * 255 + noise).astype(np.uint8)
+
+
+def solid_color(color: str, size: tuple[int, int]) -> DisplayImage:
+    """One colour, `#rrggbb` in sRGB, over `size` (width, height)."""
+    return np.full((size[1], size[0], 3), list(bytes.fromhex(color[1:])), dtype=np.uint8)
+
+
+def apply_exposure(image: DisplayImage, gain_ev: float) -> DisplayImage:
+    """The uint8 sRGB image with 2**gain_ev of its light: dimmed as it is, brightened through the display curve."""
+    if gain_ev == 0:
+        return image
+    light, gain = linear_from_uint8(np.arange(256, dtype=np.uint8)), np.float32(2**gain_ev)
+    changed = light * gain if gain < 1 else tone_curve(inverse_tone_curve(light) * gain)
+    result: DisplayImage = cv2.LUT(image, uint8_from_linear(changed))
+    return result
+
+
+def crossfade(before: DisplayImage, after: DisplayImage, share: float) -> DisplayImage:
+    """Between two pictures: `share` of `after`."""
+    if share >= 1 or before is after:
+        return after
+    mixed: DisplayImage = cv2.addWeighted(before, 1 - share, after, share, 0)
+    return mixed

@@ -1,0 +1,65 @@
+"""The last stop before the sink: the moved picture before its background, as the display shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
+from relit_camera.base.images.tone_mapping import display_from_linear
+from relit_camera.live.compositing.alpha_compositing import estimate_foreground_colors, over, unpremultiply
+from relit_camera.live.compositing.background_renderer import (
+    BackgroundRenderer,
+    BackgroundRequest,
+    MattedFrame,
+    needs_matte,
+)
+from relit_camera.live.compositing.matting import Matting
+from relit_camera.live.reenactment.reenactor import WarpedLayer
+from relit_camera.live.scene.scene import Scene
+from relit_camera.live.status.stage_timing import StageTimer
+
+
+class Compositor:
+    """Composes pictures of one size. Not thread-safe."""
+
+    def __init__(self, size: tuple[int, int], open_matte: Callable[[], Matting], timer: StageTimer) -> None:
+        """`size` is (width, height); `open_matte` is called when a live person must first be parted from the room."""
+        self._background_renderer = BackgroundRenderer(size)
+        self._matte: Matting | None = None
+        self._open_matte = open_matte
+        self._timer = timer
+
+    def still(self, layer: WarpedLayer, scene: Scene, now: float) -> DisplayImage:
+        """The reenacted still before its background: uint8 sRGB of the output's size. No live pixel is in it.
+
+        `now` is the frame's time in seconds, for fading from one background to the next.
+        """
+        return composite_source_image(self._background_renderer, layer, scene, now)
+
+    def live(self, picture: LinearImage, frame: Frame, scene: Scene) -> DisplayImage:
+        """The relit live picture (output size, linear, display exposure) before its background, uint8 sRGB.
+
+        Raises:
+            ModelError: the background must be parted from the person and the matting model is missing.
+        """
+        shown = display_from_linear(picture)
+        if not needs_matte(scene.look.background, scene.look.lighting):
+            return shown
+        with self._timer.stage("matte"):
+            if self._matte is None:
+                self._matte = self._open_matte()
+            alpha = self._matte.matte(frame)
+        background = self._background_renderer.live(_background_request(scene), MattedFrame(shown, alpha), frame.time_s)
+        return over(estimate_foreground_colors(shown, alpha), alpha, np.ascontiguousarray(background))
+
+
+def composite_source_image(backdrop: BackgroundRenderer, layer: WarpedLayer, scene: Scene, now: float) -> DisplayImage:
+    """A moved still before the scene's background at `now` seconds: uint8 sRGB of the backdrop's size."""
+    background = backdrop.still(_background_request(scene), now)
+    return over(display_from_linear(unpremultiply(layer.picture, layer.alpha)), layer.alpha, background, layer.at)
+
+
+def _background_request(scene: Scene) -> BackgroundRequest:
+    return BackgroundRequest(scene.look.background, scene.look.lighting, scene.environment, scene.backdrop)

@@ -1,0 +1,200 @@
+"""The room's light, measured with the live face as probe.
+
+The subject's field tells how the face looks under any light; so the light under which it looks as it does now is a
+linear fit: non-negative amounts of some eighty soft lights, fixed in the room, that explain the live pixels of the
+face, robustly, a few times a second. Between fits the camera's exposure is followed by a gain a frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.sparse import csr_array
+from scipy.spatial import Delaunay
+from scipy.spatial.transform import Rotation
+
+from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.images.image_types import DisplayImage, Points
+from relit_camera.light.directions import (
+    MAP_HEIGHT,
+    MAP_WIDTH,
+    fibonacci_directions,
+    texel_directions,
+    texel_solid_angles,
+)
+from relit_camera.light.light_map_rotation import LightMap, rotate_light_map
+from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.subject.relighting.relighter import weighted_light
+from relit_camera.subject.subject import Subject
+
+LOBE_COUNT = 80
+LOBE_SHARPNESS = 12.0
+"""Of exp(k (cos − 1)): half value at 20°, about the spacing of eighty directions."""
+RIDGE = 3e-3
+"""Pull toward the last fit, relative to the normal matrix's mean diagonal."""
+ROBUST_ITERATIONS = 3
+FITS_PER_S = 4.0
+LIGHT_SMOOTHING = 0.5
+"""Share of the way from the last light to the newly fitted one."""
+RESIDUAL_SMOOTHING = 0.1
+"""Share of the way that the reported residual goes to that of each frame."""
+CLIPPING_CODE = 250
+HUBER_THRESHOLD = 0.25
+"""Relative residual from which a sample loses weight (Huber)."""
+
+
+@dataclass(frozen=True)
+class RoomLightEstimate:
+    """What the probe says.
+
+    Attributes:
+        light_map: (32, 64, 3) float32 room radiance in units of the live picture's linear values.
+        in_head_frame: the same as the head sees it, under its rotation.
+        gain: (3,) float32 by which this frame's exposure differs from the fit's.
+        residual: median relative deviation of the live face from the relit one, 0..1: how badly the light explains it.
+    """
+
+    light_map: LightMap
+    in_head_frame: LightMap
+    gain: NDArray[np.float32]
+    residual: float
+
+
+class RoomLightEstimator:
+    """Fits the room's light to the face of one subject."""
+
+    def __init__(self, subject: Subject, face: SourceFace) -> None:
+        self._triangles = _skin_triangles(face)
+        self._samples = _sample_basis(subject, face.landmarks[self._triangles].mean(axis=1))
+        self._coefficients = subject.coefficients
+        self._amounts = np.zeros((LOBE_COUNT, 3))
+        self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), dtype=np.float32)
+        self._fitted_at = -np.inf
+        self._residual: float | None = None
+
+    def update(self, image: DisplayImage, landmarks: Points, rotation: Rotation, time_s: float) -> RoomLightEstimate:
+        """Follow the light in one live frame.
+
+        Args:
+            image: the live picture, uint8 sRGB.
+            landmarks: (count, 2) of the live face, in the scheme of the subject's.
+            rotation: head → room, relative to neutral.
+            time_s: of the frame.
+        """
+        live, usable = _sample_frame(image, landmarks[self._triangles].mean(axis=1))
+        if time_s - self._fitted_at > 1 / FITS_PER_S or time_s < self._fitted_at:
+            self._fit(live, usable, rotation)
+            self._fitted_at = time_s
+            light = _lobe_maps(Rotation.identity()) @ self._amounts
+            self._light_map = light.reshape(MAP_HEIGHT, MAP_WIDTH, 3).astype(np.float32)
+        in_head_frame = rotate_light_map(self._light_map, rotation)
+        predicted = self._predict(in_head_frame)
+        gain = np.ones(3, np.float32)
+        if usable.sum() >= 20:
+            ratio = live[usable] / np.maximum(predicted[usable], 1e-4)
+            gain = np.clip(np.median(ratio, axis=0), 0.25, 4.0).astype(np.float32)
+            deviation = np.abs(predicted * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
+            now = float(np.median(deviation))
+            self._residual = (
+                now if self._residual is None else self._residual + RESIDUAL_SMOOTHING * (now - self._residual)
+            )
+        return RoomLightEstimate(
+            self._light_map, in_head_frame, gain, 0.0 if self._residual is None else self._residual
+        )
+
+    def _predict(self, in_head_frame: LightMap) -> NDArray[np.float32]:
+        amounts = self._coefficients @ weighted_light(in_head_frame)
+        return np.stack([self._samples[c] @ amounts[:, c] for c in range(3)], axis=1)
+
+    def _fit(self, live: NDArray[np.float32], usable: NDArray[np.bool_], rotation: Rotation) -> None:
+        weighted = _lobe_maps(rotation) * texel_solid_angles().reshape(-1, 1)
+        mixed = self._coefficients @ weighted.astype(np.float32)
+        first = not self._amounts.any()
+        for channel in range(3):
+            design = (self._samples[channel] @ mixed).astype(np.float64)
+            amounts = self._amounts[:, channel]
+            weight = usable.astype(np.float64)
+            level = max(float(live[usable, channel].mean()) if usable.any() else 0.0, 1e-4)
+            for _ in range(ROBUST_ITERATIONS):
+                fitted = _regularized_nnls(design, live[:, channel], weight, amounts)
+                error = np.abs(design @ fitted - live[:, channel]) / level
+                weight = usable * np.minimum(1, HUBER_THRESHOLD / np.maximum(error, 1e-9))
+            self._amounts[:, channel] = fitted if first else amounts + LIGHT_SMOOTHING * (fitted - amounts)
+
+
+def _regularized_nnls(
+    design: NDArray[np.float64], values: NDArray[np.float32], weight: NDArray[np.float64], prior: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """argmin_{x ≥ 0} Σ w (A x − b)² + λ |x − prior|²; solved on the Cholesky factor, which is small."""
+    normal = design.T @ (design * weight[:, None])
+    ridge = RIDGE * max(float(np.trace(normal)) / len(normal), 1e-12)
+    normal[np.diag_indices_from(normal)] += ridge
+    right = design.T @ (weight * values) + ridge * prior
+    factor = np.linalg.cholesky(normal)
+    solution, _ = nnls(factor.T, np.linalg.solve(factor, right))
+    return np.asarray(solution)
+
+
+def _lobe_maps(rotation: Rotation) -> NDArray[np.float64]:
+    """Soft lights fixed in the room, as a head under `rotation` sees them: (2048, LOBES)."""
+    seen = rotation.inv().apply(fibonacci_directions(LOBE_COUNT))
+    return np.exp(LOBE_SHARPNESS * (texel_directions().reshape(-1, 3) @ seen.T - 1))
+
+
+def _skin_triangles(face: SourceFace) -> NDArray[np.intp]:
+    """Triangles (count, 3) of landmark indices that lie on skin: not in the eyes, nor between the lips."""
+    scheme = face.scheme
+    triangles = np.asarray(Delaunay(face.landmarks).simplices, dtype=np.intp)
+    holes = [
+        set(scheme.right_eye.lids) | set(scheme.right_eye.iris),
+        set(scheme.left_eye.lids) | set(scheme.left_eye.iris),
+    ]
+    holes.append(set(scheme.lips))
+    keep = [not any(set(map(int, t)) <= hole for hole in holes) for t in triangles]
+    return np.asarray(triangles[np.array(keep)])
+
+
+def _sample_basis(subject: Subject, points: Points) -> NDArray[np.float32]:
+    """The subject's rows at `points` (count, 2): (3, count, components), softened as the live samples are."""
+    width, height = subject.size
+    reach = _blur_size(points)
+    # What a box filter and then bilinear interpolation would read there, borders repeated.
+    offsets = np.arange(reach) - reach // 2
+    base = np.floor(points - 0.5)
+    share = points - 0.5 - base
+    rows, columns, weights = [], [], []
+    for across, up in product((0, 1), repeat=2):
+        corner = np.abs(1 - across - share[:, 0]) * np.abs(1 - up - share[:, 1]) / reach**2
+        for x, y in product(offsets + across, offsets + up):
+            column = np.clip(base[:, 0] + x, 0, width - 1)
+            columns.append((np.clip(base[:, 1] + y, 0, height - 1) * width + column).astype(int))
+            rows.append(np.arange(len(points)))
+            weights.append(corner)
+    entries = np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))
+    return subject.basis.rows(csr_array(entries, shape=(len(points), width * height)))
+
+
+def _sample_frame(image: DisplayImage, points: Points) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Linear values (count, 3) of the live picture at `points`, and which of them lie inside it and are not clipped."""
+    reach = _blur_size(points)
+    height, width = image.shape[:2]
+    low = np.clip(np.floor(points.min(axis=0)).astype(int) - reach, 0, [width - 2, height - 2])
+    high = np.clip(np.ceil(points.max(axis=0)).astype(int) + reach, low + 2, [width, height])
+    part = image[low[1] : high[1], low[0] : high[0]]
+    soft = cv2.blur(linear_from_uint8(part), (reach, reach))
+    local = (points - low).astype(np.float32) - 0.5
+    x, y = local[:, 0][None], local[:, 1][None]
+    values = cv2.remap(soft, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
+    brightest = cv2.remap(part, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)[0].max(axis=1)
+    inside = ((points > 0) & (points < [width, height])).all(axis=1)
+    return values, inside & (brightest < CLIPPING_CODE)
+
+
+def _blur_size(points: Points) -> int:
+    """Box size in pixels: about the spacing of the samples, so that both pictures are seen equally coarse."""
+    return max(int(np.ptp(points[:, 0]) / 24), 1)

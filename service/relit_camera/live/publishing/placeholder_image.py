@@ -1,0 +1,91 @@
+"""The picture shown while there is nothing else to show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.color import uint8_from_linear
+from relit_camera.base.images.image_files import read_display
+from relit_camera.base.images.image_types import DisplayImage
+
+TITLE = "Relit Camera"
+BACKGROUND_COLOR = np.array([0.010, 0.012, 0.015], np.float32)
+KEY_COLOR, RIM_COLOR = np.array([1.00, 0.80, 0.58], np.float32), np.array([0.10, 0.16, 0.28], np.float32)
+KEY_DIRECTION, RIM_DIRECTION = np.array([-0.62, 0.55, 0.56]), np.array([0.93, -0.1, -0.35])
+"""Directions in the picture's axes: the key light from the left above, the rim light from the right behind."""
+
+TITLE_COLOR, REASON_COLOR = (222, 224, 228), (138, 144, 152)
+FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+def placeholder(size: tuple[int, int], reason: str = "", picture: Path | None = None) -> DisplayImage:
+    """Make the placeholder.
+
+    Args:
+        size: width and height in pixels.
+        reason: one line under our own picture; characters beyond ASCII are shown as `?`.
+        picture: a picture file of the user's own, fitted whole into the size, without title or reason.
+
+    Returns:
+        uint8 sRGB RGB (height, width, 3).
+
+    Raises:
+        ImageError: the picture file cannot be read.
+    """
+    return _draw(size, reason) if picture is None else _letterbox(read_display(picture), size)
+
+
+def _letterbox(image: DisplayImage, size: tuple[int, int]) -> DisplayImage:
+    width, height = size
+    scale = min(width / image.shape[1], height / image.shape[0])
+    inner_width, inner_height = max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale))
+    filter_ = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
+    canvas = np.empty((height, width, 3), np.uint8)
+    canvas[:] = uint8_from_linear(BACKGROUND_COLOR)
+    x, y = (width - inner_width) // 2, (height - inner_height) // 2
+    canvas[y : y + inner_height, x : x + inner_width] = cv2.resize(
+        image, (inner_width, inner_height), interpolation=filter_
+    )
+    return canvas
+
+
+def _draw(size: tuple[int, int], reason: str) -> DisplayImage:
+    """A ball under a warm key and a cool rim light, and the words below it."""
+    width, height = size
+    unit = min(width * 9 / 16, height)
+    middle = height * 0.40
+    canvas = uint8_from_linear(_ball(width, height, (width / 2, middle), unit * 0.13))
+    _write(canvas, TITLE, middle + unit * 0.255, unit * 0.052, TITLE_COLOR)
+    _write(canvas, reason.encode("ascii", "replace").decode(), middle + unit * 0.345, unit * 0.028, REASON_COLOR)
+    return canvas
+
+
+def _ball(width: int, height: int, centre: tuple[float, float], radius: float) -> NDArray[np.float32]:
+    x = ((np.arange(width, dtype=np.float32) + 0.5 - centre[0]) / radius)[None, :]
+    y = ((centre[1] - np.arange(height, dtype=np.float32) - 0.5) / radius)[:, None]
+    squared = x**2 + y**2
+    image = BACKGROUND_COLOR + 0.035 * np.exp(squared / -9)[..., None] * KEY_COLOR
+    rows, columns = np.nonzero(squared < (1 + 1 / radius) ** 2)
+    squared = squared[rows, columns]
+    normals = np.stack([x[0, columns], y[rows, 0], np.sqrt(np.maximum(1 - squared, 0))], axis=-1)
+    key = np.maximum(normals @ (KEY_DIRECTION / np.linalg.norm(KEY_DIRECTION)), 0)[:, None] * KEY_COLOR
+    rim = np.maximum(normals @ (RIM_DIRECTION / np.linalg.norm(RIM_DIRECTION)), 0)[:, None] * RIM_COLOR
+    covered = np.clip((1 - np.sqrt(squared)) * radius + 0.5, 0, 1)[:, None]
+    image[rows, columns] += covered * (0.006 + 0.62 * key + 1.2 * rim - image[rows, columns])
+    return np.asarray(image, np.float32)
+
+
+def _write(canvas: DisplayImage, text: str, baseline: float, cap_height: float, ink: tuple[int, int, int]) -> None:
+    """Write one centred line, smaller where it would not fit."""
+    thickness = max(1, round(cap_height / 20))
+    scale = cv2.getFontScaleFromHeight(FONT, max(1, round(cap_height)), thickness)
+    (text_width, _), _ = cv2.getTextSize(text, FONT, scale, thickness)
+    room = canvas.shape[1] * 0.9
+    if text_width > room:
+        scale, text_width = scale * room / text_width, int(room)
+    origin = (int((canvas.shape[1] - text_width) / 2), round(baseline))
+    cv2.putText(canvas, text, origin, FONT, scale, ink, thickness, cv2.LINE_AA)

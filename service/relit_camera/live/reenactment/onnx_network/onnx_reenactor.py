@@ -1,0 +1,136 @@
+"""A reenactor of the user's own: a published network (FOMM, LivePortrait …) exported to ONNX (docs/reenactors.md).
+
+It sees square crops of heads. A flow warps the relit picture at full resolution; a picture is laid over the still.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.color import srgb_decode, uint8_from_linear
+from relit_camera.base.images.image_types import Frame, LinearImage, Mask
+from relit_camera.face.landmarks.rotated_crop import Crop
+from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.live.reenactment.first_order_reenactor import fade_flow_at_border
+from relit_camera.live.reenactment.motion_transfer import split_body_motion
+from relit_camera.live.reenactment.onnx_network.head_crop import DrivingCrops, crop_square, head_crop
+from relit_camera.live.reenactment.onnx_network.onnx_contract import NetworkOutput, ReenactorNetwork, identity_grid
+from relit_camera.live.reenactment.reenactor import ReenactorContext, WarpedLayer, WarpTask
+from relit_camera.live.reenactment.source_image import Cutout
+from relit_camera.live.reenactment.warp import (
+    Box,
+    FlowPatch,
+    Warp,
+    inverse_affine,
+    move_body,
+    source_from_output,
+    visible_box,
+)
+
+EDGE_FADE = 0.1
+"""Share of the crop's side over which a picture gives way to the still round it."""
+
+
+class OnnxReenactor:
+    """See `Reenactor`. While the face is lost or out of reach, the picture eases to the unmoved still."""
+
+    def __init__(self, stage: ReenactorContext, path: Path) -> None:
+        """Load and check the network at `path`.
+
+        Raises:
+            ModelError: it is missing, damaged, or breaks the contract.
+        """
+        self._face, self._size = stage.face, stage.size
+        self._network = ReenactorNetwork(path, stage.options)
+        self._crop = head_crop(stage.face.pose, stage.face.size)
+        self._source = crop_square(stage.subject.neutral, self._crop, self._network.side)
+        self._network.check_at_rest(self._source)
+        self._driver = DrivingCrops(self._network.side)
+        self._person = Cutout(stage.subject)
+        self._placed = source_from_output(stage.subject.size, stage.size)
+
+    def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
+        """See `Reenactor.plan_warp`.
+
+        Raises:
+            ModelError: the network fails on this frame, or breaks the contract; so does the move.
+        """
+        placed = self._placed
+        if self._person.whole:
+            body = split_body_motion(self._face, motion)
+            placed = move_body(placed, body.pivot, body.shift, body.scale, self._face.size[1])
+        box = visible_box(placed, self._face.size, self._size)
+        self._driver.update(motion, frame)
+        driving, initial = self._driver.driving, self._driver.initial
+        seen = None if driving is None or initial is None or motion.presence == 0 else (driving, initial)
+        # The flow is that of the still as it was captured, and known at once; a picture is made of the relit one.
+        flow = self._network.answer(self._source, *seen).flow if seen and self._network.gives_flow else None
+        patches = () if flow is None else (self._patch(flow, motion.presence),)
+        positions = self._person.positions(Warp(placed, patches), box)
+
+        def warp(relit: LinearImage) -> WarpedLayer:
+            picture, alpha = self._person.sampled(relit, positions)
+            if seen and not self._network.gives_flow:
+                source = crop_square(uint8_from_linear(relit), self._crop, self._network.side)
+                answer = self._network.answer(source, *seen)
+                assert answer.picture is not None
+                affine = output_from_crop(self._crop, answer.picture.shape[:2], placed, box)
+                _blend_prediction(picture, alpha, answer, motion.presence, affine)
+            return WarpedLayer(picture, alpha, box[:2])
+
+        return warp
+
+    def _patch(self, flow: NDArray[np.float32], share: float) -> FlowPatch:
+        """A `share` of the network's flow, in still pixels."""
+        # −1 and 1 are the middles of the outermost pixels of the crop.
+        half = self._crop.width / 2 * (1 - 1 / self._network.side)
+        displacement = (flow - identity_grid(*flow.shape[:2])) * np.float32(half * share)
+        middle = np.array(self._crop.center)
+        patch = FlowPatch(displacement, np.concatenate([middle - half, middle + half]))
+        return patch if self._person.whole else fade_flow_at_border(patch, self._face.size)
+
+
+def output_from_crop(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.float64], box: Box) -> NDArray[np.float64]:
+    """The affine map (2, 3) from a picture of `crop` to the output pixels of `box`, for cv2: pixel centres at integers.
+
+    Args:
+        crop: in the still.
+        shape: (rows, columns) of its picture.
+        placed: output pixels → still pixels.
+        box: left, top, right, bottom in output pixels.
+    """
+    box_from_source = inverse_affine(placed)
+    box_from_source[:, 2] -= box[:2]
+    source_from_picture = np.vstack([crop.picture_from_pixels(shape[1], shape[0]), [0, 0, 1]])
+    affine = np.asarray(box_from_source @ source_from_picture, dtype=np.float64)
+    affine[:, 2] += affine[:, :2] @ [0.5, 0.5] - 0.5
+    return affine
+
+
+def _blend_prediction(
+    picture: LinearImage, alpha: Mask, answer: NetworkOutput, share: float, affine: NDArray[np.float64]
+) -> None:
+    """Blend a `share` of the network's picture into the unmoved one, in place.
+
+    Without an alpha of its own it is cut out by the still's.
+    """
+    assert answer.picture is not None
+    size = (picture.shape[1], picture.shape[0])
+    cover = _edge_fade_mask(answer.picture.shape[:2])
+    own = cover if answer.alpha is None else answer.alpha
+    colours = cv2.warpAffine(srgb_decode(answer.picture), affine, size, borderMode=cv2.BORDER_REPLICATE)
+    masks = cv2.warpAffine(np.dstack([cover, own]), affine, size)
+    cover, own = masks[..., 0] * np.float32(share), alpha if answer.alpha is None else masks[..., 1]
+    picture += cover[..., None] * (colours * own[..., None] - picture)
+    alpha += cover * (own - alpha)
+
+
+def _edge_fade_mask(shape: tuple[int, ...]) -> Mask:
+    """1 in the middle of (rows, columns), smoothly 0 at its edges."""
+    edges = [np.clip((np.minimum(np.arange(n), np.arange(n)[::-1]) + 0.5) / (EDGE_FADE * n), 0, 1) for n in shape]
+    share = np.minimum.outer(*edges)
+    return np.asarray(share * share * (3 - 2 * share), dtype=np.float32)

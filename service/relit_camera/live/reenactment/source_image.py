@@ -1,0 +1,138 @@
+"""The face in the subject's still: where its landmarks are and how the head stands.
+
+The person in the still, cut out: the matte, its edges, and warping picture and matte together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.errors import SubjectError
+from relit_camera.base.images.image_types import LinearImage, Mask, Points
+from relit_camera.face.face_state import HeadPose, Tracker
+from relit_camera.face.head_pose import fit_pose, unproject
+from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
+from relit_camera.face.tracking.trackers import open_tracker, track_still
+from relit_camera.live.reenactment.warp import Box, Warp, sample_bilinear
+from relit_camera.subject.subject import Subject
+
+SCHEME_TRACKERS = {"mesh478": "mesh", "openseeface66": "openseeface"}
+"""Who finds the landmarks of a scheme in a picture."""
+
+
+@dataclass(frozen=True)
+class SourceFace:
+    """The still's face.
+
+    Attributes:
+        scheme: the landmark scheme.
+        landmarks: (count, 2) float32 pixels of the still.
+        pose: of the head in the still, relative to the camera.
+        head_points: (count, 3) float64 centimetres: the landmarks in head axes.
+        size: (width, height) of the still.
+    """
+
+    scheme: LandmarkScheme
+    landmarks: Points
+    pose: HeadPose
+    head_points: NDArray[np.float64]
+    size: tuple[int, int]
+
+
+def find_source_face(subject: Subject, tracker: Tracker) -> SourceFace:
+    """Find the face in the subject's still: as `tracker` sees it, where it is to be compared with what it sees live.
+
+    Where it is a recording, or finds none, the landmarks stored with the subject count: models and people who mark
+    faces do not mean quite the same points.
+
+    Raises:
+        SubjectError: the subject keeps no landmarks of the tracker's scheme and the tracker finds no face in it.
+        ModelError: a recorded track is played back, the subject keeps no landmarks, and the models are missing.
+    """
+    scheme = landmark_scheme(tracker.scheme)
+    recorded = tracker.name == "recorded"
+    landmarks = None if recorded else _tracked_landmarks(subject, tracker)
+    if landmarks is None:
+        landmarks = subject.landmarks.get(scheme.name)
+    if landmarks is None and recorded:
+        # A recording has not seen the still; the tracker that gives such landmarks finds them.
+        landmarks = _tracked_landmarks(subject, open_tracker(SCHEME_TRACKERS[scheme.name]))
+    if landmarks is None:
+        raise SubjectError(
+            f"tracker '{tracker.name}' finds no face in the subject's still",
+            "choose a subject whose face looks into the camera, or another tracker",
+        )
+    if len(landmarks) != scheme.count:
+        raise SubjectError(
+            f"the subject keeps {len(landmarks)} landmarks of scheme '{scheme.name}', which has {scheme.count}",
+            "build the subject again",
+        )
+    pose = fit_pose(landmarks, scheme, subject.size)
+    if pose is None:
+        raise SubjectError("no head pose fits the landmarks of the subject's face", "build the subject again")
+    return SourceFace(scheme, landmarks, pose, unproject(landmarks, pose, scheme, subject.size), subject.size)
+
+
+def _tracked_landmarks(subject: Subject, tracker: Tracker) -> Points | None:
+    state = track_still(subject.neutral, tracker)
+    return state.landmarks if state.visible else None
+
+
+UPSAMPLING = 2
+"""The still is enlarged by bicubic interpolation before the bilinear warp: as sharp as a bicubic one, and quicker."""
+FEATHER_WIDTH = 0.06
+"""Share of the still's width over which a person who is cut off by its side fades out."""
+
+
+class Cutout:
+    """One subject's person.
+
+    Attributes:
+        alpha: (height, width) float32 straight alpha of the still, faded out at the sides and the top.
+        whole: whether there is background beside the head; else the picture's border cuts the face off.
+    """
+
+    def __init__(self, subject: Subject) -> None:
+        self.alpha = feather_edges(subject.matte)
+        self.whole = shows_whole_head(subject.matte)
+        # Frames that were taken over black carry the matte as a factor already: twice would darken the edge.
+        share = feather_edges(np.ones_like(self.alpha)) if subject.metadata.over_black else self.alpha
+        self._share = share[..., None]
+        self._large_alpha = _upsample(self.alpha)
+
+    def positions(self, warp: Warp, box: Box) -> NDArray[np.float32]:
+        """Where the output pixels of `box` look under `warp`: (height, width, 2), for `sample_bilinear`."""
+        return warp.map(box, UPSAMPLING)
+
+    def sampled(self, relit: LinearImage, positions: NDArray[np.float32]) -> tuple[LinearImage, Mask]:
+        """The relit still (height, width, 3) at `positions`: premultiplied, and alpha."""
+        # Colours and alpha go apart through the same positions: taking four channels apart afterwards costs more.
+        # The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing.
+        picture = sample_bilinear(_upsample(relit * self._share), positions, cv2.BORDER_REPLICATE)
+        alpha = sample_bilinear(self._large_alpha, positions, cv2.BORDER_REPLICATE)
+        return picture, np.minimum(alpha, np.float32(1))
+
+
+def shows_whole_head(matte: Mask) -> bool:
+    """Whether there is background beside the head; else the picture's border cuts the face off."""
+    return bool(matte[: len(matte) // 2, [0, -1]].mean() < 0.5)
+
+
+def feather_edges(matte: Mask) -> Mask:
+    """The matte, faded out toward the sides and the top of the picture where it would be cut off hard."""
+    height, width = matte.shape
+    reach = max(FEATHER_WIDTH * width, 1.0)
+    across = np.clip((np.minimum(np.arange(width), np.arange(width)[::-1]) + 0.5) / reach, 0, 1)
+    down = np.clip((np.arange(height) + 0.5) / reach, 0, 1)
+    smooth = np.minimum.outer(down, across)
+    return np.asarray(matte * (smooth * smooth * (3 - 2 * smooth)), dtype=np.float32)
+
+
+def _upsample(source: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The still (height, width[, channels]) at ENLARGE times its size, without bicubic's overshoot below 0."""
+    large = cv2.resize(source, None, fx=UPSAMPLING, fy=UPSAMPLING, interpolation=cv2.INTER_CUBIC)
+    return np.asarray(np.maximum(large, 0, out=large), dtype=np.float32)

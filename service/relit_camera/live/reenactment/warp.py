@@ -1,0 +1,176 @@
+"""Where the subject's picture sits in the output.
+
+A dense warp: an affine view of the still with a smooth flow inside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.image_types import Flow
+
+Box = tuple[int, int, int, int]
+
+
+def source_from_output(source: tuple[int, int], output: tuple[int, int]) -> NDArray[np.float64]:
+    """The affine map (2, 3) from output pixels to still pixels: the still fitted in whole, centred, on the bottom edge.
+
+    Args:
+        source: (width, height).
+        output: (width, height).
+    """
+    scale = min(output[0] / source[0], output[1] / source[1])
+    left = (output[0] - scale * source[0]) / 2
+    top = output[1] - scale * source[1]
+    return np.array([[1 / scale, 0, -left / scale], [0, 1 / scale, -top / scale]])
+
+
+def move_body(
+    placed: NDArray[np.float64], pivot: NDArray[np.float64], shift: NDArray[np.float64], scale: float, bottom: float
+) -> NDArray[np.float64]:
+    """`placed`, with the person moved by `shift` and grown by `scale` about `pivot`, all in still pixels.
+
+    The still's lower edge, at y = `bottom`, never rises into view: nobody hovers.
+    """
+    lift = shift[1] + (scale - 1) * (bottom - pivot[1])
+    shift = shift - [0.0, min(lift, 0.0)]
+    view = np.array([[1 / scale, 0, 0], [0, 1 / scale, 0]])
+    view[:, 2] = pivot - (pivot + shift) / scale
+    return np.asarray(view @ np.vstack([placed, [0, 0, 1]]))
+
+
+def visible_box(placed: NDArray[np.float64], source: tuple[int, int], output: tuple[int, int]) -> Box:
+    """The output pixels (left, top, right, bottom) in which the still is seen under an affine map without rotation."""
+    inverse = inverse_affine(placed)
+    corners = np.array([[0, 0], source]) @ inverse[:, :2].T + inverse[:, 2]
+    left, top = np.clip(np.floor(corners.min(axis=0)), 0, output).astype(int)
+    right, bottom = np.clip(np.ceil(corners.max(axis=0)), 0, output).astype(int)
+    return int(left), int(top), int(right), int(bottom)
+
+
+def inverse_affine(affine: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The inverse (2, 3) of an affine map (2, 3)."""
+    return np.linalg.inv(np.vstack([affine, [0, 0, 1]]))[:2]
+
+
+PATCH_FADE = 0.1
+"""Share of a patch's side over which it gives way to what lies under it."""
+MAX_STEP = 8
+"""Positions outside the fine patches are computed for at least every eighth output pixel and interpolated."""
+
+
+@dataclass(frozen=True)
+class FlowPatch:
+    """Flow on a grid.
+
+    Attributes:
+        flow: (rows, columns, 2) float32 backward flow in still pixels; the grid's corners are the region's.
+        region: (4,) float64 left, top, right, bottom in still pixels.
+    """
+
+    flow: Flow
+    region: NDArray[np.float64]
+
+    @property
+    def positions(self) -> NDArray[np.float32]:
+        """Where each grid point looks: its own place plus the flow, (rows, columns, 2) still pixels."""
+        rows, columns = self.flow.shape[:2]
+        x = np.linspace(self.region[0], self.region[2], columns, dtype=np.float32)
+        y = np.linspace(self.region[1], self.region[3], rows, dtype=np.float32)
+        return np.asarray(self.flow + np.dstack(np.meshgrid(x, y)), dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class Warp:
+    """Where each output pixel looks in the still: u = affine(x), then u + flow(u).
+
+    Attributes:
+        affine: (2, 3) float64, output pixels → still pixels (centres at integers + ½ in both).
+        patches: the first covers the head and fades to 0 outside; later ones refine it where motion is fine.
+    """
+
+    affine: NDArray[np.float64]
+    patches: tuple[FlowPatch, ...]
+
+    def map(self, box: Box, enlarged: int = 1) -> NDArray[np.float32]:
+        """Positions (height, width, 2) for cv2.remap, for the output pixels of `box` (left, top, right, bottom).
+
+        `enlarged`: by how much the still to be sampled is larger than the one that the warp was made for.
+        """
+        width, height = box[2] - box[0], box[3] - box[1]
+        # Few positions, interpolated. One beyond each side, so that none is extrapolated.
+        step = self._step()
+        columns, rows = -(-width // step) + 2, -(-height // step) + 2
+        coarse = np.zeros((rows, columns, 2), dtype=np.float32)
+        from_coarse = self._source_from_pixel(box[0] - 0.5 * step, box[1] - 0.5 * step, step)
+        for patch in self.patches[:1]:
+            _blend_grid(coarse, patch.flow, patch.region, from_coarse)
+        a = from_coarse.astype(np.float32)
+        coarse += (a[:, 0] * np.arange(columns, dtype=np.float32)[:, None] + a[:, 2])[None]
+        coarse += (a[:, 1] * np.arange(rows, dtype=np.float32)[:, None])[:, None]
+        # cv2 counts pixel centres as integers: x_ours = x_cv + ½.
+        coarse = coarse * np.float32(enlarged) - np.float32(0.5)
+        fine = cv2.resize(coarse, (columns * step, rows * step), interpolation=cv2.INTER_LINEAR)
+        positions = np.ascontiguousarray(fine[step : step + height, step : step + width])
+        from_pixel = self._source_from_pixel(box[0] + 0.5, box[1] + 0.5, 1)
+        for patch in self.patches[1:]:
+            _blend_grid(positions, patch.positions * np.float32(enlarged) - np.float32(0.5), patch.region, from_pixel)
+        return positions
+
+    def _step(self) -> int:
+        """Output pixels between computed positions: no more than between the points of the first patch's grid."""
+        if not self.patches:
+            return MAX_STEP
+        first = self.patches[0]
+        spacing = (first.region[2:] - first.region[:2]) / (np.array(first.flow.shape[1::-1]) - 1)
+        source_per_output = np.sqrt(abs(np.linalg.det(self.affine[:, :2])))
+        return int(np.clip(spacing.min() / source_per_output, 1, MAX_STEP))
+
+    def _source_from_pixel(self, left: float, top: float, step: float) -> NDArray[np.float64]:
+        """The affine map (2, 3) from array indices to still pixels, index 0 at output position (left, top)."""
+        return np.asarray(self.affine @ np.array([[step, 0, left], [0, step, top], [0, 0, 1]]))
+
+    def apply(self, source: NDArray[np.float32], box: Box, enlarged: int = 1) -> NDArray[np.float32]:
+        """The still (height, width[, channels ≤ 4]) as seen at the output pixels of `box`; 0 beyond its edges."""
+        return sample_bilinear(source, self.map(box, enlarged))
+
+
+def sample_bilinear(
+    source: NDArray[np.float32], positions: NDArray[np.float32], beyond: int = cv2.BORDER_CONSTANT
+) -> NDArray[np.float32]:
+    """The still at `positions` (height, width, 2) from `Warp.map`, bilinear; beyond its edges 0, or as cv2 names it."""
+    view = cv2.remap(source, positions, None, cv2.INTER_LINEAR, borderMode=beyond, borderValue=0)
+    return np.asarray(view, dtype=np.float32)
+
+
+def _blend_grid(
+    onto: NDArray[np.float32],
+    values: NDArray[np.float32],
+    region: NDArray[np.float64],
+    source_from_index: NDArray[np.float64],
+) -> None:
+    """Blend a grid of values (rows, columns, 2) over a region of the still into an array of positions, in place."""
+    rows, columns = values.shape[:2]
+    spacing = (region[2:] - region[:2]) / [columns - 1, rows - 1]
+    grid_from_source = np.array([[1 / spacing[0], 0, 0], [0, 1 / spacing[1], 0], [0, 0, 1]])
+    grid_from_source[:2, 2] = -region[:2] / spacing
+    grid_from_index = grid_from_source @ np.vstack([source_from_index, [0, 0, 1]])
+    corners = np.array([[0, 0, 1], [columns - 1, 0, 1], [0, rows - 1, 1], [columns - 1, rows - 1, 1]], dtype=float)
+    seen = (corners @ np.linalg.inv(grid_from_index).T)[:, :2]
+    left, top = np.maximum(np.floor(seen.min(axis=0)).astype(int), 0)
+    right, bottom = np.minimum(np.ceil(seen.max(axis=0)).astype(int) + 1, onto.shape[1::-1])
+    if right <= left or bottom <= top:
+        return
+    local = (grid_from_index @ np.array([[1, 0, left], [0, 1, top], [0, 0, 1]]))[:2]
+    edges = [np.clip(np.minimum(np.arange(n), np.arange(n)[::-1]) / (PATCH_FADE * n), 0, 1) for n in (rows, columns)]
+    cover = np.minimum.outer(*edges).astype(np.float32)
+    stacked = np.dstack([values * cover[..., None], cover])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    pasted = cv2.warpAffine(stacked, local, (int(right - left), int(bottom - top)), flags=flags)
+    area = onto[top:bottom, left:right]
+    area *= 1 - pasted[..., 2:]
+    area += pasted[..., :2]

@@ -1,0 +1,168 @@
+"""Turns what users ask for into the next scene: resolves names, checks that parts fit, replaces the scene whole."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from relit_camera.base.config.look import Background, ColorBackground, EnvironmentBackground, ImageBackground, Look
+from relit_camera.base.config.settings import StorageSettings
+from relit_camera.base.errors import InputError, NotFoundError
+from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.light.background_light import panorama_from_background
+from relit_camera.light.environment_panorama import Environment
+from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.exposure import auto_exposure_scale
+from relit_camera.light.light_map_rotation import resample_to_light_map
+from relit_camera.live.scene.background_store import BackgroundStore
+from relit_camera.live.scene.scene import Scene
+from relit_camera.subject.subject import Subject
+from relit_camera.subject.subject_store import SubjectStore
+
+BACKGROUND_ENVIRONMENT = "background"
+"""The environment's reserved name for: lit by the virtual background."""
+
+
+class SceneController:
+    """Holds the scene. Reading is one attribute access; changes are made one at a time, from any thread.
+
+    A change that cannot be resolved raises and leaves the scene as it was.
+    """
+
+    def __init__(self, storage: StorageSettings) -> None:
+        self.environments = EnvironmentStore(storage.environments)
+        self.subjects = SubjectStore(storage.subjects, in_memory=True)
+        self.backgrounds = BackgroundStore(storage.backgrounds)
+        self._change = threading.Lock()
+        self._temporary_environments: dict[str, Environment] = {}
+        self.scene = Scene(Look())
+
+    def set_look(self, look: Look) -> Scene:
+        """Show another lighting, background or mode.
+
+        Raises:
+            NotFoundError: an environment or background of that name is not stored.
+            InputError: `background` as environment while the background cannot light.
+        """
+        return self.update_look(lambda _: look)
+
+    def update_look(self, change: Callable[[Look], Look]) -> Scene:
+        """Show what `change` makes of the present look; no other change comes between reading and replacing it.
+
+        Raises:
+            NotFoundError, InputError: as `set_look`.
+        """
+        with self._change:
+            look = change(self.scene.look)
+            # A slider sends dozens of changes a second: what it leaves alone is not read again.
+            backdrop = self.scene.backdrop if look.background == self.scene.look.background else None
+            if backdrop is None:
+                backdrop = self._backdrop(look.background)
+            environment = self._unchanged_environment(look) or self._environment(look, backdrop)
+            return self._replace(look=look, environment=environment, backdrop=backdrop)
+
+    def set_subject(self, name_or_path: str | None) -> Scene:
+        """Show another subject, or none.
+
+        Raises:
+            NotFoundError: no such subject or file.
+            SubjectError: its file is damaged.
+        """
+        with self._change:
+            if name_or_path is None:
+                return self._replace(subject=None, subject_name=None)
+            name, subject = self.subjects.resolve(name_or_path)
+            return self._replace(subject=subject, subject_name=name)
+
+    def show_subject(self, name: str, subject: Subject) -> Scene:
+        """Show a subject that is not stored, under `name`."""
+        with self._change:
+            return self._replace(subject=subject, subject_name=name)
+
+    def set_frozen(self, frozen: bool) -> Scene:
+        """Hold the published picture, or let it go on."""
+        with self._change:
+            return self._replace(frozen=frozen)
+
+    def register_temporary_environment(self, name_or_path: str) -> str:
+        """The name under which an environment can be chosen: a stored one's own, or a file's, for this run only.
+
+        Raises:
+            NotFoundError: neither a stored name nor a file.
+            PanoramaError: the file cannot be used as light.
+        """
+        if name_or_path == BACKGROUND_ENVIRONMENT or name_or_path in self.environments.names():
+            return name_or_path
+        environment = self.environments.resolve(name_or_path)
+        name = re.sub(r"[^A-Za-z0-9_-]+", "-", Path(name_or_path).stem).strip("-_")[:50] or "file"
+        if name == BACKGROUND_ENVIRONMENT or name in self.environments.names():
+            name += "-file"
+        with self._change:
+            self._temporary_environments[name] = environment
+        return name
+
+    def temporary_environments(self) -> dict[str, Environment]:
+        """Environments that `register_temporary_environment` took from files, for this run only."""
+        return dict(self._temporary_environments)
+
+    def background_names(self) -> list[str]:
+        """Names that an `image` background may have: stored pictures and environments."""
+        return sorted({*self.backgrounds.names(), *self.environments.names()})
+
+    def _replace(self, **changes: object) -> Scene:
+        self.scene = replace(self.scene, **changes, revision=self.scene.revision + 1)  # type: ignore[arg-type]
+        return self.scene
+
+    def _unchanged_environment(self, look: Look) -> Environment | None:
+        before = self.scene.look
+        if look.lighting.environment != before.lighting.environment:
+            return None
+        stays = look.lighting.environment != BACKGROUND_ENVIRONMENT or look.background == before.background
+        return self.scene.environment if stays else None
+
+    def _environment(self, look: Look, backdrop: DisplayImage | None) -> Environment | None:
+        name = look.lighting.environment
+        if name is None:
+            return None
+        if name != BACKGROUND_ENVIRONMENT:
+            # Never `resolve`: a name that came over the API must not reach a file beside the program.
+            return (
+                self._temporary_environments[name]
+                if name in self._temporary_environments
+                else self.environments.load(name)
+            )
+        background = look.background
+        if isinstance(background, ImageBackground) and background.image in self.environments.names():
+            return self.environments.load(background.image)
+        if isinstance(background, ColorBackground):
+            code = int(background.color[1:], 16)
+            backdrop = np.full((90, 160, 3), [code >> 16, code >> 8 & 255, code & 255], dtype=np.uint8)
+        if backdrop is None:
+            kind = "an environment needs a name" if isinstance(background, EnvironmentBackground) else "has no picture"
+            raise InputError(
+                f"the face cannot be lit by a background of kind '{background.kind}': it {kind}",
+                "choose an image or color background first",
+            )
+        panorama = panorama_from_background(linear_from_uint8(backdrop))
+        return Environment(BACKGROUND_ENVIRONMENT, panorama, resample_to_light_map(panorama.radiance), panorama.notes)
+
+    def _backdrop(self, background: Background) -> DisplayImage | None:
+        if not isinstance(background, ImageBackground):
+            return None
+        if background.image in self.backgrounds.names():
+            return self.backgrounds.load(background.image)
+        if background.image in self.environments.names():
+            environment = self.environments.load(background.image)
+            # A white wall under irradiance 1 reads 1 and has radiance 1/π: so seen, background and face fit together.
+            # Seen from inside, looking where the camera looks: the map's edge in the middle, its right half mirrored.
+            seen = np.roll(environment.panorama.radiance[:, ::-1], environment.panorama.radiance.shape[1] // 2, axis=1)
+            shown = seen * np.float32(np.pi * auto_exposure_scale(environment.light_map))
+            return uint8_from_linear(shown)
+        known = ", ".join(self.background_names()) or "none"
+        raise NotFoundError(f"no background picture '{background.image}'", f"stored are: {known}")

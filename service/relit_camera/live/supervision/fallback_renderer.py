@@ -1,0 +1,85 @@
+"""What is shown while the picture path fails or hangs."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from relit_camera.base.config.settings import Fallback
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.images.resize import crop_to_fill
+from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.live.compositing.background_renderer import BackgroundRenderer
+from relit_camera.live.compositing.compositor import composite_source_image
+from relit_camera.live.reenactment.reenactor import WarpedLayer
+from relit_camera.live.reenactment.source_image import Cutout
+from relit_camera.live.reenactment.warp import Warp, source_from_output, visible_box
+from relit_camera.live.scene.light_transition import LightTransition
+from relit_camera.live.scene.scene import Scene
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.subject import Subject
+
+log = logging.getLogger(__name__)
+
+
+class FallbackRenderer:
+    """Makes pictures without tracker and reenactor: the subject's still at rest, relit as the scene says.
+
+    Where there is no subject, or that fails too: the live picture or the placeholder, as configured. Not thread-safe.
+    """
+
+    def __init__(self, size: tuple[int, int], fallback: Fallback, placeholder: DisplayImage) -> None:
+        """For an output of `size` (width, height).
+
+        Args:
+            size: of the pictures to make.
+            fallback: what is shown where no still can be.
+            placeholder: uint8 sRGB RGB of the output's size.
+        """
+        self._size, self._fallback, self._placeholder = size, fallback, placeholder
+        self._background_renderer = BackgroundRenderer(size)
+        self._light = LightTransition()
+        self._source: _RelitSource | None = None
+        self._failed_subject: Subject | None = None
+
+    def release(self) -> None:
+        """Let go of the memory that pictures take: none is wanted now."""
+        self._source = None
+
+    def picture(self, frame: Frame, scene: Scene) -> DisplayImage:
+        """A picture for this live frame: uint8 sRGB RGB of the output's size. Never fails."""
+        subject = scene.subject
+        if subject is not None and subject is not self._failed_subject:
+            try:
+                return self._relit(subject, scene, frame.time_s)
+            except Exception:  # this is what is shown when all else fails
+                log.exception("the still cannot be relit either")
+                self._failed_subject = subject
+        return crop_to_fill(frame.image, self._size) if self._fallback is Fallback.LIVE else self._placeholder
+
+    def _relit(self, subject: Subject, scene: Scene, now: float) -> DisplayImage:
+        if self._source is None or self._source.subject is not subject:
+            self._source = _RelitSource(subject, self._size)
+        light = self._light.update(scene, now) * np.float32(subject.metadata.display_gain)
+        return composite_source_image(self._background_renderer, self._source.render(light), scene, now)
+
+
+class _RelitSource:
+    """One subject, in its place in the output."""
+
+    def __init__(self, subject: Subject, size: tuple[int, int]) -> None:
+        self.subject = subject
+        self._relighter = BasisRelighter(subject)
+        self._person = Cutout(subject)
+        placed = source_from_output(subject.size, size)
+        self._box = visible_box(placed, subject.size, size)
+        self._positions = self._person.positions(Warp(placed, ()), self._box)
+        self._last: tuple[LightMap, WarpedLayer] | None = None
+
+    def render(self, light: LightMap) -> WarpedLayer:
+        """The person under `light`; the last picture again while that stays."""
+        if self._last is None or not np.array_equal(self._last[0], light):
+            picture, alpha = self._person.sampled(self._relighter.relight(light), self._positions)
+            self._last = light, WarpedLayer(picture, alpha, self._box[:2])
+        return self._last[1]

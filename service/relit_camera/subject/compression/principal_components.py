@@ -1,0 +1,141 @@
+"""One cluster of pixels as principal components in 8 bits, as many as the error asks for.
+
+What the components of all clusters have in common: one basis over lights, in which each is short to tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = NDArray[np.float32]
+
+MAX_CODE = 127
+"""Values are kept as -127..127 times their scale."""
+
+
+@dataclass(frozen=True)
+class ClusterComponents:
+    """A cluster's rows as Σ_j codes[j] · scales[j] · vectors[j].
+
+    Attributes:
+        codes: (count, rows) int8.
+        scales: (count,) float32.
+        vectors: (count, columns) float16 of unit length; one occurs again where 8 bits do not tell its amounts.
+    """
+
+    codes: NDArray[np.int8]
+    scales: Values
+    vectors: NDArray[np.float16]
+
+    @property
+    def energies(self) -> Values:
+        """Sum (count,) of the squares that each component stands for."""
+        codes = self.codes.astype(np.float32)
+        return np.asarray(np.einsum("jr,jr->j", codes, codes) * self.scales**2)
+
+    def restored(self) -> Values:
+        """The rows (rows, columns)."""
+        amounts = self.codes.astype(np.float32) * self.scales[:, None]
+        return np.asarray(amounts.T @ self.vectors.astype(np.float32))
+
+
+@dataclass(frozen=True)
+class PixelCluster:
+    """Rows (rows, columns) float32 of a cluster: its pixels' channels, under lights that all count alike."""
+
+    rows: Values
+
+    @cached_property
+    def _principal(self) -> tuple[Values, Values]:
+        """Unit vectors over rows, as columns, by falling energy, and that energy."""
+        # By the smaller side: a cluster has fewer rows than there are lights.
+        energies, vectors = np.linalg.eigh((self.rows @ self.rows.T).astype(np.float64))
+        return np.ascontiguousarray(vectors[:, ::-1], np.float32), energies[::-1].astype(np.float32)
+
+    def components(self, threshold: float) -> ClusterComponents:
+        """The principal components that explain more than `threshold`, in 8 bits.
+
+        What 8 bits leave of a component is kept as another one, by the same rule.
+        """
+        directions, energies = self._principal
+        kept = directions[:, : max(1, int((energies > threshold).sum()))]
+        vectors = kept.T @ self.rows
+        lengths = np.linalg.norm(vectors, axis=1) + np.float32(1e-20)
+        left, vectors = (kept * lengths).T, vectors / lengths[:, None]
+        codes, scales, used = [], [], []
+        chosen = np.arange(len(left))
+        while len(chosen):
+            scale = np.abs(left).max(axis=1) / MAX_CODE + np.float32(1e-30)
+            code = np.rint(left / scale[:, None])
+            codes.append(code.astype(np.int8))
+            scales.append(scale)
+            used.append(chosen)
+            left = left - code * scale[:, None]
+            again = np.einsum("jr,jr->j", left, left) > threshold
+            left, chosen = left[again], chosen[again]
+        order = np.concatenate(used)
+        return ClusterComponents(np.concatenate(codes), np.concatenate(scales), vectors[order].astype(np.float16))
+
+
+CLUSTERS_PER_BATCH = 64
+"""Clusters whose products are added up at once: one at a time, adding takes longer than multiplying."""
+
+
+@dataclass(frozen=True)
+class SharedBasis:
+    """Orthonormal vectors over lights.
+
+    Attributes:
+        vectors: (components, columns) float32.
+        mixes: for each cluster (count, components) float16, its components in them.
+        error: (columns,) sum of squares, over all clusters, that is lost.
+    """
+
+    vectors: Values
+    mixes: list[NDArray[np.float16]]
+    error: NDArray[np.float64]
+
+
+def fit_shared_basis(clusters: Sequence[ClusterComponents], allowed: float) -> SharedBasis:
+    """The fewest principal directions of all clusters' components with an error of `allowed` at most in every column.
+
+    Principal components of the parts' principal components are those of the whole, but for what the parts left out.
+    """
+    energies, directions = _principal_directions(clusters)
+    lost = np.cumsum((directions**2 * energies)[:, ::-1], axis=1)[:, ::-1].max(axis=0)
+    enough = np.flatnonzero(lost <= allowed)
+    count = int(enough[0]) if len(enough) else len(energies)
+    vectors = np.ascontiguousarray(directions[:, : max(count, 1)].T, np.float32)
+    mixes = [(cluster.vectors.astype(np.float32) @ vectors.T).astype(np.float16) for cluster in clusters]
+    return SharedBasis(vectors, mixes, _squared_error(clusters, vectors, mixes))
+
+
+def _principal_directions(clusters: Sequence[ClusterComponents]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Energies (count,), falling, and unit vectors (columns, count) of all clusters' components together."""
+    columns = clusters[0].vectors.shape[1]
+    weighted = (each.vectors.astype(np.float32) * np.sqrt(each.energies)[:, None] for each in clusters)
+    if sum(len(each.scales) for each in clusters) < columns:
+        _, amounts, directions = np.linalg.svd(np.concatenate(list(weighted)).astype(np.float64), full_matrices=False)
+        return amounts**2, directions.T
+    gram = np.zeros((columns, columns))
+    for batch in iter(lambda: list(islice(weighted, CLUSTERS_PER_BATCH)), []):
+        rows = np.concatenate(batch)
+        gram += rows.T @ rows
+    energies, directions = np.linalg.eigh(gram)
+    return np.maximum(energies[::-1], 0), directions[:, ::-1]
+
+
+def _squared_error(
+    clusters: Sequence[ClusterComponents], vectors: Values, mixes: list[NDArray[np.float16]]
+) -> NDArray[np.float64]:
+    error = np.zeros(vectors.shape[1])
+    for cluster, mix in zip(clusters, mixes, strict=True):
+        left = cluster.vectors.astype(np.float32) - mix.astype(np.float32) @ vectors
+        error += cluster.energies @ left**2
+    return error

@@ -1,0 +1,225 @@
+"""The subject file: one .relit file is a safetensors file, opened memory-mapped. Layout: docs/formats.md."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+from safetensors import SafetensorError, safe_open
+
+from relit_camera.base.errors import SubjectError
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.storage import write_tensors
+from relit_camera.subject.compression.local_basis import LocalBasis, global_basis
+from relit_camera.subject.compression.webp_packing import decode_basis, encode_basis
+from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
+
+SUFFIX = ".relit"
+HEADER_KEY = "relit_subject"
+LANDMARKS_PREFIX = "landmarks."
+MAX_TENSORS = 64
+MAX_BYTES = 8 << 30
+MAX_IN_MEMORY_BYTES = 1 << 30
+"""Of a subject that is read into memory: the largest that is built, 1024 pixels a side, has under 700 MB."""
+REQUIRED_TENSORS = ("coefficients", "light_directions", "light_coefficients", "matte", "neutral")
+OPTIONAL_TENSORS = ("normals", "albedo", "depth", "horizons")
+LOCAL_BASIS_PREFIX = "basis."
+LOCAL_BASIS_TENSORS = ("pixels", "first", "values", "scales", "mixes")
+"""The basis of version 2, each with `LOCAL_BASIS_PREFIX` before its name."""
+GLOBAL_BASIS, GLOBAL_BASIS_WEBP = "basis", "basis_webp"
+"""In their place in version 1: the pictures themselves (3, components, height, width), or one WebP picture of them."""
+DTYPES: dict[str, tuple[type[np.generic], ...]] = {
+    GLOBAL_BASIS: (np.float16,),
+    GLOBAL_BASIS_WEBP: (np.uint8,),
+    "neutral": (np.uint8,),
+    "normals": (np.float16, np.float32),
+    "albedo": (np.float16, np.float32),
+    "horizons": (np.uint8,),
+    LOCAL_BASIS_PREFIX + "pixels": (np.int32,),
+    LOCAL_BASIS_PREFIX + "first": (np.int32,),
+    LOCAL_BASIS_PREFIX + "values": (np.int8, np.float16),
+    LOCAL_BASIS_PREFIX + "mixes": (np.float16,),
+}
+"""Every other tensor is float32."""
+SAFETENSORS_DTYPES: dict[str, type[np.generic]] = {
+    "F16": np.float16,
+    "F32": np.float32,
+    "U8": np.uint8,
+    "I8": np.int8,
+    "I32": np.int32,
+}
+"""What safetensors calls the types that a subject may hold."""
+
+
+def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
+    """Write a subject whole or not at all.
+
+    Args:
+        path: file to write.
+        subject: what it holds.
+        small: keep the principal pictures of `subject.compression.webp_packing.pack_subject` as one picture of 8 bits,
+            which is format version
+            1. Such a file is decoded when it is opened.
+
+    Raises:
+        StorageError: the file cannot be written.
+        InputError: `small`, and the pictures are larger than a WebP picture may be.
+    """
+    meta = subject.metadata.model_copy(update={"format_version": 1 if small else FORMAT_VERSION})
+    tensors: dict[str, NDArray] = {name: getattr(subject, name) for name in REQUIRED_TENSORS}
+    tensors |= {name: getattr(subject, name) for name in OPTIONAL_TENSORS if getattr(subject, name) is not None}
+    tensors |= {LANDMARKS_PREFIX + scheme: points for scheme, points in subject.landmarks.items()}
+    if small:
+        tensors[GLOBAL_BASIS_WEBP] = encode_basis(
+            subject.pictures(np.eye(meta.components, dtype=np.float32)).transpose(3, 0, 1, 2)
+        )
+    else:
+        tensors |= {LOCAL_BASIS_PREFIX + name: getattr(subject.basis, name) for name in LOCAL_BASIS_TENSORS}
+    write_tensors(path, tensors, {HEADER_KEY: meta.model_dump_json()})
+
+
+def read_subject(path: Path, in_memory: bool = False) -> Subject:
+    """Open a subject; its arrays are read-only views of the mapped file, which the system may drop and read again.
+
+    The basis of a file of version 1 is not: it is decoded into memory.
+
+    Args:
+        path: the file.
+        in_memory: read it into memory instead. What runs for long needs that: where somebody cuts a mapped file short,
+            the
+            system ends the process that looks at it. It may have `MAX_IN_MEMORY_BYTES` then, else `MAX_BYTES`.
+
+    Raises:
+        SubjectError: missing, too large, damaged, of another version, or with values that are not finite.
+    """
+    with _open_safetensors(path, MAX_IN_MEMORY_BYTES if in_memory else MAX_BYTES) as file:
+        metadata = _metadata(path, file.metadata() or {})
+        names = list(file.keys())
+        if len(names) > MAX_TENSORS:
+            raise _damaged_file_error(path, f"it holds {len(names)} tensors")
+        tensors = _tensor_views(path, names, in_memory)
+    _require_valid_tensors(path, tensors, metadata.format_version)
+    landmarks = {n.removeprefix(LANDMARKS_PREFIX): t for n, t in tensors.items() if n.startswith(LANDMARKS_PREFIX)}
+    arrays = {name: tensors[name] for name in (*REQUIRED_TENSORS, *OPTIONAL_TENSORS) if name in tensors}
+    try:
+        return Subject(metadata=metadata, basis=_basis(tensors, metadata), landmarks=landmarks, **arrays)
+    except (ValueError, SubjectError) as error:
+        raise _damaged_file_error(path, error.what if isinstance(error, SubjectError) else str(error)) from error
+
+
+def read_metadata(path: Path) -> SubjectMetadata:
+    """What a subject's header says. Its tensors are not looked at.
+
+    Raises:
+        SubjectError: missing, too large, no subject, or of another version.
+    """
+    with _open_safetensors(path, MAX_BYTES) as file:
+        return _metadata(path, file.metadata() or {})
+
+
+def read_neutral(path: Path) -> DisplayImage:
+    """A copy of the neutral picture, uint8 sRGB RGB (height, width, 3). No other tensor is looked at.
+
+    Raises:
+        SubjectError: missing, too large, no subject, of another version, or without such a picture.
+    """
+    with _open_safetensors(path, MAX_BYTES) as file:
+        metadata = _metadata(path, file.metadata() or {})
+        if "neutral" not in list(file.keys()):
+            raise _damaged_file_error(path, "it has no tensor 'neutral'")
+        stored, shape = file.get_slice("neutral"), [metadata.height, metadata.width, 3]
+        if stored.get_dtype() != "U8" or stored.get_shape() != shape:
+            raise _damaged_file_error(path, f"'neutral' is {stored.get_dtype()} {stored.get_shape()}, not U8 {shape}")
+        neutral: DisplayImage = file.get_tensor("neutral")
+        return neutral
+
+
+@contextmanager
+def _open_safetensors(path: Path, most_bytes: int) -> Iterator[Any]:
+    """A sound file of tensors, by `safe_open`, which has no types. What fails while it is open is a SubjectError."""
+    if not path.is_file():
+        raise SubjectError(f"no subject file at {path}", "build one with 'relit capture import' or check the path")
+    if path.stat().st_size > most_bytes:
+        raise SubjectError(f"{path} is larger than {most_bytes >> 30} GiB", "build it again at a smaller size")
+    try:
+        with safe_open(path, framework="numpy") as file:
+            yield file
+    except (SafetensorError, OSError) as error:
+        raise _damaged_file_error(path, str(error)) from error
+
+
+def _basis(tensors: Mapping[str, NDArray], metadata: SubjectMetadata) -> LocalBasis:
+    if metadata.format_version == FORMAT_VERSION:
+        return LocalBasis(**{name: tensors[LOCAL_BASIS_PREFIX + name] for name in LOCAL_BASIS_TENSORS})
+    shape = (3, metadata.components, metadata.height, metadata.width)
+    pictures = tensors[GLOBAL_BASIS] if GLOBAL_BASIS in tensors else decode_basis(tensors[GLOBAL_BASIS_WEBP], shape)
+    if pictures.shape != shape or tensors["matte"].shape != shape[2:]:
+        raise ValueError(
+            f"{GLOBAL_BASIS} has shape {pictures.shape} with a matte of {tensors['matte'].shape}, not {shape}"
+        )
+    return global_basis(pictures, tensors["matte"])
+
+
+def _metadata(path: Path, header: Mapping[str, str]) -> SubjectMetadata:
+    try:
+        raw = json.loads(header[HEADER_KEY])
+        version = raw.get("format_version")
+    except (KeyError, ValueError, AttributeError, RecursionError) as error:
+        raise _damaged_file_error(path, "it has no Relit Camera header") from error
+    if version not in (1, FORMAT_VERSION):
+        raise SubjectError(
+            f"{path} has format version {version}; this program reads versions 1 and {FORMAT_VERSION}",
+            "build the subject again, or use the program that wrote it",
+        )
+    try:
+        return SubjectMetadata.model_validate(raw)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise _damaged_file_error(path, f"header field {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def _tensor_views(path: Path, names: list[str], in_memory: bool) -> dict[str, NDArray]:
+    """The tensors of a file that `safe_open` found sound; its own `get_tensor` would copy each.
+
+    Layout (github.com/huggingface/safetensors): the header's length as 8 bytes, the header as JSON, the tensors.
+    """
+    content = np.fromfile(path, np.uint8) if in_memory else np.asarray(np.memmap(path, np.uint8, mode="r"))
+    content.flags.writeable = False
+    start = 8 + int.from_bytes(content[:8].tobytes(), "little")
+    header = json.loads(content[8:start].tobytes())
+    tensors = {}
+    for name in names:
+        kind, (first, last) = header[name]["dtype"], header[name]["data_offsets"]
+        if kind not in SAFETENSORS_DTYPES:
+            raise _damaged_file_error(path, f"'{name}' is {kind}, which no tensor of a subject is")
+        stored = content[start + first : start + last]
+        tensors[name] = stored.view(SAFETENSORS_DTYPES[kind]).reshape(header[name]["shape"])
+    return tensors
+
+
+def _require_valid_tensors(path: Path, tensors: Mapping[str, NDArray], version: int) -> None:
+    whole = GLOBAL_BASIS if GLOBAL_BASIS in tensors else GLOBAL_BASIS_WEBP
+    for name in (
+        *REQUIRED_TENSORS,
+        *((whole,) if version == 1 else (LOCAL_BASIS_PREFIX + part for part in LOCAL_BASIS_TENSORS)),
+    ):
+        if name not in tensors:
+            raise _damaged_file_error(path, f"it has no tensor '{name}'")
+    for name, tensor in tensors.items():
+        expected = DTYPES.get(name, (np.float32,))
+        if tensor.dtype not in expected:
+            raise _damaged_file_error(
+                path, f"'{name}' is {tensor.dtype}, not {' or '.join(np.dtype(each).name for each in expected)}"
+            )
+        if tensor.dtype.kind == "f" and not np.isfinite(tensor).all():
+            raise _damaged_file_error(path, f"'{name}' holds NaN or infinity")
+
+
+def _damaged_file_error(path: Path, reason: str) -> SubjectError:
+    return SubjectError(f"{path} is not a usable subject file: {reason}", "restore it from a copy or build it again")

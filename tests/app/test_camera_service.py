@@ -1,0 +1,289 @@
+"""The running camera: changes over HTTP reach the next frames, and whatever fails, pictures keep coming."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from relit_camera.app import camera_service as daemon_module
+from relit_camera.base.config.look import Look, Mode
+from relit_camera.base.errors import VideoError
+from relit_camera.base.images.image_types import Frame
+from relit_camera.base.models.model_store import FOLDER_VARIABLE
+from relit_camera.devices.sources.playback_source import PlaybackSource
+from relit_camera.devices.sources.source import SourceInfo, SourceState
+from relit_camera.face.face_state import LOST, FaceState
+from relit_camera.live.publishing.placeholder_image import placeholder
+from relit_camera.live.supervision import pipeline_supervisor as line_module
+from tests.small_camera import FPS, SIZE, SteadyTracker, difference, grey, memory_source, running_camera, wait_until
+
+LAMP_LEFT = {"azimuth_deg": -90, "elevation_deg": 0, "intensity": 1.5}
+LAMP_RIGHT = {"azimuth_deg": 90, "elevation_deg": 0, "intensity": 1.5}
+
+
+def sides(picture: np.ndarray) -> float:
+    """How much brighter the right half is than the left, code values."""
+    half = picture.shape[1] // 2
+    return float(picture[:, half:].mean() - picture[:, :half].mean())
+
+
+def test_a_change_of_light_is_whole_in_the_second_new_frame(tmp_path: Path) -> None:
+    with running_camera(tmp_path) as camera:
+        for lamp, sign in ((LAMP_LEFT, -1), (LAMP_RIGHT, 1), (LAMP_LEFT, -1)):
+            camera.sink.wait_for(len(camera.sink.new) + 4)
+            camera.put("lighting", environment=None, lamps=[lamp], transition_s=0)
+            known = len(camera.sink.new)
+            camera.sink.wait_for(known + 6)
+            after = camera.sink.new[known + 1]
+            assert sign * sides(after) > 10
+            assert difference(after, camera.sink.new[known + 5]) == 0
+
+
+def test_an_eased_change_begins_in_the_second_new_frame(tmp_path: Path) -> None:
+    with running_camera(tmp_path) as camera:
+        camera.sink.wait_for(4)
+        before = camera.sink.new[-1]
+        camera.put("lighting", environment="studio", exposure_ev=-2)
+        known = len(camera.sink.new)
+        camera.sink.wait_for(known + int(FPS))
+        shown = [difference(before, picture) for picture in camera.sink.new[known : known + int(FPS)]]
+        assert shown[1] > 2
+        assert shown[1] < 0.95 * shown[-1]
+        assert difference(camera.sink.new[-1], camera.sink.new[-2]) == 0
+        assert (np.diff(shown) >= 0).all()
+
+
+def test_status_tells_what_runs(tmp_path: Path) -> None:
+    with running_camera(tmp_path) as camera:
+        wait_until(lambda: camera.status()["state"] == "live" and camera.daemon.status().fps.pipeline > FPS / 3)
+        status = camera.status()
+        assert status["subject"] == "small"
+        assert status["source"] == "still memory"
+        assert status["tracker"] == {"name": "nodding", "state": "found"}
+        assert status["degraded"] == []
+        assert {"track", "light", "relight", "follow", "move", "compose"} <= status["stage_ms"].keys()  # type: ignore[attr-defined]
+        found = camera.daemon.status()
+        assert 0 < found.latency_ms.p50 <= found.latency_ms.p95
+        assert found.frames.published >= found.frames.repeated >= 0
+        # On a busy machine the first second may stutter.
+        wait_until(lambda: camera.daemon.status().fps.published == pytest.approx(FPS, rel=0.35))
+
+
+class SlowTracker(SteadyTracker):
+    def track(self, frame: Frame) -> FaceState:
+        time.sleep(3 / FPS)
+        return super().track(frame)
+
+
+def test_a_slow_pipeline_is_not_taken_for_a_slow_camera(tmp_path: Path) -> None:
+    with running_camera(tmp_path, tracker=SlowTracker()) as camera:
+        wait_until(lambda: camera.daemon.status().frames.dropped > 20 and camera.daemon.status().fps.pipeline > 0)
+        status = camera.daemon.status()
+        assert status.fps.camera > 1.8 * status.fps.pipeline > 0
+
+
+def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(daemon_module, "STALE_AFTER_S", 0.3)
+    with running_camera(tmp_path) as camera:
+        camera.sink.wait_for(3)
+        camera.put("freeze", frozen=True)
+        wait_until(lambda: camera.status()["state"] == "frozen")
+        begun = camera.sink.count
+        wait_until(lambda: camera.sink.count >= begun + 3)  # what was on its way
+        held, count = camera.sink.new[-1], camera.sink.count
+        camera.put("lighting", environment=None, lamps=[LAMP_LEFT], transition_s=0)
+        time.sleep(0.8)
+        assert camera.sink.new[-1] is held
+        assert camera.sink.count > count
+        camera.put("freeze", frozen=False)
+        wait_until(lambda: difference(camera.sink.new[-1], held) > 5)
+        assert camera.status()["state"] == "live"
+
+
+class FailingTracker(SteadyTracker):
+    """Raises for some frames, as a fault of ours would."""
+
+    fails = False
+
+    def track(self, frame: Frame) -> FaceState:
+        if self.fails:
+            raise ZeroDivisionError("a fault in one frame")
+        return super().track(frame)
+
+
+def test_a_frame_that_raises_does_not_stop_publishing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(line_module, "RETRY_S", 0.1)
+    tracker = FailingTracker()
+    with running_camera(tmp_path, tracker=tracker) as camera:
+        camera.sink.wait_for(3)
+        tracker.fails = True
+        wait_until(lambda: "a fault in one frame" in camera.troubles())
+        assert "fault of ours" in camera.troubles()
+        count = camera.sink.count
+        wait_until(lambda: camera.sink.count > count + 3)
+        tracker.fails = False
+        wait_until(lambda: camera.troubles() == "")
+        camera.sink.wait_for(len(camera.sink.new) + 2)
+
+
+class NoFaceTracker(SteadyTracker):
+    def track(self, frame: Frame) -> FaceState:
+        return LOST
+
+
+def test_without_a_face_it_searches_and_shows_the_still(tmp_path: Path) -> None:
+    with running_camera(tmp_path, tracker=NoFaceTracker()) as camera:
+        wait_until(lambda: camera.status()["state"] == "searching")
+        assert camera.sink.new[-1].std() > 5
+        assert camera.troubles() == ""
+
+
+def test_a_source_that_ends_leaves_the_placeholder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(daemon_module, "STALE_AFTER_S", 0.3)
+    with running_camera(tmp_path, source=memory_source(count=8)) as camera:
+        wait_until(lambda: camera.status()["state"] == "waiting")
+        waiting = placeholder(SIZE, "waiting for the camera")
+        wait_until(lambda: difference(camera.sink.new[-1], waiting) == 0)
+        count = camera.sink.count
+        wait_until(lambda: camera.sink.count > count + 3)
+
+
+def test_a_source_that_ended_takes_no_time(tmp_path: Path) -> None:
+    reads = []
+
+    class Counted(PlaybackSource):
+        def read(self, timeout_s: float) -> Frame | None:
+            reads.append(time.monotonic())
+            return super().read(timeout_s)
+
+    source = Counted(SourceInfo("still", "memory", SIZE, FPS), iter([(grey(), 0.0)]))
+    with running_camera(tmp_path, source=source) as camera:
+        wait_until(lambda: camera.status()["state"] == "waiting")
+        begun, began_at = len(reads), time.monotonic()
+        time.sleep(0.5)
+        assert len(reads) - begun <= (time.monotonic() - began_at) / daemon_module.READ_TIMEOUT_S + 2
+
+
+class BrokenSource:
+    """A real source whose file turns out to be damaged after some frames."""
+
+    def __init__(self) -> None:
+        self._inner = memory_source()
+        self.error: Exception | None = None
+
+    def read(self, timeout_s: float) -> Frame | None:
+        if self.error is not None:
+            raise self.error
+        return self._inner.read(timeout_s)
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._inner, name)
+
+
+@pytest.mark.parametrize(
+    ("error", "cure"),
+    [(VideoError("clip.mp4 is damaged", "copy it again"), "copy it again"), (KeyError("x"), "a fault of ours")],
+)
+def test_a_source_that_fails_is_told_with_its_cure(
+    error: Exception, cure: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(daemon_module, "RETRY_S", 0.1)
+    source = BrokenSource()
+    with running_camera(tmp_path, source=source) as camera:  # type: ignore[arg-type]
+        camera.sink.wait_for(3)
+        source.error = error
+        wait_until(lambda: cure in camera.troubles())
+        count = camera.sink.count
+        wait_until(lambda: camera.sink.count > count + 3)
+        source.error = None
+        wait_until(lambda: camera.troubles() == "")
+
+
+class SilentSource(BrokenSource):
+    """A camera that another program holds: it never gives a frame and says why."""
+
+    state = SourceState.RECONNECTING
+    reason = "HD Webcam cannot be opened: another program may be using it"
+
+    def read(self, timeout_s: float) -> Frame | None:
+        time.sleep(0.01)
+        return None
+
+
+def test_a_camera_that_never_came_is_told_and_waited_for(tmp_path: Path) -> None:
+    source = SilentSource()
+    with running_camera(tmp_path, source=source) as camera:  # type: ignore[arg-type]
+        wait_until(lambda: "another program may be using it" in camera.troubles())
+        wait_until(lambda: camera.status()["state"] == "waiting")
+        assert "relit devices" in camera.troubles()
+        wait_until(lambda: difference(camera.sink.new[-1], placeholder(SIZE, "waiting for the camera")) == 0)
+        source.reason = "HD Webcam is unplugged"
+        wait_until(lambda: "is unplugged" in camera.troubles())
+
+
+def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
+    with running_camera(tmp_path) as camera:
+        camera.sink.wait_for(3)
+        camera.put("freeze", frozen=True)
+        wait_until(lambda: camera.status()["state"] == "frozen")
+        time.sleep(2 / FPS)
+        assert httpx.get(camera.http.base_url.join("/readyz")).json() == {"status": "ready"}
+
+
+class LongFaceTracker(SteadyTracker):
+    """Sees another person: a face a fifth longer than the subject's."""
+
+    def track(self, frame: Frame) -> FaceState:
+        state = super().track(frame)
+        middle = state.landmarks.mean(axis=0)
+        return replace(state, landmarks=middle + (state.landmarks - middle) * np.array([1, 1.2], np.float32))
+
+
+def test_ratio_falls_back_with_a_word_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
+    source = memory_source(noise.repeat(4, axis=0).repeat(4, axis=1))
+    with running_camera(tmp_path, source, LongFaceTracker(), look=Look(mode=Mode.RATIO)) as camera:
+        wait_until(lambda: "mode ratio shows the reenacted still" in camera.troubles())
+        assert camera.status()["mode"] == "ratio"
+        degraded = camera.status()["degraded"]
+        assert isinstance(degraded, list)
+        assert "choose your own subject" in degraded[0]["cure"]
+        camera.sink.wait_for(len(camera.sink.new) + 3)
+        camera.put("mode", mode="reenact")
+        camera.sink.wait_for(len(camera.sink.new) + 3)
+
+
+def test_a_missing_matte_model_is_told_and_pictures_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "no-models"))
+    monkeypatch.setattr(line_module, "RETRY_S", 0.1)
+    with running_camera(tmp_path, look=Look(mode=Mode.RATIO)) as camera:
+        camera.sink.wait_for(3)
+        camera.put("background", kind="blur")
+        wait_until(lambda: "relit models pull" in camera.troubles())
+        count = camera.sink.count
+        wait_until(lambda: camera.sink.count > count + 3)
+        camera.put("background", kind="none")
+        wait_until(lambda: camera.troubles() == "")
+
+
+def test_stop_ends_every_thread(tmp_path: Path) -> None:
+    before = set(threading.enumerate())
+    with running_camera(tmp_path) as camera:
+        camera.sink.wait_for(2)
+        start = time.monotonic()
+        camera.daemon.stop()
+        assert time.monotonic() - start < 3
+        assert camera.daemon.stopping()
+        assert camera.daemon.status().state == "stopping"
+        camera.daemon.stop()
+    wait_until(
+        lambda: not {t for t in set(threading.enumerate()) - before if t.name in {"worker", "line", "publisher", "api"}}
+    )

@@ -1,0 +1,111 @@
+"""Films in, samples out, against what was put in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from relit_camera.base.errors import ConfigError, InputError
+from relit_camera.capture.film.face_circle import FaceCircle
+from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
+from relit_camera.capture.film.pipeline.film_capture import CaptureResult, build_samples, max_frames_in_memory
+from tests.capture.film.ball.mirror_scene import degrees_between
+from tests.capture.film.generated_film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film, write_film
+
+OPTIONS = CaptureOptions(gamma=2.2, size=96, focal_px=FOCAL_PX, face=FaceCircle(*HEAD, 9.5 * PX_PER_CM))
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> CaptureResult:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RELIT_MODELS_DIR", str(tmp_path_factory.mktemp("models")))
+        return build_samples(write_film(tmp_path_factory.mktemp("film") / "film.mp4", Film().codes()), OPTIONS)
+
+
+def test_lamps_gains_and_motion_are_those_of_the_film(built: CaptureResult) -> None:
+    film, frames = Film(), built.findings.report()["frames"]
+    bright = [frame for frame in frames if frame["kind"] == "bright"]
+    assert len(bright) > 70
+    assert all(film.lit(frame["index"]) > 0.97 for frame in bright)
+    error = [degrees_between(np.array(frame["direction"]), film.lamp_cm(frame["index"])) for frame in bright]
+    assert np.mean(error) < 2
+    gains = np.array([np.log(frame["gain"]) - np.log(film.gain(frame["index"])) for frame in bright])
+    assert gains.std(axis=0).max() < 0.02
+    moved = np.array([np.add(frame["translation_px"], film.shift(frame["index"])) for frame in bright])
+    assert moved.std(axis=0).max() < 0.2
+
+
+def test_samples_are_pictures_under_distant_lights(built: CaptureResult) -> None:
+    film, samples, square = Film(), built.samples, built.findings.square
+    normals = film.surface[0]
+    reflectance = film.reflectance.astype(np.float32)
+    x, y = film.shift(built.findings.analysis.motion.reference)
+    back = np.array([[1, 0, x], [0, 1, y]])
+    inside = samples.matte > 0.99
+    ratios = []
+    for picture, direction in zip(samples.pictures, samples.directions, strict=True):
+        shade = np.maximum(normals @ direction, 0)[..., None].astype(np.float32)
+        moved = cv2.warpAffine(reflectance * shade, back, SIZE)
+        left, top, side = round(square.left), round(square.top), round(square.side)
+        wanted = cv2.resize(
+            moved[top : top + side, left : left + side], samples.matte.shape, interpolation=cv2.INTER_AREA
+        )
+        lit = inside & (wanted.mean(axis=2) > 0.1)
+        ratios.append(picture[lit].mean(axis=1) / wanted[lit].mean(axis=1))
+    unit = np.median(np.concatenate(ratios))
+    errors = np.concatenate([np.abs(ratio / unit - 1) for ratio in ratios])
+    assert np.median(errors) < 0.06
+    assert np.abs(samples.matte.mean() - 0.5) < 0.2
+    assert samples.pictures[:, samples.matte == 0].max() == 0
+
+
+def test_the_report_tells_what_the_lamps_nearness_is_worth(built: CaptureResult) -> None:
+    near = built.findings.report()["near_field"]
+    assert 0 < near["misfit"] < near["misfit_if_far"]
+
+
+def test_the_room_is_taken_off(built: CaptureResult) -> None:
+    report = built.findings.report()
+    assert report["room"]["taken_off"]
+    assert report["room"]["left"] < 0.02
+    shaded = built.samples.pictures[built.samples.directions[:, 0].argmin()][:, 60:66]
+    assert np.median(shaded[built.samples.matte[:, 60:66] > 0.99]) < 0.02
+
+
+def test_a_good_film_is_taken_without_warnings_but_of_the_detector(built: CaptureResult) -> None:
+    assert all("no face detector is installed" in warning for warning in built.findings.warnings)
+
+
+@pytest.mark.parametrize(
+    ("detector", "visible", "told"),
+    [
+        (False, 0.9, ["the flash reaches everything", "no face detector is installed"]),
+        (True, 0.0, ["the room is too dark", "the eyes are not found"]),
+    ],
+)
+def test_warnings_tell_what_is_amiss(built: CaptureResult, detector: bool, visible: float, told: list[str]) -> None:
+    analysis = built.findings.analysis
+    gains = replace(analysis.gains, share=0.0, visible=visible)
+    amiss = replace(built.findings, analysis=replace(analysis, gains=gains, detector=detector, eyes_px=None))
+    warnings = amiss.warnings[-2:]
+    assert all(warning.startswith(start) for warning, start in zip(warnings, told, strict=True))
+
+
+def test_a_size_that_memory_cannot_hold_is_refused(tmp_path: Path) -> None:
+    assert max_frames_in_memory(96) == max_frames_in_memory(512) == 600
+    assert 150 <= max_frames_in_memory(1024) < 160
+    with pytest.raises(InputError, match=r"1200 pixels a side.*--size of 1024 or less"):
+        build_samples(tmp_path / "film.mp4", replace(OPTIONS, size=1200))
+
+
+def test_a_face_outside_of_the_picture_is_refused_before_a_frame_is_read(tmp_path: Path) -> None:
+    told: list[str] = []
+    options = replace(OPTIONS, face=FaceCircle(SIZE[0] + 5, 60, 40))
+    video = write_film(tmp_path / "film.mp4", np.zeros((12, *SIZE[::-1], 3), np.uint8))
+    with pytest.raises(ConfigError, match=f"face at {SIZE[0] + 5}, 60 is outside of the picture, which is {SIZE[0]}x"):
+        build_samples(video, options, lambda stage, done, total: told.append(stage))
+    assert not told

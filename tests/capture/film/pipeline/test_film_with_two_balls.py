@@ -1,0 +1,113 @@
+"""A film with two mirror balls: the lamp's distance is measured, and its direction is surer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from relit_camera.base.errors import CaptureError
+from relit_camera.capture.film.ball.specular_highlight import Highlight, NoHighlight
+from relit_camera.capture.film.face_circle import FaceCircle
+from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
+from relit_camera.capture.film.pipeline.film_analysis import FilmAnalysis
+from relit_camera.capture.film.pipeline.film_capture import CaptureResult, build_samples
+from relit_camera.capture.film.pipeline.lamp_localization import UsableLamps, find_usable_lamps
+from tests.capture.film.ball.mirror_scene import degrees_between
+from tests.capture.film.generated_film import FOCAL_PX, HEAD, PX_PER_CM, Film, with_ball, write_film
+
+FILM = Film(frames=120, distance_cm=80, sway=12, second=with_ball(-85, 75, 1))
+OPTIONS = CaptureOptions(gamma=2.2, size=64, focal_px=FOCAL_PX, face=FaceCircle(*HEAD, 9.5 * PX_PER_CM), balls=2)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> CaptureResult:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RELIT_MODELS_DIR", str(tmp_path_factory.mktemp("models")))
+        return build_samples(write_film(tmp_path_factory.mktemp("film") / "film.mp4", FILM.codes()), OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def analysis(built: CaptureResult) -> FilmAnalysis:
+    return built.findings.analysis
+
+
+def true_cm(lamps: UsableLamps) -> np.ndarray:
+    return np.array([np.linalg.norm(FILM.lamp_cm(index)) for index in lamps.index])
+
+
+def off_deg(lamps: UsableLamps) -> np.ndarray:
+    pairs = zip(lamps.directions, lamps.index, strict=True)
+    return np.array([degrees_between(direction, FILM.lamp_cm(index)) for direction, index in pairs])
+
+
+def test_the_lamps_distance_is_measured(built: CaptureResult) -> None:
+    lamps = built.findings.lamps
+    ratio = lamps.distances.cm / true_cm(lamps)
+    assert np.std(np.log(true_cm(lamps))) > 0.08
+    assert np.median(ratio) == pytest.approx(1, abs=0.05)
+    assert np.std(np.log(ratio)) < 0.06
+
+
+def test_the_direction_is_better_than_by_either_ball(analysis: FilmAnalysis) -> None:
+    both = off_deg(find_usable_lamps(analysis, OPTIONS)).mean()
+    for alone in (analysis.balls[:1], analysis.balls[1:]):
+        assert both < 0.7 * off_deg(find_usable_lamps(replace(analysis, balls=alone), OPTIONS)).mean()
+
+
+def test_where_one_ball_shows_the_lamp_neighbours_tell_its_distance(analysis: FilmAnalysis) -> None:
+    whole = find_usable_lamps(analysis, OPTIONS)
+    first, second = analysis.balls
+    gone = set(whole.index[10:13].tolist())
+    highlights = {index: NoHighlight("gone") if index in gone else each for index, each in second.highlights.items()}
+    lamps = find_usable_lamps(replace(analysis, balls=(first, replace(second, highlights=highlights))), OPTIONS)
+    np.testing.assert_array_equal(lamps.index, whole.index)
+    assert not gone & set(lamps.located)
+    changed = np.isin(lamps.index, list(gone))
+    np.testing.assert_allclose(lamps.distances.cm[changed], true_cm(lamps)[changed], rtol=0.12)
+    assert (lamps.distances.error[changed] > whole.distances.error[changed]).all()
+
+
+def test_a_frame_in_which_they_show_different_things_is_left_out(analysis: FilmAnalysis) -> None:
+    first, second = analysis.balls
+    index = int(find_usable_lamps(analysis, OPTIONS).index[20])
+    other = second.highlights[index - 24]
+    assert isinstance(other, Highlight)
+    wrong = replace(second, highlights=dict(second.highlights) | {index: other})
+    lamps = find_usable_lamps(replace(analysis, balls=(first, wrong)), OPTIONS)
+    assert lamps.unusable[index] == "the two balls show the lamp in different places"
+    assert index not in lamps.index
+
+
+def test_the_report_tells_where_the_distance_is_from(built: CaptureResult) -> None:
+    report, lamps = built.findings.report(), built.findings.lamps
+    told = report["lamp_distance"]
+    assert told["source"] == "two balls"
+    assert told["frames"] == len(lamps.located) > 40
+    assert 0 < told["gap_deg"] < 1
+    assert 0 < told["error"] < 0.15
+    assert told["median_cm"] == pytest.approx(80, rel=0.06)
+    distances = [frame["distance_cm"] for frame in report["frames"] if "distance_cm" in frame]
+    np.testing.assert_allclose(distances, lamps.distances.cm, atol=0.01)
+    assert report["second_ball"]["radius_cm"] == report["ball"]["radius_cm"]
+    assert abs(report["second_ball"]["x"] - report["ball"]["x"]) > 100
+
+
+def test_balls_that_disagree_are_told(built: CaptureResult) -> None:
+    findings = built.findings
+    apart = {index: replace(each, gap_deg=2.5) for index, each in findings.lamps.located.items()}
+    amiss = replace(findings, lamps=replace(findings.lamps, located=apart))
+    assert any("the two balls disagree about the lamp by 2.5 degrees" in warning for warning in amiss.warnings)
+    few = dict(list(apart.items())[:10])
+    amiss = replace(findings, lamps=replace(findings.lamps, located=few))
+    assert any(warning.startswith("both balls show the lamp in 2") for warning in amiss.warnings)
+    assert not any("balls" in warning for warning in findings.warnings)
+
+
+def test_circles_that_are_no_balls_of_one_size_are_refused(analysis: FilmAnalysis) -> None:
+    first, second = analysis.balls
+    small = replace(second.found.outline, radius=second.found.outline.radius / 2)
+    wrong = replace(second, found=replace(second.found, outline=small))
+    with pytest.raises(CaptureError, match=r"show the lamp in different places in \d+ of \d+ frames; .*of one size"):
+        find_usable_lamps(replace(analysis, balls=(first, wrong)), OPTIONS)

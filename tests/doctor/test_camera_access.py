@@ -1,0 +1,142 @@
+"""What the doctor sees of webcam and virtual camera."""
+
+from __future__ import annotations
+
+from relit_camera.base.config.settings import OutputSettings, SourceSettings
+from relit_camera.doctor.camera_access import check_virtual_camera, check_webcam, groups_to_join
+from relit_camera.doctor.report import Severity
+from tests.doctor.conftest import C920
+from tests.doctor.fake_host import FIREFOX, RELIT, FakeMachine, everybody_may, expect, nobody_may
+
+# The virtual camera.
+
+
+def test_a_virtual_camera_as_it_should_be(machine):
+    expect(check_virtual_camera(OutputSettings(), machine.host, everybody_may), Severity.OK, "Relit Camera", "video10")
+
+
+def test_without_the_module_the_cure_loads_it(bare):
+    finding = check_virtual_camera(OutputSettings(), bare.host, everybody_may)
+    expect(finding, Severity.PROBLEM, "not loaded", "sudo modprobe v4l2loopback", 'card_label="Relit Camera"')
+
+
+def test_another_label_is_named(machine):
+    finding = check_virtual_camera(OutputSettings(label="Studio"), machine.host, everybody_may)
+    expect(finding, Severity.PROBLEM, "'Studio'", "there are 'Relit Camera'", 'card_label="Studio"')
+
+
+def test_without_exclusive_caps_browsers_do_not_list_it(machine):
+    machine.load_module(exclusive_caps="N,N,N,N,N,N,N,N")
+    finding = check_virtual_camera(OutputSettings(), machine.host, everybody_may)
+    expect(finding, Severity.WARNING, "Chrome", "modprobe -r v4l2loopback", "exclusive_caps=1")
+
+
+def test_exclusive_caps_count_for_each_device(machine):
+    machine.tree.add_loopback(9, "OBS Virtual Camera")
+    machine.load_module(exclusive_caps="Y,N,N,N,N,N,N,N")  # ours is the second now
+    expect(check_virtual_camera(OutputSettings(), machine.host, everybody_may), Severity.WARNING, "exclusive_caps")
+    machine.load_module(exclusive_caps="N,Y,N,N,N,N,N,N")
+    expect(check_virtual_camera(OutputSettings(), machine.host, everybody_may), Severity.OK)
+
+
+def test_who_may_use_the_node_is_said(machine):
+    expect(
+        check_virtual_camera(OutputSettings(), machine.host, nobody_may),
+        Severity.PROBLEM,
+        "group",
+        "usermod -aG",
+        "log in again",
+    )
+
+
+def test_no_virtual_camera_is_needed_for_a_file(bare):
+    for sink in ("null", "out.mp4"):
+        finding = check_virtual_camera(OutputSettings(sink=sink), bare.host, nobody_may)
+        expect(finding, Severity.OK, "not needed", sink)
+
+
+def test_a_node_given_as_sink_is_examined(machine):
+    node = machine.tree.add_loopback(11, "Spare", size=(1280, 720))
+    machine.load_module(exclusive_caps="Y,Y")
+    finding = check_virtual_camera(OutputSettings(sink=node), machine.host, everybody_may)
+    expect(finding, Severity.OK, "Spare", "video11", "in use at 1280x720")
+
+
+def test_a_node_that_is_no_virtual_camera_is_a_problem_though_there_is_one(machine, tmp_path):
+    node = str(machine.tree.dev / "video97")
+    finding = check_virtual_camera(OutputSettings(sink=node), machine.host, everybody_may)
+    expect(finding, Severity.PROBLEM, "video97 is no virtual camera", "choose one of", "'Relit Camera'")
+    bare = FakeMachine(tmp_path / "another")
+    finding = check_virtual_camera(OutputSettings(sink=str(bare.tree.dev / "video97")), bare.host, everybody_may)
+    expect(finding, Severity.PROBLEM, "modprobe")
+
+
+# The webcam.
+
+
+def test_a_webcam_is_named_with_its_node(machine):
+    expect(check_webcam(SourceSettings(), machine.host, everybody_may), Severity.OK, "HD Pro Webcam C920", "video2")
+
+
+def test_no_webcam_and_an_unknown_one_are_problems(machine, bare):
+    expect(check_webcam(SourceSettings(), bare.host, everybody_may), Severity.PROBLEM, "no webcam", "--source FILE")
+    expect(
+        check_webcam(SourceSettings(source="usb-other"), machine.host, everybody_may),
+        Severity.PROBLEM,
+        "usb-other",
+        C920,
+    )
+
+
+def test_our_own_camera_is_no_webcam_whatever_it_is_called(machine):
+    machine.tree.add_loopback(12, "Studio")
+    source = SourceSettings(source="Studio")
+    expect(check_webcam(source, machine.host, everybody_may), Severity.OK, "video12")
+    finding = check_webcam(source, machine.host, everybody_may, "Studio")
+    expect(finding, Severity.PROBLEM, "film itself")
+
+
+def test_who_may_read_the_webcam_is_said(machine):
+    expect(
+        check_webcam(SourceSettings(), machine.host, nobody_may),
+        Severity.PROBLEM,
+        "only be read by group",
+        "usermod -aG",
+    )
+
+
+def test_no_webcam_is_needed_for_a_file_or_the_pattern(bare, tmp_path):
+    clip = tmp_path / "clip.mp4"
+    clip.touch()
+    for source in (str(clip), "pattern"):
+        finding = check_webcam(SourceSettings(source=source), bare.host, nobody_may)
+        expect(finding, Severity.OK, "not needed", source)
+
+
+# Who has them open, and who may.
+
+
+def test_a_webcam_that_another_program_has_open_is_named_with_it(machine):
+    node = str(machine.tree.dev / "video2")
+    machine.open_by(node, FIREFOX)
+    finding = check_webcam(SourceSettings(), machine.host, everybody_may)
+    expect(finding, Severity.WARNING, node, "firefox (process 30)", "close it")
+    machine.open_by(node, RELIT)
+    expect(check_webcam(SourceSettings(), machine.host, everybody_may), Severity.OK, "read by relit (process 40)")
+
+
+def test_who_has_the_virtual_camera_open_is_listed(machine):
+    machine.open_by(str(machine.tree.dev / "video10"), FIREFOX, RELIT)
+    finding = check_virtual_camera(OutputSettings(), machine.host, everybody_may)
+    expect(finding, Severity.OK, "opened by firefox (process 30), relit (process 40)")
+
+
+def test_the_groups_to_join_are_those_of_shut_devices(machine):
+    assert groups_to_join(machine.tree, everybody_may) == ()
+    group = (machine.tree.dev / "video2").group()
+    assert groups_to_join(machine.tree, nobody_may) == (group,)
+
+
+def test_another_system_has_obs_studios_camera(tmp_path):
+    other = FakeMachine(tmp_path / "mac", is_linux=False)
+    expect(check_virtual_camera(OutputSettings(), other.host, everybody_may), Severity.OK, "OBS Studio")

@@ -1,0 +1,89 @@
+"""A small running camera whose every published frame is timed, for injecting faults."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from relit_camera.base.images.image_types import DisplayImage
+from tests.small_camera import Camera, RememberingSink, running_camera, wait_until
+
+LONGEST_GAP_S = 1.0
+"""Between two published frames, whatever happens. Chromium gives a camera up after some ten seconds."""
+
+
+@dataclass
+class TimedSink(RememberingSink):
+    """Keeps the monotonic time of every write."""
+
+    times: list[float] = field(default_factory=list)
+
+    def write(self, image: DisplayImage) -> None:
+        super().write(image)
+        self.times.append(time.monotonic())
+
+    def longest_gap_s(self, since: float) -> float:
+        """Between two writes, the last one and now included."""
+        times = [since, *(each for each in self.times if each > since), time.monotonic()]
+        return float(np.diff(times).max())
+
+
+@dataclass
+class Watched:
+    """A camera under test.
+
+    Attributes:
+        camera: it.
+        sink: what it publishes to.
+    """
+
+    camera: Camera
+    sink: TimedSink
+    since: float = 0.0
+
+    def begin(self) -> None:
+        """The fault begins now."""
+        self.since = time.monotonic()
+
+    def told(self, text: str) -> None:
+        """Wait until the status tells of this."""
+        wait_until(lambda: text in self.camera.troubles())
+
+    def still_told_nothing(self) -> bool:
+        """Whether the status says that all is well."""
+        return self.camera.troubles() == ""
+
+    def state(self, state: str) -> None:
+        """Wait for a state."""
+        wait_until(lambda: self.camera.status()["state"] == state)
+
+    def recovers(self) -> None:
+        """Wait until all is well: live, with no trouble left."""
+        wait_until(lambda: self.camera.troubles() == "" and self.camera.status()["state"] == "live")
+        self.sink.wait_for(len(self.sink.new))
+
+    def goes_on(self, frames: int = 5) -> None:
+        """Wait for some more frames."""
+        count = self.sink.count
+        wait_until(lambda: self.sink.count >= count + frames)
+
+
+Survived = Callable[[str, Watched], None]
+"""Told a fault's name at its end: asserts that no frame was missing for long, and notes it for the table."""
+
+
+@contextmanager
+def watched_camera(folder: Path, **arguments: Any) -> Iterator[Watched]:
+    """A running camera that is live; see `running_camera`."""
+    sink = TimedSink()
+    with running_camera(folder, sink=sink, **arguments) as camera:
+        watched = Watched(camera, sink)
+        watched.state("live")
+        watched.begin()
+        yield watched

@@ -1,0 +1,90 @@
+"""A small person whose face is known exactly, and live faces that move as told."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from relit_camera.base.images.image_types import Frame
+from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.face.face_state import FaceStatus, HeadPose
+from relit_camera.face.head_pose import guess_focal, project
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.neutral_face import NeutralFace
+from relit_camera.lab.bench.synthetic_subject import synthetic_subject
+from relit_camera.live.reenactment.reenactor import ReenactorContext
+from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.subject import Subject
+
+SCHEME = landmark_scheme("mesh478")
+LIVE_SIZE = (320, 240)
+LIVE_NEUTRAL = HeadPose(Rotation.from_euler("Y", 4, degrees=True), np.array([3.0, -1.0, -60.0]), guess_focal(LIVE_SIZE))
+NEUTRAL = NeutralFace(SCHEME.canonical.copy(), LIVE_NEUTRAL)
+
+
+class Looker:
+    """A recording: it is only asked for its scheme."""
+
+    name, scheme = "recorded", "mesh478"
+
+
+@cache
+def close_up() -> Subject:
+    """A face that fills its picture, 96 x 128, cut off by the border; not taken over black."""
+    subject = synthetic_subject(96, 128)
+    return dataclasses.replace(subject, metadata=subject.metadata.model_copy(update={"over_black": False}))
+
+
+@cache
+def person() -> Subject:
+    """The same, with background beside and above the head."""
+    subject = close_up()
+    height, width = subject.matte.shape
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    distance = np.hypot((x - width / 2) / (0.42 * width), (y - height / 2) / (0.46 * height))
+    body = np.clip(1 - np.abs(x - width / 2) / (0.4 * width), 0, 0.2) * 5 * (y > height / 2)
+    matte = np.maximum(np.clip((1 - distance) * 12, 0, 1), body)
+    return dataclasses.replace(subject, matte=matte.astype(np.float32))
+
+
+def face_of(subject: Subject) -> SourceFace:
+    """Its face, as stored with it."""
+    return find_source_face(subject, Looker())
+
+
+def stage_of(subject: Subject, size: tuple[int, int]) -> ReenactorContext:
+    """A stage for pictures of `size`."""
+    return ReenactorContext(subject, BasisRelighter(subject), face_of(subject), size, SessionOptions())
+
+
+def motion(turn=None, shift=(0, 0, 0), expression=None, presence=1.0, status=FaceStatus.FOUND) -> FaceMotion:
+    """A live face that has moved from `LIVE_NEUTRAL` by a rotation, centimetres, and head-space centimetres a point."""
+    turn = turn or Rotation.identity()
+    expression = np.zeros((SCHEME.count, 3)) if expression is None else expression
+    shift = np.asarray(shift, dtype=np.float64)
+    now = HeadPose(turn * LIVE_NEUTRAL.rotation, LIVE_NEUTRAL.translation + shift, LIVE_NEUTRAL.focal_px)
+    landmarks = project(NEUTRAL.points + expression, now, LIVE_SIZE)
+    return FaceMotion(status, presence, turn, shift, expression, landmarks, now, NEUTRAL)
+
+
+NOBODY = FaceMotion(
+    FaceStatus.LOST, 0.0, Rotation.identity(), np.zeros(3), np.zeros((SCHEME.count, 3)), np.zeros((0, 2), np.float32),
+    None, None,
+)  # fmt: skip
+
+
+def moved_by(reenactor, relit, motion, frame):
+    """A frame as the pipeline does it: follow the face, then move the relit picture."""
+    return reenactor.plan_warp(motion, frame)(relit)
+
+
+def live_frame(image=None, index=0) -> Frame:
+    """A frame of the live size: grey noise unless given."""
+    if image is None:
+        image = np.random.default_rng(index).integers(60, 180, (LIVE_SIZE[1], LIVE_SIZE[0], 3)).astype(np.uint8)
+    return Frame(image, index, index / 30, index / 30)

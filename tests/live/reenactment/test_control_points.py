@@ -1,0 +1,164 @@
+"""Control points: the right landmarks, lids and lips that part cleanly, anchors that turn as a head does."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.face.face_state import HeadPose
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.live.reenactment.control_points import (
+    MAX_LANDMARKS,
+    NECK_PIVOT,
+    SKULL_CENTER,
+    control_points,
+    fine_regions,
+    head_and_shoulder_anchors,
+    select_landmarks,
+    shoulder_anchors,
+    skull_outline,
+)
+from relit_camera.live.reenactment.dense_motion import DenseMotion
+from relit_camera.live.reenactment.face_mesh import triangulate_face
+from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
+from relit_camera.live.reenactment.motion_transfer import rotate_about, transfer_motion
+from tests.live.people import SCHEME, face_of, motion, person
+
+UP = np.array([0.0, -1.0])
+
+
+@pytest.fixture(scope="module")
+def face():
+    return face_of(person())
+
+
+@pytest.fixture(scope="module")
+def points(face):
+    return control_points(face, head_and_shoulder_anchors(face.pose, face.size))
+
+
+def lids_lowered(face, share=1.0):
+    """The expression, head-space cm, that brings each upper lid down by a share of the way to the lower one."""
+    expression = np.zeros((SCHEME.count, 3))
+    for eye in (SCHEME.right_eye, SCHEME.left_eye):
+        inner = eye.lids.index(eye.inner)
+        upper, lower = list(eye.lids[1:inner]), list(eye.lids[:inner:-1])
+        expression[upper, :2] = share * (face.head_points[lower] - face.head_points[upper])[:, :2]
+    return expression
+
+
+def test_lips_eyes_brows_and_outline_are_all_chosen(face):
+    chosen = set(select_landmarks(SCHEME, face.landmarks.astype(float)).tolist())
+    assert len(chosen) == MAX_LANDMARKS
+    assert chosen >= {*SCHEME.lips, *SCHEME.eyes, *SCHEME.right_brow, *SCHEME.left_brow, *SCHEME.oval}
+    small = landmark_scheme("openseeface66")
+    assert select_landmarks(small, small.canonical[:, :2]).tolist() == list(range(66))
+
+
+def test_the_chosen_are_spread_evenly(face, points):
+    """No landmark is far from a chosen one: farthest-point sampling leaves no hole."""
+    distance = np.linalg.norm(face.landmarks[:, None] - points.source[None, : len(points.chosen)], axis=2).min(axis=1)
+    assert distance.max() < 0.12 * points.unit
+
+
+def test_pairs_lie_over_each_other(points):
+    upper, lower = points.source[points.pairs.T]
+    assert (lower[:, 1] >= upper[:, 1] - 1e-6).all()
+    assert np.abs(lower[:, 0] - upper[:, 0]).max() < 0.06 * points.unit
+
+
+def test_open_lids_act_where_they_are(points):
+    """Two landmarks a whole reach apart need no handing over."""
+    apart = points.source.copy()
+    upper, lower = points.pairs.T
+    apart[upper] += 2 * points.radius[upper, None] * UP
+    apart[lower] -= 2 * points.radius[lower, None] * UP
+    influence = points.influence(apart, UP)
+    np.testing.assert_array_equal(influence.centre, influence.target)
+    np.testing.assert_array_equal(influence.target, apart)
+    np.testing.assert_allclose(influence.strength, (points.unit / points.radius) ** 2)
+
+
+def test_lids_that_would_cross_meet_in_the_middle(points):
+    crossed = points.source.copy()
+    upper, lower = points.pairs.T
+    crossed[upper] = points.source[lower] - 2 * UP  # two pixels below the lower one
+    crossed[lower] = points.source[lower]
+    target = points.influence(crossed, UP).target
+    np.testing.assert_allclose(target[upper], target[lower], atol=1e-9)
+    np.testing.assert_allclose(target[upper], points.source[lower] - UP)
+
+
+def test_a_shut_eye_has_no_iris(face, points):
+    shut, open_ = (
+        transfer_motion(face, points, motion(expression=lids_lowered(face, share))).points for share in (1.0, 0.0)
+    )
+    irises = np.concatenate([iris for iris, _ in points.irises])
+    assert len(irises) == 10
+    assert points.influence(shut, UP).strength[irises].max() == 0
+    assert points.influence(open_, UP).strength[irises].min() > 0
+
+
+def test_a_blink_shows_the_upper_lid_above_the_slit_and_the_lower_lid_below_it(face, points):
+    """The eyeball between the still's open lids is nowhere to be seen."""
+    moved = transfer_motion(face, points, motion(expression=lids_lowered(face)))
+    patches = face_and_head_flow(
+        DenseMotion(SessionOptions()), triangulate_face(face), points, moved.points, moved.landmarks, moved.pose
+    )
+    still = face.landmarks.astype(float)
+    for eye, patch in zip((SCHEME.right_eye, SCHEME.left_eye), patches[2:4], strict=True):
+        rows, columns = patch.flow.shape[:2]
+        x, y = np.meshgrid(
+            np.linspace(patch.region[0], patch.region[2], columns), np.linspace(patch.region[1], patch.region[3], rows)
+        )
+        looks_y = y + patch.flow[..., 1]
+        inner = eye.lids.index(eye.inner)
+        upper, lower = eye.lids[1:inner], eye.lids[:inner:-1]
+        middle = len(upper) // 2
+        for u, v in list(zip(upper, lower, strict=True))[middle - 1 : middle + 2]:
+            gap = still[v, 1] - still[u, 1]
+            slit = (moved.landmarks[u] + moved.landmarks[v]) / 2
+            column = int(np.abs(x[0] - slit[0]).argmin())
+            distance = y[:, column] - slit[1]
+            above = (distance < -0.35 * gap) & (distance > -0.9 * gap)
+            below = (distance > 0.35 * gap) & (distance < 0.9 * gap)
+            assert above.any()
+            assert below.any()
+            assert looks_y[above, column].max() < still[u, 1] + 0.2 * gap
+            assert looks_y[below, column].min() > still[v, 1] - 0.2 * gap
+
+
+def test_fine_regions_hold_eyes_and_mouth(face):
+    regions = fine_regions(face, face.landmarks.astype(float))
+    for region, group in zip(regions, (SCHEME.right_eye.lids, SCHEME.left_eye.lids, SCHEME.lips), strict=True):
+        part = face.landmarks[list(group)]
+        assert (part > region.box[:2]).all()
+        assert (part < region.box[2:]).all()
+
+
+def test_the_skulls_outline_stays_when_the_head_turns_about_its_middle(face):
+    rest = skull_outline(face.pose, face.size)
+    nodded = rotate_about(SKULL_CENTER, face.pose, Rotation.from_euler("Y", 25, degrees=True))
+    np.testing.assert_allclose(skull_outline(nodded, face.size), rest, atol=1e-3)
+
+
+def test_the_skulls_outline_rolls_and_grows_with_the_head(face):
+    rest, size = skull_outline(face.pose, face.size), face.size
+    # A roll about the camera's own axis turns the whole picture: positive lifts its right side.
+    roll = Rotation.from_euler("Z", 20, degrees=True)
+    rolled = HeadPose(roll * face.pose.rotation, roll.apply(face.pose.translation), face.pose.focal_px)
+    across = (rest - np.array(size) / 2) * [1, -1]
+    expected = roll.apply(np.column_stack([across, np.zeros(len(across))]))[:, :2] * [1, -1] + np.array(size) / 2
+    np.testing.assert_allclose(skull_outline(rolled, size), expected, atol=1e-3)
+    near = dataclasses.replace(face.pose, translation=face.pose.translation * [1, 1, 0.8])
+    assert np.ptp(skull_outline(near, size)[:, 0]) > 1.15 * np.ptp(rest[:, 0])
+
+
+def test_shoulders_stay_while_the_head_turns_on_its_neck(face):
+    turned = rotate_about(NECK_PIVOT, face.pose, Rotation.from_euler("YXZ", [25, 10, 5], degrees=True))
+    np.testing.assert_allclose(shoulder_anchors(turned, face.size), shoulder_anchors(face.pose, face.size), atol=1e-3)
+    assert shoulder_anchors(face.pose, face.size)[:, 1].min() > face.landmarks[list(SCHEME.lips), 1].max()

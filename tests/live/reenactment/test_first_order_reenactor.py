@@ -1,0 +1,169 @@
+"""The default reenactor: at rest the still stands in the output, and its features go where the driver's go."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.face.head_pose import project
+from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor, fade_flow_at_border
+from relit_camera.live.reenactment.motion_transfer import split_body_motion, transfer_motion
+from relit_camera.live.reenactment.reenactor import open_reenactor
+from relit_camera.live.reenactment.source_image import feather_edges
+from relit_camera.live.reenactment.warp import FlowPatch, inverse_affine, move_body, source_from_output
+from tests.live.people import NOBODY, SCHEME, close_up, live_frame, motion, moved_by, person, stage_of
+
+SIZE = (480, 360)
+FEATURES = {"nose": 1, "chin": 152, "brow": 105, "cheek": 50, "mouth corner": 61}
+"""Vertices of the canonical face that lie well inside it."""
+
+
+def relit_picture(subject):
+    """A smooth, bright picture of the subject's size."""
+    height, width = subject.matte.shape
+    x, y = np.meshgrid(np.linspace(0, 5, width), np.linspace(0, 7, height))
+    return np.stack([0.5 + 0.3 * np.sin(x), 0.5 + 0.3 * np.cos(y), 0.4 + 0.2 * np.sin(x + y)], 2).astype(np.float32)
+
+
+def marked(subject, point):
+    """Black but for a soft dot at a still position."""
+    height, width = subject.matte.shape
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    dot = np.exp(-((x - point[0]) ** 2 + (y - point[1]) ** 2) / (2 * 1.5**2))
+    return np.repeat(dot[..., None], 3, axis=2).astype(np.float32)
+
+
+def centroid(moved):
+    """Where the light is, in output pixels."""
+    weight = moved.picture.sum(axis=2)
+    x, y = np.meshgrid(np.arange(weight.shape[1]) + 0.5, np.arange(weight.shape[0]) + 0.5)
+    return np.array([(weight * x).sum(), (weight * y).sum()]) / weight.sum() + moved.at
+
+
+def placed_still(picture, subject):
+    """The still fitted into the output on its bottom edge, by cv2's resize alone."""
+    scale = SIZE[1] / subject.size[1]
+    width = round(subject.size[0] * scale)
+    assert width == subject.size[0] * scale
+    large = cv2.resize(picture, (width, SIZE[1]), interpolation=cv2.INTER_CUBIC)
+    left = (SIZE[0] - width) // 2
+    return cv2.copyMakeBorder(large, 0, 0, left, SIZE[0] - width - left, cv2.BORDER_CONSTANT), left
+
+
+def in_output(moved):
+    """The moved picture and its alpha in the whole output."""
+    picture, alpha = np.zeros((SIZE[1], SIZE[0], 3), np.float32), np.zeros((SIZE[1], SIZE[0]), np.float32)
+    area = np.s_[moved.at[1] : moved.at[1] + moved.alpha.shape[0], moved.at[0] : moved.at[0] + moved.alpha.shape[1]]
+    picture[area], alpha[area] = moved.picture, moved.alpha
+    return picture, alpha
+
+
+@pytest.mark.parametrize("subject", [person, close_up])
+@pytest.mark.parametrize("at_rest", [motion(), NOBODY], ids=["at rest", "nobody"])
+def test_a_face_at_rest_gives_back_the_still(subject, at_rest):
+    subject = subject()
+    colours = relit_picture(subject)
+    over_black = colours * (subject.matte[..., None] if subject.metadata.over_black else 1)
+    reenactor = open_reenactor("first-order", stage_of(subject, SIZE))
+    picture, alpha = in_output(moved_by(reenactor, over_black, at_rest, live_frame()))
+    matte = feather_edges(subject.matte)
+    expected = placed_still(colours * matte[..., None], subject)[0]
+    assert 10 * np.log10(1 / np.mean((picture - expected) ** 2)) > 35
+    np.testing.assert_allclose(alpha, placed_still(matte, subject)[0], atol=0.06)
+
+
+@pytest.mark.parametrize("feature", FEATURES)
+@pytest.mark.parametrize("angles", [(14, 0, 0), (0, 9, 0), (0, 0, 10), (-10, -6, 5)])
+def test_features_go_where_the_turned_head_has_them(feature, angles):
+    subject = person()
+    stage = stage_of(subject, SIZE)
+    index = FEATURES[feature]
+    moving = motion(rotation_from_angles(*angles))
+    moved = moved_by(FirstOrderReenactor(stage), marked(subject, stage.face.landmarks[index]), moving, live_frame())
+    body = split_body_motion(stage.face, moving)
+    in_still = project(stage.face.head_points, body.turned, stage.face.size)[index]
+    placed = move_body(source_from_output(subject.size, SIZE), body.pivot, body.shift, body.scale, subject.size[1])
+    inverse = inverse_affine(placed)
+    expected = inverse[:, :2] @ in_still + inverse[:, 2]
+    pixel = SIZE[1] / subject.size[1]
+    before = inverse_affine(source_from_output(subject.size, SIZE))
+    start = before[:, :2] @ stage.face.landmarks[index] + before[:, 2]
+    way = np.linalg.norm(expected - start)
+    assert way > pixel  # it had somewhere to go
+    assert np.linalg.norm(centroid(moved) - expected) < 0.5 * pixel + 0.15 * way
+
+
+def test_brows_go_up_with_the_drivers():
+    subject = person()
+    stage = stage_of(subject, SIZE)
+    expression = np.zeros((SCHEME.count, 3))
+    brow = list(SCHEME.right_brow)
+    away = np.linalg.norm(SCHEME.canonical[:, None, :2] - SCHEME.canonical[None, brow, :2], axis=2).min(axis=1)
+    expression[:, 1] = 0.6 * np.exp(-((away / 1.5) ** 2))  # a brow takes the skin above and below it along
+    relit = marked(subject, stage.face.landmarks[brow].mean(axis=0))
+    reenactor = FirstOrderReenactor(stage)
+    rest = centroid(moved_by(reenactor, relit, motion(), live_frame()))
+    raised = centroid(moved_by(reenactor, relit, motion(expression=expression), live_frame()))
+    points = reenactor._points
+    expected = (
+        transfer_motion(stage.face, points, motion(expression=expression)).landmarks[brow] - stage.face.landmarks[brow]
+    )
+    np.testing.assert_allclose(raised - rest, expected.mean(axis=0) * SIZE[1] / subject.size[1], atol=1.5)
+    assert raised[1] < rest[1] - 3
+
+
+def test_an_opening_mouth_shows_a_dark_inside():
+    subject = person()
+    stage = stage_of(subject, SIZE)
+    expression = np.zeros((SCHEME.count, 3))
+    expression[list(SCHEME.lower_lip_inner[1:-1]), 1] = -2.0
+    expression[list(SCHEME.lower_lip_outer[1:-1]), 1] = -2.0
+    relit = np.full((*subject.matte.shape, 3), 0.5, np.float32)
+    reenactor = FirstOrderReenactor(stage)
+    shut, _ = in_output(moved_by(reenactor, relit, motion(), live_frame()))
+    opened, alpha = in_output(moved_by(reenactor, relit, motion(expression=expression), live_frame()))
+    lips = stage.face.landmarks[[13, 14]].mean(axis=0) + [0, 6]
+    column, row = (inverse_affine(source_from_output(subject.size, SIZE)) @ [*lips, 1]).astype(int)
+    assert shut[row, column].min() > 0.4
+    assert opened[row, column].max() < 0.12
+    assert alpha[row, column] == pytest.approx(1, abs=1e-3)
+
+
+def test_no_motion_lets_the_body_hover_and_all_stays_in_the_output():
+    subject = person()
+    reenactor = FirstOrderReenactor(stage_of(subject, SIZE))
+    relit = relit_picture(subject)
+    for shift in ((0, 9, 0), (-12, 5, 4), (12, -6, -20), (0, 0, 12)):
+        moved = moved_by(reenactor, relit, motion(rotation_from_angles(10, -8, 4), shift=shift), live_frame())
+        height, width = moved.alpha.shape
+        assert moved.picture.shape == (height, width, 3)
+        assert moved.picture.dtype == moved.alpha.dtype == np.float32
+        assert min(moved.at) >= 0
+        assert moved.at[0] + width <= SIZE[0]
+        assert moved.at[1] + height == SIZE[1]
+        assert moved.alpha[-1].max() > 0.9
+        assert np.isfinite(moved.picture).all()
+        assert moved.alpha.min() >= 0
+        assert moved.alpha.max() <= 1
+
+
+def test_light_and_picture_are_proportional():
+    """The warp is linear in the light: twice the light is twice the picture."""
+    subject = person()
+    relit = relit_picture(subject)
+    reenactor = FirstOrderReenactor(stage_of(subject, SIZE))
+    moving = motion(rotation_from_angles(10, 5, 0))
+    once, twice = (moved_by(reenactor, relit * gain, moving, live_frame()).picture for gain in (1, 2))
+    np.testing.assert_allclose(twice, 2 * once, atol=1e-5)
+
+
+def test_a_face_cut_off_by_its_border_does_not_move_there():
+    flow = np.full((41, 31, 2), 3, np.float32)
+    held = fade_flow_at_border(FlowPatch(flow, np.array([-10.0, 0, 110, 160])), (100, 150)).flow
+    x, y = np.meshgrid(np.linspace(-10, 110, 31), np.linspace(0, 160, 41))
+    outside = (x <= 0) | (x >= 100) | (y <= 0) | (y >= 150)
+    np.testing.assert_array_equal(held[outside], 0)
+    inside = (np.abs(x - 50) < 30) & (np.abs(y - 75) < 50)
+    np.testing.assert_array_equal(held[inside], 3)

@@ -1,0 +1,136 @@
+"""The inside of the mouth: drawn where the lips part, lit as the lips are, and nowhere else."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.live.reenactment.motion_transfer import FACE_CENTER, rotate_about
+from relit_camera.live.reenactment.mouth_interior import MouthInterior
+from tests.live.people import SCHEME, face_of, person
+
+SCALE = 4.0
+TO_OUTPUT = np.array([[SCALE, 0, 0], [0, SCALE, 0]])
+SKIN = np.float32([0.4, 0.25, 0.2])
+
+
+@pytest.fixture(scope="module")
+def face():
+    return face_of(person())
+
+
+@pytest.fixture(scope="module")
+def mouth(face):
+    return MouthInterior(face, person().neutral)
+
+
+def opened(face, pixels):
+    """Landmarks with the lower lip down by some still pixels."""
+    landmarks = face.landmarks.astype(np.float64)
+    landmarks[list(SCHEME.lower_lip_inner[1:-1]), 1] += pixels
+    return landmarks
+
+
+def draw(mouth, face, landmarks, light=1.0, alpha=1.0):
+    """A picture of plain skin with the mouth drawn; and the skin."""
+    shape = int(face.size[1] * SCALE), int(face.size[0] * SCALE)
+    mask = np.full(shape, alpha, np.float32)
+    relit = np.broadcast_to(SKIN * np.float32(light), (face.size[1], face.size[0], 3))
+    picture = np.ascontiguousarray(np.broadcast_to(SKIN * np.float32(light * alpha), (*shape, 3)))
+    skin = picture.copy()
+    mouth.draw(picture, mask, relit, landmarks, face.pose, TO_OUTPUT)
+    np.testing.assert_array_equal(mask, np.float32(alpha))
+    return picture, skin
+
+
+def changed(picture, skin):
+    rows, columns = np.nonzero(np.abs(picture - skin).max(axis=2) > 0.01)
+    return (columns + 0.5) / SCALE, (rows + 0.5) / SCALE
+
+
+def test_a_shut_mouth_is_left_alone(mouth, face):
+    for pixels in (0.0, -1.0):
+        picture, skin = draw(mouth, face, opened(face, pixels))
+        np.testing.assert_array_equal(picture, skin)
+
+
+def test_it_is_drawn_between_the_lips_and_nowhere_else(mouth, face):
+    landmarks = opened(face, 8)
+    x, y = changed(*draw(mouth, face, landmarks))
+    lips = landmarks[[*SCHEME.upper_lip_inner, *SCHEME.lower_lip_inner]]
+    assert len(x) > 100
+    assert x.min() > lips[:, 0].min() - 1
+    assert x.max() < lips[:, 0].max() + 1
+    assert y.min() > lips[:, 1].min() - 1
+    assert y.max() < lips[:, 1].max() + 1.5
+
+
+def test_the_middle_is_dark_and_red(mouth, face):
+    landmarks = opened(face, 8)
+    picture, skin = draw(mouth, face, landmarks)
+    x, y = landmarks[[SCHEME.lip_gap[1][0]]].mean(axis=0) - [0, 2]
+    inside = picture[int(y * SCALE), int(x * SCALE)]
+    assert inside.max() < 0.35 * skin.max()
+    assert inside[0] > inside[1] > 0
+    assert inside[0] > inside[2] > 0
+
+
+def test_teeth_are_brighter_than_the_cavity_and_lie_at_the_upper_lip(mouth, face):
+    landmarks = opened(face, 10)
+    picture, _ = draw(mouth, face, landmarks)
+    x = landmarks[list(SCHEME.lips), 0].mean()
+    top = landmarks[list(SCHEME.lip_gap[0]), 1].mean()
+    column = picture[:, int(x * SCALE)].mean(axis=1)
+    just_below = column[int((top + 0.3) * SCALE) : int((top + 1.5) * SCALE)].max()
+    deep = column[int((top + 5) * SCALE) : int((top + 7) * SCALE)].max()
+    assert just_below > 2 * deep
+
+
+def test_it_is_lit_as_the_lips_are(mouth, face):
+    landmarks = opened(face, 8)
+    once, twice = (draw(mouth, face, landmarks, light)[0] for light in (1, 2))
+    np.testing.assert_allclose(twice, 2 * once, rtol=1e-4)
+
+
+def test_it_fades_in_and_never_jumps(mouth, face):
+    """From shut to open in small steps, no pixel changes by more than a share of the way."""
+    pictures = [draw(mouth, face, opened(face, pixels))[0] for pixels in np.arange(0, 3, 0.1)]
+    steps = [np.abs(b - a).max() for a, b in pairwise(pictures)]
+    assert max(steps) < 0.15
+    assert np.abs(pictures[-1] - pictures[0]).max() > 0.2
+
+
+def test_the_picture_stays_premultiplied(mouth, face):
+    whole, half = (draw(mouth, face, opened(face, 8), alpha=alpha)[0] for alpha in (1.0, 0.5))
+    np.testing.assert_allclose(half, whole / 2, atol=1e-5)
+
+
+def test_a_mouth_beyond_the_picture_is_no_trouble(mouth, face):
+    for corner in ((-5000, 0), (0, 5000), (120, 0)):
+        picture = np.ones((40, 40, 3), np.float32)
+        moved = np.column_stack([TO_OUTPUT[:, :2], corner]).astype(float)
+        relit = np.ones((face.size[1], face.size[0], 3), np.float32)
+        mouth.draw(picture, np.ones((40, 40), np.float32), relit, opened(face, 8), face.pose, moved)
+        np.testing.assert_array_equal(picture, 1)
+
+
+def test_teeth_turn_with_the_head(mouth, face):
+    """They are points of the skull, projected by the pose that they are drawn under."""
+    turned = rotate_about(FACE_CENTER, face.pose, rotation_from_angles(0, 0, 15))
+    band, rolled = (mouth._teeth(pose, TO_OUTPUT) for pose in (face.pose, turned))
+    half = len(band) // 2
+    slope, tilt = ((p[half - 1] - p[0]) for p in (band, rolled))
+    angle = np.degrees(np.arctan2(slope[1], slope[0]) - np.arctan2(tilt[1], tilt[0]))
+    assert angle == pytest.approx(15, abs=2)
+
+
+def test_teeth_part_in_the_middle_and_darken_to_the_sides(mouth, face):
+    x = face.landmarks[list(SCHEME.lips), 0]
+    columns = np.linspace(x.min(), x.max(), 401) * SCALE
+    row = mouth._row(face.pose, TO_OUTPUT, columns)
+    middle = 200 - 10 + int(row[190:211].argmin())
+    assert row[middle - 20] > row[middle] + 0.1 < row[middle + 20]
+    assert row[[middle - 20, middle + 20]].min() > row[[0, -1]].max() + 0.2

@@ -1,0 +1,125 @@
+"""The warp looks where its affine map and its flow say, with pixel centres at integers + ½."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from relit_camera.live.reenactment.warp import FlowPatch, Warp
+
+SIMILARITY = np.array([[0.7 * np.cos(0.3), -0.7 * np.sin(0.3), 36.0], [0.7 * np.sin(0.3), 0.7 * np.cos(0.3), -16.0]])
+WHOLE = (0, 0, 320, 240)
+REGION = np.array([40.0, 48.0, 200.0, 176.0])
+
+
+def smooth_picture(height=280, width=360):
+    rng = np.random.default_rng(5)
+    return cv2.GaussianBlur(rng.random((height, width, 4)).astype(np.float32), (0, 0), 6)
+
+
+def looked_at(affine, box):
+    """Where each output pixel's centre looks in the still, in our coordinates: (height, width, 2)."""
+    x, y = np.meshgrid(np.arange(box[0], box[2]) + 0.5, np.arange(box[1], box[3]) + 0.5)
+    return np.stack([x, y], axis=2) @ affine[:, :2].T + affine[:, 2]
+
+
+def patch_of(flow, region=REGION, rows=65, columns=81):
+    x, y = np.meshgrid(np.linspace(region[0], region[2], columns), np.linspace(region[1], region[3], rows))
+    return FlowPatch(flow(np.stack([x, y], axis=2)).astype(np.float32), np.asarray(region, dtype=np.float64))
+
+
+def well_inside(looks, region=REGION, margin=32):
+    return ((looks > region[:2] + margin) & (looks < region[2:] - margin)).all(axis=2)
+
+
+def test_without_flow_it_is_cv2s_affine_warp():
+    picture = smooth_picture()
+    ours = Warp(SIMILARITY, ()).apply(picture, WHOLE)
+    for_cv2 = SIMILARITY.copy()
+    for_cv2[:, 2] += SIMILARITY[:, :2] @ [0.5, 0.5] - 0.5
+    theirs = cv2.warpAffine(picture, for_cv2, WHOLE[2:], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+    seen = ((looked_at(SIMILARITY, WHOLE) > 2) & (looked_at(SIMILARITY, WHOLE) < [358, 278])).all(axis=2)
+    np.testing.assert_allclose(ours[seen], theirs[seen], atol=1e-3)
+    assert np.ptp(ours[seen]) > 0.05
+
+
+def test_the_identity_gives_the_picture_back():
+    picture = smooth_picture()
+    np.testing.assert_allclose(Warp(np.eye(2, 3), ()).apply(picture, (0, 0, 360, 280)), picture, atol=1e-4)
+
+
+@pytest.mark.parametrize("box", [WHOLE, (3, 5, 74, 58), (0, 0, 1, 1), (100, 50, 103, 240)])
+def test_positions_are_the_affine_ones_less_half_a_pixel_for_cv2(box):
+    np.testing.assert_allclose(Warp(SIMILARITY, ()).map(box), looked_at(SIMILARITY, box) - 0.5, atol=1e-3)
+
+
+def test_beyond_the_still_there_is_nothing():
+    view = Warp(np.array([[1.0, 0, -30], [0, 1, 0]]), ()).apply(np.ones((20, 20, 4), np.float32), (0, 0, 60, 20))
+    assert view[:, :29].max() == 0
+    np.testing.assert_allclose(view[:, 30:50], 1, atol=1e-4)
+    assert view[:, 51:].max() == 0
+
+
+def test_an_enlarged_still_is_sampled_in_the_same_places():
+    """A ramp has the value of its position, whatever its size: half-pixel conventions hold on both sides."""
+    x, y = np.meshgrid(np.arange(360) + 0.5, np.arange(280) + 0.5)
+    ramp = np.stack([x, y], axis=2).astype(np.float32)
+    large = cv2.resize(ramp, None, fx=3, fy=3, interpolation=cv2.INTER_LINEAR)
+    box = (80, 80, 270, 230)
+    warp = Warp(SIMILARITY, (patch_of(lambda u: 0 * u + 3), patch_of(lambda u: 0 * u + 7, (90, 90, 130, 130))))
+    np.testing.assert_allclose(warp.apply(large, box, 3), warp.map(box) + 0.5, atol=0.02)
+
+
+def test_a_box_is_a_part_of_the_whole():
+    """Wherever the box begins; what is interpolated differs by a share of a pixel where the flow fades."""
+    warp = Warp(SIMILARITY, (patch_of(lambda u: 0.1 * u - 10),))
+    part, whole = warp.map((13, 7, 253, 161)), warp.map(WHOLE)[7:161, 13:253]
+    np.testing.assert_allclose(part, whole, atol=1.0)
+    inside = well_inside(looked_at(SIMILARITY, (13, 7, 253, 161)))
+    np.testing.assert_allclose(part[inside], whole[inside], atol=1e-2)
+
+
+@pytest.mark.parametrize("affine", [np.array([[0.5, 0, 12.0], [0, 0.5, 20.0]]), SIMILARITY], ids=["plain", "turned"])
+@pytest.mark.parametrize("fine", [False, True], ids=["head", "fine"])
+def test_a_linear_flow_is_reproduced_inside_its_region(affine, fine):
+    """Bilinear interpolation of a linear flow is exact; under the middle of the patch nothing of it fades."""
+    bend = np.array([[0.1, -0.05], [0.02, -0.08]])
+    patch = patch_of(lambda u: u @ bend.T + [2, -1])
+    warp = Warp(affine, (patch_of(lambda u: 0 * u), patch) if fine else (patch,))
+    looks = looked_at(affine, WHOLE)
+    inside = well_inside(looks)
+    expected = looks + looks @ bend.T + [2, -1] - 0.5
+    assert inside.sum() > 2000
+    np.testing.assert_allclose(warp.map(WHOLE)[inside], expected[inside], atol=0.03)
+
+
+def test_the_flow_fades_to_nothing_outside_its_region():
+    warp, still = Warp(SIMILARITY, (patch_of(lambda u: u * 0 + 5),)), Warp(SIMILARITY, ())
+    moved = warp.map(WHOLE) - still.map(WHOLE)
+    looks = looked_at(SIMILARITY, WHOLE)
+    outside = ((looks < REGION[:2] - 10) | (looks > REGION[2:] + 10)).any(axis=2)
+    np.testing.assert_allclose(moved[outside], 0, atol=1e-3)
+    np.testing.assert_allclose(moved[well_inside(looks)], 5, atol=1e-3)
+    steps = [np.abs(np.diff(moved, axis=axis)).max() for axis in (0, 1)]
+    assert max(steps) < 1  # no cliff
+
+
+def test_a_later_patch_wins_where_it_is():
+    warp = Warp(np.eye(2, 3), (patch_of(lambda u: u * 0 + 5), patch_of(lambda u: u * 0 - 2, (80, 80, 144, 144))))
+    moved = warp.map(WHOLE) - Warp(np.eye(2, 3), ()).map(WHOLE)
+    np.testing.assert_allclose(moved[96:128, 96:128], -2, atol=1e-3)
+    np.testing.assert_allclose(moved[152:156, 80:150], 5, atol=1e-3)
+
+
+def test_a_later_patch_keeps_its_detail():
+    """Lids move within a few pixels: their flow is not thinned out as the head's is."""
+
+    def wave(u):
+        return 3 * np.sin(u[..., ::-1] / 2)
+
+    region = np.array([80.0, 80, 144, 144])
+    warp = Warp(np.eye(2, 3), (patch_of(lambda u: u * 0), patch_of(wave, region, 129, 129)))
+    looks = looked_at(np.eye(2, 3), WHOLE)
+    inside = well_inside(looks, region, 12)
+    np.testing.assert_allclose(warp.map(WHOLE)[inside], (looks + wave(looks) - 0.5)[inside], atol=0.1)

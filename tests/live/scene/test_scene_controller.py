@@ -1,0 +1,210 @@
+"""What users ask for becomes a scene whole, or not at all."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from relit_camera.base.config.look import (
+    BlurBackground,
+    ColorBackground,
+    EnvironmentBackground,
+    ImageBackground,
+    Lighting,
+    Look,
+    Mode,
+)
+from relit_camera.base.config.settings import StorageSettings
+from relit_camera.base.errors import InputError, NotFoundError, SubjectError
+from relit_camera.base.images.image_files import encode_display, write_linear
+from relit_camera.light.light_map_rotation import irradiance
+from relit_camera.live.scene.scene_controller import BACKGROUND_ENVIRONMENT, SceneController
+from relit_camera.subject.subject_file import write_subject
+from tests.small_camera import small_subject
+
+
+@pytest.fixture
+def scene_controller(tmp_path: Path) -> SceneController:
+    return SceneController(StorageSettings(data_dir=tmp_path))
+
+
+def half_bright(right: bool) -> bytes:
+    """A picture whose one half is bright, as a PNG file."""
+    picture = np.full((60, 80, 3), 20, np.uint8)
+    picture[:, 40:] = 240 if right else 20
+    picture[:, :40] = 20 if right else 240
+    return encode_display(picture, ".png")
+
+
+def lit_from_right(scene_controller: SceneController) -> float:
+    """How much more light comes from the picture's right than from its left."""
+    environment = scene_controller.scene.environment
+    assert environment is not None
+    columns = environment.light_map.sum(axis=(0, 2))
+    return float(columns[32:].sum() - columns[:32].sum())
+
+
+def test_first_look_is_not_resolved_until_it_is_set(scene_controller: SceneController) -> None:
+    assert scene_controller.scene.environment is None
+    scene = scene_controller.set_look(Look())
+    assert scene is scene_controller.scene
+    assert scene.environment is not None
+    assert scene.environment.name == "studio"
+    assert scene.revision == 1
+
+
+def test_lamps_only(scene_controller: SceneController) -> None:
+    assert scene_controller.set_look(Look(lighting=Lighting(environment=None))).environment is None
+
+
+@pytest.mark.parametrize(
+    ("look", "words"),
+    [
+        (Look(lighting=Lighting(environment="stduio")), "studio"),
+        (Look(background=ImageBackground(image="beach")), "beach"),
+        (Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT)), "choose an image or color background"),
+        (Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=BlurBackground()), "kind 'blur'"),
+        (
+            Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=EnvironmentBackground()),
+            "needs a name",
+        ),
+    ],
+)
+def test_what_cannot_be_resolved_leaves_the_scene(look: Look, words: str, scene_controller: SceneController) -> None:
+    before = scene_controller.set_look(Look())
+    with pytest.raises(InputError) as error:
+        scene_controller.set_look(look)
+    assert words in str(error.value)
+    assert scene_controller.scene is before
+
+
+def test_a_file_is_admitted_for_this_run_and_only_by_the_command_line(
+    scene_controller: SceneController, tmp_path: Path
+) -> None:
+    path = tmp_path / "my sky (1).exr"
+    write_linear(path, np.ones((16, 32, 3), np.float32))
+    name = scene_controller.register_temporary_environment(str(path))
+    assert name == "my-sky-1"
+    assert scene_controller.set_look(Look(lighting=Lighting(environment=name))).environment is not None
+    assert name not in scene_controller.environments.names()
+    assert scene_controller.register_temporary_environment("sunset") == "sunset"
+    assert scene_controller.register_temporary_environment(BACKGROUND_ENVIRONMENT) == BACKGROUND_ENVIRONMENT
+    with pytest.raises(NotFoundError):
+        scene_controller.register_temporary_environment("nothing-like-it")
+
+
+def test_a_colour_lights_the_face_in_its_colour(scene_controller: SceneController) -> None:
+    look = Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=ColorBackground(color="#ff2000"))
+    environment = scene_controller.set_look(look).environment
+    assert environment is not None
+    red, green, blue = environment.light_map.reshape(-1, 3).mean(axis=0)
+    assert red > 5 * green >= 5 * blue
+
+
+@pytest.mark.parametrize("right", [True, False])
+def test_a_picture_lights_the_face_from_its_bright_side(right: bool, scene_controller: SceneController) -> None:
+    scene_controller.backgrounds.add("room", half_bright(right))
+    look = Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=ImageBackground(image="room"))
+    scene = scene_controller.set_look(look)
+    assert scene.backdrop is not None
+    assert (lit_from_right(scene_controller) > 0) == right
+
+
+def test_another_background_lights_anew(scene_controller: SceneController) -> None:
+    for name, right in (("a", True), ("b", False)):
+        scene_controller.backgrounds.add(name, half_bright(right))
+    lighting = Lighting(environment=BACKGROUND_ENVIRONMENT)
+    scene_controller.set_look(Look(lighting=lighting, background=ImageBackground(image="a")))
+    assert lit_from_right(scene_controller) > 0
+    scene_controller.set_look(Look(lighting=lighting, background=ImageBackground(image="b")))
+    assert lit_from_right(scene_controller) < 0
+
+
+def test_an_environment_as_background_picture_is_seen_from_inside(scene_controller: SceneController) -> None:
+    scene = scene_controller.set_look(Look(background=ImageBackground(image="window")))
+    assert scene.backdrop is not None
+    assert scene.backdrop.dtype == np.uint8
+    halves = np.split(scene.backdrop.astype(np.float64), 2, axis=1)
+    brighter_right = float(halves[1].mean() - halves[0].mean())
+    lit = Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=ImageBackground(image="window"))
+    environment = scene_controller.set_look(lit).environment
+    assert environment is not None
+    np.testing.assert_array_equal(environment.light_map, scene_controller.environments.load("window").light_map)
+    sides = [irradiance(environment.light_map, [x, 0, 0]).mean() for x in (-1.0, 1.0)]
+    assert np.sign(brighter_right) == np.sign(sides[1] - sides[0])
+    assert abs(brighter_right) > 5
+
+
+def test_what_a_change_leaves_alone_is_kept(scene_controller: SceneController, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene_controller.backgrounds.add("room", half_bright(True))
+    before = scene_controller.set_look(Look(background=ImageBackground(image="room")))
+    monkeypatch.setattr(scene_controller.backgrounds, "load", pytest.fail)
+    monkeypatch.setattr(scene_controller.environments, "load", pytest.fail)
+    change: Callable[[Look], Look] = lambda look: look.model_copy(  # noqa: E731
+        update={"lighting": look.lighting.model_copy(update={"exposure_ev": 1.0}), "mode": Mode.RATIO}
+    )
+    after = scene_controller.update_look(change)
+    assert after.backdrop is before.backdrop
+    assert after.environment is before.environment
+    assert after.look.mode is Mode.RATIO
+
+
+@pytest.mark.parametrize("stem", [BACKGROUND_ENVIRONMENT, "studio", "background!", "s" * 80])
+def test_a_file_takes_no_name_that_means_something_else(
+    stem: str, scene_controller: SceneController, tmp_path: Path
+) -> None:
+    path = tmp_path / f"{stem}.exr"
+    write_linear(path, np.full((32, 64, 3), 0.5, np.float32))
+    name = scene_controller.register_temporary_environment(str(path))
+    assert name not in {BACKGROUND_ENVIRONMENT, *scene_controller.environments.names()}
+    environment = scene_controller.set_look(Look(lighting=Lighting(environment=name))).environment
+    assert environment is scene_controller.temporary_environments()[name]
+
+
+def test_subjects_by_path_by_name_and_none(scene_controller: SceneController, tmp_path: Path) -> None:
+    path = tmp_path / "me.relit"
+    write_subject(path, small_subject())
+    assert scene_controller.set_subject(str(path)).subject_name == "me"
+    scene_controller.subjects.folder.mkdir(parents=True)
+    shutil.copy(path, scene_controller.subjects.folder / "stored.relit")
+    assert scene_controller.set_subject("stored").subject is not None
+    kept = scene_controller.scene
+    path.write_bytes(b"damaged")
+    for wrong, error in ((str(path), SubjectError), ("nobody", NotFoundError)):
+        with pytest.raises(error):
+            scene_controller.set_subject(wrong)
+    assert scene_controller.scene is kept
+    assert scene_controller.set_subject(None).subject is None
+
+
+def test_changes_from_many_threads_are_all_made(scene_controller: SceneController) -> None:
+    scene_controller.set_look(Look(lighting=Lighting(exposure_ev=0)))
+
+    def brighten() -> None:
+        for _ in range(50):
+            scene_controller.update_look(
+                lambda look: look.model_copy(
+                    update={
+                        "lighting": look.lighting.model_copy(update={"exposure_ev": look.lighting.exposure_ev + 0.01})
+                    }
+                )
+            )
+
+    threads = [threading.Thread(target=brighten) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert scene_controller.scene.look.lighting.exposure_ev == pytest.approx(2.0)
+    assert scene_controller.scene.revision == 201
+
+
+def test_background_names(scene_controller: SceneController) -> None:
+    scene_controller.backgrounds.add("beach", cv2.imencode(".png", np.zeros((8, 8, 3), np.uint8))[1].tobytes())
+    assert {"beach", "studio"} <= set(scene_controller.background_names())

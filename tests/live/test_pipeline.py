@@ -1,0 +1,186 @@
+"""One frame from left to right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
+from relit_camera.base.config.settings import ReenactSettings, TrackerSettings
+from relit_camera.base.errors import ModelError
+from relit_camera.base.images.image_types import Frame
+from relit_camera.base.models.model_store import FOLDER_VARIABLE
+from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
+from relit_camera.lab.bench.live_benchmark import SyntheticTracker
+from relit_camera.light.builtin.builtin_environments import builtin_environment
+from relit_camera.live.compositing.matting import matting_factory
+from relit_camera.live.pipeline import Pipeline, fit_frame
+from relit_camera.live.scene.scene import Scene
+from tests.small_camera import SIZE, SteadyTracker, difference, grey, small_subject
+
+CPU = SessionOptions("cpu")
+STUDIO = builtin_environment("studio")
+LAMP_RIGHT = Lighting(environment=None, lamps=(Lamp(azimuth_deg=90, elevation_deg=0),), transition_s=0)
+LAMP_LEFT = Lighting(environment=None, lamps=(Lamp(azimuth_deg=-90, elevation_deg=0),), transition_s=0)
+
+
+def pipeline(tracker: Tracker | None = None, size: tuple[int, int] = SIZE) -> Pipeline:
+    return Pipeline(
+        tracker or SteadyTracker(), size, TrackerSettings(), ReenactSettings(), CPU, matting_factory("selfie", CPU)
+    )
+
+
+def scene(subject: bool = True, mode: Mode = Mode.REENACT, **look: object) -> Scene:
+    wanted = Look.model_validate({"mode": mode, **look})
+    lit = STUDIO if wanted.lighting.environment == "studio" else None
+    return Scene(wanted, lit, None, "small", small_subject() if subject else None)
+
+
+def frame(index: int = 0, image: np.ndarray | None = None) -> Frame:
+    return Frame(grey() if image is None else image, index, 0.0, index / 20)
+
+
+def test_pictures_are_of_the_outputs_size_whatever_comes() -> None:
+    for image in (grey(), grey(size=(90, 160)), grey(size=(300, 40))):
+        for shown in (scene(), scene(subject=False), scene(mode=Mode.RATIO)):
+            picture = pipeline(size=(160, 90)).process(frame(0, image), shown).image
+            assert picture.shape == (90, 160, 3)
+            assert picture.dtype == np.uint8
+
+
+def test_reenact_lets_no_live_pixel_through() -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
+    quiet, loud = (pipeline().process(frame(0, image), scene()).image for image in (grey(), noise))
+    np.testing.assert_array_equal(quiet, loud)
+
+
+def test_without_a_subject_the_live_picture_passes() -> None:
+    made = pipeline()
+    assert difference(made.process(frame(), scene(subject=False)).image, grey()) <= 1
+    assert [trouble.why for trouble in made.troubles] == ["no subject is chosen"]
+    made.process(frame(1), scene())
+    assert made.troubles == []
+
+
+def test_ratio_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
+    """The face is tracked in the frame as it comes, the light is exchanged in the frame as it goes out."""
+    size, shown = (160, 90), scene(mode=Mode.RATIO, lighting={"exposure_ev": -2})
+    textured = cv2.resize(np.random.default_rng(0).integers(60, 200, (9, 16, 3), dtype=np.uint8), (320, 240))
+    live = frame(0, textured)
+    scaled, cut = pipeline(SyntheticTracker(), size), pipeline(SyntheticTracker(), size)
+    one = scaled.process(live, shown).image
+    motion = scaled.process(live, shown).motion
+    assert motion is not None
+    assert motion.pose is not None
+    middle = motion.landmarks.mean(axis=0)
+    assert np.abs(middle - np.array(size) / 2).max() < 0.2 * size[1]
+    two = cut.process(fit_frame(live, size), shown).image
+    assert difference(one, two) < 2
+
+
+def test_the_light_comes_from_its_side() -> None:
+    left, right = (
+        pipeline().process(frame(), scene(lighting=light)).image.astype(float) for light in (LAMP_LEFT, LAMP_RIGHT)
+    )
+    half = SIZE[0] // 2
+    assert (right - left)[:, half + 8 :].mean() > 2
+    assert (left - right)[:, : half - 8].mean() > 2
+
+
+def test_the_picture_moves_with_the_head() -> None:
+    made = pipeline(SyntheticTracker())
+    pictures = [made.process(frame(index), scene(lighting={"transition_s": 0})).image for index in range(30)]
+    moved = [difference(pictures[20], picture) for picture in pictures[21:]]
+    assert max(moved) > 1
+
+
+class Vanishing(SteadyTracker):
+    """Loses the face from frame 25 on."""
+
+    def track(self, frame: Frame) -> FaceState:
+        return super().track(frame) if frame.index < 25 else LOST
+
+
+def test_a_lost_face_eases_to_neutral_and_says_so() -> None:
+    made = pipeline(Vanishing())
+    motions = [made.process(frame(index), scene()).motion for index in range(50)]
+    assert motions[24] is not None
+    assert motions[24].status is FaceStatus.FOUND
+    assert motions[-1] is not None
+    assert motions[-1].status is FaceStatus.LOST
+    assert motions[-1].presence == 0
+    assert motions[-1].rotation.magnitude() < 1e-6
+
+
+def test_blend_goes_from_the_live_picture_to_the_relit_one() -> None:
+    image = grey(150)
+
+    def last(blend: float) -> np.ndarray:
+        made, shown = pipeline(), scene(mode=Mode.RATIO, lighting={"blend": blend, "exposure_ev": -2})
+        # A face that just came is eased in.
+        return [made.process(frame(index, image), shown).image for index in range(25)][-1]
+
+    live, half, relit = (last(blend) for blend in (0.0, 0.5, 1.0))
+    assert difference(live, image) <= 1
+    assert live.mean() > half.mean() + 5 > relit.mean() + 10
+
+
+def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None:
+    class LongFace(SteadyTracker):
+        def track(self, frame: Frame) -> FaceState:
+            state = super().track(frame)
+            middle = state.landmarks.mean(axis=0)
+            return replace(state, landmarks=middle + (state.landmarks - middle) * np.array([1, 1.2], np.float32))
+
+    noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
+    image = np.ascontiguousarray(noise.repeat(4, axis=0).repeat(4, axis=1))
+    made, ratio = pipeline(LongFace()), scene(mode=Mode.RATIO)
+    for index in range(45):
+        last = made.process(frame(index, image), ratio).image
+    assert [trouble.what for trouble in made.troubles] == ["mode ratio shows the reenacted still"]
+    still = made.process(frame(45, image), scene()).image
+    assert difference(last, still) < 2
+    other = replace(ratio, subject=replace(small_subject()))
+    made.process(frame(46, image), other)
+    assert made.troubles == []
+
+
+def test_stages_are_timed() -> None:
+    made = pipeline()
+    made.process(frame(), scene())
+    stages = made.timer.lap_ms()
+    assert set(stages) == {"track", "light", "relight", "follow", "move", "compose"}
+    assert all(value > 0 for value in stages.values())
+
+
+def test_a_matte_that_needs_a_missing_model_says_which(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+    coloured = scene(mode=Mode.RATIO, background=ColorBackground())
+    with pytest.raises(ModelError, match="relit models pull"):
+        pipeline().process(frame(), coloured)
+
+
+def test_reenact_stands_before_its_background_without_any_model() -> None:
+    red = pipeline().process(frame(), scene(background=ColorBackground(color="#ff0000"))).image
+    assert (red[:, 0] == [255, 0, 0]).all()
+
+
+def test_fitted_covers_and_centres() -> None:
+    wide = np.zeros((100, 400, 3), np.uint8)
+    wide[:, 190:210] = 255
+    cut = fit_frame(frame(3, wide), (200, 100))
+    assert cut.size == (200, 100)
+    assert cut.index == 3
+    np.testing.assert_array_equal(cut.image, wide[:, 100:300])
+    same = frame(0, wide)
+    assert fit_frame(same, (400, 100)) is same
+    small = fit_frame(frame(0, wide), (100, 50)).image
+    expected = cv2.resize(wide[:, 100:300], (100, 50), interpolation=cv2.INTER_AREA)
+    assert difference(small, expected) < 2
+    stripes = np.zeros((90, 180, 3), np.uint8)
+    stripes[:, ::3] = 255
+    assert (fit_frame(frame(0, stripes), (60, 30)).image == 85).all()  # what is finer than its pixels is averaged

@@ -1,0 +1,161 @@
+"""A whole camera, small and fast: a generated subject, a made-up face, pictures from memory, a sink that remembers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+import httpx
+import numpy as np
+
+from relit_camera.api.app import create_app
+from relit_camera.api.server.http_server import start_api_server
+from relit_camera.app.camera_service import CameraService
+from relit_camera.base.config.look import Lighting, Look
+from relit_camera.base.config.settings import Fallback, OutputSettings, RelitSettings, ServerSettings, StorageSettings
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.devices.sinks.sink import NullSink
+from relit_camera.devices.sources.playback_source import PlaybackSource, TimedImage
+from relit_camera.devices.sources.source import Source, SourceInfo
+from relit_camera.face.face_state import FaceState, Tracker
+from relit_camera.lab.bench.live_benchmark import SyntheticTracker
+from relit_camera.lab.bench.synthetic_subject import synthetic_subject
+from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.subject.subject import Subject
+
+SIZE = (128, 96)
+FPS = 20.0
+WAIT_S = 60.0
+"""Long enough for a slow machine that has much else to do."""
+
+
+@cache
+def small_subject() -> Subject:
+    """A generated subject of 64 lights, 64 x 80 pixels."""
+    return synthetic_subject(64, 80)
+
+
+class SteadyTracker(SyntheticTracker):
+    """Sees the same face in every frame, so that only the light changes a picture."""
+
+    def track(self, frame: Frame) -> FaceState:
+        return super().track(Frame(frame.image, frame.index, frame.captured_at, 0.0))
+
+
+def grey(value: int = 120, size: tuple[int, int] = SIZE) -> DisplayImage:
+    return np.full((size[1], size[0], 3), value, np.uint8)
+
+
+def memory_source(picture: DisplayImage | None = None, count: int | None = None) -> Source:
+    """Gives a picture `FPS` times a second, for ever or `count` times."""
+    shown = grey() if picture is None else picture
+
+    def play() -> Iterator[TimedImage]:
+        index = 0
+        while count is None or index < count:
+            yield shown, index / FPS
+            index += 1
+
+    return PlaybackSource(SourceInfo("still", "memory", SIZE, FPS), play())
+
+
+@dataclass
+class RememberingSink(NullSink):
+    """Keeps every picture that is new.
+
+    Attributes:
+        new: the pictures without repetitions, oldest first.
+    """
+
+    new: list[DisplayImage] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        super().__init__(SIZE)
+
+    def write(self, image: DisplayImage) -> None:
+        if not self.new or self.new[-1] is not image:
+            self.new.append(image)
+        super().write(image)
+
+    def wait_for(self, count: int) -> None:
+        """Wait until so many new pictures came since the start."""
+        wait_until(lambda: len(self.new) >= count)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A running camera and a client of its API."""
+
+    daemon: CameraService
+    scene_controller: SceneController
+    sink: RememberingSink
+    http: httpx.Client
+
+    def put(self, path: str, **body: object) -> None:
+        """Change something; the answer must be good."""
+        answer = self.http.put(path, json=body)
+        assert answer.status_code == 200, answer.text
+
+    def status(self) -> dict[str, object]:
+        """What the camera says of itself."""
+        found: dict[str, object] = self.http.get("status").raise_for_status().json()
+        return found
+
+    def troubles(self) -> str:
+        """All that works less well than asked, as one text."""
+        return "\n".join(f"{t.what}: {t.why}; {t.cure}" for t in self.daemon.status().degraded)
+
+
+@contextmanager
+def running_camera(
+    folder: Path,
+    source: Source | None = None,
+    tracker: Tracker | None = None,
+    subject: Subject | None = None,
+    look: Look | None = None,
+    sink: RememberingSink | None = None,
+    new_tracker: Callable[[], Tracker] | None = None,
+    fallback: Fallback = Fallback.PLACEHOLDER,
+    on_viewer: Callable[[], None] = lambda: None,
+) -> Iterator[Camera]:
+    """Run a camera with its API on a real port; `folder` is for what it stores."""
+    settings = RelitSettings(
+        output=OutputSettings(sink="null", width=SIZE[0], height=SIZE[1], fps=FPS, fallback=fallback),
+        server=ServerSettings(port=0),
+        storage=StorageSettings(data_dir=folder),
+    )
+    scene_controller = SceneController(settings.storage)
+    scene_controller.set_look(look or Look(lighting=Lighting(transition_s=0)))
+    scene_controller.show_subject("small", subject or small_subject())
+    sink, tracker = sink or RememberingSink(), tracker or SteadyTracker()
+    daemon = CameraService(settings, scene_controller, source or memory_source(), sink, tracker, new_tracker, on_viewer)
+    daemon.start()
+    try:
+        with (
+            start_api_server(create_app(daemon, settings), settings.server) as server,
+            httpx.Client(base_url=f"{server.address.url}api/v1/", timeout=WAIT_S) as http,
+        ):
+            yield Camera(daemon, scene_controller, sink, http)
+    finally:
+        daemon.stop()
+
+
+def wait_until(condition: Callable[[], bool], timeout_s: float = WAIT_S) -> None:
+    """Wait for a condition.
+
+    Raises:
+        AssertionError: it did not come about in time.
+    """
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come about in time"
+        time.sleep(0.01)
+
+
+def difference(a: DisplayImage, b: DisplayImage) -> float:
+    """Mean absolute difference of two uint8 pictures, code values."""
+    return float(np.abs(a.astype(np.float32) - b).mean())
