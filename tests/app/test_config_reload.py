@@ -32,7 +32,7 @@ def started(folder: Path, text: str) -> tuple[SceneController, RelitSettings]:
     before = settings(folder, text)
     scene_controller = SceneController(before.storage)
     scene_controller.set_look(before.look)
-    scene_controller.set_subject(before.subject)
+    scene_controller.load_configured_subject(before.subject)
     return scene_controller, before
 
 

@@ -75,7 +75,7 @@ def run_camera(
         )
         look = look.model_copy(update={"lighting": named})
     scene_controller.set_look(look)
-    scene_controller.set_subject(settings.subject)
+    scene_controller.load_configured_subject(settings.subject)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
@@ -137,7 +137,7 @@ def _apply_reload(
     if chosen is not None:
         scene_controller.show_subject(*chosen)
     elif after.subject is None and before.subject is not None:
-        scene_controller.set_subject(None)
+        scene_controller.choose_stored_subject(None)
     fixed = [name for name in RelitSettings.model_fields if name not in ("look", "subject")]
     later = [name for name in fixed if getattr(after, name) != getattr(started, name)]
     return ConfigError(f"what changed of {', '.join(later)} counts from the next start", "restart") if later else None

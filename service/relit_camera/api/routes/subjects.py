@@ -25,10 +25,7 @@ def get_subject(api: ApiContextDep) -> CurrentSubject:
 @router.put("/subject", responses=error_responses(404, 422))
 def set_subject(api: ApiContextDep, choice: SubjectChoice) -> CurrentSubject:
     """Show another stored subject, or nobody."""
-    scene_controller = api.camera.scene_controller
-    if choice.name is not None:
-        scene_controller.subjects.path(choice.name)  # a stored name only: `set_subject` would take a file's path too
-    return CurrentSubject(name=scene_controller.set_subject(choice.name).subject_name)
+    return CurrentSubject(name=api.camera.scene_controller.choose_stored_subject(choice.name).subject_name)
 
 
 @router.get("/subjects")
