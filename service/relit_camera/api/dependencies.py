@@ -11,9 +11,9 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from relit_camera.api.preview_stream import PreviewBroadcaster
-from relit_camera.api.problem_details import NotReadyError
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.errors import NotReadyError
 from relit_camera.live.camera_control import CameraControl
 
 

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from anyio import CapacityLimiter, to_thread
 
-from relit_camera.api.problem_details import NotReadyError
+from relit_camera.base.errors import NotReadyError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.live.camera_control import CameraControl

@@ -12,7 +12,17 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 from starlette.responses import Response
 
-from relit_camera.base.errors import DeviceError, InputError, NotFoundError, RelitError, StorageError
+from relit_camera.base.errors import (
+    ConflictError,
+    DeviceError,
+    ForbiddenError,
+    InputError,
+    NotFoundError,
+    NotReadyError,
+    RelitError,
+    StorageError,
+    TooLargeError,
+)
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -47,22 +57,6 @@ class Problem(BaseModel):
     """What to do about it."""
     errors: list[FieldProblem] | None = None
     """Every wrong field, where fields are at fault."""
-
-
-class ConflictError(RelitError):
-    """The thing is in use, built in, or of that name already."""
-
-
-class TooLargeError(RelitError):
-    """The request's body is larger than is taken."""
-
-
-class ForbiddenError(RelitError):
-    """The request came from another site."""
-
-
-class NotReadyError(RelitError):
-    """The camera cannot answer that now."""
 
 
 STATUS_BY_ERROR = {

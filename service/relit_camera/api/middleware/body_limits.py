@@ -12,8 +12,8 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from relit_camera.api.problem_details import TooLargeError, problem_response_from
-from relit_camera.base.errors import InputError
+from relit_camera.api.problem_details import problem_response_from
+from relit_camera.base.errors import InputError, TooLargeError
 
 MAX_UPLOAD_BYTES = 64 << 20
 MAX_UPLOAD_FORM_BYTES = MAX_UPLOAD_BYTES + (1 << 16)

@@ -22,8 +22,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from relit_camera.api.problem_details import ForbiddenError, problem_response, problem_response_from
+from relit_camera.api.problem_details import problem_response, problem_response_from
 from relit_camera.base.config.settings import ServerSettings
+from relit_camera.base.errors import ForbiddenError
 
 LOOPBACK_HOSTS = frozenset({"127.0.0.1", "localhost", "::1"})
 SAFE_METHODS = frozenset({"GET", "HEAD"})

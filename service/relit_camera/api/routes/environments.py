@@ -12,9 +12,10 @@ from starlette.responses import Response
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response, thumbnail_url_path
 from relit_camera.api.middleware.body_limits import read_upload
-from relit_camera.api.problem_details import ConflictError, error_responses
+from relit_camera.api.problem_details import error_responses
 from relit_camera.api.schemas import EnvironmentDetails, EnvironmentItem
 from relit_camera.base.config.look import ImageBackground, StoredName
+from relit_camera.base.errors import ConflictError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
 from relit_camera.light.environment_store import RESERVED_NAMES

@@ -19,8 +19,9 @@ from prometheus_client.core import (
 from starlette.responses import Response
 
 from relit_camera.api.dependencies import ApiContextDep
-from relit_camera.api.problem_details import NotReadyError, error_responses
+from relit_camera.api.problem_details import error_responses
 from relit_camera.api.schemas import Health, Readiness
+from relit_camera.base.errors import NotReadyError
 from relit_camera.live.status.camera_status import CameraState, CameraStatus, Percentiles
 
 METRICS_CONTENT_TYPE: str = CONTENT_TYPE_LATEST

@@ -15,11 +15,11 @@ import uvicorn
 from fastapi import FastAPI
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from relit_camera.api.problem_details import NotReadyError, problem_response_from
+from relit_camera.api.problem_details import problem_response_from
 from relit_camera.api.server.connection_timeouts import SEND_BUFFER_BYTES, TimeoutHttpProtocol
 from relit_camera.base.config.access_token import read_token
 from relit_camera.base.config.settings import ServerSettings
-from relit_camera.base.errors import ConfigError, PortInUseError, RelitError
+from relit_camera.base.errors import ConfigError, NotReadyError, PortInUseError, RelitError
 
 START_TIMEOUT_S = 10.0
 SHUTDOWN_GRACE_S = 1

@@ -13,8 +13,9 @@ import numpy as np
 from relit_camera.base.errors import DeviceError, InputError
 from relit_camera.base.images.image_types import DisplayImage, check_image
 from relit_camera.base.images.resize import crop_to_fill
+from relit_camera.devices.device_lock import DeviceLock
 from relit_camera.devices.sinks.sink import SinkInfo
-from relit_camera.devices.v4l2loopback import DeviceLock, LoopbackDevice, reset_stuck_device
+from relit_camera.devices.v4l2loopback import LoopbackDevice, reset_stuck_device
 from relit_camera.devices.video_devices import (
     SYSTEM_TREE,
     VIRTUAL_CAMERA_LABEL,
