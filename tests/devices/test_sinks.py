@@ -112,8 +112,8 @@ def test_a_missing_camera_comes_with_its_command(tmp_path):
         (OSError(errno.EBUSY, "a program still shows it"), "is in use: a program still shows it; stop"),
         (OSError(errno.EBUSY, "Device or resource busy"), "is in use: Device or resource busy; stop that program"),
         (OSError(errno.ENOTTY, "Inappropriate ioctl for device"), "cannot be opened: Inappropriate ioctl for device"),
-        (RuntimeError("no backend"), "there is no virtual camera: no backend; install OBS Studio"),
-        (ImportError("no such module"), "pip install pyvirtualcam"),
+        (RuntimeError("no backend"), "there is no virtual camera: no backend; `relit doctor` says"),
+        (ImportError("no such module"), "pyvirtualcam cannot be used: no such module; `relit doctor` says"),
     ],
 )
 def test_why_it_cannot_be_opened_is_explained(tree, error, message):

@@ -143,7 +143,7 @@ class VirtualCameraSink:
 
     def _explained(self, error: Exception, node: str) -> Exception:
         if isinstance(error, ImportError):
-            return DeviceError(f"pyvirtualcam cannot be used: {error}", "run: pip install pyvirtualcam")
+            return DeviceError(f"pyvirtualcam cannot be used: {error}", "`relit doctor` says how to install it")
         if isinstance(error, OSError) and error.errno == errno.EBUSY:
             what = f"{node} is in use: {error.strerror}"
             reload = f"sudo modprobe -r v4l2loopback && {modprobe_command(self._label)}"
@@ -151,8 +151,7 @@ class VirtualCameraSink:
         if isinstance(error, OSError):
             return DeviceError(f"{node} cannot be opened: {error.strerror}", f"run: {modprobe_command(self._label)}")
         if isinstance(error, RuntimeError):
-            cure = "install OBS Studio and start its virtual camera once"
-            return DeviceError(f"there is no virtual camera: {error}", cure)
+            return DeviceError(f"there is no virtual camera: {error}", "`relit doctor` says how to get one here")
         return error
 
 
