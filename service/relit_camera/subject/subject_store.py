@@ -70,7 +70,10 @@ class SubjectStore(NamedFiles):
             NotFoundError: neither a stored name nor a file.
             SubjectError: the file is damaged, or too large.
         """
-        path = Path(name_or_path)
-        if name_or_path in self.names() or not path.exists():
-            return name_or_path, self.load(name_or_path)
-        return self.load_file(path)
+        if self.names_file(name_or_path):
+            return self.load_file(Path(name_or_path))
+        return name_or_path, self.load(name_or_path)
+
+    def names_file(self, name_or_path: str) -> bool:
+        """Whether what a person named is the path of a file, and not the name of a stored subject, which comes first."""
+        return name_or_path not in self.names() and Path(name_or_path).exists()

@@ -94,9 +94,9 @@ class SceneController:
             NotFoundError: neither a stored name nor a file.
             SubjectError: the file is damaged.
         """
-        if name_or_path is None:
-            return self.choose_stored_subject(None)
-        return self.show_subject(*self.subjects.resolve(name_or_path))
+        if name_or_path is not None and self.subjects.names_file(name_or_path):
+            return self.load_subject_file(Path(name_or_path))
+        return self.choose_stored_subject(name_or_path)
 
     def show_subject(self, name: str, subject: Subject) -> Scene:
         """Show a subject that is not stored, under `name`."""
