@@ -75,5 +75,5 @@ class SubjectStore(NamedFiles):
         return name_or_path, self.load(name_or_path)
 
     def names_file(self, name_or_path: str) -> bool:
-        """Whether what a person named is the path of a file, and not the name of a stored subject, which comes first."""
+        """Whether what a person named is a file, and no stored subject: those come first."""
         return name_or_path not in self.names() and Path(name_or_path).exists()
