@@ -1,4 +1,4 @@
-"""What is seen behind the person, and the pictures stored for it."""
+"""Routes of the background behind the person, and of the pictures stored for it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def list_backgrounds(api: ApiContextDep) -> list[BackgroundPicture]:
 def add_background(api: ApiContextDep, name: Annotated[StoredName, Form()], file: UploadFile) -> BackgroundPicture:
     """Store a picture (.jpg, .png, .webp …) to be used as background."""
     scene_controller, data = api.camera.scene_controller, read_upload(file)
-    with api.exclusive_image_work():  # the check too: of two at a time with one name, one must hear of the other
+    with api.exclusive_image_work():  # with the check: of two uploads of one name at a time, one must fail
         if name in scene_controller.background_names():
             raise ConflictError(f"a background or environment '{name}' is stored already", "choose another name")
         scene_controller.backgrounds.add(name, data)

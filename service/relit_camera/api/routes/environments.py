@@ -1,4 +1,4 @@
-"""Stored light from all sides."""
+"""Routes of the stored environments: light from all sides."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def list_environments(api: ApiContextDep) -> list[EnvironmentItem]:
 def add_environment(api: ApiContextDep, name: Annotated[StoredName, Form()], file: UploadFile) -> EnvironmentDetails:
     """Store a 360° panorama (.hdr, .exr, .png or .jpg, twice as wide as high), as seen from inside."""
     scene_controller, data = api.camera.scene_controller, read_upload(file)
-    with api.exclusive_image_work():  # the check too: of two at a time with one name, one must hear of the other
+    with api.exclusive_image_work():  # with the check: of two uploads of one name at a time, one must fail
         if name in RESERVED_NAMES or name in {
             *scene_controller.background_names(),
             *scene_controller.temporary_environments(),
@@ -71,10 +71,11 @@ def get_environment_thumbnail(api: ApiContextDep, request: Request, name: Stored
     """A small picture of an environment as seen from inside, in an exposure that suits it."""
     with api.exclusive_image_work():
         scene_controller = api.camera.scene_controller
-        guest = scene_controller.temporary_environments().get(name)
-        jpeg = (
-            encode_display(thumbnail_image(guest.panorama)) if guest else scene_controller.environments.thumbnail(name)
-        )
+        temporary = scene_controller.temporary_environments().get(name)
+        if temporary is None:
+            jpeg = scene_controller.environments.thumbnail(name)
+        else:
+            jpeg = encode_display(thumbnail_image(temporary.panorama))
     return jpeg_response(request, jpeg)
 
 

@@ -1,4 +1,4 @@
-"""Who is shown: the stored subjects and the chosen one."""
+"""Routes of the stored subjects and of the one that is shown."""
 
 from __future__ import annotations
 
