@@ -9,8 +9,8 @@ import pytest
 from fastapi import FastAPI
 
 from relit_camera.api.middleware.body_limits import MAX_JSON_BYTES, MAX_UPLOAD_FORM_BYTES
-from relit_camera.api.problem_details import ConflictError, problem_response_from, redact_folders, status_for_error
-from relit_camera.base.errors import DeviceError, ImageError, NotFoundError, RelitError, StorageError
+from relit_camera.api.problem_details import problem_response_from, redact_folders, status_for_error
+from relit_camera.base.errors import ConflictError, DeviceError, ImageError, NotFoundError, RelitError, StorageError
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera
 

@@ -7,18 +7,12 @@ import numpy as np
 import pytest
 
 from relit_camera.base.config.settings import SourceSettings
-from relit_camera.base.errors import DeviceError, ImageError, InputError, VideoError
+from relit_camera.base.errors import DeviceError, IllegalTransitionError, ImageError, InputError, VideoError
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.devices.sources.pattern_source import draw_pattern, pattern_source, read_number
 from relit_camera.devices.sources.playback_source import PlaybackSource
-from relit_camera.devices.sources.source import (
-    TRANSITIONS,
-    IllegalTransitionError,
-    SourceInfo,
-    SourceState,
-    SourceStateMachine,
-)
+from relit_camera.devices.sources.source import TRANSITIONS, SourceInfo, SourceState, SourceStateMachine
 from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.devices.sources.webcam_source import BACKOFF_S, WebcamSource
 from relit_camera.devices.video_devices import DeviceTree

@@ -1,4 +1,4 @@
-"""Small pictures as answers, which browsers keep and only ask whether they are still the same."""
+"""JPEG pictures as answers, with an ETag: a browser that has the same picture gets 304 instead."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ JPEG_RESPONSE: dict[int | str, dict[str, Any]] = {
 
 
 def thumbnail_url_path(collection: str, name: str) -> str:
-    """Where the small picture of a stored thing is to be had."""
+    """The URL path of the small picture of a stored environment, background or subject."""
     return f"/api/v1/{collection}/{quote(name)}/thumbnail.jpg"
 
 
@@ -41,7 +41,7 @@ def encode_thumbnail(picture: DisplayImage) -> bytes:
 
 
 def jpeg_response(request: Request, jpeg: bytes) -> Response:
-    """The picture, or 304 to a client that has it."""
+    """Answer with the picture, or with 304 if the request's If-None-Match names it."""
     tag = f'"{hashlib.sha256(jpeg).hexdigest()[:32]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
     known = [known.strip().removeprefix("W/") for known in request.headers.get("if-none-match", "").split(",")]

@@ -149,7 +149,7 @@ def find_virtual_camera(tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CAM
         what = f"no virtual camera is called '{label}' (there are {labels})"
         raise DeviceError(what, f"run: sudo modprobe -r v4l2loopback && {load}")
     what = f"there is no virtual camera '{label}': the kernel module v4l2loopback is not loaded"
-    raise DeviceError(what, f"run: sudo apt install v4l2loopback-dkms && {load}")
+    raise DeviceError(what, f"run: {load}; if it is not installed, `relit doctor` says how to install it")
 
 
 def modprobe_command(label: str = VIRTUAL_CAMERA_LABEL) -> str:

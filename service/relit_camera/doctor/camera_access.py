@@ -65,7 +65,8 @@ def check_virtual_camera(settings: OutputSettings, host: Host, access: AccessChe
     if settings.sink != "camera" and not settings.sink.startswith(str(tree.dev / "video")):
         return ok(topic, f"not needed: the sink is '{settings.sink}'")
     if not host.is_linux:
-        return ok(topic, "OBS Studio's is used here; it shows when the camera starts")
+        cure = "if the camera does not start, install OBS Studio, and start and stop its virtual camera once"
+        return ok(topic, f"OBS Studio's is used here; {cure}")
     cameras = list_virtual_cameras(tree, settings.label)
     named = next((camera for camera in cameras if camera.node == settings.sink), None)
     if named is None and settings.sink != "camera":

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.errors import ImageError, PanoramaError
-from relit_camera.base.images.image_files import image_size_from_header, read_linear
+from relit_camera.base.images.image_files import read_linear
+from relit_camera.base.images.image_limits import image_size_from_header
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.light_map_rotation import LightMap, resample_by_area, resample_to_light_map
 

@@ -167,20 +167,52 @@ def test_a_file_takes_no_name_that_means_something_else(
     assert environment is scene_controller.temporary_environments()[name]
 
 
-def test_subjects_by_path_by_name_and_none(scene_controller: SceneController, tmp_path: Path) -> None:
-    path = tmp_path / "me.relit"
-    write_subject(path, small_subject())
-    assert scene_controller.set_subject(str(path)).subject_name == "me"
+@pytest.fixture
+def subject_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A subject file in the working folder, which is no store."""
+    monkeypatch.chdir(tmp_path)
+    write_subject(tmp_path / "me.relit", small_subject())
+    return tmp_path / "me.relit"
+
+
+@pytest.fixture
+def stored_subject(subject_file: Path, scene_controller: SceneController) -> Path:
+    """The same subject in the store, called `stored`."""
     scene_controller.subjects.folder.mkdir(parents=True)
-    shutil.copy(path, scene_controller.subjects.folder / "stored.relit")
-    assert scene_controller.set_subject("stored").subject is not None
+    return Path(shutil.copy(subject_file, scene_controller.subjects.folder / "stored.relit"))
+
+
+@pytest.mark.usefixtures("stored_subject")
+def test_the_api_chooses_stored_subjects_only(scene_controller: SceneController, subject_file: Path) -> None:
+    assert scene_controller.choose_stored_subject("stored").subject_name == "stored"
     kept = scene_controller.scene
-    path.write_bytes(b"damaged")
-    for wrong, error in ((str(path), SubjectError), ("nobody", NotFoundError)):
-        with pytest.raises(error):
-            scene_controller.set_subject(wrong)
+    for name in ("nobody", "me", "me.relit", "./me.relit", str(subject_file)):
+        with pytest.raises(NotFoundError):
+            scene_controller.choose_stored_subject(name)
     assert scene_controller.scene is kept
-    assert scene_controller.set_subject(None).subject is None
+    assert scene_controller.choose_stored_subject(None).subject is None
+
+
+def test_a_subject_file_is_shown_under_its_name(scene_controller: SceneController, subject_file: Path) -> None:
+    assert scene_controller.load_subject_file(subject_file).subject_name == "me"
+    kept = scene_controller.scene
+    with pytest.raises(NotFoundError, match=r"none\.relit"):
+        scene_controller.load_subject_file(subject_file.with_name("none.relit"))
+    subject_file.write_bytes(b"damaged")
+    with pytest.raises(SubjectError):
+        scene_controller.load_subject_file(subject_file)
+    assert scene_controller.scene is kept
+
+
+@pytest.mark.usefixtures("stored_subject")
+def test_the_configuration_names_a_stored_subject_or_a_file(
+    scene_controller: SceneController, subject_file: Path
+) -> None:
+    assert scene_controller.load_configured_subject("stored").subject_name == "stored"
+    assert scene_controller.load_configured_subject(str(subject_file)).subject_name == "me"
+    with pytest.raises(NotFoundError, match="no subject 'nobody'; stored are: stored"):
+        scene_controller.load_configured_subject("nobody")
+    assert scene_controller.load_configured_subject(None).subject is None
 
 
 def test_changes_from_many_threads_are_all_made(scene_controller: SceneController) -> None:

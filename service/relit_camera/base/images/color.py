@@ -1,4 +1,4 @@
-"""Colour curves and light colours. Linear values are Rec. 709 primaries, scene-referred, channel order RGB."""
+"""Colour conversions and light colours. Linear values are Rec. 709 primaries, scene-referred, channel order RGB."""
 
 from __future__ import annotations
 
@@ -9,9 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from relit_camera.base.errors import InputError
+from relit_camera.base.images.image_types import DisplayImage
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 """Rec. 709 luminance weights of linear R, G, B."""
+
+CHROMA_MATRIX = np.array(
+    [[-37.797, -74.203, 112.0, 128 * 255], [112.0, -93.786, -18.214, 128 * 255]], dtype=np.float32
+) / np.float32(255)
+"""U and V of R, G, B from 0 to 255 (ITU-R BT.601, limited range)."""
 
 Gamma = str | float
 """How a picture's code values map to linear light: "srgb", "linear" or the exponent of a power law."""
@@ -128,3 +134,17 @@ def rgb_from_kelvin(kelvin: float) -> NDArray[np.float32]:
     )
     rgb = np.maximum(rgb_from_xyz @ xyz, 0).astype(np.float32)
     return np.asarray(rgb / (rgb @ LUMINANCE), dtype=np.float32)
+
+
+def rgb_to_i420(image: DisplayImage) -> NDArray[np.uint8]:
+    """Convert uint8 sRGB RGB (height, width, 3), both even, to uint8 (height · width · 3/2,): planes Y, U, V.
+
+    Chroma is the mean of each two by two pixels: OpenCV's own conversion takes that of every second pixel, which frays
+    edges.
+    """
+    height, width = image.shape[:2]
+    planes: NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_RGB2YUV_I420).reshape(-1)
+    half = cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+    chroma = cv2.transform(half, CHROMA_MATRIX)
+    planes[height * width :].reshape(2, height // 2, width // 2)[:] = chroma.transpose(2, 0, 1)
+    return planes

@@ -55,7 +55,7 @@ def replay(
     chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
     info = probe_video(video)
     scene_controller = SceneController(settings.storage)
-    scene_controller.set_subject(subject)
+    scene_controller.load_configured_subject(subject)
     lighting = parse_lighting(scene_controller.register_temporary_environment(environment), rotate, exposure_ev)
     scene_controller.set_look(Look(lighting=lighting, background=chosen_background, mode=chosen_mode))
     track = make_tracker(settings)

@@ -13,8 +13,9 @@ import numpy as np
 from relit_camera.base.errors import DeviceError, InputError
 from relit_camera.base.images.image_types import DisplayImage, check_image
 from relit_camera.base.images.resize import crop_to_fill
+from relit_camera.devices.device_lock import DeviceLock
 from relit_camera.devices.sinks.sink import SinkInfo
-from relit_camera.devices.v4l2loopback import DeviceLock, LoopbackDevice, reset_stuck_device
+from relit_camera.devices.v4l2loopback import LoopbackDevice, reset_stuck_device
 from relit_camera.devices.video_devices import (
     SYSTEM_TREE,
     VIRTUAL_CAMERA_LABEL,
@@ -142,7 +143,7 @@ class VirtualCameraSink:
 
     def _explained(self, error: Exception, node: str) -> Exception:
         if isinstance(error, ImportError):
-            return DeviceError(f"pyvirtualcam cannot be used: {error}", "run: pip install pyvirtualcam")
+            return DeviceError(f"pyvirtualcam cannot be used: {error}", "`relit doctor` says how to install it")
         if isinstance(error, OSError) and error.errno == errno.EBUSY:
             what = f"{node} is in use: {error.strerror}"
             reload = f"sudo modprobe -r v4l2loopback && {modprobe_command(self._label)}"
@@ -150,8 +151,7 @@ class VirtualCameraSink:
         if isinstance(error, OSError):
             return DeviceError(f"{node} cannot be opened: {error.strerror}", f"run: {modprobe_command(self._label)}")
         if isinstance(error, RuntimeError):
-            cure = "install OBS Studio and start its virtual camera once"
-            return DeviceError(f"there is no virtual camera: {error}", cure)
+            return DeviceError(f"there is no virtual camera: {error}", "`relit doctor` says how to get one here")
         return error
 
 

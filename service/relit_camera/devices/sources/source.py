@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from relit_camera.base.errors import IllegalTransitionError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.newest_slot import NewestSlot
 
@@ -47,10 +48,6 @@ TRANSITIONS: dict[SourceState, frozenset[SourceState]] = {
     _S.ENDED: frozenset(),
 }
 """The legal moves. Staying where one is is always legal. No source goes to RELEASED: what wraps it says so."""
-
-
-class IllegalTransitionError(RuntimeError):
-    """A source tried a move that is not in the table: a fault of ours."""
 
 
 class SourceStateMachine:

@@ -67,18 +67,36 @@ class SceneController:
             environment = self._unchanged_environment(look) or self._environment(look, backdrop)
             return self._replace(look=look, environment=environment, backdrop=backdrop)
 
-    def set_subject(self, name_or_path: str | None) -> Scene:
-        """Show another subject, or none.
+    def choose_stored_subject(self, name: str | None) -> Scene:
+        """Show a subject of the store, or none. For names from the API: never a file elsewhere.
 
         Raises:
-            NotFoundError: no such subject or file.
+            NotFoundError: no stored subject has that name.
             SubjectError: its file is damaged.
         """
         with self._change:
-            if name_or_path is None:
-                return self._replace(subject=None, subject_name=None)
-            name, subject = self.subjects.resolve(name_or_path)
+            subject = None if name is None else self.subjects.load(name)
             return self._replace(subject=subject, subject_name=name)
+
+    def load_subject_file(self, path: Path) -> Scene:
+        """Show the subject of a file, under the name of the file. For the command line and the configuration.
+
+        Raises:
+            NotFoundError: there is no such file.
+            SubjectError: it is damaged.
+        """
+        return self.show_subject(*self.subjects.load_file(path))
+
+    def load_configured_subject(self, name_or_path: str | None) -> Scene:
+        """Show the subject that the command line or the configuration names: a stored one, else a file; or none.
+
+        Raises:
+            NotFoundError: neither a stored name nor a file.
+            SubjectError: the file is damaged.
+        """
+        if name_or_path is not None and self.subjects.names_file(name_or_path):
+            return self.load_subject_file(Path(name_or_path))
+        return self.choose_stored_subject(name_or_path)
 
     def show_subject(self, name: str, subject: Subject) -> Scene:
         """Show a subject that is not stored, under `name`."""

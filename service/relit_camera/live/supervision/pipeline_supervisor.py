@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 
-from relit_camera.base.errors import RelitError
+from relit_camera.base.errors import PipelineHangError, RelitError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.newest_slot import NewestSlot
 from relit_camera.live.pipeline import Pipeline, RenderedFrame, RenderTask
@@ -28,10 +28,6 @@ FAULTS_BEFORE_RESTART = 3
 """After so many faults of ours in a row the state of the line itself is suspected: it is begun anew."""
 
 _POLL_S = 0.2
-
-
-class PipelineHangError(RelitError):
-    """The picture path gives nothing."""
 
 
 class PipelineWorker:

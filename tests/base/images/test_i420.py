@@ -2,8 +2,8 @@ import av
 import numpy as np
 import pytest
 
+from relit_camera.base.images.color import rgb_to_i420
 from relit_camera.devices.sources.pattern_source import draw_pattern
-from relit_camera.devices.v4l2loopback import rgb_to_i420
 
 
 @pytest.mark.parametrize("size", [(320, 180), (642, 482), (64, 66)])

@@ -1,0 +1,28 @@
+"""Checks of the settings before a device is opened, for what is otherwise read only once source and sink are open."""
+
+from __future__ import annotations
+
+from relit_camera.app.wiring import session_options
+from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.errors import ModelError
+from relit_camera.live.compositing.matting import matting_factory
+from relit_camera.live.publishing.placeholder_image import placeholder
+
+
+def check_before_devices(settings: RelitSettings) -> None:
+    """Check the files and names in the settings that the camera service reads after source and sink are open.
+
+    Look, subject, address, token and tracker are not checked here: `run_camera` itself uses them before it opens a
+    device. A failure there or here leaves the webcam's light off and the virtual camera to other programs.
+
+    Raises:
+        ImageError: the placeholder picture cannot be read.
+        NotFoundError: no matte has the name in the settings.
+        InputError: the recorded mattes cannot be read.
+        ModelError: the file of the reenactor's own model does not exist.
+    """
+    placeholder((settings.output.width, settings.output.height), picture=settings.output.placeholder)
+    matting_factory(settings.matte, session_options(settings.inference))
+    model = settings.reenact.model
+    if model is not None and not model.is_file():
+        raise ModelError(f"{model} does not exist", "name an ONNX reenactor as reenact.model (docs/reenactors.md)")
