@@ -35,6 +35,7 @@ from relit_camera.devices.sinks.sink import Sink
 from relit_camera.devices.sinks.sink_factory import open_sink, published_label
 from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.live.status.camera_status import DegradationCode
 
 log = logging.getLogger(__name__)
 
@@ -97,7 +98,7 @@ def run_camera(
             )
         else:
             camera_service = CameraService(settings, scene_controller, source, sink, tracker, new_tracker)
-        unowned.pop_all()  # the daemon closes it, where closing does not hang
+        unowned.pop_all()  # the camera service closes it, unless closing would hang
         cleanup.push(partial(_exit_if_threads_hang, camera_service))
         cleanup.callback(camera_service.stop)
         camera_service.start()
@@ -108,11 +109,11 @@ def run_camera(
         if side_task is not None:
             cleanup.enter_context(side_task(camera_service, server.address.url))
         if reload is not None:
-            apply, report_trouble = (
+            apply, report_degradation = (
                 partial(_apply_reload, scene_controller, settings),
-                partial(camera_service.report_trouble, "configuration"),
+                partial(camera_service.report_degradation, DegradationCode.CONFIGURATION_FAILED),
             )
-            cleanup.enter_context(watch_config(*reload, settings, apply, report_trouble))
+            cleanup.enter_context(watch_config(*reload, settings, apply, report_degradation))
         cleanup.enter_context(notify_systemd(camera_service.status))
         ends_at = time.monotonic() + (math.inf if seconds is None else seconds)
         while not stop.is_set() and (left := ends_at - time.monotonic()) > 0:
