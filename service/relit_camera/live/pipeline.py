@@ -27,7 +27,7 @@ from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext,
 from relit_camera.live.reenactment.source_image import find_source_face
 from relit_camera.live.scene.light_transition import LightTransition
 from relit_camera.live.scene.scene import Scene
-from relit_camera.live.status.camera_status import Degradation
+from relit_camera.live.status.camera_status import Degradation, DegradationCode
 from relit_camera.live.status.stage_timing import StageTimer
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.relighting.relighter import Relighter
@@ -36,7 +36,10 @@ from relit_camera.subject.subject import Subject
 log = logging.getLogger(__name__)
 
 NO_SUBJECT = Degradation(
-    "the live picture is shown as it is", "no subject is chosen", "choose one in the panel or with --subject"
+    code=DegradationCode.NO_SUBJECT,
+    what="the live picture is shown as it is",
+    why="no subject is chosen",
+    cure="choose one in the panel or with --subject",
 )
 REENACTOR_OF_MODE = {Mode.REENACT: "first-order", Mode.RATIO: "ratio"}
 
@@ -224,7 +227,12 @@ class Pipeline:
                 raise
             log.warning("mode ratio falls back to reenact: %s", error)
             self._mismatched_subject = active.subject
-            self._troubles["ratio"] = Degradation("mode ratio shows the reenacted still", error.what, error.cure)
+            self._troubles["ratio"] = Degradation(
+                code=DegradationCode.FACE_MISMATCH,
+                what="mode ratio shows the reenacted still",
+                why=error.what,
+                cure=error.cure,
+            )
             return None
 
     def _compose(self, layer: WarpedLayer, mode: Mode, frame: Frame, scene: Scene) -> DisplayImage:
