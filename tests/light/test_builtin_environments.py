@@ -12,7 +12,7 @@ from relit_camera.light.builtin.canvas import bearings, directions, to_map_axes
 from relit_camera.light.directions import direction_from_degrees, texel_directions
 from relit_camera.light.environment_store import EnvironmentStore
 from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map_rotation import irradiance, total
+from relit_camera.light.light_map import irradiance, total
 
 
 def reading(name: str, azimuth: float, elevation: float = 10) -> np.ndarray:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from relit_camera.base.errors import ImageError, PanoramaError
 from relit_camera.base.images.image_files import image_size_from_header, read_linear
 from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.light_map_rotation import LightMap, resample_by_area, resample_to_light_map
+from relit_camera.light.light_map import LightMap, resample_by_area, resample_to_light_map
 
 Axes = Literal["picture", "map"]
 """How a panorama file is laid out: `picture` as seen from inside the sphere, so that −X lies to the right of its middle

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import Indices, LandmarkScheme
 from relit_camera.live.reenactment.dense_motion import Influence, Region, region_around
 from relit_camera.live.reenactment.source_image import SourceFace

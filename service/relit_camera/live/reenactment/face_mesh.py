@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from relit_camera.face.face_state import HeadPose
+from relit_camera.face.head_pose import HeadPose
 from relit_camera.live.reenactment.dense_motion import Region, region_around
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.warp import FlowPatch

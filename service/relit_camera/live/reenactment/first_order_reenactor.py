@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import Frame, LinearImage
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.head_pose import HeadPose
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import (
     COARSE_GRID,
     ControlPoints,

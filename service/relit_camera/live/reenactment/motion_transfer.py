@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import project
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.head_pose import HeadPose, project
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import NECK_PIVOT, ControlPoints, rigid_head_anchors, shoulder_anchors
 from relit_camera.live.reenactment.source_image import SourceFace
 

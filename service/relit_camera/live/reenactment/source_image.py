@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import LinearImage, Mask, Points
-from relit_camera.face.face_state import HeadPose, Tracker
-from relit_camera.face.head_pose import fit_pose, unproject
+from relit_camera.face.face_state import Tracker
+from relit_camera.face.head_pose import HeadPose, fit_pose, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 from relit_camera.face.tracking.trackers import open_tracker, track_still
 from relit_camera.live.reenactment.warp import Box, Warp, sample_bilinear

@@ -19,7 +19,7 @@ from relit_camera.light.background_light import panorama_from_background
 from relit_camera.light.environment_panorama import Environment
 from relit_camera.light.environment_store import EnvironmentStore
 from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map_rotation import resample_to_light_map
+from relit_camera.light.light_map import resample_to_light_map
 from relit_camera.live.scene.background_store import BackgroundStore
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject

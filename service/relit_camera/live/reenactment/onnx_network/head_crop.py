@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 
 from relit_camera.base.images.image_types import DisplayImage, Frame
-from relit_camera.face.face_state import FaceStatus, HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.face_state import FaceStatus
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.rotated_crop import Crop
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.face.motion.neutral_face import NeutralFace
 from relit_camera.live.reenactment.control_points import NECK_PIVOT
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.color import srgb_decode, uint8_from_linear
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.face.landmarks.rotated_crop import Crop
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.first_order_reenactor import fade_flow_at_border
 from relit_camera.live.reenactment.motion_transfer import split_body_motion
 from relit_camera.live.reenactment.onnx_network.head_crop import DrivingCrops, crop_square, head_crop
