@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.light.directions import texel_directions
 from relit_camera.light.environment_panorama import Panorama
@@ -83,8 +84,7 @@ def _extrapolate_to_sphere(picture: LinearImage, height_deg: float) -> NDArray[n
     # Seen from the front a direction lies at its mirror image in the unseen half. The floor under the depth keeps both
     # coordinates smooth at the sides and poles, where only the picture's edges are seen.
     depth = np.maximum(np.abs(z), 0.3)
-    unseen = np.clip((z + 0.6) / 1.2, 0, 1)
-    unseen = unseen * unseen * (3 - 2 * unseen)
+    unseen = smoothstep((z + 0.6) / 1.2)
     across = (1 - unseen) * np.clip(x / (depth * half_width), -1, 1) + unseen * x
     up = (1 - unseen) * np.clip(y / (depth * half_height), -1, 1) + unseen * y
     softness = _angle_outside_picture(x, y, z, half_width, half_height) / _MAX_BLUR_AT_DEG

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import TrackError
 from relit_camera.base.images.image_types import Points
 from relit_camera.base.rotations import Angles, angles_from_rotation
 from relit_camera.face.face_state import FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose, project, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
-from relit_camera.face.motion.motion_blending import Crossfade, Inertialization, RelativeMotion, smoothstep, zero_motion
+from relit_camera.face.motion.motion_blending import Crossfade, Inertialization, RelativeMotion, zero_motion
 from relit_camera.face.motion.neutral_face import NeutralFace, NeutralFaceFinder, is_frontal
 from relit_camera.face.motion.one_euro_filter import OneEuroFilter, OneEuroParameters, RotationOneEuroFilter
 
@@ -187,7 +188,7 @@ class FaceFollower:
         self._time_s = time_s
         step = passed / self._settings.ease_s
         self._presence = float(np.clip(self._presence + (step if self._followed else -step), 0, 1))
-        return smoothstep(self._presence)
+        return float(smoothstep(self._presence))
 
 
 class _FaceSmoother:

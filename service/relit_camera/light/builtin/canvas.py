@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.color import srgb_decode
 from relit_camera.light.directions import direction_from_degrees
 
@@ -49,12 +50,6 @@ def color(code: str, strength: float = 1.0) -> NDArray[np.float32]:
     return srgb_decode(encoded) * np.float32(strength)
 
 
-def smoothstep(low: float, high: float, value: NDArray) -> Canvas:
-    """0 below `low`, 1 above `high` (or the other way round where low > high), smooth between (Hermite)."""
-    t = np.clip((value - low) / (high - low), 0, 1)
-    return np.asarray(t * t * (3 - 2 * t), np.float32)
-
-
 def color_ramp(value: NDArray, stops: Sequence[float], colours: list[NDArray[np.float32]]) -> Canvas:
     """Colours (..., 3) at `value` (...), linear between rising `stops`."""
     table = np.array(colours)
@@ -87,7 +82,7 @@ def panel_mask(
     u, v, depth = np.moveaxis(directions() @ axes.T, -1, 0)
     inside = [
         smoothstep(
-            size / 2 + soft_deg, size / 2 - soft_deg, np.abs(np.degrees(np.arctan2(offset, np.maximum(depth, 1e-6))))
+            np.abs(np.degrees(np.arctan2(offset, np.maximum(depth, 1e-6)))), size / 2 + soft_deg, size / 2 - soft_deg
         )
         for offset, size in ((u, width_deg), (v, height_deg))
     ]

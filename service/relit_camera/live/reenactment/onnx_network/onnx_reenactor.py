@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.color import srgb_decode, uint8_from_linear
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.face.landmarks.rotated_crop import Crop
@@ -132,5 +133,4 @@ def _blend_prediction(
 def _edge_fade_mask(shape: tuple[int, ...]) -> Mask:
     """1 in the middle of (rows, columns), smoothly 0 at its edges."""
     edges = [np.clip((np.minimum(np.arange(n), np.arange(n)[::-1]) + 0.5) / (EDGE_FADE * n), 0, 1) for n in shape]
-    share = np.minimum.outer(*edges)
-    return np.asarray(share * share * (3 - 2 * share), dtype=np.float32)
+    return smoothstep(np.minimum.outer(*edges)).astype(np.float32)
