@@ -35,6 +35,10 @@ class HeadPose:
     translation: NDArray[np.float64]
     focal_px: float
 
+    def depth_of(self, point: NDArray[np.float64]) -> float:
+        """Distance in centimetres, along the camera's axis, from the camera to a head-space point (3,)."""
+        return float(-(self.rotation.apply(point) + self.translation)[2])
+
 
 _CV_FROM_OURS = np.array([1.0, -1.0, -1.0])
 

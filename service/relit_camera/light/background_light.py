@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import LinearImage
+from relit_camera.base.images.resize import shrink
 from relit_camera.light.directions import texel_directions
 from relit_camera.light.environment_panorama import Panorama
 
@@ -46,7 +47,7 @@ def panorama_from_background(picture: LinearImage, height_deg: float = BACKGROUN
         # environment has its middle before the person instead.
         radiance = np.roll(picture[:, ::-1], picture.shape[1] // 2, axis=1)
         return Panorama(np.ascontiguousarray(radiance), notes=("The background is a panorama: its light is exact.",))
-    bright = _with_highlights(_downscaled(picture))
+    bright = _with_highlights(shrink(picture, _WORKING_ROWS / picture.shape[0]))
     radiance = _extrapolate_to_sphere(bright, height_deg)
     return Panorama(radiance, notes=("Guessed from an ordinary picture: the light in front of it is not known.",))
 
@@ -60,12 +61,6 @@ def _is_panorama(picture: LinearImage) -> bool:
     seam = np.abs(encoded[:, 0] - encoded[:, -1]).mean()
     poles = encoded[[0, -1]].std(axis=1).mean()
     return bool(seam <= _MAX_SEAM_RATIO * neighbours + 0.01 and poles <= 0.05)
-
-
-def _downscaled(picture: LinearImage) -> LinearImage:
-    scale = min(1.0, _WORKING_ROWS / picture.shape[0])
-    size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _with_highlights(picture: LinearImage) -> LinearImage:

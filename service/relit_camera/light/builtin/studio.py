@@ -1,4 +1,4 @@
-"""A photographer's studio: a large key from the front left, a weak fill, two strips behind, a lit roll of grey paper."""
+"""A photographer's studio: a large key light from the front left, a weak fill, two strips behind, lit grey paper."""
 
 from __future__ import annotations
 

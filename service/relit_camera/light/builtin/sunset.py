@@ -49,7 +49,8 @@ def _sky(elevation: Canvas) -> Canvas:
     lit = color_ramp(away, [0, 50, 110, 180], [
         color("#ffc27a", 2.8), color("#ff9a78", 1.9), color("#ff9f9a", 1.6), color("#e8a3b4", 1.3),
     ])  # fmt: skip
-    return blend_over(sky, 0.8 * cover, lit * (1.15 - 0.6 * smoothstep(field, 0.3, 1.5))[..., None])
+    thickness = 1.15 - 0.6 * smoothstep(field, 0.3, 1.5)[..., None]
+    return blend_over(sky, np.asarray(0.8 * cover, np.float32), lit * thickness)
 
 
 def _sea(sky: Canvas) -> Canvas:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.easing import smoothstep
+from relit_camera.base.images.affine import opencv_affine
 from relit_camera.base.images.color import srgb_decode, uint8_from_linear
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.face.landmarks.rotated_crop import Crop
@@ -107,9 +108,7 @@ def output_from_crop(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.floa
     box_from_source = inverse_affine(placed)
     box_from_source[:, 2] -= box[:2]
     source_from_picture = np.vstack([crop.picture_from_pixels(shape[1], shape[0]), [0, 0, 1]])
-    affine = np.asarray(box_from_source @ source_from_picture, dtype=np.float64)
-    affine[:, 2] += affine[:, :2] @ [0.5, 0.5] - 0.5
-    return affine
+    return opencv_affine(np.asarray(box_from_source @ source_from_picture, dtype=np.float64))
 
 
 def _blend_prediction(
