@@ -17,6 +17,7 @@ from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.images.resize import shrink
 from relit_camera.light.directions import texel_directions
 from relit_camera.light.environment_panorama import Panorama
+from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 
 BACKGROUND_HEIGHT_DEG = 35.0
 """How high an environment is seen behind the person, in degrees."""
@@ -45,8 +46,8 @@ def panorama_from_background(picture: LinearImage, height_deg: float = BACKGROUN
     if _is_panorama(picture):
         # It is shown as it is: what stands at its left is seen at the left, and must light from there. A file of an
         # environment has its middle before the person instead.
-        radiance = np.roll(picture[:, ::-1], picture.shape[1] // 2, axis=1)
-        return Panorama(np.ascontiguousarray(radiance), notes=("The background is a panorama: its light is exact.",))
+        radiance = between_map_and_viewer_axes(picture)
+        return Panorama(radiance, notes=("The background is a panorama: its light is exact.",))
     bright = _with_highlights(shrink(picture, _WORKING_ROWS / picture.shape[0]))
     radiance = _extrapolate_to_sphere(bright, height_deg)
     return Panorama(radiance, notes=("Guessed from an ordinary picture: the light in front of it is not known.",))

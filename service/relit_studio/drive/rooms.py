@@ -8,8 +8,9 @@ import numpy as np
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.light.builtin import window
-from relit_camera.light.builtin.canvas import Canvas, bearings, blend_over, color, panel_mask, to_map_axes
+from relit_camera.light.builtin.canvas import Canvas, bearings, blend_over, color, panel_mask
 from relit_camera.light.environment_panorama import Environment, environment_from_panorama, panorama_from_radiance
+from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 
 
 def _soft() -> Canvas:
@@ -55,4 +56,4 @@ def paint_room(name: str) -> Environment:
     Raises:
         KeyError: `name` is none of `ROOMS`.
     """
-    return environment_from_panorama(name, panorama_from_radiance(to_map_axes(_ROOMS[name]()), name))
+    return environment_from_panorama(name, panorama_from_radiance(between_map_and_viewer_axes(_ROOMS[name]()), name))

@@ -1,7 +1,6 @@
 """The canvas that the built-in environments are painted on, and the strokes they share.
 
-Viewer axes: a latitude-longitude picture as somebody sees it who looks along −Z, where the background of the virtual
-camera lies. Its middle is −Z, right of it lies +X, row 0 is up. `bearing` is the angle from the middle to the right, in
+A canvas has viewer axes (`light.panorama_axes`), row 0 up. `bearing` is the angle from its middle to the right, in
 degrees; what lights the face from the front is at bearings beyond ±90.
 """
 
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.easing import smoothstep
-from relit_camera.base.images.color import srgb_decode
+from relit_camera.base.images.color import rgb_from_hex, srgb_decode
 from relit_camera.light.directions import direction_from_degrees
 
 HEIGHT, WIDTH = 512, 1024
@@ -39,15 +38,9 @@ def directions() -> Canvas:
     return direction_from_degrees(180 - bearing, elevation).astype(np.float32)
 
 
-def to_map_axes(canvas: Canvas) -> Canvas:
-    """A canvas as a map: mirrored, with the camera's side in the middle."""
-    return np.ascontiguousarray(np.roll(canvas[:, ::-1], WIDTH // 2, axis=1))
-
-
 def color(code: str, strength: float = 1.0) -> NDArray[np.float32]:
     """Linear RGB (3,) of a web colour such as "#ff8800", times `strength`."""
-    encoded = np.array([int(code[k : k + 2], 16) for k in (1, 3, 5)], np.float32) / 255
-    return srgb_decode(encoded) * np.float32(strength)
+    return srgb_decode(np.array(rgb_from_hex(code), np.float32) / 255) * np.float32(strength)
 
 
 def color_ramp(value: NDArray, stops: Sequence[float], colours: list[NDArray[np.float32]]) -> Canvas:
