@@ -18,7 +18,7 @@ from relit_camera.base.errors import TrackError
 from relit_camera.base.images.image_types import Frame, LinearImage
 from relit_camera.base.models.session_with_fallback import Session
 from relit_camera.face.face_state import FaceState
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
 from relit_camera.live.reenactment.reenactor import WarpTask

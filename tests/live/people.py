@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.face.face_state import FaceStatus, HeadPose
-from relit_camera.face.head_pose import guess_focal, project
+from relit_camera.face.face_state import FaceStatus
+from relit_camera.face.head_pose import HeadPose, guess_focal, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.face.motion.neutral_face import NeutralFace
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.live.reenactment.reenactor import ReenactorContext

@@ -19,8 +19,9 @@ from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import Tracker
-from relit_camera.face.motion.motion_smoothing import FaceFollower, FaceFollowerSettings, FaceMotion
-from relit_camera.light.light_map_rotation import LightMap, rotate_light_map
+from relit_camera.face.motion.face_follower import FaceFollower, FaceFollowerSettings, FaceMotion
+from relit_camera.light.light_map import LightMap
+from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.compositing.compositor import Compositor
 from relit_camera.live.compositing.matting import Matting
 from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, WarpedLayer, WarpTask, open_reenactor

@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.relighting.onnx_relighter import OnnxBasisRelighter
 from relit_camera.subject.relighting.relighter import DenseRelighter, weighted_light

@@ -24,7 +24,7 @@ from relit_camera.base.config.look import (
     NoBackground,
 )
 from relit_camera.base.easing import ease_out_cubic
-from relit_camera.base.images.color import linear_from_uint8, srgb_encode, uint8_from_linear
+from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, srgb_encode, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, Mask
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.base.images.tone_mapping import inverse_tone_curve, tone_curve
@@ -211,7 +211,7 @@ def neutral_background(size: tuple[int, int]) -> DisplayImage:
 
 def solid_color(color: str, size: tuple[int, int]) -> DisplayImage:
     """One colour, `#rrggbb` in sRGB, over `size` (width, height)."""
-    return np.full((size[1], size[0], 3), list(bytes.fromhex(color[1:])), dtype=np.uint8)
+    return np.full((size[1], size[0], 3), rgb_from_hex(color), dtype=np.uint8)
 
 
 def apply_exposure(image: DisplayImage, gain_ev: float) -> DisplayImage:

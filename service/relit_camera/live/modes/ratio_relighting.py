@@ -13,7 +13,7 @@ from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion

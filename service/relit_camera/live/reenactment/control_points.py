@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import Indices, LandmarkScheme
 from relit_camera.live.reenactment.dense_motion import Influence, Region, region_around
 from relit_camera.live.reenactment.source_image import SourceFace
@@ -157,7 +156,7 @@ def skull_outline(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
     The outline of a round head does not turn with it: it follows the skull's centre, its size and its roll only.
     """
     centre, above = project(np.stack([SKULL_CENTER, SKULL_CENTER + [0, CROWN_OFFSET_CM, 0]]), pose, size)
-    depth = -(pose.rotation.apply(SKULL_CENTER) + pose.translation)[2]
+    depth = pose.depth_of(SKULL_CENTER)
     up = (above - centre) / max(float(np.linalg.norm(above - centre)), 1e-6)
     right = np.array([-up[1], up[0]])
     # From one temple over the crown to the other: below are face and neck.
@@ -169,5 +168,5 @@ def skull_outline(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
 def shoulder_anchors(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
     """Points (count, 2) of neck and shoulders in the picture, below the neck's pivot."""
     pivot = project(NECK_PIVOT[None], pose, size)[0]
-    depth = -(pose.rotation.apply(NECK_PIVOT) + pose.translation)[2]
+    depth = pose.depth_of(NECK_PIVOT)
     return np.asarray(pivot + SHOULDER_ANCHORS_CM * [1, -1] * (pose.focal_px / max(depth, 1.0)))

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from relit_camera.face.face_state import HeadPose
+from relit_camera.base.easing import smoothstep
+from relit_camera.face.head_pose import HeadPose
 from relit_camera.live.reenactment.dense_motion import Region, region_around
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.warp import FlowPatch
@@ -113,8 +114,7 @@ def triangulate_face(face: SourceFace) -> FaceMesh:
     delaunay = Delaunay(corners)
     triangles = np.asarray(delaunay.simplices, dtype=np.intp)
     outline = np.array([corners[row] for row in delaunay.convex_hull])
-    share = np.clip(_distance(corners, outline) / (OUTLINE_BLEND * face.scheme.eye_span(face.landmarks)), 0, 1)
-    trust = share * share * (3 - 2 * share)
+    trust = smoothstep(_distance(corners, outline), 0, OUTLINE_BLEND * face.scheme.eye_span(face.landmarks))
     return FaceMesh(face, members, triangles, np.sign(_doubled_areas(corners[triangles])), trust)
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import Frame, LinearImage
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.head_pose import HeadPose
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import (
     COARSE_GRID,
     ControlPoints,
@@ -120,5 +121,5 @@ def fade_flow_at_border(patch: FlowPatch, size: tuple[int, int]) -> FlowPatch:
     rows, columns = patch.flow.shape[:2]
     x, y = (np.linspace(patch.region[i], patch.region[i + 2], n) for i, n in ((0, columns), (1, rows)))
     inward = np.minimum.outer(np.minimum(y, size[1] - y), np.minimum(x, size[0] - x))
-    share = np.clip(inward / (BORDER_FADE * min(size)), 0, 1)
-    return FlowPatch(patch.flow * (share * share * (3 - 2 * share)).astype(np.float32)[..., None], patch.region)
+    fade = smoothstep(inward, 0, BORDER_FADE * min(size)).astype(np.float32)
+    return FlowPatch(patch.flow * fade[..., None], patch.region)

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import project
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.head_pose import HeadPose, project
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import NECK_PIVOT, ControlPoints, rigid_head_anchors, shoulder_anchors
 from relit_camera.live.reenactment.source_image import SourceFace
 
@@ -64,7 +63,7 @@ def split_body_motion(face: SourceFace, motion: FaceMotion) -> BodyMotion:
     still = face.pose
     turned = rotate_about(NECK_PIVOT, still, soft_limit_rotation(motion.rotation, MAX_ROTATION_DEG))
     body = still.translation + motion.translation - turned.translation
-    depth = -(still.rotation.apply(NECK_PIVOT) + still.translation)[2]
+    depth = still.depth_of(NECK_PIVOT)
     scale = float(np.clip(depth / max(depth - body[2], 1.0), *SCALE_RANGE))
     shift = np.clip(body[:2], -MAX_SHIFT_CM, MAX_SHIFT_CM) * [1, -1] * still.focal_px / depth
     return BodyMotion(turned, shift, scale, project(NECK_PIVOT[None], still, face.size)[0])

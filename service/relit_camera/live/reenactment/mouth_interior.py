@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.live.reenactment.source_image import SourceFace
 
 CAVITY = np.array([0.035, 0.014, 0.012], dtype=np.float32)

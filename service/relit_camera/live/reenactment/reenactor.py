@@ -10,7 +10,7 @@ from typing import Protocol
 from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.subject.relighting.relighter import Relighter
 from relit_camera.subject.subject import Subject

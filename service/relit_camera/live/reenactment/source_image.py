@@ -11,10 +11,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import LinearImage, Mask, Points
-from relit_camera.face.face_state import HeadPose, Tracker
-from relit_camera.face.head_pose import fit_pose, unproject
+from relit_camera.face.face_state import Tracker
+from relit_camera.face.head_pose import HeadPose, fit_pose, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 from relit_camera.face.tracking.trackers import open_tracker, track_still
 from relit_camera.live.reenactment.warp import Box, Warp, sample_bilinear
@@ -129,7 +130,7 @@ def feather_edges(matte: Mask) -> Mask:
     across = np.clip((np.minimum(np.arange(width), np.arange(width)[::-1]) + 0.5) / reach, 0, 1)
     down = np.clip((np.arange(height) + 0.5) / reach, 0, 1)
     smooth = np.minimum.outer(down, across)
-    return np.asarray(matte * (smooth * smooth * (3 - 2 * smooth)), dtype=np.float32)
+    return np.asarray(matte * smoothstep(smooth), dtype=np.float32)
 
 
 def _upsample(source: NDArray[np.float32]) -> NDArray[np.float32]:

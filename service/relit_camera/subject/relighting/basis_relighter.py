@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import LinearImage
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.subject.compression.local_basis import LocalBasis
 from relit_camera.subject.relighting.relighter import weighted_light
 from relit_camera.subject.subject import Subject

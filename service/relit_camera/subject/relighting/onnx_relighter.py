@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.relighting.basis_relighter import group_by_rank
 from relit_camera.subject.relighting.relighter import dense_matrix, weighted_light

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.subject import Subject
 

@@ -23,7 +23,7 @@ from relit_camera.lab.evaluate.field.map_pictures import (
     values_on_light_map,
 )
 from relit_camera.lab.evaluate.html_report import chart, heading, line_chart, page, paragraph, picture, table
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.light.spherical_harmonics import coefficient_count, project, reconstruct
 
 MAP_CAPTION = (

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.contact_sheet import contact_sheet
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
-from relit_camera.capture.reflectance.delaunay_barycentric import spherical_delaunay
+from relit_camera.capture.reflectance.delaunay_triangulation import spherical_delaunay
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, sampled_region
 from relit_camera.lab.evaluate.field.sample_points import SamplePoint
 from relit_camera.light.directions import MAP_HEIGHT, MAP_WIDTH, map_position_from_direction, texel_directions

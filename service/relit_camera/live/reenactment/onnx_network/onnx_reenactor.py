@@ -11,10 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
+from relit_camera.base.images.affine import opencv_affine
 from relit_camera.base.images.color import srgb_decode, uint8_from_linear
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.face.landmarks.rotated_crop import Crop
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.first_order_reenactor import fade_flow_at_border
 from relit_camera.live.reenactment.motion_transfer import split_body_motion
 from relit_camera.live.reenactment.onnx_network.head_crop import DrivingCrops, crop_square, head_crop
@@ -106,9 +108,7 @@ def output_from_crop(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.floa
     box_from_source = inverse_affine(placed)
     box_from_source[:, 2] -= box[:2]
     source_from_picture = np.vstack([crop.picture_from_pixels(shape[1], shape[0]), [0, 0, 1]])
-    affine = np.asarray(box_from_source @ source_from_picture, dtype=np.float64)
-    affine[:, 2] += affine[:, :2] @ [0.5, 0.5] - 0.5
-    return affine
+    return opencv_affine(np.asarray(box_from_source @ source_from_picture, dtype=np.float64))
 
 
 def _blend_prediction(
@@ -132,5 +132,4 @@ def _blend_prediction(
 def _edge_fade_mask(shape: tuple[int, ...]) -> Mask:
     """1 in the middle of (rows, columns), smoothly 0 at its edges."""
     edges = [np.clip((np.minimum(np.arange(n), np.arange(n)[::-1]) + 0.5) / (EDGE_FADE * n), 0, 1) for n in shape]
-    share = np.minimum.outer(*edges)
-    return np.asarray(share * share * (3 - 2 * share), dtype=np.float32)
+    return smoothstep(np.minimum.outer(*edges)).astype(np.float32)
