@@ -1,4 +1,4 @@
-"""One frame from left to right."""
+"""The picture of one frame, from tracking to compositing, in every mode."""
 
 from __future__ import annotations
 
@@ -8,30 +8,28 @@ import cv2
 import numpy as np
 import pytest
 
+from relit_camera.app.wiring import make_pipeline
 from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
-from relit_camera.base.config.settings import ReenactSettings, TrackerSettings
+from relit_camera.base.config.settings import InferenceSettings, RelitSettings
 from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
-from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.lab.bench.live_benchmark import SyntheticTracker
 from relit_camera.light.builtin.builtin_environments import builtin_environment
-from relit_camera.live.compositing.matting import matting_factory
-from relit_camera.live.pipeline import Pipeline, fit_frame
+from relit_camera.live.modes.frame_fitting import fit_frame
+from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.scene.scene import Scene
 from tests.small_camera import SIZE, SteadyTracker, difference, grey, small_subject
 
-CPU = SessionOptions("cpu")
+CPU = RelitSettings(inference=InferenceSettings(provider="cpu"))
 STUDIO = builtin_environment("studio")
 LAMP_RIGHT = Lighting(environment=None, lamps=(Lamp(azimuth_deg=90, elevation_deg=0),), transition_s=0)
 LAMP_LEFT = Lighting(environment=None, lamps=(Lamp(azimuth_deg=-90, elevation_deg=0),), transition_s=0)
 
 
 def pipeline(tracker: Tracker | None = None, size: tuple[int, int] = SIZE) -> Pipeline:
-    return Pipeline(
-        tracker or SteadyTracker(), size, TrackerSettings(), ReenactSettings(), CPU, matting_factory("selfie", CPU)
-    )
+    return make_pipeline(CPU, tracker or SteadyTracker(), size)
 
 
 def scene(subject: bool = True, mode: Mode = Mode.REENACT, **look: object) -> Scene:
@@ -141,7 +139,7 @@ def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None
     made, ratio = pipeline(LongFace()), scene(mode=Mode.RATIO)
     for index in range(45):
         last = made.process(frame(index, image), ratio).image
-    assert [trouble.what for trouble in made.troubles] == ["mode ratio shows the reenacted still"]
+    assert [trouble.what for trouble in made.troubles] == ["mode reenact is shown in place of mode ratio"]
     still = made.process(frame(45, image), scene()).image
     assert difference(last, still) < 2
     other = replace(ratio, subject=replace(small_subject()))
@@ -167,20 +165,3 @@ def test_a_matte_that_needs_a_missing_model_says_which(tmp_path: object, monkeyp
 def test_reenact_stands_before_its_background_without_any_model() -> None:
     red = pipeline().process(frame(), scene(background=ColorBackground(color="#ff0000"))).image
     assert (red[:, 0] == [255, 0, 0]).all()
-
-
-def test_fitted_covers_and_centres() -> None:
-    wide = np.zeros((100, 400, 3), np.uint8)
-    wide[:, 190:210] = 255
-    cut = fit_frame(frame(3, wide), (200, 100))
-    assert cut.size == (200, 100)
-    assert cut.index == 3
-    np.testing.assert_array_equal(cut.image, wide[:, 100:300])
-    same = frame(0, wide)
-    assert fit_frame(same, (400, 100)) is same
-    small = fit_frame(frame(0, wide), (100, 50)).image
-    expected = cv2.resize(wide[:, 100:300], (100, 50), interpolation=cv2.INTER_AREA)
-    assert difference(small, expected) < 2
-    stripes = np.zeros((90, 180, 3), np.uint8)
-    stripes[:, ::3] = 255
-    assert (fit_frame(frame(0, stripes), (60, 30)).image == 85).all()  # what is finer than its pixels is averaged

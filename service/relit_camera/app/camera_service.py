@@ -181,7 +181,7 @@ class CameraService:
             latency_ms=self._publisher.latency_ms,
             stage_ms=pipeline.timer.percentiles(),
             frames=replace(counts, dropped=counts.dropped + self._skipped + self._supervisor.dropped),
-            providers={s.name: s.provider for s in sessions},
+            providers={s.name: s.provider for s in sessions} | pipeline.providers,
             degraded=troubles,
             version=__version__,
             uptime_s=time.monotonic() - self._started_at,

@@ -42,18 +42,19 @@ BORDER_FADE = 0.08
 class FirstOrderReenactor:
     """See `Reenactor`."""
 
-    def __init__(self, stage: ReenactorContext) -> None:
-        self._face = stage.face
-        self._size = stage.size
-        self._person = Cutout(stage.subject)
+    def __init__(self, context: ReenactorContext) -> None:
+        context.require_no_argument("first-order")
+        self._face = context.face
+        self._size = context.size
+        self._person = Cutout(context.subject)
         anchors = (
-            head_and_shoulder_anchors(stage.face.pose, stage.face.size) if self._person.whole else np.zeros((0, 2))
+            head_and_shoulder_anchors(context.face.pose, context.face.size) if self._person.whole else np.zeros((0, 2))
         )
-        self._points = control_points(stage.face, anchors)
-        self._mesh = triangulate_face(stage.face)
-        self._motion = DenseMotion(stage.options)
-        self._mouth = MouthInterior(stage.face, stage.subject.neutral)
-        self._placed = source_from_output(stage.subject.size, stage.size)
+        self._points = control_points(context.face, anchors)
+        self._mesh = triangulate_face(context.face)
+        self._motion = DenseMotion(context.session)
+        self._mouth = MouthInterior(context.face, context.subject.neutral)
+        self._placed = source_from_output(context.subject.size, context.size)
 
     def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
         """See `Reenactor.plan_warp`."""

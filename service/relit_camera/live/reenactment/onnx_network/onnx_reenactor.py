@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.errors import InputError
 from relit_camera.base.images.color import srgb_decode, uint8_from_linear
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.face.landmarks.rotated_crop import Crop
@@ -38,20 +39,24 @@ EDGE_FADE = 0.1
 class OnnxReenactor:
     """See `Reenactor`. While the face is lost or out of reach, the picture eases to the unmoved still."""
 
-    def __init__(self, stage: ReenactorContext, path: Path) -> None:
-        """Load and check the network at `path`.
+    def __init__(self, context: ReenactorContext) -> None:
+        """Load and check the network whose file the context's argument names.
 
         Raises:
+            InputError: no file is named.
             ModelError: it is missing, damaged, or breaks the contract.
         """
-        self._face, self._size = stage.face, stage.size
-        self._network = ReenactorNetwork(path, stage.options)
-        self._crop = head_crop(stage.face.pose, stage.face.size)
-        self._source = crop_square(stage.subject.neutral, self._crop, self._network.side)
+        if not context.argument:
+            raise InputError("reenactor onnx needs a network", "name it 'onnx:FILE.onnx'")
+        path = Path(context.argument).expanduser()
+        self._face, self._size = context.face, context.size
+        self._network = ReenactorNetwork(path, context.session)
+        self._crop = head_crop(context.face.pose, context.face.size)
+        self._source = crop_square(context.subject.neutral, self._crop, self._network.side)
         self._network.check_at_rest(self._source)
         self._driver = DrivingCrops(self._network.side)
-        self._person = Cutout(stage.subject)
-        self._placed = source_from_output(stage.subject.size, stage.size)
+        self._person = Cutout(context.subject)
+        self._placed = source_from_output(context.subject.size, context.size)
 
     def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
         """See `Reenactor.plan_warp`.
