@@ -26,7 +26,7 @@ from relit_camera.live.reenactment.reenactor import REENACTORS
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.relighting.relighter import RELIGHTERS
 from tests.cli.relit_command import Material, call, start
-from tests.small_camera import small_subject
+from tests.small_camera import small_subject, wait_until
 from tests.synthetic import sphere_samples
 
 FOLDER = Path(__file__).parent
@@ -104,11 +104,12 @@ def test_relit_run_takes_plug_ins_from_its_configuration(
         line = process.stdout.readline()
         assert "the panel is at " in line, process.stderr and process.stderr.read()
         with httpx.Client(base_url=line.split()[-1] + "api/v1/", timeout=60) as http:
-            snapshot = http.get("snapshot.jpg")  # waits for a picture
+            wait_until(lambda: http.get("status").json()["state"] == "live")
             status = http.get("status").json()
-        assert snapshot.status_code == 200
         assert (status["source"], status["sink"]) == ("example example:77", "example shelf")
-        assert status["tracker"]["name"] == "example"
+        assert status["tracker"] == {"name": "example", "state": "found"}
+        assert status["providers"]["relighter example"] == "numpy"
+        assert status["degraded"] == []
     finally:
         process.terminate()
         process.communicate()

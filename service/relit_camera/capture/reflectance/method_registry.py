@@ -13,6 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.errors import NotFoundError
 from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.subject.reflectance_field import FactoredField, ReflectanceField
@@ -73,6 +74,9 @@ def open_method(name: str) -> ReflectanceMethod:
         ConfigError: the plug-in cannot be loaded.
         InputError: the name has an argument (`NAME:ARGUMENT`).
     """
+    if name != "default" and not METHODS.has(name):
+        there_are = ", ".join(["default", *method_names()])
+        raise NotFoundError(f"no reflectance method is called '{name}'", f"there are: {there_are}")
     factory, argument = METHODS.load(DEFAULT_METHOD if name == "default" else name)
     require_no_argument("reflectance method", name.partition(":")[0], argument)
     return factory()
