@@ -1,6 +1,7 @@
-"""A reenactor of the user's own: a published network (FOMM, LivePortrait …) exported to ONNX (docs/reenactors.md).
+"""Reenactor `onnx:FILE`: the user's own network (FOMM, LivePortrait …), exported to ONNX (docs/reenactors.md).
 
-It sees square crops of heads. A flow warps the relit picture at full resolution; a picture is laid over the still.
+It gets square crops of heads. A flow warps the relit picture at full resolution; a picture is laid over the source
+image.
 """
 
 from __future__ import annotations
@@ -33,11 +34,11 @@ from relit_camera.live.reenactment.warp import (
 )
 
 EDGE_FADE = 0.1
-"""Share of the crop's side over which a picture gives way to the still round it."""
+"""Share of the crop's side over which a picture gives way to the source image round it."""
 
 
 class OnnxReenactor:
-    """See `Reenactor`. While the face is lost or out of reach, the picture eases to the unmoved still."""
+    """See `Reenactor`. While the face is lost or out of reach, the picture eases to the unmoved source image."""
 
     def __init__(self, context: ReenactorContext) -> None:
         """Load and check the network whose file the context's argument names.
@@ -62,7 +63,7 @@ class OnnxReenactor:
         """See `Reenactor.plan_warp`.
 
         Raises:
-            ModelError: the network fails on this frame, or breaks the contract; so does the move.
+            ModelError: the network fails on this frame, or breaks the contract; so does the task.
         """
         placed = self._placed
         if self._person.whole:
@@ -72,7 +73,7 @@ class OnnxReenactor:
         self._driver.update(motion, frame)
         driving, initial = self._driver.driving, self._driver.initial
         seen = None if driving is None or initial is None or motion.presence == 0 else (driving, initial)
-        # The flow is that of the still as it was captured, and known at once; a picture is made of the relit one.
+        # A flow is computed from the source image as it was captured, so at once; a picture from the relit one.
         flow = self._network.answer(self._source, *seen).flow if seen and self._network.gives_flow else None
         patches = () if flow is None else (self._patch(flow, motion.presence),)
         positions = self._person.positions(Warp(placed, patches), box)
@@ -90,7 +91,7 @@ class OnnxReenactor:
         return warp
 
     def _patch(self, flow: NDArray[np.float32], share: float) -> FlowPatch:
-        """A `share` of the network's flow, in still pixels."""
+        """A `share` of the network's flow, in source pixels."""
         # −1 and 1 are the middles of the outermost pixels of the crop.
         half = self._crop.width / 2 * (1 - 1 / self._network.side)
         displacement = (flow - identity_grid(*flow.shape[:2])) * np.float32(half * share)
@@ -103,9 +104,9 @@ def output_from_crop(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.floa
     """The affine map (2, 3) from a picture of `crop` to the output pixels of `box`, for cv2: pixel centres at integers.
 
     Args:
-        crop: in the still.
+        crop: in the source image.
         shape: (rows, columns) of its picture.
-        placed: output pixels → still pixels.
+        placed: output pixels → source pixels.
         box: left, top, right, bottom in output pixels.
     """
     box_from_source = inverse_affine(placed)
@@ -121,7 +122,7 @@ def _blend_prediction(
 ) -> None:
     """Blend a `share` of the network's picture into the unmoved one, in place.
 
-    Without an alpha of its own it is cut out by the still's.
+    Without an alpha of its own it is cut out by the source image's.
     """
     assert answer.picture is not None
     size = (picture.shape[1], picture.shape[0])
