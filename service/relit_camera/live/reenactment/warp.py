@@ -139,7 +139,7 @@ class Warp:
 def sample_bilinear(
     source: NDArray[np.float32], positions: NDArray[np.float32], beyond: int = cv2.BORDER_CONSTANT
 ) -> NDArray[np.float32]:
-    """Sample a picture at `positions` (height, width, 2) from `Warp.map`, bilinear; `beyond` is OpenCV's border mode."""
+    """Sample a picture at `positions` (height, width, 2) from `Warp.map`, bilinear; `beyond`: OpenCV's border mode."""
     view = cv2.remap(source, positions, None, cv2.INTER_LINEAR, borderMode=beyond, borderValue=0)
     return np.asarray(view, dtype=np.float32)
 
