@@ -1,4 +1,4 @@
-"""Square pictures of a head, cut alike from the still and from live frames, as published reenactors want them."""
+"""Square crops of a head, alike from the source image and from live frames, as published reenactors want them."""
 
 from __future__ import annotations
 
