@@ -31,7 +31,9 @@ def layers(container: str = PACKAGE) -> list[list[str]]:
     assert isinstance(tool, dict)
     for contract in tool["importlinter"]["contracts"]:
         if container in contract.get("containers", []) or (container == PACKAGE and "containers" not in contract):
-            return [[name.strip().removeprefix(f"{PACKAGE}.") for name in line.split("|")] for line in contract["layers"]]
+            return [
+                [name.strip().removeprefix(f"{PACKAGE}.") for name in line.split("|")] for line in contract["layers"]
+            ]
     raise LookupError(f"pyproject.toml has no layers contract for {container}")
 
 
@@ -69,7 +71,9 @@ def _imports_text(container: str = PACKAGE) -> str:
 
 
 def _plug_ins_text() -> str:
-    rows = "".join(f"| `{group}` | {', '.join(f'`{name}`' for name in names)} |\n" for group, names in plug_ins().items())
+    rows = "".join(
+        f"| `{group}` | {', '.join(f'`{name}`' for name in names)} |\n" for group, names in plug_ins().items()
+    )
     return f"| group | built in |\n|---|---|\n{rows}"
 
 
