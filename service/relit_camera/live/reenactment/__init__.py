@@ -1,1 +1,1 @@
-"""Face motion → moved picture: reenactors behind one interface."""
+"""Reenactment: from the motion of the live face to a warp of the relit source image."""
