@@ -1,1 +1,1 @@
-"""Reenactment: from the motion of the live face to a warp of the relit source image."""
+"""Face motion → moved picture: reenactors behind one interface."""
