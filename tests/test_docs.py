@@ -23,7 +23,7 @@ from relit_camera.api.server.connection_timeouts import MIN_BODY_BYTES_PER_TIMEO
 from relit_camera.base.config.access_token import MIN_TOKEN_LENGTH
 from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH
 from relit_camera.base.config.settings import RelitSettings
-from relit_camera.base.images import image_files
+from relit_camera.base.images.image_files import MAX_EXR_VALUES, MAX_IMAGE_PIXELS, MAX_JPEG_SCANS
 from relit_camera.base.models.model_manifest import public_manifest
 from relit_camera.capture import lights_file, subject_landmarks
 from relit_camera.cli.main import app
@@ -116,8 +116,8 @@ def test_the_table_of_events_names_all_that_are_published() -> None:
 LIMITS = {
     "a file sent": [f"{MAX_UPLOAD_BYTES // MIB} MiB"],
     "JSON sent": [f"{MAX_JSON_BYTES // MIB} MiB"],
-    "a picture": [f"{image_files.MAX_IMAGE_PIXELS // 10**6} million pixels", f"{image_files.MAX_JPEG_SCANS} scans"],
-    "a panorama": [f"{MAX_PANORAMA_PIXELS / 1e6:.1f} million", f"{image_files.MAX_EXR_VALUES // 10**6} million values"],
+    "a picture": [f"{MAX_IMAGE_PIXELS // 10**6} million pixels", f"{MAX_JPEG_SCANS} scans"],
+    "a panorama": [f"{MAX_PANORAMA_PIXELS / 1e6:.1f} million", f"{MAX_EXR_VALUES // 10**6} million values"],
     "a stored background": [f"{MAX_BACKGROUND_SIDE_PX} pixels"],
     "a preset's or settings file": [f"{MAX_YAML_BYTES // MIB} MiB", f"{MAX_YAML_DEPTH} levels"],
     "a subject that is shown by the camera": [f"{subject_file.MAX_IN_MEMORY_BYTES // (1 << 30)} GiB"],
