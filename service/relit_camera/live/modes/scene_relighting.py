@@ -6,7 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import LinearImage
-from relit_camera.light.light_map_rotation import LightMap, rotate_light_map
+from relit_camera.light.light_map import LightMap
+from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.scene.light_transition import LightTransition
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.stage_timing import StageTimer
