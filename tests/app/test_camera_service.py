@@ -23,6 +23,8 @@ from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.supervision import pipeline_supervisor as line_module
 from tests.small_camera import FPS, SIZE, SteadyTracker, difference, grey, memory_source, running_camera, wait_until
 
+pytestmark = pytest.mark.real_time
+
 LAMP_LEFT = {"azimuth_deg": -90, "elevation_deg": 0, "intensity": 1.5}
 LAMP_RIGHT = {"azimuth_deg": 90, "elevation_deg": 0, "intensity": 1.5}
 

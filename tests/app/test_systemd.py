@@ -21,6 +21,8 @@ from relit_camera.live.status.camera_status import CameraState, Degradation, Fra
 from tests.api.fake_camera import STATUS
 from tests.cli.relit_command import Material, environment
 
+pytestmark = pytest.mark.real_time
+
 START_S = 60.0
 WATCHDOG_S = 1.0
 INJECTED = """

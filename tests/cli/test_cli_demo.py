@@ -20,6 +20,8 @@ from relit_camera.face.tracking.track_recording import read_track
 from relit_camera.subject.subject_file import read_subject
 from tests.cli.relit_command import call, start
 
+pytestmark = pytest.mark.real_time
+
 START_S = 60.0
 
 

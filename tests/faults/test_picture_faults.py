@@ -25,6 +25,8 @@ from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from tests.faults.watched_camera import Survived, watched_camera
 from tests.small_camera import SIZE, SteadyTracker, difference, grey, memory_source, wait_until
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:

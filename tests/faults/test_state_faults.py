@@ -33,6 +33,8 @@ from tests.small_camera import (
     wait_until,
 )
 
+pytestmark = pytest.mark.real_time
+
 
 def overwritten(path: Path) -> None:
     path.write_bytes(b"garbage" * 1000)

@@ -11,6 +11,8 @@ from relit_camera.live.publishing.placeholder_image import BACKGROUND_COLOR, pla
 from relit_camera.live.publishing.publisher import PublishedPicture, Publisher
 from tests.small_camera import wait_until
 
+pytestmark = pytest.mark.real_time
+
 SIZE = (64, 48)
 PLACEHOLDER = np.full((48, 64, 3), 7, np.uint8)
 
