@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from relit_camera.app.systemd import SystemdNotifier, notify_systemd, status_line
-from relit_camera.live.status.camera_status import CameraState, Degradation, FrameCounts
+from relit_camera.live.status.camera_status import CameraState, CameraStatus, Degradation, FrameCounts
 from tests.api.fake_camera import STATUS
 from tests.cli.relit_command import Material, environment
 
@@ -91,7 +91,7 @@ class Camera:
     def __init__(self) -> None:
         self.base, self.published = STATUS, 0
 
-    def __call__(self):
+    def __call__(self) -> CameraStatus:
         return replace(self.base, frames=FrameCounts(self.published, 0, 0))
 
 

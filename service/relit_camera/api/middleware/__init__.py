@@ -1,1 +1,1 @@
-"""What every HTTP request passes: access control, limits of size and time, headers."""
+"""What every HTTP request passes: body limits, checks of token and origin, error handlers."""
