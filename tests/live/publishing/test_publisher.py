@@ -245,10 +245,22 @@ def test_a_stuck_sink_does_not_hold_up_stopping():
 
 
 def test_the_publisher_never_waits_for_a_slow_pipeline(make, sink):
-    make(fps=50)
-    wait_until(lambda: len(sink.times) >= 25)
+    publisher, ended = make(fps=50), threading.Event()
+
+    def pipeline() -> None:
+        value = 100
+        while not ended.wait(0.13):  # six and a half periods a picture
+            value += 1
+            publisher.pictures.put(picture(value))
+
+    thread = threading.Thread(target=pipeline)
+    thread.start()
+    wait_until(lambda: max(sink.values, default=0) >= 105)
+    ended.set()
+    thread.join()
     gaps = np.diff(sink.times)
     assert np.median(gaps) == pytest.approx(0.02, abs=0.005)
+    assert publisher.counts.repeated > 3 * len(set(sink.values))
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (320, 240), (480, 640), (64, 64)])
