@@ -33,6 +33,8 @@ from tests.small_camera import (
     wait_until,
 )
 
+pytestmark = pytest.mark.real_time
+
 SOON_STALE = CameraTimings(stale_after_s=0.3)
 
 
