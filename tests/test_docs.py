@@ -23,7 +23,7 @@ from relit_camera.api.server.connection_timeouts import MIN_BODY_BYTES_PER_TIMEO
 from relit_camera.base.config.access_token import MIN_TOKEN_LENGTH
 from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH
 from relit_camera.base.config.settings import RelitSettings
-from relit_camera.base.images.image_files import MAX_EXR_VALUES, MAX_IMAGE_PIXELS, MAX_JPEG_SCANS
+from relit_camera.base.images.image_limits import MAX_EXR_VALUES, MAX_IMAGE_PIXELS, MAX_JPEG_SCANS
 from relit_camera.base.models.model_manifest import public_manifest
 from relit_camera.capture import lights_file, subject_landmarks
 from relit_camera.cli.main import app
