@@ -49,7 +49,7 @@ def camera_frame_ms(video: Path, subject: Path, mode: str, seconds: float) -> tu
     )
     scene_controller = SceneController(settings.storage)
     scene_controller.set_look(settings.look)
-    scene_controller.set_subject(str(subject))
+    scene_controller.load_configured_subject(str(subject))
     source = open_source(settings.source)
     sink = NullSink((settings.output.width, settings.output.height))
     camera = CameraService(settings, scene_controller, source, sink, make_tracker(settings))

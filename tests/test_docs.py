@@ -123,7 +123,7 @@ LIMITS = {
     "a subject that is shown by the camera": [f"{subject_file.MAX_IN_MEMORY_BYTES // (1 << 30)} GiB"],
     "a subject file elsewhere": [f"{subject_file.MAX_BYTES // (1 << 30)} GiB"],
     "any subject file": [f"{subject_file.MAX_TENSORS} tensors", f"{MAX_SIDE_PX} pixels"],
-    "a recorded matte": [f"{matting.MAX_BYTES // (1 << 30)} GiB"],
+    "a recorded matte": [f"{matting.MAX_RECORDED_BYTES // (1 << 30)} GiB"],
     "a track; landmarks; an .lp file": [
         "; ".join(f"{module.MAX_BYTES // MIB} MiB" for module in (track_recording, subject_landmarks, lights_file))
     ],

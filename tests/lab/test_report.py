@@ -16,6 +16,7 @@ from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_files import decode_display
 from relit_camera.lab.evaluate.report import html_page
 from relit_camera.lab.evaluate.report.html_page import (
+    Block,
     Heading,
     Paragraph,
     picture,
@@ -31,7 +32,7 @@ from tests.lab.html_outline import Outline
 
 def test_text_from_outside_is_escaped_everywhere() -> None:
     evil = "<script>alert(1)</script>"
-    blocks = [Heading(evil), Heading(evil), Paragraph(evil), table([evil], [[evil]], evil)]
+    blocks: list[Block] = [Heading(evil), Heading(evil), Paragraph(evil), table([evil], [[evil]], evil)]
     page = render_page(evil, [*blocks, picture(np.zeros((2, 2, 3), np.uint8), evil)])
     outline = Outline()
     outline.feed(page)

@@ -18,7 +18,7 @@ from relit_camera.light.directions import (
 )
 from tests.synthetic import fibonacci_directions, sphere_samples
 
-METHODS = [SphericalBarycentric(), PlanarBarycentric(), Nearest()]
+METHODS: list[LinearMethod] = [SphericalBarycentric(), PlanarBarycentric(), Nearest()]
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: type(m).__name__)
