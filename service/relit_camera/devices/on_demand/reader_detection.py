@@ -132,7 +132,6 @@ class ReaderMonitor:
                 node,
             )
         except OSError as error:
-            return (
-                self._has_readers and error.errno not in DEVICE_GONE_ERRNOS
-            )  # it may not be opened now: keep the last answer
+            # A node that exists but may not be opened now leaves the last answer as it was.
+            return self._has_readers and error.errno not in DEVICE_GONE_ERRNOS
         return self._scan(node)
