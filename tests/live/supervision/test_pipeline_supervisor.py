@@ -59,8 +59,9 @@ class FakeWorker:
         self.dropped = 0
 
     def submit_frame(self, frame: Frame) -> None:
-        assert not self.closed
-        if self._busy:
+        if self.closed:
+            assert self._simulation.closing
+        elif self._busy:
             self.dropped += self._waiting is not None
             self._waiting = frame
         else:
@@ -115,6 +116,7 @@ class Simulation:
         self.shown: list[tuple[float, str, int]] = []
         self.troubles: list[tuple[float, Exception | None]] = []
         self.frames = 0
+        self.closing = False
         self.supervisor = PipelineSupervisor(
             cast(Pipeline, FakePipeline()),
             lambda: cast(Pipeline, FakePipeline()),
@@ -281,6 +283,14 @@ def test_models_may_take_a_minute_to_open() -> None:
     slower.run(60.0)
     assert slower.reported() == [(10.1, "PipelineHangError"), (50.1, "recovered")]
     assert len(slower.workers) == 1
+
+
+def test_a_worker_that_is_started_while_the_camera_closes_is_closed_at_once() -> None:
+    simulation = Simulation()
+    simulation.closing = True
+    simulation.supervisor.close()  # by another thread, while a frame is on its way
+    simulation.supervisor.submit_frame(Frame(IMAGE, 0, 0.0, 0.0))
+    assert [worker.closed for worker in simulation.workers] == [True]
 
 
 def test_closing_closes_all_workers() -> None:
