@@ -1,4 +1,4 @@
-"""A ball that is covered, or moves, in a film made for it."""
+"""A ball that is covered or moved, in a film made for it."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def frames() -> list[LinearImage]:
 
 
 def test_hidden_and_moved_frames_are_told(frames: list[LinearImage]) -> None:
-    watch = BallTracker(sample_scene(frames), OUTLINE)
-    found = find_episodes([watch.see(index, frame) for index, frame in enumerate(frames)], OUTLINE.radius)
+    tracker = BallTracker(sample_scene(frames), OUTLINE)
+    found = find_episodes([tracker.observe(index, frame) for index, frame in enumerate(frames)], OUTLINE.radius)
     assert [(episode.kind, episode.first, episode.last) for episode in found] == [("hidden", 12, 15), ("moved", 16, 21)]
     scale = SCENE.focal_px / -SCENE.center[2]
     assert found[1].dx == pytest.approx(SHIFT_CM[0] * scale, abs=0.3)
@@ -45,10 +45,10 @@ def test_hidden_and_moved_frames_are_told(frames: list[LinearImage]) -> None:
 
 
 def test_a_ball_that_stays_has_no_episodes(frames: list[LinearImage]) -> None:
-    watch = BallTracker(sample_scene(frames[:12]), OUTLINE)
-    sightings = [watch.see(index, frame) for index, frame in enumerate(frames[:12])]
-    assert find_episodes(sightings, OUTLINE.radius) == []
-    assert max(np.hypot(sighting.dx, sighting.dy) for sighting in sightings) < 0.4
+    tracker = BallTracker(sample_scene(frames[:12]), OUTLINE)
+    observations = [tracker.observe(index, frame) for index, frame in enumerate(frames[:12])]
+    assert find_episodes(observations, OUTLINE.radius) == []
+    assert max(np.hypot(each.dx, each.dy) for each in observations) < 0.4
 
 
 def test_where_it_is_in_a_frame() -> None:

@@ -1,4 +1,4 @@
-"""Films in, samples out, against what was put in."""
+"""The whole capture, against the head, lamps, gains and motion from which its film was made."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import pytest
 
 from relit_camera.base.errors import ConfigError, InputError
 from relit_camera.capture.film.face_circle import FaceCircle
+from relit_camera.capture.film.olat.olat_pictures import max_pictures_in_memory
 from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
-from relit_camera.capture.film.pipeline.film_capture import CaptureResult, build_samples, max_frames_in_memory
+from relit_camera.capture.film.pipeline.film_capture import CaptureResult, build_samples
 from tests.capture.film.ball.mirror_scene import degrees_between
 from tests.capture.film.generated_film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film, write_film
 
@@ -40,17 +41,17 @@ def test_lamps_gains_and_motion_are_those_of_the_film(built: CaptureResult) -> N
 
 
 def test_samples_are_pictures_under_distant_lights(built: CaptureResult) -> None:
-    film, samples, square = Film(), built.samples, built.findings.square
+    film, samples, crop = Film(), built.samples, built.findings.crop
     normals = film.surface[0]
     reflectance = film.reflectance.astype(np.float32)
-    x, y = film.shift(built.findings.analysis.motion.reference)
+    x, y = film.shift(built.findings.motion.reference)
     back = np.array([[1, 0, x], [0, 1, y]])
     inside = samples.matte > 0.99
     ratios = []
     for picture, direction in zip(samples.pictures, samples.directions, strict=True):
         shade = np.maximum(normals @ direction, 0)[..., None].astype(np.float32)
         moved = cv2.warpAffine(reflectance * shade, back, SIZE)
-        left, top, side = round(square.left), round(square.top), round(square.side)
+        left, top, side = round(crop.left), round(crop.top), round(crop.side)
         wanted = cv2.resize(
             moved[top : top + side, left : left + side], samples.matte.shape, interpolation=cv2.INTER_AREA
         )
@@ -88,16 +89,15 @@ def test_a_good_film_is_taken_without_warnings_but_of_the_detector(built: Captur
     ],
 )
 def test_warnings_tell_what_is_amiss(built: CaptureResult, detector: bool, visible: float, told: list[str]) -> None:
-    analysis = built.findings.analysis
-    gains = replace(analysis.gains, share=0.0, visible=visible)
-    amiss = replace(built.findings, analysis=replace(analysis, gains=gains, detector=detector, eyes_px=None))
+    gains = replace(built.findings.gains, share=0.0, visible=visible)
+    amiss = replace(built.findings, gains=gains, detector_installed=detector, eyes_px=None)
     warnings = amiss.warnings[-2:]
     assert all(warning.startswith(start) for warning, start in zip(warnings, told, strict=True))
 
 
 def test_a_size_that_memory_cannot_hold_is_refused(tmp_path: Path) -> None:
-    assert max_frames_in_memory(96) == max_frames_in_memory(512) == 600
-    assert 150 <= max_frames_in_memory(1024) < 160
+    assert max_pictures_in_memory(96) == max_pictures_in_memory(512) == 600
+    assert 150 <= max_pictures_in_memory(1024) < 160
     with pytest.raises(InputError, match=r"1200 pixels a side.*--size of 1024 or less"):
         build_samples(tmp_path / "film.mp4", replace(OPTIONS, size=1200))
 

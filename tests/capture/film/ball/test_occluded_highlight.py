@@ -1,4 +1,4 @@
-"""A disc that is seen in part."""
+"""A highlight fitted as a disc that is visible in part."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.capture.film.lamp.flash_matte import estimate_flash_matte
+from relit_camera.capture.film.olat.flash_matte import estimate_flash_matte
 
 
 def painted(wall_reached: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

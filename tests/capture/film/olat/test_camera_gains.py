@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.capture.film.lamp.camera_gains import FrameGains, downsample_for_gains, estimate_gains
+from relit_camera.base.errors import CaptureError
+from relit_camera.capture.film.olat.camera_gains import (
+    FrameGains,
+    downsample_for_gains,
+    estimate_gains,
+    require_uniform_gains,
+)
 
 
 def scene(*, reached: bool, uneven: float = 0.0, seed: int = 0) -> tuple[FrameGains, np.ndarray, np.ndarray]:
@@ -85,3 +91,9 @@ def test_a_dark_room_is_not_taken_for_one_that_the_flash_reaches() -> None:
     found = estimate_gains(light.astype(np.float16), index / 30, index % 6 < 3, index // 6)
     assert found.share == 0
     assert found.too_dim
+
+
+def test_a_camera_that_improves_pictures_is_refused() -> None:
+    require_uniform_gains(0.03)
+    with pytest.raises(CaptureError, match=r"changes parts of the picture by themselves, by 20%.*turn off HDR"):
+        require_uniform_gains(0.2)

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.capture.film.lamp.flash_strength import estimate_flash_strengths
-from relit_camera.capture.film.lamp.near_field import CaptureLamp, Surface, distant_light_factor, near_field_irradiance
+from relit_camera.capture.film.olat.flash_strength import estimate_flash_strengths
+from relit_camera.capture.film.olat.near_field import CaptureLamp, Surface, distant_light_factor, near_field_irradiance
 from relit_camera.light.directions import direction_from_degrees
 from tests.capture.film.generated_film import Film
 
@@ -27,7 +27,7 @@ def film_matte(film: Film) -> np.ndarray:
 
 def test_light_falls_with_the_square_of_the_distance_and_off_the_axis() -> None:
     points = np.array([[[0, 0, 0], [0, 0, 10], [30, 0, 0]]], np.float32)
-    surface = Surface(np.tile(np.float32([0, 0, 1]), (1, 3, 1)), points)
+    surface = Surface(np.tile(np.array([0, 0, 1], np.float32), (1, 3, 1)), points)
     toward, light = near_field_irradiance(surface, CaptureLamp(np.array([0.0, 0.0, 100.0]), np.zeros(3)))
     np.testing.assert_allclose(light, [[1, (100 / 90) ** 2, (100**2 / (100**2 + 30**2)) ** 2]], rtol=1e-5)
     np.testing.assert_allclose(toward[0, 2], np.array([-30, 0, 100]) / np.hypot(30, 100), atol=1e-6)
@@ -91,7 +91,7 @@ def test_where_no_flash_lights_skin_none_is_alike() -> None:
 
 def test_the_direction_of_a_lamp_far_away_is_the_same_everywhere() -> None:
     surface = Surface(
-        np.tile(np.float32([0, 0, 1]), (4, 4, 1)), np.random.default_rng(0).uniform(-9, 9, (4, 4, 3)).astype(np.float32)
+        np.tile(np.array([0, 0, 1], np.float32), (4, 4, 1)), np.random.default_rng(0).uniform(-9, 9, (4, 4, 3)).astype(np.float32)
     )
     np.testing.assert_allclose(
         distant_light_factor(surface, CaptureLamp(1e5 * direction_from_degrees(20, 30), np.zeros(3))), 1, atol=1e-3

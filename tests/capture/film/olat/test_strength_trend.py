@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_camera.capture.film.lamp.flash_strength import remove_half_direction_trend, set_inverse_square_trend
+from relit_camera.capture.film.olat.flash_strength import remove_half_direction_trend, set_inverse_square_trend
 from relit_camera.light.directions import direction_from_degrees
 
 RNG = np.random.default_rng(0)
