@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import CaptureError, ModelError, VideoError
+from relit_camera.base.images.image_files import read_display
 from relit_camera.capture.film.face_localization import (
     find_face_circle,
     locate_face,
@@ -81,7 +82,7 @@ def test_with_a_detector_that_decides(shared: Path) -> None:
 
 
 @pytest.mark.parametrize("width", [1, 24])
-def test_what_is_no_head_is_not_taken_for_one(width: int) -> None:
+def test_a_shape_that_is_no_head_is_refused(width: int) -> None:
     lit = np.zeros((ROWS, COLUMNS))
     lit[8:30, :width] = 0.5
     with pytest.raises(CaptureError, match="nothing that the flash lights looks like a head; name the face's place"):

@@ -63,7 +63,7 @@ def frames() -> list[LinearImage]:
     return film(SCENE)
 
 
-def test_among_other_round_things(frames: list[LinearImage]) -> None:
+def test_a_ball_among_other_round_things(frames: list[LinearImage]) -> None:
     (ball,) = find_balls(sample_scene(with_decoys(frames)), GIVEN)
     center, radius = off(ball.outline, SCENE.outline())
     assert center < 0.02
@@ -73,7 +73,7 @@ def test_among_other_round_things(frames: list[LinearImage]) -> None:
     assert ball.evidence > 0.6
 
 
-def test_without_it_none_of_them_is_taken(frames: list[LinearImage]) -> None:
+def test_other_round_things_are_no_balls(frames: list[LinearImage]) -> None:
     plain = np.full_like(frames[0], 0.06)
     with pytest.raises(CaptureError, match="no mirror ball was found") as refusal:
         find_balls(sample_scene(with_decoys([plain] * 10)), GIVEN)
@@ -123,7 +123,7 @@ def test_a_second_ball_that_is_missing_beside_a_given_one_is_refused(frames: lis
         find_balls(sample_scene(frames), GIVEN, 2, [given])
 
 
-def test_the_outline_tells_of_the_focal_length() -> None:
+def test_the_outline_corrects_the_focal_length() -> None:
     scene = MirrorScene(size=(320, 400), center=np.array([17.0, 26.0, -60.0]), radius_cm=6.5, noise=0.002)
     guess = typical_focal_length(scene.size)
     assert abs(guess.pixels / scene.focal_px - 1) > 0.2

@@ -1,4 +1,4 @@
-"""The highlight where the lamp's place says it must be, and only there."""
+"""Highlights in traced photographs, whose true positions follow from the lamp's."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def true_highlight(lamp: np.ndarray) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("lamp", LAMPS)
-def test_its_place_to_a_fraction_of_a_pixel(lamp: np.ndarray) -> None:
+def test_its_position_to_a_fraction_of_a_pixel(lamp: np.ndarray) -> None:
     found = highlight_in(SCENE.photograph(lamp, seed=1), VIEW, SCENE.photograph(seed=2))
     assert isinstance(found, Highlight)
     assert np.hypot(*np.subtract((found.x, found.y), true_highlight(lamp))) < 0.25
@@ -76,7 +76,7 @@ def test_hidden() -> None:
     assert "brighter" in found.reason
 
 
-def test_nothing_that_is_lit_itself_is_a_mirror() -> None:
+def test_a_ball_that_is_lit_itself_has_no_highlight() -> None:
     dark = np.full((240, 300, 3), 0.05, np.float32)
     lit = np.full((240, 300, 3), 0.5, np.float32)
     cv2.circle(lit, (150, 100), 4, (1.0, 1.0, 1.0), -1)

@@ -31,7 +31,7 @@ def test_elongation_is_that_of_the_counted_outline() -> None:
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_rays_are_mirrored_as_the_law_says(scene: MirrorScene) -> None:
+def test_rays_obey_the_law_of_reflection(scene: MirrorScene) -> None:
     view = PinholeView(BallOutline(*scene.outline()), scene.size, scene.focal_px)
     x0, y0, radius = scene.outline()
     for dx, dy in [(0.0, 0.0), (0.6, 0.2), (-0.5, 0.5), (0.1, -0.8)]:

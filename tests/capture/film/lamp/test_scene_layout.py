@@ -9,7 +9,7 @@ from relit_camera.capture.film.ball.sphere_projection import BallOutline, Pinhol
 from relit_camera.capture.film.lamp.scene_layout import estimate_scene_layout
 
 
-def test_the_head_is_where_its_eyes_say() -> None:
+def test_the_distance_of_the_eyes_gives_the_depth_of_the_head() -> None:
     view = PinholeView(BallOutline(400, 100, 30), (640, 480), 600)
     layout = estimate_scene_layout([view], (320 + 100, 240 - 50), 63)
     assert layout.pixels_per_cm == pytest.approx(10)
@@ -18,7 +18,7 @@ def test_the_head_is_where_its_eyes_say() -> None:
     assert (layout.ball_radius_cm * view.center)[2] == pytest.approx(-60)
 
 
-def test_a_ball_of_known_size_is_where_its_size_says() -> None:
+def test_a_known_size_gives_the_depth_of_the_ball() -> None:
     view = PinholeView(BallOutline(320, 240, 30), (640, 480), 600)
     layout = estimate_scene_layout([view], (320, 240), 63, ball_radius_cm=4)
     assert -(layout.ball_radius_cm * view.center)[2] == pytest.approx(4 / np.sin(np.arctan(30 / 600)))

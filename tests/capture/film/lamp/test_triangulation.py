@@ -21,7 +21,7 @@ def seen(scene: MirrorScene, lamp: np.ndarray) -> BallHighlight:
     return BallHighlight(view, scene.radius_cm, place.normal)
 
 
-def test_the_place_of_a_lamp() -> None:
+def test_the_position_of_a_lamp() -> None:
     for lamp in (np.array([-30.0, 40.0, 20.0]), np.array([10.0, 20.0, 35.0])):
         found = triangulate_lamp(*(seen(scene, lamp) for scene in SCENES))
         assert found is not None
@@ -29,7 +29,7 @@ def test_the_place_of_a_lamp() -> None:
         assert found.gap_deg < 1
 
 
-def test_rays_that_part_meet_nowhere() -> None:
+def test_diverging_rays_have_no_position() -> None:
     outer = [seen(scene, np.array([side * 120.0, 0.0, -20.0])) for side, scene in zip((-1, 1), SCENES, strict=True)]
     assert triangulate_lamp(*outer) is None
     assert triangulate_lamp(outer[0], outer[0]) is None

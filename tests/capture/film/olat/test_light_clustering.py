@@ -27,7 +27,7 @@ def test_groups_are_close_and_not_too_many() -> None:
     assert len(few) == 5
 
 
-def test_near_duplicates_are_merged_and_a_bad_one_hardly_counts() -> None:
+def test_near_duplicates_are_merged_and_outliers_weigh_little() -> None:
     rng = np.random.default_rng(0)
     truth = rng.uniform(0.2, 0.8, (10, 12, 3)).astype(np.float32)
     pictures = truth + rng.normal(0, 0.01, (5, 10, 12, 3)).astype(np.float32)
@@ -38,12 +38,12 @@ def test_near_duplicates_are_merged_and_a_bad_one_hardly_counts() -> None:
     np.testing.assert_allclose(weighed, truth + 0.25, atol=1e-5)
 
 
-def test_of_a_large_group_some_are_merged() -> None:
+def test_of_a_large_cluster_some_are_merged() -> None:
     assert subsample_cluster(np.arange(10, 110, 2)).tolist() == [10, 22, 34, 46, 58, 72, 84, 96, 108]
     assert subsample_cluster(np.array([4, 7])).tolist() == [4, 7]
 
 
-def test_of_a_long_films_lights_some_from_everywhere_are_kept() -> None:
+def test_of_a_long_film_lights_from_all_directions_are_kept() -> None:
     directions = np.concatenate([spread(50, 40, 300), direction_from_degrees(np.linspace(60, 61, 500), 0.0)])
     kept = subsample_evenly(directions, 150)
     assert len(kept) <= 150

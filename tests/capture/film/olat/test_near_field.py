@@ -1,4 +1,4 @@
-"""A near lamp made a distant one, and strengths told by the person: against formulas."""
+"""Correction of the near field, and strengths of flashes, against formulas."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_picture_under_a_near_lamp_becomes_one_under_a_distant_lamp() -> None:
         assert corrected.mean() < 0.03 < 0.08 < as_is.mean()
 
 
-def test_strengths_come_back() -> None:
+def test_strengths_are_recovered() -> None:
     film = Film(frames=60)
     indices = range(60)
     pictures = film_pictures(film, indices)
@@ -65,7 +65,7 @@ def test_strengths_come_back() -> None:
     assert np.median(found.misfit) < 0.05
 
 
-def test_flashes_that_light_no_skin_spoil_no_others() -> None:
+def test_flashes_that_light_no_skin_do_not_affect_others() -> None:
     film, spoilt = Film(frames=60), [10, 30]
     pictures = film_pictures(film, range(60))
     lamps = np.stack([film.lamp_cm(index) for index in range(60)])
@@ -80,7 +80,7 @@ def test_flashes_that_light_no_skin_spoil_no_others() -> None:
     np.testing.assert_array_equal(found.consistent(np.inf), others)
 
 
-def test_where_no_flash_lights_skin_none_is_alike() -> None:
+def test_without_lit_skin_no_flash_is_consistent() -> None:
     film = Film(frames=60)
     lamps = np.stack([film.lamp_cm(index) for index in range(0, 60, 6)])
     dark = np.zeros((len(lamps), SIDE, SIDE, 3), np.float32)
@@ -91,14 +91,15 @@ def test_where_no_flash_lights_skin_none_is_alike() -> None:
 
 def test_the_direction_of_a_lamp_far_away_is_the_same_everywhere() -> None:
     surface = Surface(
-        np.tile(np.array([0, 0, 1], np.float32), (4, 4, 1)), np.random.default_rng(0).uniform(-9, 9, (4, 4, 3)).astype(np.float32)
+        np.tile(np.array([0, 0, 1], np.float32), (4, 4, 1)),
+        np.random.default_rng(0).uniform(-9, 9, (4, 4, 3)).astype(np.float32),
     )
     np.testing.assert_allclose(
         distant_light_factor(surface, CaptureLamp(1e5 * direction_from_degrees(20, 30), np.zeros(3))), 1, atol=1e-3
     )
 
 
-def test_a_lamp_that_points_beside_the_head_is_told() -> None:
+def test_the_tilt_of_a_lamp_that_points_beside_the_head() -> None:
     film = Film(frames=60)
     pictures = film_pictures(film, range(60))
     scale, matte = SIDE / 210, film_matte(film)

@@ -1,4 +1,4 @@
-"""What a build keeps until it is done: taken back bit by bit, or not at all."""
+"""The checkpoint of a build: read back bit by bit, or deleted."""
 
 from __future__ import annotations
 
@@ -64,13 +64,13 @@ def test_what_was_written_is_read_again_bit_by_bit(
     assert told == [f"going on from {tmp_path / 'me.relit.partial'}, where the last build was broken off"]
 
 
-def test_nobody_else_may_enter(kept: CheckpointFolder, found: Checkpoint) -> None:
+def test_the_folder_is_private(kept: CheckpointFolder, found: Checkpoint) -> None:
     kept.folder.mkdir(mode=0o755)
     kept.write(found)
     assert kept.folder.stat().st_mode & 0o777 == 0o700
 
 
-def test_of_another_film_it_is_deleted(
+def test_a_checkpoint_of_another_film_is_deleted(
     kept: CheckpointFolder, found: Checkpoint, told: list[str], tmp_path: Path
 ) -> None:
     kept.write(found)
@@ -94,7 +94,7 @@ def _one_letter_of_the_report(data: bytes) -> bytes:
 @pytest.mark.parametrize(
     "spoil", [_cut_off, _one_bit_of_a_picture, _one_letter_of_the_report, lambda data: b"", lambda data: b"{}" * 99]
 )
-def test_a_damaged_one_is_deleted(
+def test_a_damaged_checkpoint_is_deleted(
     spoil: Callable[[bytes], bytes], kept: CheckpointFolder, found: Checkpoint, told: list[str]
 ) -> None:
     kept.write(found)
@@ -105,7 +105,7 @@ def test_a_damaged_one_is_deleted(
     assert not kept.folder.exists()
 
 
-def test_what_it_is_made_of_decides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fingerprint_depends_on_content_and_options(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     codes = np.arange(12, dtype=np.uint8)[:, None, None, None] * np.ones((64, 64, 3), np.uint8)
     film, other = (write_film(tmp_path / name, codes + add) for name, add in (("a.mp4", 0), ("b.mp4", 9)))
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path))
@@ -126,7 +126,7 @@ def test_what_it_is_made_of_decides(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     [(None, False), (CaptureError("no ball"), False), (StorageError("full"), True), (KeyboardInterrupt(), True),
      (SystemExit(143), True), (MemoryError(), True)],
 )  # fmt: skip
-def test_it_stays_where_the_build_could_go_on(
+def test_a_checkpoint_is_kept_where_the_build_could_resume(
     end: BaseException | None, stays: bool, kept: CheckpointFolder, found: Checkpoint, told: list[str]
 ) -> None:
     def build() -> None:
@@ -145,7 +145,7 @@ def test_it_stays_where_the_build_could_go_on(
     assert told == [f"kept in {kept.folder}: the same command goes on from there, --fresh starts over"] * broken_off
 
 
-def test_only_what_is_ours_is_deleted(kept: CheckpointFolder, found: Checkpoint) -> None:
+def test_only_own_files_are_deleted(kept: CheckpointFolder, found: Checkpoint) -> None:
     kept.write(found)
     (kept.folder / ".samples.half.safetensors").touch()
     (kept.folder / "diary.txt").touch()
@@ -153,7 +153,7 @@ def test_only_what_is_ours_is_deleted(kept: CheckpointFolder, found: Checkpoint)
     assert [path.name for path in kept.folder.iterdir()] == ["diary.txt"]
 
 
-def test_where_nothing_can_be_kept_the_build_goes_on(
+def test_without_a_writable_checkpoint_the_build_goes_on(
     kept: CheckpointFolder, found: Checkpoint, told: list[str]
 ) -> None:
     kept.folder.write_text("a file of that name")

@@ -64,12 +64,12 @@ def test_samples_are_pictures_under_distant_lights(built: CaptureResult) -> None
     assert samples.pictures[:, samples.matte == 0].max() == 0
 
 
-def test_the_report_tells_what_the_lamps_nearness_is_worth(built: CaptureResult) -> None:
+def test_the_report_has_the_gain_of_the_near_field_correction(built: CaptureResult) -> None:
     near = built.findings.report()["near_field"]
     assert 0 < near["misfit"] < near["misfit_if_far"]
 
 
-def test_the_room_is_taken_off(built: CaptureResult) -> None:
+def test_the_room_is_subtracted(built: CaptureResult) -> None:
     report = built.findings.report()
     assert report["room"]["taken_off"]
     assert report["room"]["left"] < 0.02
@@ -77,7 +77,7 @@ def test_the_room_is_taken_off(built: CaptureResult) -> None:
     assert np.median(shaded[built.samples.matte[:, 60:66] > 0.99]) < 0.02
 
 
-def test_a_good_film_is_taken_without_warnings_but_of_the_detector(built: CaptureResult) -> None:
+def test_a_good_film_warns_of_the_missing_detector_only(built: CaptureResult) -> None:
     assert all("no face detector is installed" in warning for warning in built.findings.warnings)
 
 
@@ -88,7 +88,7 @@ def test_a_good_film_is_taken_without_warnings_but_of_the_detector(built: Captur
         (True, 0.0, ["the room is too dark", "the eyes are not found"]),
     ],
 )
-def test_warnings_tell_what_is_amiss(built: CaptureResult, detector: bool, visible: float, told: list[str]) -> None:
+def test_warnings(built: CaptureResult, detector: bool, visible: float, told: list[str]) -> None:
     gains = replace(built.findings.gains, share=0.0, visible=visible)
     amiss = replace(built.findings, gains=gains, detector_installed=detector, eyes_px=None)
     warnings = amiss.warnings[-2:]

@@ -68,7 +68,7 @@ def test_the_direction_is_better_than_by_either_ball(findings: Findings) -> None
         assert both < 0.7 * off_deg(located(findings, alone)).mean()
 
 
-def test_where_one_ball_shows_the_lamp_neighbours_tell_its_distance(findings: Findings) -> None:
+def test_where_one_ball_shows_the_lamp_its_distance_is_interpolated(findings: Findings) -> None:
     whole = findings.lamps
     first, second = findings.balls
     gone = set(whole.index[10:13].tolist())
@@ -92,7 +92,7 @@ def test_a_frame_in_which_they_show_different_things_is_left_out(findings: Findi
     assert index not in lamps.index
 
 
-def test_the_report_tells_where_the_distance_is_from(built: CaptureResult) -> None:
+def test_the_report_has_the_source_of_the_distance(built: CaptureResult) -> None:
     report, lamps = built.findings.report(), built.findings.lamps
     told = report["lamp_distance"]
     assert told["source"] == "two balls"
@@ -106,7 +106,7 @@ def test_the_report_tells_where_the_distance_is_from(built: CaptureResult) -> No
     assert abs(report["second_ball"]["x"] - report["ball"]["x"]) > 100
 
 
-def test_balls_that_disagree_are_told(built: CaptureResult) -> None:
+def test_balls_that_disagree_cause_warnings(built: CaptureResult) -> None:
     findings = built.findings
     apart = {index: replace(each, gap_deg=2.5) for index, each in findings.lamps.triangulated.items()}
     amiss = replace(findings, lamps=replace(findings.lamps, triangulated=apart))

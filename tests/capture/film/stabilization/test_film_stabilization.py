@@ -88,7 +88,7 @@ def test_a_face_that_goes_away(tmp_path: Path) -> None:
         stabilize_film(path, detect_flashes(measure_brightness(path)), CIRCLE)
 
 
-def test_a_short_absence_costs_the_frames_about_it(tmp_path: Path) -> None:
+def test_frames_of_a_short_absence_are_lost(tmp_path: Path) -> None:
     moves = wandering(180)
     another = texture(seed=9)
     faces = [another if 90 <= index < 108 else texture() for index in range(180)]
@@ -126,7 +126,8 @@ def test_corners_are_followed(from_reference: bool) -> None:
     moves = [Move(), *wandering(30, seed=4)]
     tracker = CornerTracker(local_contrast(face), CIRCLE, from_reference=from_reference)
     assert tracker.corners > 30
-    matches = [tracker.track(local_contrast(moved(face, move) * np.float32(1 + 0.01 * i))) for i, move in enumerate(moves)]
+    pictures = [moved(face, move) * np.float32(1 + 0.01 * index) for index, move in enumerate(moves)]
+    matches = [tracker.track(local_contrast(picture)) for picture in pictures]
     found = [match for match in matches if match is not None]
     assert len(found) == len(moves)
     assert min(match.inliers for match in found) > 0.5 * tracker.corners

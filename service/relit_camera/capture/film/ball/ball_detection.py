@@ -256,13 +256,13 @@ def _require_whole(outline: BallOutline, sample: SceneSample) -> None:
 
 def _nothing_found(sample: SceneSample, edges: EdgeMap, circles: list[BallOutline]) -> CaptureError:
     """Why no circle counts as a ball: the clearest one is white all over, or none shows the lamp."""
-    usual = np.median(sample.codes, axis=0)
+    median = np.median(sample.codes, axis=0)
     for fit in _significant([fit_outline_to_edges(edges, circle) for circle in circles]):
         outline = fit.outline
-        rows, columns = outline.pixels_within(1.0, (usual.shape[1], usual.shape[0]))
+        rows, columns = outline.pixels_within(1.0, (median.shape[1], median.shape[0]))
         place = outline.scaled(1 / sample.scale)
         where = f"at {place.x:.0f}, {place.y:.0f} with radius {place.radius:.0f}"
-        if np.mean(usual[rows, columns] > _TUNABLES.white_code) > _TUNABLES.max_white:
+        if np.mean(median[rows, columns] > _TUNABLES.white_code) > _TUNABLES.max_white:
             return CaptureError(
                 f"the ball {where} is over-exposed: most of it is white",
                 "lower the exposure and lock it, or turn off lamps that the ball shows",

@@ -95,7 +95,7 @@ class BallTracker:
             sample: of the frames in which it was found.
             outline: of the ball, in pixels of the frames.
         """
-        self._outline, self._size = outline, sample.size
+        self._outline = outline
         self._scale = _SIDE_PX / (2 * _TUNABLES.window_radii * outline.radius)
         # The median has no highlight, which is at another place in each frame.
         usual = linear_from_uint8(np.median(sample.codes, axis=0).astype(np.uint8))
@@ -126,13 +126,13 @@ class BallTracker:
         shrunk = min(1.0, factor)
         # Low-pass filtered first, so that a large ball does not alias.
         smooth = cv2.GaussianBlur(light, (0, 0), 0.5 / shrunk) if shrunk < 1 else light
-        inverse = np.array(
+        from_window = np.array(
             [
                 [1 / factor, 0, self._outline.x * scale - 0.5 - (_SIDE_PX - 1) / 2 / factor],
                 [0, 1 / factor, self._outline.y * scale - 0.5 - (_SIDE_PX - 1) / 2 / factor],
             ]
         )
-        codes = uint8_from_linear(_resample(smooth, inverse)).astype(np.float32)
+        codes = uint8_from_linear(_resample(smooth, from_window)).astype(np.float32)
         return np.asarray(cv2.GaussianBlur(codes, (0, 0), 1.0), np.float32)
 
     def _best_whole_pixel_shift(self, window: Plane) -> tuple[float, float]:
@@ -150,19 +150,16 @@ class BallTracker:
         shift = np.array(start, np.float64)
         disc, flat = self._disc, np.ones(int(self._disc.sum()))
         down, across = (np.asarray(slope)[disc] for slope in np.gradient(self._usual))
-        usual = self._usual[disc]
+        template = self._usual[disc]
         correlation = 0.0
         for _ in range(_TUNABLES.iterations):
-            back = np.array([[1, 0, shift[0]], [0, 1, shift[1]]])
-            flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-            seen = cv2.warpAffine(window, back, (_SIDE_PX, _SIDE_PX), flags=flags, borderMode=cv2.BORDER_REPLICATE)[
-                disc
-            ]
-            lamp = seen > usual + _TUNABLES.lamp_codes
+            shifted = np.array([[1, 0, shift[0]], [0, 1, shift[1]]])
+            seen = _resample(window, shifted)[disc]
+            lamp = seen > template + _TUNABLES.lamp_codes
             used = ~lamp if lamp.mean() < _TUNABLES.max_lamp else np.ones_like(lamp)
-            terms = np.stack([across, down, usual, flat], axis=1)[used]
+            terms = np.stack([across, down, template, flat], axis=1)[used]
             (x, y, gain, _), *_ = np.linalg.lstsq(terms, seen[used], rcond=None)
-            correlation = _correlation(usual[used], seen[used])
+            correlation = _correlation(template[used], seen[used])
             step = np.array([x, y]) / gain if gain > 0.1 else np.zeros(2)
             shift -= step
             if np.hypot(*step) < 0.01 or np.abs(shift - start).max() > _SIDE_PX / 8:
@@ -193,9 +190,11 @@ def find_episodes(observations: Iterable[BallObservation], radius: float) -> lis
     seen = list(observations)
     if not seen:
         return []
-    x, y, usual = np.median([(observation.dx, observation.dy, observation.correlation) for observation in seen], axis=0)
+    x, y, median_correlation = np.median(
+        [(observation.dx, observation.dy, observation.correlation) for observation in seen], axis=0
+    )
     seen = [replace(observation, dx=observation.dx - float(x), dy=observation.dy - float(y)) for observation in seen]
-    kinds = [_kind(observation, float(usual), radius) for observation in seen]
+    kinds = [_kind(observation, float(median_correlation), radius) for observation in seen]
     found, start = [], 0
     for end in range(1, len(seen) + 1):
         if end < len(seen) and kinds[end] == kinds[start]:
@@ -216,9 +215,9 @@ def outline_at_frame(episodes: Iterable[BallEpisode], outline: BallOutline, inde
     return outline
 
 
-def _kind(observation: BallObservation, usual: float, radius: float) -> Literal["hidden", "moved"] | None:
-    """Which episode a frame belongs to, given the usual correlation and the radius in pixels; None for no episode."""
-    if observation.correlation < _TUNABLES.hidden_correlation * usual:
+def _kind(observation: BallObservation, median_correlation: float, radius: float) -> Literal["hidden", "moved"] | None:
+    """Which episode a frame belongs to, by the median correlation and the radius in pixels, or None."""
+    if observation.correlation < _TUNABLES.hidden_correlation * median_correlation:
         return "hidden"
     return "moved" if np.hypot(observation.dx, observation.dy) > _TUNABLES.moved_radii * radius else None
 

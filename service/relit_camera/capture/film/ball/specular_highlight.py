@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_types import LinearImage
-from relit_camera.capture.film.ball.sphere_projection import BallOutline, BallView, PinholeView, Vectors
+from relit_camera.capture.film.ball.sphere_projection import BallOutline, BallView, CroppedView, PinholeView, Vectors
 
 Plane = NDArray[np.float32]
 
@@ -305,7 +305,7 @@ class BallCrops:
     ) -> Highlight | NoHighlight:
         if view is None:
             return NoHighlight("something is before the ball")
-        crop = _CropView(view, (self._left, self._top), self._step)
+        crop = CroppedView(view, (self._left, self._top), self._step)
         if view.outline != self._outline and not _contains(self._size, crop.outline):
             return NoHighlight("the ball is out of its place so far that not all of it is seen")
         dark_plane = None
@@ -325,35 +325,3 @@ def _contains(size: tuple[int, int], outline: BallOutline) -> bool:
     return all(
         outline.radius <= at <= side - outline.radius for at, side in zip((outline.x, outline.y), size, strict=True)
     )
-
-
-class _CropView:
-    """A view of the ball in pixels of a downscaled crop of the picture; see `BallView`."""
-
-    def __init__(self, view: PinholeView, corner: tuple[int, int], step: tuple[float, float]) -> None:
-        """Convert to pixels of the crop.
-
-        Args:
-            view: in pixels of the picture.
-            corner: x and y of the crop in the picture.
-            step: pixels of the picture per pixel of the crop, along x and y.
-        """
-        self._view, self._corner, self._step = view, corner, step
-        x, y = self._to_crop(view.outline.x, view.outline.y)
-        self.outline = BallOutline(float(x), float(y), view.outline.radius / step[0])
-
-    def to_picture(self, x: NDArray | float, y: NDArray | float) -> tuple[NDArray, NDArray]:
-        """Position in the picture of a position in the crop."""
-        return np.asarray(x) * self._step[0] + self._corner[0], np.asarray(y) * self._step[1] + self._corner[1]
-
-    def _to_crop(self, x: NDArray | float, y: NDArray | float) -> tuple[NDArray, NDArray]:
-        return (np.asarray(x) - self._corner[0]) / self._step[0], (np.asarray(y) - self._corner[1]) / self._step[1]
-
-    def normals(self, x: NDArray, y: NDArray) -> Vectors:
-        return self._view.normals(*self.to_picture(x, y))
-
-    def reflect(self, normals: Vectors) -> Vectors:
-        return self._view.reflect(normals)
-
-    def project(self, normals: Vectors) -> tuple[NDArray, NDArray]:
-        return self._to_crop(*self._view.project(normals))

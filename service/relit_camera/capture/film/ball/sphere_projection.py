@@ -175,6 +175,41 @@ class PinholeView:
         return self.size[0] / 2 + scale * points[..., 0], self.size[1] / 2 - scale * points[..., 1]
 
 
+class CroppedView:
+    """A view of the ball in pixels of a downscaled crop of the picture; see `BallView`."""
+
+    def __init__(self, view: PinholeView, corner: tuple[int, int], step: tuple[float, float]) -> None:
+        """Convert to pixels of the crop.
+
+        Args:
+            view: in pixels of the picture.
+            corner: x and y of the crop in the picture.
+            step: pixels of the picture per pixel of the crop, along x and y.
+        """
+        self._view, self._corner, self._step = view, corner, step
+        x, y = self._to_crop(view.outline.x, view.outline.y)
+        self.outline = BallOutline(float(x), float(y), view.outline.radius / step[0])
+
+    def to_picture(self, x: NDArray | float, y: NDArray | float) -> tuple[NDArray, NDArray]:
+        """Position in the picture of a position in the crop."""
+        return np.asarray(x) * self._step[0] + self._corner[0], np.asarray(y) * self._step[1] + self._corner[1]
+
+    def _to_crop(self, x: NDArray | float, y: NDArray | float) -> tuple[NDArray, NDArray]:
+        return (np.asarray(x) - self._corner[0]) / self._step[0], (np.asarray(y) - self._corner[1]) / self._step[1]
+
+    def normals(self, x: NDArray, y: NDArray) -> Vectors:
+        """See `BallView.normals`."""
+        return self._view.normals(*self.to_picture(x, y))
+
+    def reflect(self, normals: Vectors) -> Vectors:
+        """See `BallView.reflect`."""
+        return self._view.reflect(normals)
+
+    def project(self, normals: Vectors) -> tuple[NDArray, NDArray]:
+        """See `BallView.project`."""
+        return self._to_crop(*self._view.project(normals))
+
+
 def _elongation(off_axis: float, half_angle: float) -> float:
     """Ratio of the axes of the ellipse in which the cone of rays tangent to the ball cuts the image plane."""
     return float(np.cos(half_angle) / np.sqrt(np.cos(half_angle) ** 2 - np.sin(off_axis) ** 2))

@@ -94,7 +94,7 @@ class ExposureFractions:
         since: (edges, frames, blocks) seconds from the first guess of the edge to the frame.
         place: (blocks,) position in the order of readout, as a share of the picture's height (or width).
         by_columns: whether columns are read one after another, not rows.
-        share: (edges, frames, blocks) measured fractions: 0 unlit, 1 lit throughout.
+        fraction: (edges, frames, blocks) measured: 0 unlit, 1 lit throughout.
         root_weight: (edges, frames, blocks) square roots of their weights.
         rising: (edges,) whether the light goes on.
     """
@@ -102,7 +102,7 @@ class ExposureFractions:
     since: Floats
     place: Floats
     by_columns: bool
-    share: Floats
+    fraction: Floats
     root_weight: Floats
     rising: NDArray[np.bool_]
 
@@ -129,11 +129,11 @@ class ExposureFractions:
         known = (about == index) & (time >= np.append(-np.inf, between)[:, None] - slack_s)
         known &= time <= np.append(between, np.inf)[:, None] + slack_s
         height = np.maximum(lit - unlit, 1e-9)
-        share = ((blocks.level - unlit) / height)[index]
+        fraction = ((blocks.level - unlit) / height)[index]
         weight = known[..., None] * np.minimum(height / np.median(height), 1)[index]
-        since = np.broadcast_to((time - edges.times_s[:, None])[..., None], share.shape)
+        since = np.broadcast_to((time - edges.times_s[:, None])[..., None], fraction.shape)
         place = blocks.place[:, 0 if by_columns else 1]
-        return cls(since, place, by_columns, np.clip(share, -0.5, 1.5), np.sqrt(weight), edges.rising)
+        return cls(since, place, by_columns, np.clip(fraction, -0.5, 1.5), np.sqrt(weight), edges.rising)
 
     def expected(self, exposure_s: float, readout_s: float, offsets: Floats) -> Floats:
         """Predicted fractions (edges, frames, blocks), for edges later than guessed by offsets (edges,) in seconds."""

@@ -246,10 +246,10 @@ def schedule_from_edges(edges: FlashEdges) -> FlashSchedule:
     """
     on, off = edges.times_s[edges.rising], edges.times_s[~edges.rising]
     period, first_on, last_on = float(np.median(np.diff(on))), edges.rising[0], edges.rising[-1]
-    usual = float(np.median((off if first_on else off[1:])[: len(on) - last_on] - on[: len(on) - last_on]))
+    duration = float(np.median((off if first_on else off[1:])[: len(on) - last_on] - on[: len(on) - last_on]))
     if not first_on:
-        on = np.append(off[0] - usual, on)
+        on = np.append(off[0] - duration, on)
     if last_on:
-        off = np.append(off, on[-1] + usual)
+        off = np.append(off, on[-1] + duration)
     on = np.concatenate([[on[0] - period], on, [on[-1] + period]])
-    return FlashSchedule(on, np.concatenate([[on[0] + usual], off, [on[-1] + usual]]))
+    return FlashSchedule(on, np.concatenate([[on[0] + duration], off, [on[-1] + duration]]))

@@ -130,11 +130,6 @@ class FlashSignal:
     reached: NDArray[np.bool_]
     gains: Floats
 
-    @property
-    def has_gains(self) -> bool:
-        """Whether enough cells beyond the flash's reach show the gains."""
-        return bool(np.ptp(self.gains) > 0)
-
 
 def reached_cells(brightness: BrightnessGrid, circle: FaceCircle | None = None) -> NDArray[np.bool_]:
     """Mask (rows, columns) of the cells whose brightness varies most in ratio, inside a circle where it is given."""

@@ -206,8 +206,8 @@ def find_outlier_frames(blocks: BrightnessBlocks, bright: Indices, dark: Indices
     alone = np.minimum(gap[:-1], gap[1:]) > _TUNABLES.alone_frames
     least = np.where(alone, _TUNABLES.min_lit_alone, _TUNABLES.min_lit)
     missing = (shares < np.median(shares, axis=1, keepdims=True) * least[:, None]) & clear[bright]
-    usual = np.median(blocks.level / np.maximum(unlit, 1e-9), axis=1, keepdims=True)
-    stray = ((blocks.level - usual * unlit) / height > _TUNABLES.max_stray)[dark]
+    of_frame = np.median(blocks.level / np.maximum(unlit, 1e-9), axis=1, keepdims=True)
+    stray = ((blocks.level - of_frame * unlit) / height > _TUNABLES.max_stray)[dark]
     outliers = [(bright[missing.any(axis=1)], "bright"), (dark[(stray & clear[dark]).any(axis=1)], "dark")]
     return {int(index): f"not lit like the {kind} frames beside it" for found, kind in outliers for index in found}
 

@@ -77,17 +77,17 @@ def fit_rolling_shutter(
     beginning = film.beginning(_TUNABLES.trial_edges)
     trials = []
     for by_columns in (False, True):
-        starts = _starts(beginning.first_shares(by_columns), brightness.interval_s)
+        starts = _starts(beginning.first_fractions(by_columns), brightness.interval_s)
         for jitter_s in _TUNABLES.jitters_s:
-            fit = _Fit(beginning, beginning.first_shares(by_columns), jitter_s)
+            fit = _Fit(beginning, beginning.first_fractions(by_columns), jitter_s)
             best = min((fit.solve(start) for start in starts), key=fit.cost)
             fit, best = _remeasure(fit, best)
             trials.append((jitter_s, fit.cost(best), by_columns, best[:2]))
     # The steadiest flash that explains the frames about as well as the best fit.
     enough = _TUNABLES.tolerance * min(cost for _, cost, *_ in trials)
     jitter_s, _, by_columns, shutter = min((each for each in trials if each[1] <= enough), key=lambda each: each[:2])
-    fit = _Fit(film, film.first_shares(by_columns), jitter_s)
-    offsets = _best_offsets(fit.shares, shutter[0], shutter[1], _offset_grid(brightness.interval_s))
+    fit = _Fit(film, film.first_fractions(by_columns), jitter_s)
+    offsets = _best_offsets(fit.fractions, shutter[0], shutter[1], _offset_grid(brightness.interval_s))
     fit, best = _remeasure(fit, fit.solve(np.concatenate([shutter, offsets])))
     return fit.refined(best), fit.shutter(best)
 
@@ -101,7 +101,7 @@ def _remeasure(fit: _Fit, parameters: Floats) -> tuple[_Fit, Floats]:
         dark = np.flatnonzero(lit.max(axis=1) <= 1 - FULLY_LIT_FRACTION)
         if len(fully_lit) < 3 or len(dark) < 3:
             break
-        fit = replace(fit, shares=film.shares(fit.shares.by_columns, dark, fully_lit))
+        fit = replace(fit, fractions=film.fractions(fit.fractions.by_columns, dark, fully_lit))
         parameters = fit.solve(parameters)
     return fit, parameters
 
@@ -140,12 +140,12 @@ class _Film:
         blocks = replace(self.blocks, level=self.blocks.level[:end])
         return _Film(self.times_s[:end], blocks, self.edges.only(slice(0, edges)), self.frequency_hz)
 
-    def first_shares(self, by_columns: bool) -> ExposureFractions:
+    def first_fractions(self, by_columns: bool) -> ExposureFractions:
         """Fractions between the darkest and the brightest level about each frame."""
         levels = self.blocks.local_extremes(1 / self.frequency_hz / self.interval_s)
         return ExposureFractions.of(self.blocks, by_columns, self.times_s, self.edges, *levels)
 
-    def shares(self, by_columns: bool, dark: NDArray[np.intp], fully_lit: NDArray[np.intp]) -> ExposureFractions:
+    def fractions(self, by_columns: bool, dark: NDArray[np.intp], fully_lit: NDArray[np.intp]) -> ExposureFractions:
         """Fractions between the levels of dark and of fully lit frames, given by their indices."""
         levels = self.blocks.between(dark), self.blocks.between(fully_lit)
         return ExposureFractions.of(self.blocks, by_columns, self.times_s, self.edges, *levels)
@@ -160,12 +160,12 @@ class _Fit:
 
     Attributes:
         film: what the shutter is fitted to.
-        shares: exposure fractions about the edges.
+        fractions: exposure fractions about the edges.
         jitter_s: standard deviation of the flash's period.
     """
 
     film: _Film
-    shares: ExposureFractions
+    fractions: ExposureFractions
     jitter_s: float
 
     def refined(self, parameters: Floats) -> FlashEdges:
@@ -174,7 +174,7 @@ class _Fit:
 
     def shutter(self, parameters: Floats) -> RollingShutter:
         """The shutter with these parameters."""
-        return RollingShutter(float(parameters[0]), float(parameters[1]), self.shares.by_columns, self.jitter_s)
+        return RollingShutter(float(parameters[0]), float(parameters[1]), self.fractions.by_columns, self.jitter_s)
 
     def solve(self, parameters: Floats) -> Floats:
         """The best parameters near these, by the Levenberg-Marquardt method reweighted for outliers.
@@ -206,22 +206,24 @@ class _Fit:
 
     def cost(self, parameters: Floats) -> float:
         """Robust cost of the exposure fractions alone."""
-        return _robust(self._share_errors(parameters))
+        return _robust(self._fraction_errors(parameters))
 
     def _residuals(self, parameters: Floats) -> Floats:
         deviations = self.film.clock @ (self.film.edges.times_s + parameters[2:])
-        usual = np.log(parameters[:1] / (_TUNABLES.usual_exposure * self.film.interval_s))
-        return np.concatenate([self._share_errors(parameters), deviations / self.jitter_s, usual])
+        prior = np.log(parameters[:1] / (_TUNABLES.usual_exposure * self.film.interval_s))
+        return np.concatenate([self._fraction_errors(parameters), deviations / self.jitter_s, prior])
 
     def _jacobian(self, parameters: Floats) -> csr_array:
-        of_shares = self.shares.jacobian(parameters[0], parameters[1], parameters[2:]) * (-1 / _TUNABLES.fraction_error)
+        of_fractions = self.fractions.jacobian(parameters[0], parameters[1], parameters[2:]) * (
+            -1 / _TUNABLES.fraction_error
+        )
         of_clock = hstack([csr_array((self.film.clock.shape[0], 2)), self.film.clock / self.jitter_s])
-        of_usual = csr_array(([1 / parameters[0]], ([0], [0])), shape=(1, len(parameters)))
-        return csr_array(vstack([of_shares, of_clock, of_usual]))
+        of_prior = csr_array(([1 / parameters[0]], ([0], [0])), shape=(1, len(parameters)))
+        return csr_array(vstack([of_fractions, of_clock, of_prior]))
 
-    def _share_errors(self, parameters: Floats) -> Floats:
-        error = self.shares.share - self.shares.expected(parameters[0], parameters[1], parameters[2:])
-        return np.asarray((self.shares.root_weight * error).ravel() / _TUNABLES.fraction_error)
+    def _fraction_errors(self, parameters: Floats) -> Floats:
+        error = self.fractions.fraction - self.fractions.expected(parameters[0], parameters[1], parameters[2:])
+        return np.asarray((self.fractions.root_weight * error).ravel() / _TUNABLES.fraction_error)
 
 
 def _robust(residuals: Floats) -> float:
@@ -229,27 +231,27 @@ def _robust(residuals: Floats) -> float:
     return float(np.sum(np.sqrt(1 + residuals**2) - 1))
 
 
-def _starts(shares: ExposureFractions, interval_s: float) -> list[Floats]:
+def _starts(fractions: ExposureFractions, interval_s: float) -> list[Floats]:
     """Start parameters: for readout upward, at once and downward the best of a few exposures, each edge independent."""
     grid = _offset_grid(interval_s)
     starts = []
     for readouts in ((-0.8, -0.5, -0.25), (0.0,), (0.25, 0.5, 0.8)):
         pairs = [(exposure * interval_s, readout * interval_s) for exposure in (0.2, 0.5, 0.9) for readout in readouts]
-        best = min(pairs, key=lambda pair: float(_costs(shares, pair[0], pair[1], grid).min(axis=0).mean()))
-        starts.append(np.concatenate([best, _best_offsets(shares, best[0], best[1], grid)]))
+        best = min(pairs, key=lambda pair: float(_costs(fractions, pair[0], pair[1], grid).min(axis=0).mean()))
+        starts.append(np.concatenate([best, _best_offsets(fractions, best[0], best[1], grid)]))
     return starts
 
 
-def _costs(shares: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
+def _costs(fractions: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
     """Mean absolute error (offsets, edges) of the fractions, for each offset of a grid (offsets,)."""
-    edges, weight = len(shares.rising), shares.root_weight**2
-    errors = (shares.share - shares.expected(exposure_s, readout_s, np.full(edges, offset)) for offset in grid)
+    edges, weight = len(fractions.rising), fractions.root_weight**2
+    errors = (fractions.fraction - fractions.expected(exposure_s, readout_s, np.full(edges, offset)) for offset in grid)
     return np.array([(weight * np.abs(error)).mean(axis=(1, 2)) for error in errors])
 
 
-def _best_offsets(shares: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
+def _best_offsets(fractions: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
     """Best offset (edges,) of each edge on a grid (offsets,); the mean of those that are about equally good."""
-    costs = _costs(shares, exposure_s, readout_s, grid)
+    costs = _costs(fractions, exposure_s, readout_s, grid)
     good = costs <= costs.min(axis=0) + 0.002
     return np.asarray((good * grid[:, None]).sum(axis=0) / good.sum(axis=0))
 

@@ -143,8 +143,8 @@ def _triangulate(highlights: Mapping[int, list[BallHighlight]]) -> tuple[dict[in
     """
     both = {index: triangulate_lamp(*pair) for index, pair in highlights.items() if len(pair) == 2}
     met = {index: each for index, each in both.items() if each is not None}
-    usual = np.median([each.gap_deg for each in met.values()]) if met else 0.0
-    max_gap_deg = max(_AGREEMENT.max_gap_deg, _AGREEMENT.max_gap_ratio * usual)
+    median_gap_deg = np.median([each.gap_deg for each in met.values()]) if met else 0.0
+    max_gap_deg = max(_AGREEMENT.max_gap_deg, _AGREEMENT.max_gap_ratio * median_gap_deg)
     agreeing = {index: each for index, each in met.items() if each.gap_deg < max_gap_deg}
     contradicting = [index for index in both if index not in agreeing]
     if len(contradicting) > _AGREEMENT.max_contradicting * len(both):

@@ -77,7 +77,7 @@ def require_lamp_beyond_ball(ball_cm: Vectors, radius_cm: float, head_cm: Vector
 def position_at_distance(highlight: BallHighlight, head_cm: Vectors, distance_cm: float) -> Vectors:
     """Position (3,) of a lamp at a known distance from the head, camera axes.
 
-    It is where the reflected ray meets the sphere of that radius about the head. A lamp a metre away is seen from the
+    It is where the reflected ray meets the sphere of that radius about the head. A lamp a meter away is seen from the
     ball some ten degrees off the direction in which the head sees it.
 
     Args:

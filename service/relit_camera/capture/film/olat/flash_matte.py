@@ -104,12 +104,12 @@ def flash_ratio(pictures: NDArray[np.floating], room: LinearImage) -> NDArray[np
 def _threshold(ratio: NDArray[np.float32]) -> float:
     """Threshold between the room's ratio and that of the person in the middle, on a log scale (Otsu 1979)."""
     third = [slice(side // 3, 2 * side // 3) for side in ratio.shape]
-    usual = max(float(np.median(ratio[third[0], third[1]])), 1e-6)
-    shares = np.log(np.clip(ratio / usual, _TUNABLES.min_threshold / 10, 1))
+    of_person = max(float(np.median(ratio[third[0], third[1]])), 1e-6)
+    shares = np.log(np.clip(ratio / of_person, _TUNABLES.min_threshold / 10, 1))
     codes = cv2.normalize(shares, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8)
     code, _ = cv2.threshold(codes, 0, 255, cv2.THRESH_OTSU)
     between = np.exp(shares.min() + code / 255 * np.ptp(shares))
-    return usual * float(np.clip(between, _TUNABLES.min_threshold, _TUNABLES.max_threshold))
+    return of_person * float(np.clip(between, _TUNABLES.min_threshold, _TUNABLES.max_threshold))
 
 
 def _largest_region(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Correction of the near field: a picture under a lamp a metre away becomes one under a distant lamp.
+"""Correction of the near field: a picture under a lamp a meter away becomes one under a distant lamp.
 
 A nose is 9 cm nearer to such a lamp than an ear, and sees it in a direction 5 degrees off. With the head's shape known,
 each pixel's own direction to the lamp and the inverse square of its own distance give the factor to the light of a

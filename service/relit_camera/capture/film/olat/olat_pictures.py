@@ -94,7 +94,7 @@ def read_olat_pictures(
         progress: called with the number of frames read.
 
     Raises:
-        VideoError: the video cannot be read.
+        VideoError: the film cannot be read.
     """
     pictures = np.empty((len(bright), crop.size, crop.size, 3), np.float16)
     room_sum, rows = np.zeros((crop.size, crop.size, 3)), {int(each): row for row, each in enumerate(bright)}
@@ -161,7 +161,7 @@ class RoomSubtraction:
         self._settle()
 
     def _settle(self) -> None:
-        """Process the waiting bright frames, whose later dark frames are there."""
+        """Process the waiting bright frames with the dark ones before and after them."""
         if not self._waiting:
             return
         after = self._room()
@@ -181,7 +181,7 @@ class RoomSubtraction:
 
 
 def _interpolate_room(time_s: float, before: _Room | None, after: _Room | None) -> LinearImage | None:
-    """The room's light at a time, interpolated, or the one known of both; None if neither is known."""
+    """The room's light at a time, interpolated between two, or the only one there is; None if there is none."""
     if before is None or after is None:
         known = before or after
         return None if known is None else known.picture

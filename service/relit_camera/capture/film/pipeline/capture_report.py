@@ -242,13 +242,13 @@ def _two_ball_warnings(lamps: LampPositions) -> list[str]:
 def _gain_warnings(gains: FrameGains) -> list[str]:
     if gains.too_dim:
         return [
-            "the room is too dark, or too bright, in nearly all of the picture, so that it does not tell what the "
-            "camera's automatics did: make some light in it, or film with exposure and white balance locked"
+            "the room is too dark, or too bright, in nearly all of the picture, so the camera's automatic exposure and "
+            "white balance cannot be measured: make some light in it, or film with both locked"
         ]
     if not gains.share:
         return [
-            "the flash reaches everything in the picture, so that the camera's automatics are known only between "
-            "flashes: film before something far away, or with exposure and white balance locked"
+            "the flash reaches everything in the picture, so the camera's automatic exposure and white balance are "
+            "measured only between flashes: film before something far away, or with both locked"
         ]
     return []
 
