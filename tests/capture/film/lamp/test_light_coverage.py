@@ -24,7 +24,7 @@ def test_light_all_over_the_front_is_enough() -> None:
 
 
 @pytest.mark.parametrize(
-    ("directions", "told", "cure"),
+    ("directions", "what", "cure"),
     [
         (spread(12, 12), "the light comes only from beside the camera", "do not use the phone's own lamp"),
         (spread(15, 15) @ np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0]]), "from one side", "move another around"),
@@ -33,10 +33,10 @@ def test_light_all_over_the_front_is_enough() -> None:
         (direction_from_degrees(np.linspace(-45, 45, 90), 5.0), "the light covers", "from one ear to the other"),
     ],
 )
-def test_too_little_light_is_refused(directions: np.ndarray, told: str, cure: str) -> None:
+def test_too_little_light_is_refused(directions: np.ndarray, what: str, cure: str) -> None:
     with pytest.raises(CaptureError) as refused:
         require_light_coverage(directions, 90)
-    assert told in refused.value.what
+    assert what in refused.value.what
     assert cure in refused.value.cure
 
 

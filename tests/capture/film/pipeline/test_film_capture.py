@@ -82,17 +82,17 @@ def test_a_good_film_warns_of_the_missing_detector_only(built: CaptureResult) ->
 
 
 @pytest.mark.parametrize(
-    ("detector", "visible", "told"),
+    ("detector", "visible", "messages"),
     [
         (False, 0.9, ["the flash reaches everything", "no face detector is installed"]),
         (True, 0.0, ["the room is too dark", "the eyes are not found"]),
     ],
 )
-def test_warnings(built: CaptureResult, detector: bool, visible: float, told: list[str]) -> None:
+def test_warnings(built: CaptureResult, detector: bool, visible: float, messages: list[str]) -> None:
     gains = replace(built.findings.gains, share=0.0, visible=visible)
     amiss = replace(built.findings, gains=gains, detector_installed=detector, eyes_px=None)
     warnings = amiss.warnings[-2:]
-    assert all(warning.startswith(start) for warning, start in zip(warnings, told, strict=True))
+    assert all(warning.startswith(start) for warning, start in zip(warnings, messages, strict=True))
 
 
 def test_a_size_that_memory_cannot_hold_is_refused(tmp_path: Path) -> None:
@@ -103,9 +103,9 @@ def test_a_size_that_memory_cannot_hold_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_face_outside_of_the_picture_is_refused_before_a_frame_is_read(tmp_path: Path) -> None:
-    told: list[str] = []
+    messages: list[str] = []
     options = replace(OPTIONS, face=FaceCircle(SIZE[0] + 5, 60, 40))
     video = write_film(tmp_path / "film.mp4", np.zeros((12, *SIZE[::-1], 3), np.uint8))
     with pytest.raises(ConfigError, match=f"face at {SIZE[0] + 5}, 60 is outside of the picture, which is {SIZE[0]}x"):
-        build_samples(video, options, lambda stage, done, total: told.append(stage))
-    assert not told
+        build_samples(video, options, lambda stage, done, total: messages.append(stage))
+    assert not messages

@@ -94,12 +94,12 @@ def test_a_frame_in_which_they_show_different_things_is_left_out(findings: Findi
 
 def test_the_report_has_the_source_of_the_distance(built: CaptureResult) -> None:
     report, lamps = built.findings.report(), built.findings.lamps
-    told = report["lamp_distance"]
-    assert told["source"] == "two balls"
-    assert told["frames"] == len(lamps.triangulated) > 40
-    assert 0 < told["gap_deg"] < 1
-    assert 0 < told["error"] < 0.15
-    assert told["median_cm"] == pytest.approx(80, rel=0.06)
+    distance = report["lamp_distance"]
+    assert distance["source"] == "two balls"
+    assert distance["frames"] == len(lamps.triangulated) > 40
+    assert 0 < distance["gap_deg"] < 1
+    assert 0 < distance["error"] < 0.15
+    assert distance["median_cm"] == pytest.approx(80, rel=0.06)
     distances = [frame["distance_cm"] for frame in report["frames"] if "distance_cm" in frame]
     np.testing.assert_allclose(distances, lamps.distances.cm, atol=0.01)
     assert report["second_ball"]["radius_cm"] == report["ball"]["radius_cm"]

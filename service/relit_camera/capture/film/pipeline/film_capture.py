@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from relit_camera.base.errors import ModelError
+from relit_camera.base.images.color import Gamma
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.video.video_readers import LinearVideoFrame, LinearVideoReader
 from relit_camera.capture.film.ball.ball_detection import find_balls
@@ -91,7 +92,7 @@ def build_samples(
 
     # Mirror balls, whose outlines correct the focal length.
     progress("Looking for the mirror ball", 0, None)
-    sample = _sample_frames(video, flashes, options)
+    sample = _sample_frames(video, flashes, options.gamma, options.threads)
     focal = known_focal_length(video, brightness.size, options.focal_px)
     balls = find_balls(sample, focal, options.balls, given_balls)
 
@@ -115,7 +116,7 @@ def build_samples(
         observed = observe_light(film, usable, flashes, balls, sample, detector)
     gains = observed.gains
     require_uniform_gains(gains.spread)
-    del sample  # 60 MB that no later stage needs
+    del sample  # tens of megabytes that no later stage needs
 
     # Lamp: where it was, seen from the head.
     layout = estimate_scene_layout(
@@ -205,7 +206,7 @@ def _reporting(frames: Iterable[LinearVideoFrame], report: Callable[[int], None]
         report(frame.index + 1)
 
 
-def _sample_frames(video: Path, flashes: Flashes, options: CaptureOptions) -> SceneSample:
+def _sample_frames(video: Path, flashes: Flashes, gamma: Gamma, threads: int) -> SceneSample:
     """As many dark frames as bright ones, spread over the film."""
     half = MAX_FRAMES // 2
     picked = [
@@ -213,7 +214,7 @@ def _sample_frames(video: Path, flashes: Flashes, options: CaptureOptions) -> Sc
         for indices in map(flashes.indices, (FrameClass.BRIGHT, FrameClass.DARK))
     ]
     only = frozenset(np.concatenate(picked).tolist())
-    with LinearVideoReader(video, options.gamma, only=only, threads=options.threads) as reader:
+    with LinearVideoReader(video, gamma, only=only, threads=threads) as reader:
         return sample_scene(frame.image for frame in reader)
 
 
