@@ -1,1 +1,1 @@
-"""The reflectance field of a person, its compressed form, the subject file and the store."""
+"""Subjects: the reflectance field of a person, its compression, the subject file, the store, and relighting."""
