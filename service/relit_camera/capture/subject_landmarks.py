@@ -28,7 +28,7 @@ _Layout = TypeAdapter(dict[str, list[tuple[float, float]]])
 
 
 def find_landmarks(neutral: DisplayImage) -> Mapping[str, Points]:
-    """Landmarks (count, 2) of the face in a neutral picture by scheme, from all installed trackers; empty for no face."""
+    """Landmarks (count, 2) of the face in a neutral picture, by scheme of each installed tracker."""
     found: dict[str, Points] = {}
     for name in LANDMARK_TRACKERS:
         try:
