@@ -1,3 +1,1 @@
-"""Capture from a film: from a video of a face, one or two mirror balls and a blinking lamp that moves about to one linear
-picture for each light (thesis 4.3).
-"""
+"""Capture from a film: a face, one or two mirror balls and a moving lamp become one linear picture for each light."""

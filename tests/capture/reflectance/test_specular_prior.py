@@ -1,10 +1,10 @@
-"""Highlights that a pixel cannot tell are its neighbours', of those that can."""
+"""The specular prior: highlights that a pixel's own pictures cannot tell are its neighbours'."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from relit_camera.capture.reflectance.appearance_model import REACH, SpecularEstimate, specular_prior
+from relit_camera.capture.reflectance.appearance_model import TUNABLES, SpecularEstimate, specular_prior
 
 SIZE = 40
 
@@ -20,7 +20,7 @@ def test_what_is_told_well_counts_and_what_is_far_does_not() -> None:
     # Every second pixel knows nothing, and has nonsense.
     amounts[::2], precision[::2] = 9.0, 0.0
     found = specular_prior(SpecularEstimate(amounts.astype(np.float32), precision), inside, matte)
-    far = REACH * SIZE * 2.5
+    far = TUNABLES.prior_reach * SIZE * 2.5
     np.testing.assert_allclose(found.amounts[column < SIZE / 2 - far], 0.4, rtol=0.05)
     np.testing.assert_allclose(found.amounts[column > SIZE / 2 + far], 0.1, rtol=0.2)
     assert (found.precision > 0).all()
