@@ -14,10 +14,10 @@ from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.light.light_map_rotation import LightMap, rotate_light_map
 from relit_camera.live.modes.room_light_estimator import (
-    FITS_PER_S,
+    TUNABLES,
     RoomLightEstimate,
     RoomLightEstimator,
-    _regularized_nnls,
+    regularized_nnls,
 )
 from tests.live.people import close_up, face_of
 from tests.live.rooms import EVENING, WINDOW, before_the_camera, live_picture, relighter, still_under
@@ -80,7 +80,7 @@ def test_a_change_of_exposure_is_a_gain_at_once() -> None:
     darker = uint8_from_linear(linear_from_uint8(image) * np.float32(0.6))
     motion = before_the_camera()
     before = probe.update(image, motion.landmarks, motion.rotation, 10.0)
-    room = probe.update(darker, motion.landmarks, motion.rotation, 10.0 + 0.3 / FITS_PER_S)
+    room = probe.update(darker, motion.landmarks, motion.rotation, 10.0 + 0.3 / TUNABLES.fits_per_s)
     np.testing.assert_allclose(room.gain / before.gain, 0.6, atol=0.03)
     np.testing.assert_array_equal(room.light_map, before.light_map)
 
@@ -128,4 +128,4 @@ def test_the_fit_is_non_negative_least_squares_with_a_ridge() -> None:
     ridge = 3e-3 * np.trace(design.T @ (design * weight[:, None])) / 12
     stacked = np.vstack([design * np.sqrt(weight)[:, None], np.sqrt(ridge) * np.eye(12)])
     expected, _ = nnls(stacked, np.concatenate([values * np.sqrt(weight), np.sqrt(ridge) * prior]))
-    np.testing.assert_allclose(_regularized_nnls(design, values, weight, prior), expected, atol=1e-6)
+    np.testing.assert_allclose(regularized_nnls(design, values, weight, prior), expected, atol=1e-6)
