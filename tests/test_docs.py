@@ -23,7 +23,7 @@ from relit_camera.api.server.connection_timeouts import MIN_BODY_BYTES_PER_TIMEO
 from relit_camera.base.config.access_token import MIN_TOKEN_LENGTH
 from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH
 from relit_camera.base.config.settings import RelitSettings
-from relit_camera.base.images.image_files import MAX_EXR_VALUES, MAX_IMAGE_PIXELS, MAX_JPEG_SCANS
+from relit_camera.base.images.image_limits import MAX_EXR_VALUES, MAX_IMAGE_PIXELS, MAX_JPEG_SCANS
 from relit_camera.base.models.model_manifest import public_manifest
 from relit_camera.capture import lights_file, subject_landmarks
 from relit_camera.cli.main import app
@@ -31,6 +31,7 @@ from relit_camera.face.tracking import track_recording
 from relit_camera.light.environment_panorama import MAX_PANORAMA_PIXELS
 from relit_camera.live.compositing import matting
 from relit_camera.live.scene.background_store import MAX_SIDE_PX as MAX_BACKGROUND_SIDE_PX
+from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject import subject_file
 from relit_camera.subject.subject import MAX_SIDE_PX
 from tests.doc_tables import DOCS, ROOT, imports_between_parts, layers, updated
@@ -80,7 +81,8 @@ def test_folder_tables_name_every_folder(page: str) -> None:
     heading = "## Find your way" if "CONTRIBUTING" in page else "## Folders and layers"
     named = [row[0].strip("`") for row in rows(page, heading)]
     assert named == [name for layer in layers() for name in layer]
-    assert set(named) == {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}
+    parts = {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
+    assert set(named) == parts - {"__init__"}
 
 
 def test_the_table_of_threads_names_every_thread() -> None:
@@ -113,6 +115,11 @@ def test_the_table_of_events_names_all_that_are_published() -> None:
     assert set(re.findall(r"events\.publish\(\s*\"([a-z-]+)\"", source)) <= documented
 
 
+def test_the_table_of_degradations_names_every_code() -> None:
+    documented = {row[0].strip("`") for row in rows("api.md", "### Degradations")}
+    assert documented == {str(code) for code in DegradationCode}
+
+
 LIMITS = {
     "a file sent": [f"{MAX_UPLOAD_BYTES // MIB} MiB"],
     "JSON sent": [f"{MAX_JSON_BYTES // MIB} MiB"],
@@ -123,7 +130,7 @@ LIMITS = {
     "a subject that is shown by the camera": [f"{subject_file.MAX_IN_MEMORY_BYTES // (1 << 30)} GiB"],
     "a subject file elsewhere": [f"{subject_file.MAX_BYTES // (1 << 30)} GiB"],
     "any subject file": [f"{subject_file.MAX_TENSORS} tensors", f"{MAX_SIDE_PX} pixels"],
-    "a recorded matte": [f"{matting.MAX_BYTES // (1 << 30)} GiB"],
+    "a recorded matte": [f"{matting.MAX_RECORDED_BYTES // (1 << 30)} GiB"],
     "a track; landmarks; an .lp file": [
         "; ".join(f"{module.MAX_BYTES // MIB} MiB" for module in (track_recording, subject_landmarks, lights_file))
     ],
