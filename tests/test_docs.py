@@ -196,6 +196,8 @@ def test_modules_and_files_that_a_page_names_exist(page: Path) -> None:
     paths = re.findall(r"`([\w/-]+/[\w/.-]*)`", text)
     known = (ROOT, SERVICE, PACKAGE, page.parent, ROOT / "tests/vm", SERVICE / "relit_studio")
     unknown |= {path for path in paths if _names_code(path) and not _found(path, known)}
+    names = {path.name for folder in (SERVICE, ROOT / "tests") for path in folder.rglob("*.py")}
+    unknown |= {name for name in re.findall(r"`(\w+\.py)`", text) if name not in names}
     assert unknown == set()
 
 
