@@ -218,6 +218,21 @@ def test_the_options_of_the_capture_page_exist() -> None:
     assert len(documented) > 10
 
 
+def test_the_messages_that_the_capture_page_quotes_exist() -> None:
+    written = set()
+    for path in [*(PACKAGE / "capture").rglob("*.py"), *(PACKAGE / "base/video").rglob("*.py")]:
+        constants = (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant))
+        written |= {constant.value for constant in constants if isinstance(constant.value, str)}
+    quoted = [
+        piece
+        for row in rows("capture.md", "## When it refuses")
+        for piece in re.split(r"; |…%?(?: \(.*\))?|, or ", row[0])
+    ]
+    pieces = [piece.strip(" :,") for piece in quoted if len(piece.strip()) > 8]
+    assert len(pieces) > 20
+    assert [piece for piece in pieces if not any(piece in text for text in written)] == []
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_settings_that_a_page_names_exist(page: Path) -> None:
     sections = [name for name, field in RelitSettings.model_fields.items() if _model(field.annotation)]
