@@ -1,7 +1,4 @@
-"""The networks: are they there, and where do they really run.
-
-Who is shown.
-"""
+"""Checks of the models, of the execution provider that really runs them, and of the subject."""
 
 from __future__ import annotations
 
@@ -19,11 +16,11 @@ REQUIRED_MODELS = {
     "mesh": ("face_mesh", "face_detector_yunet"),
     "openseeface": ("openseeface", "face_detector_yunet"),
 }
-"""Models without which a tracker does not open. `recorded` needs none; others' plug-ins know their own."""
+"""Models without which a tracker does not open. `recorded` needs none; a plug-in checks its own when it opens."""
 
 
 def check_models(settings: RelitSettings, registry: ModelStore | None = None) -> Finding:
-    """The public models, by their sha256."""
+    """Check the public models by their sha256: stored, missing or damaged."""
     topic = "models"
     try:
         registry = registry or ModelStore()
@@ -49,7 +46,7 @@ def check_models(settings: RelitSettings, registry: ModelStore | None = None) ->
 
 
 def check_provider(settings: RelitSettings) -> Finding:
-    """Open the packaged motion graph with the configured provider, and see where its nodes were placed."""
+    """Open the packaged motion network with the configured provider, and report where its nodes were placed."""
     topic, inference = "provider", settings.inference
     graph = files("relit_camera.live.reenactment").joinpath("first_order_motion.onnx").read_bytes()
     try:
@@ -65,7 +62,7 @@ def check_provider(settings: RelitSettings) -> Finding:
 
 
 def check_subject(settings: RelitSettings) -> Finding:
-    """The subject that the settings name: there and whole. With none the live picture passes through."""
+    """Check that the subject in the settings exists and can be read. Without one the live picture passes through."""
     topic, store = "subject", SubjectStore(settings.storage.subjects, in_memory=True)  # as the camera does
     stored = ", ".join(store.names())
     if settings.subject is None:
