@@ -1,4 +1,4 @@
-"""Notices that the configuration file was edited while the camera runs."""
+"""Watches the configuration file while the camera runs, and has edits applied."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ def watch_config(
     load: SettingsLoader,
     settings: RelitSettings,
     apply: SettingsApplier,
-    tell: Callable[[Exception | None], None],
+    report: Callable[[Exception | None], None],
 ) -> Iterator[None]:
-    """Look at the file once a second within the with-statement, in a thread of its own.
+    """Check the file for edits once a second within the with-statement, in a thread of its own.
 
-    What cannot be used leaves everything as it was: it is told, and the file is waited for to change again.
+    An edit that cannot be used is reported and changes nothing; the next edit is tried again.
 
     Args:
         path: of the configuration file.
         load: reads the settings from it; raises RelitError.
-        settings: as they are.
-        apply: takes the settings before and after; returns what a person should know, and raises RelitError where
-            they cannot be used.
-        tell: gets what is wrong or should be known, and None once there is no more of that.
+        settings: the present settings.
+        apply: applies an edit, given the settings before and after; returns what a person should know, or None, and
+            raises RelitError if the edit cannot be used.
+        report: is called with the error or note of an edit, and with None by the first edit without one.
     """
     stopping = threading.Event()
-    arguments = (path, _file_version(path), load, settings, apply, tell, stopping)
+    arguments = (path, _file_version(path), load, settings, apply, report, stopping)
     thread = threading.Thread(target=_watch, args=arguments, name="config", daemon=True)
     thread.start()
     try:
@@ -58,14 +58,14 @@ def _watch(
     load: SettingsLoader,
     settings: RelitSettings,
     apply: SettingsApplier,
-    tell: Callable[[Exception | None], None],
+    report: Callable[[Exception | None], None],
     stopping: threading.Event,
 ) -> None:
     last = used
-    told = False
+    was_reported = False
     while not stopping.wait(POLL_INTERVAL_S):
         before, last = last, _file_version(path)
-        if last == used or last != before:  # one that was just written may be written on
+        if last == used or last != before:  # a file that was just written may still be written to
             continue
         used = last
         note: Exception | None = None
@@ -75,17 +75,17 @@ def _watch(
             settings = after
         except RelitError as error:
             note = error
-        except Exception as error:  # a fault of ours must not end the watch
+        except Exception as error:  # a bug must not end the watching
             note = error
         if note is not None:
             log.warning("%s was edited: %s", path, note)
-        if note is not None or told:
-            tell(note)
-        told = note is not None
+        if note is not None or was_reported:
+            report(note)
+        was_reported = note is not None
 
 
 def _file_version(path: Path) -> _FileVersion:
-    """What is another after every edit, in place or by another file; None while there is none."""
+    """A value that changes with every edit of the file, or its replacement; None while there is no file."""
     try:
         found = path.stat()
     except OSError:

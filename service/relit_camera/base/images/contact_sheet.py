@@ -1,4 +1,4 @@
-"""Contact sheets: pictures of record side by side, so that a person can look at what was measured."""
+"""Contact sheets: labelled pictures in rows and columns, for people to look at."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def _letterbox(picture: DisplayImage, cell: tuple[int, int]) -> DisplayImage:
     height, width = picture.shape[:2]
     scale = min(cell[0] / width, cell[1] / height)
     size = (min(cell[0], max(1, round(width * scale))), min(cell[1], max(1, round(height * scale))))
-    # Enlarged pixels stay squares: a sheet shows what is there.
+    # Enlarged without interpolation, so that the sheet shows the pixels as they are.
     resized = cv2.resize(picture, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_NEAREST)
     filled = np.full((cell[1], cell[0], 3), _CELL_GRAY, dtype=np.uint8)
     x, y = (cell[0] - size[0]) // 2, (cell[1] - size[1]) // 2

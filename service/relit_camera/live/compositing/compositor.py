@@ -62,4 +62,4 @@ def composite_source_image(backdrop: BackgroundRenderer, layer: WarpedLayer, sce
 
 
 def _background_request(scene: Scene) -> BackgroundRequest:
-    return BackgroundRequest(scene.look.background, scene.look.lighting, scene.environment, scene.backdrop)
+    return BackgroundRequest(scene.look.background, scene.look.lighting, scene.environment, scene.background_image)
