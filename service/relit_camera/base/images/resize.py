@@ -15,7 +15,7 @@ def crop_to_fill(image: DisplayImage, size: tuple[int, int]) -> DisplayImage:
 
 
 def resize_to_fill(picture: NDArray[np.uint8], size: tuple[int, int], enlarging: int) -> NDArray[np.uint8]:
-    """As `crop_to_fill`, for any uint8 picture (height, width, ...), enlarged with OpenCV's interpolation `enlarging`."""
+    """As `crop_to_fill`, for any uint8 picture (height, width, ...); OpenCV interpolates by `enlarging` to enlarge."""
     height, width = picture.shape[:2]
     scale = max(size[0] / width, size[1] / height)
     columns, rows = min(width, round(size[0] / scale)), min(height, round(size[1] / scale))

@@ -1,1 +1,1 @@
-"""Where finished pictures go: virtual camera, video file, nowhere, behind one protocol."""
+"""Sinks, which take the finished pictures: the virtual camera, a video file, or none."""
