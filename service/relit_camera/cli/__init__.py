@@ -1,1 +1,1 @@
-"""The command line `relit`: a file a command in `commands/`, which import heavy modules only when they run."""
+"""The command line: one file a command group; heavy imports stay inside the commands."""

@@ -1,4 +1,4 @@
-"""Pictures: types and checks, files and their limits, color conversion, tone mapping, resizing, quality measures.
+"""Directions, rotations, colour curves and image types: the only place that knows axes, colour order and gamma.
 
-The only package that knows channel orders and transfer curves: everything else sees linear or sRGB RGB.
+Axes are right-handed: X right in the picture, Y up, Z toward the camera.
 """

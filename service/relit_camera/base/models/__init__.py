@@ -1,5 +1,5 @@
-"""Neural networks: opening them in ONNX Runtime, and the public models that users download by name.
+"""Neural networks: the one place that opens them, and the public ones that are pulled by name.
 
-`session_with_fallback` opens every network and proves its provider, `model_store` owns the folder of downloaded models,
-`model_manifest` lists them, `tflite` converts the published TFLite files to ONNX on the user's machine.
+`session` is the only user of ONNX Runtime, `registry` the only owner of the folder of pulled models, `tflite` the
+converter that turns the upstream files into ONNX on the user's machine.
 """

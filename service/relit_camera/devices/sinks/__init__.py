@@ -1,1 +1,1 @@
-"""Sinks, which take the finished pictures: the virtual camera, a video file, or none."""
+"""Where finished pictures go: virtual camera, video file, nowhere, behind one protocol."""

@@ -1,1 +1,1 @@
-"""Sources, which give the live pictures: a webcam, a video or picture file, or the test pattern."""
+"""Where live pictures come from: webcam, video file, picture, test pattern, behind one protocol."""
