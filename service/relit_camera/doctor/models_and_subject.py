@@ -5,9 +5,9 @@ from __future__ import annotations
 from importlib.resources import files
 
 from relit_camera.base.config.settings import RelitSettings
-from relit_camera.base.errors import RelitError
+from relit_camera.base.errors import DeviceError, RelitError
 from relit_camera.base.models.model_store import ModelState, ModelStore
-from relit_camera.base.models.provider_names import available_providers
+from relit_camera.base.models.provider_names import CPU, available_providers, choose_provider, full_name
 from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
 from relit_camera.doctor.report import Finding, ok, problem, problem_from_error, warning
 from relit_camera.subject.subject_store import SubjectStore
@@ -53,12 +53,25 @@ def check_provider(settings: RelitSettings) -> Finding:
         session = open_session(
             graph, "first_order_motion", SessionOptions(inference.provider, inference.threads, inference.strict)
         )
+    except DeviceError as error:
+        return problem(topic, error.what, _provider_cure(choose_provider(inference.provider)))
     except RelitError as error:
         return problem_from_error(topic, error)
     report = session.report
     nodes = f"{report.placement.get(report.provider, 0)} of {sum(report.placement.values())} nodes"
     seen = f"{report.provider} ({nodes}; asked for: {report.requested}; built in: {', '.join(available_providers())})"
-    return warning(topic, f"{seen}; {report.why}", report.cure) if report.why else ok(topic, seen)
+    if report.why:
+        return warning(topic, f"{seen}; {report.why}", _provider_cure(choose_provider(report.requested)))
+    return ok(topic, seen)
+
+
+def _provider_cure(provider: str) -> str:
+    """How to install a provider, or do without it."""
+    if provider == "cuda":
+        install = "install the NVIDIA driver, replace the package onnxruntime by onnxruntime-gpu[cuda,cudnn]"
+    else:
+        install = f"install a build of ONNX Runtime with {full_name(provider)}"
+    return f"{install}, or set the provider to {CPU}"
 
 
 def check_subject(settings: RelitSettings) -> Finding:

@@ -21,6 +21,56 @@ SettingsApplier = Callable[[RelitSettings, RelitSettings], RelitError | None]
 _FileVersion = tuple[int, int, int] | None
 
 
+class ConfigWatcher:
+    """Finds edits of the configuration file and has them applied; `check` is to be called regularly.
+
+    An edit that cannot be used is reported and changes nothing; the next edit is tried again.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        load: SettingsLoader,
+        settings: RelitSettings,
+        apply: SettingsApplier,
+        report: Callable[[Exception | None], None],
+    ) -> None:
+        """Take the file as it is now for the one that the settings were read from.
+
+        Args:
+            path: of the configuration file.
+            load: reads the settings from it; raises RelitError.
+            settings: the present settings.
+            apply: applies an edit, given the settings before and after; returns what a person should know, or None, and
+                raises RelitError if the edit cannot be used.
+            report: is called with the error or note of an edit, and with None by the first edit without one.
+        """
+        self._path, self._load, self._settings, self._apply, self._report = path, load, settings, apply, report
+        self._used = self._seen = _file_version(path)
+        self._was_reported = False
+
+    def check(self) -> None:
+        """Apply an edit, once the file is the same at two calls: until then it may still be written to."""
+        before, self._seen = self._seen, _file_version(self._path)
+        if self._seen == self._used or self._seen != before:
+            return
+        self._used = self._seen
+        note: Exception | None = None
+        try:
+            after = self._load(self._path)
+            note = self._apply(self._settings, after)
+            self._settings = after
+        except RelitError as error:
+            note = error
+        except Exception as error:  # a bug must not end the watching
+            note = error
+        if note is not None:
+            log.warning("%s was edited: %s", self._path, note)
+        if note is not None or self._was_reported:
+            self._report(note)
+        self._was_reported = note is not None
+
+
 @contextmanager
 def watch_config(
     path: Path,
@@ -29,59 +79,21 @@ def watch_config(
     apply: SettingsApplier,
     report: Callable[[Exception | None], None],
 ) -> Iterator[None]:
-    """Check the file for edits once a second within the with-statement, in a thread of its own.
-
-    An edit that cannot be used is reported and changes nothing; the next edit is tried again.
-
-    Args:
-        path: of the configuration file.
-        load: reads the settings from it; raises RelitError.
-        settings: the present settings.
-        apply: applies an edit, given the settings before and after; returns what a person should know, or None, and
-            raises RelitError if the edit cannot be used.
-        report: is called with the error or note of an edit, and with None by the first edit without one.
-    """
+    """Within the block: let a `ConfigWatcher` of these arguments check the file once a second, in a thread."""
+    watcher = ConfigWatcher(path, load, settings, apply, report)
     stopping = threading.Event()
-    arguments = (path, _file_version(path), load, settings, apply, report, stopping)
-    thread = threading.Thread(target=_watch, args=arguments, name="config", daemon=True)
+
+    def run() -> None:
+        while not stopping.wait(POLL_INTERVAL_S):
+            watcher.check()
+
+    thread = threading.Thread(target=run, name="config", daemon=True)
     thread.start()
     try:
         yield
     finally:
         stopping.set()
         thread.join(STOP_TIMEOUT_S)
-
-
-def _watch(
-    path: Path,
-    used: _FileVersion,
-    load: SettingsLoader,
-    settings: RelitSettings,
-    apply: SettingsApplier,
-    report: Callable[[Exception | None], None],
-    stopping: threading.Event,
-) -> None:
-    last = used
-    was_reported = False
-    while not stopping.wait(POLL_INTERVAL_S):
-        before, last = last, _file_version(path)
-        if last == used or last != before:  # a file that was just written may still be written to
-            continue
-        used = last
-        note: Exception | None = None
-        try:
-            after = load(path)
-            note = apply(settings, after)
-            settings = after
-        except RelitError as error:
-            note = error
-        except Exception as error:  # a bug must not end the watching
-            note = error
-        if note is not None:
-            log.warning("%s was edited: %s", path, note)
-        if note is not None or was_reported:
-            report(note)
-        was_reported = note is not None
 
 
 def _file_version(path: Path) -> _FileVersion:

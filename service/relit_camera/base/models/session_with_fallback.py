@@ -183,7 +183,7 @@ def open_session(model: Path | bytes, name: str, options: SessionOptions | None 
                 "restart the camera to try it again",
             )
     except _ProviderRejectedError as error:
-        cure = provider_names.provider_cure(wanted)
+        cure = f"`relit doctor` says how to install it; or set the provider to {provider_names.CPU}"
         if options.strict:
             raise DeviceError(f"model {name} cannot run on {wanted}: {error}", cure) from error
         session = _open_on_provider(model, name, provider_names.CPU, options, why=f"{wanted}: {error}", cure=cure)

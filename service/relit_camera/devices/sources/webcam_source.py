@@ -17,8 +17,7 @@ from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.devices.sources.source import SourceInfo, SourceState, ThreadedSource
 from relit_camera.devices.video_devices import SYSTEM_TREE, VIRTUAL_CAMERA_LABEL, DeviceTree, find_webcam
 
-STALL_TIMEOUT_S = 2.0
-"""Without a frame for this long, or for four frame intervals if that is longer, the source has stalled."""
+MIN_STALL_TIMEOUT_S = 2.0
 
 FIRST_FRAME_TIMEOUT_S = 5.0
 """A camera may take this long to give its first frame."""
@@ -73,7 +72,7 @@ class WebcamSource(ThreadedSource):
         super().__init__(SourceInfo("webcam", self._webcam.id, size, fps))
         self._tree, self._own_label = tree, own_label
         self._open_capture = open_capture or open_with_opencv
-        self._stall_timeout_s = max(STALL_TIMEOUT_S, 4 / fps) if stall_timeout_s is None else stall_timeout_s
+        self._stall_timeout_s = stall_timeout(fps) if stall_timeout_s is None else stall_timeout_s
         self._last_frame_at = 0.0
         self._index = 0
 
@@ -158,6 +157,11 @@ class WebcamSource(ThreadedSource):
         if frame.size != self._info.size:
             self._info = SourceInfo(self._info.kind, self._info.id, frame.size, self._info.fps)
         super()._publish(frame)
+
+
+def stall_timeout(fps: float) -> float:
+    """Seconds without a frame after which a source of that rate has stalled: four intervals, but at least two."""
+    return max(MIN_STALL_TIMEOUT_S, 4 / fps)
 
 
 def open_with_opencv(node: str, size: tuple[int, int], fps: float) -> OpenCvCapture:
