@@ -1,4 +1,4 @@
-"""Colour conversions and light colours. Linear values are Rec. 709 primaries, scene-referred, channel order RGB."""
+"""Color conversions and the color of light. Linear values have Rec. 709 primaries, scene-referred, channel order RGB."""
 
 from __future__ import annotations
 

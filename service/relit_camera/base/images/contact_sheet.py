@@ -1,4 +1,4 @@
-"""Contact sheets: labelled pictures in rows and columns, for people to look at."""
+"""Contact sheets: labeled pictures in rows and columns, for people to look at."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ Mask = NDArray[np.float32]
 """(height, width) float32 in 0..1."""
 
 Points = NDArray[np.float32]
-"""(count, 2) float32 pixel positions (x, y), pixel centres at integers + ½."""
+"""(count, 2) float32 pixel positions (x, y), pixel centers at integers + ½."""
 
 Flow = NDArray[np.float32]
 """(height, width, 2) float32 backward flow (dx, dy) in pixels: out(x) = in(x + flow(x))."""

@@ -163,7 +163,7 @@ def _video_stream(container: Any, path: Path) -> Any:
     curve = HDR_TRANSFER_FUNCTIONS.get(stream.codec_context.color_trc)
     if curve:
         cure = "record with HDR video switched off, or convert it to SDR (BT.709)"
-        raise VideoError(f"{path} is an HDR video ({curve}); its colours cannot be measured", cure)
+        raise VideoError(f"{path} is an HDR video ({curve}); its colors cannot be measured", cure)
     return stream
 
 
