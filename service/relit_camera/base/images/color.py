@@ -1,4 +1,4 @@
-"""Color conversions and the color of light. Linear values have Rec. 709 primaries, scene-referred, channel order RGB."""
+"""Color conversions and the color of light. Linear values are Rec. 709 RGB, scene-referred, channels in that order."""
 
 from __future__ import annotations
 
