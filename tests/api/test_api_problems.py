@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
@@ -86,7 +86,7 @@ def test_folders_of_this_machine_are_taken_out(text: str, shown: str) -> None:
 
 
 def test_a_long_body_is_refused_before_it_is_read(client: Client) -> None:
-    async def never() -> Iterator[bytes]:
+    async def never() -> AsyncIterator[bytes]:
         raise AssertionError("the body was read")
         yield b""
 
@@ -100,7 +100,7 @@ def test_a_long_body_is_refused_before_it_is_read(client: Client) -> None:
 def test_a_long_body_of_unknown_length_is_cut_off(client: Client) -> None:
     taken = 0
 
-    async def endless() -> Iterator[bytes]:
+    async def endless() -> AsyncIterator[bytes]:
         nonlocal taken
         while True:
             taken += 1 << 16

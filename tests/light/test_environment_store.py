@@ -12,7 +12,7 @@ from relit_camera.base.errors import InputError, NotFoundError, PanoramaError, S
 from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
 from relit_camera.light.environment_panorama import read_panorama
 from relit_camera.light.environment_store import EnvironmentStore
-from relit_camera.light.light_map_rotation import total
+from relit_camera.light.light_map import total
 
 
 @pytest.fixture

@@ -7,13 +7,12 @@ from http import HTTPStatus
 from typing import Any
 from urllib.parse import quote
 
-import cv2
-import numpy as np
 from fastapi import Request
 from starlette.responses import Response
 
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.images.resize import shrink
 
 THUMBNAIL_WIDTH = 320
 THUMBNAIL_QUALITY = 88
@@ -33,11 +32,7 @@ def thumbnail_url_path(collection: str, name: str) -> str:
 
 def encode_thumbnail(picture: DisplayImage) -> bytes:
     """A JPEG file of uint8 sRGB RGB (height, width, 3), scaled down to at most 320 pixels wide."""
-    height, width = picture.shape[:2]
-    if width > THUMBNAIL_WIDTH:
-        size = THUMBNAIL_WIDTH, max(1, round(height * THUMBNAIL_WIDTH / width))
-        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    return encode_display(picture, ".jpg", THUMBNAIL_QUALITY)
+    return encode_display(shrink(picture, THUMBNAIL_WIDTH / picture.shape[1]), ".jpg", THUMBNAIL_QUALITY)
 
 
 def jpeg_response(request: Request, jpeg: bytes) -> Response:

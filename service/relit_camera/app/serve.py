@@ -36,6 +36,7 @@ from relit_camera.devices.sinks.sink_factory import open_sink, published_label
 from relit_camera.devices.sources.source import Source
 from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.live.status.camera_status import DegradationCode
 
 log = logging.getLogger(__name__)
 
@@ -115,11 +116,11 @@ def run_camera(
         if side_task is not None:
             cleanup.enter_context(side_task(camera_service, server.address.url))
         if reload is not None:
-            apply, report_trouble = (
+            apply, report_degradation = (
                 partial(apply_edited_settings, scene_controller, settings),
-                partial(camera_service.report_trouble, "configuration"),
+                partial(camera_service.report_degradation, DegradationCode.CONFIGURATION_FAILED),
             )
-            cleanup.enter_context(watch_config(*reload, settings, apply, report_trouble))
+            cleanup.enter_context(watch_config(*reload, settings, apply, report_degradation))
         cleanup.enter_context(notify_systemd(camera_service.status))
         ends_at = time.monotonic() + (math.inf if seconds is None else seconds)
         while not stop.is_set() and (left := ends_at - time.monotonic()) > 0:

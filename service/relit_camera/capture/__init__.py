@@ -1,1 +1,1 @@
-"""From pictures or video to samples. Today: one-light pictures with known directions (RTI .lp)."""
+"""Capture: from OLAT pictures (RTI .lp) or from a film to samples, to a reflectance field, to a subject."""

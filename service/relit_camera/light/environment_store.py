@@ -14,13 +14,13 @@ from relit_camera.base.named_files import FileVersion, NamedFiles, file_version
 from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_camera.light.environment_panorama import (
     PANORAMA_SUFFIXES,
-    Axes,
     Environment,
     environment_from_panorama,
     read_panorama,
     require_panorama_suffix,
 )
 from relit_camera.light.environment_thumbnail import thumbnail_image
+from relit_camera.light.panorama_axes import Axes, between_map_and_picture_axes
 
 RESERVED_NAMES = frozenset({*BUILTIN_NAMES, "background"})
 """Names that no file may have: the built-in ones, and `background`, which means the light of the virtual background."""
@@ -97,7 +97,7 @@ class EnvironmentStore(NamedFiles):
             if axes == "picture":
                 shutil.copyfile(source, temporary)
             else:
-                write_linear(temporary, panorama.radiance[:, ::-1])
+                write_linear(temporary, between_map_and_picture_axes(panorama.radiance))
         return self.load(name)
 
     def add_upload(self, name: str, data: bytes, suffix: str) -> Environment:

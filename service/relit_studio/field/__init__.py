@@ -1,1 +1,1 @@
-"""A person under one light after another, over the whole sphere."""
+"""Rendered OLAT pictures: a person under one light after another, over the whole sphere."""

@@ -1,1 +1,1 @@
-"""What people hold: a mug, and the hands and sleeves that come with it."""
+"""Things that people hold: a mug, and the hands and sleeves that come with it."""

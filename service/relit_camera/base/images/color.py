@@ -95,6 +95,18 @@ def luminance(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     return result
 
 
+def rgb_from_hex(code: str) -> tuple[int, int, int]:
+    """The three 8-bit sRGB codes of a color written as `#rrggbb`.
+
+    Raises:
+        ValueError: `code` is not of that form.
+    """
+    if len(code) != 7 or code[0] != "#":
+        raise ValueError(f"'{code}' is no color; write it as #rrggbb")
+    red, green, blue = bytes.fromhex(code[1:])
+    return red, green, blue
+
+
 def _planckian_locus(t: float) -> NDArray[np.float64]:
     """CIE x and y of a black body at 1667 to 25000 K, after Kim et al. 2002."""
     if t < 4000:

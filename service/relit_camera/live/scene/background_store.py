@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
-import numpy as np
-
 from relit_camera.base.images.image_files import LDR_SUFFIXES, decode_display, encode_display, read_display
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.images.resize import shrink
 from relit_camera.base.named_files import NamedFiles
 
 MAX_SIDE_PX = 3840
@@ -45,9 +43,4 @@ class BackgroundStore(NamedFiles):
 
 
 def _limit_size(picture: DisplayImage) -> DisplayImage:
-    height, width = picture.shape[:2]
-    scale = MAX_SIDE_PX / max(height, width)
-    if scale >= 1:
-        return picture
-    size = max(1, round(width * scale)), max(1, round(height * scale))
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+    return shrink(picture, MAX_SIDE_PX / max(picture.shape[:2]))

@@ -13,13 +13,14 @@ import numpy as np
 from relit_camera.base.config.look import Background, ColorBackground, EnvironmentBackground, ImageBackground, Look
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import InputError, NotFoundError
-from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
+from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.light.background_light import panorama_from_background
 from relit_camera.light.environment_panorama import Environment
 from relit_camera.light.environment_store import EnvironmentStore
 from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map_rotation import resample_to_light_map
+from relit_camera.light.light_map import resample_to_light_map
+from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 from relit_camera.live.scene.background_store import BackgroundStore
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject
@@ -166,8 +167,7 @@ class SceneController:
         if isinstance(background, ImageBackground) and background.image in self.environments.names():
             return self.environments.load(background.image)
         if isinstance(background, ColorBackground):
-            code = int(background.color[1:], 16)
-            background_image = np.full((90, 160, 3), [code >> 16, code >> 8 & 255, code & 255], dtype=np.uint8)
+            background_image = np.full((90, 160, 3), rgb_from_hex(background.color), dtype=np.uint8)
         if background_image is None:
             kind = "an environment needs a name" if isinstance(background, EnvironmentBackground) else "has no picture"
             raise InputError(
@@ -184,8 +184,7 @@ class SceneController:
             return self.backgrounds.load(background.image)
         if background.image in self.environments.names():
             environment = self.environments.load(background.image)
-            # As seen from inside in the camera's direction: mirrored, with the panorama's edge in the middle.
-            seen = np.roll(environment.panorama.radiance[:, ::-1], environment.panorama.radiance.shape[1] // 2, axis=1)
+            seen = between_map_and_viewer_axes(environment.panorama.radiance)
             # A white wall of irradiance 1 reads 1 and has radiance 1/π: with the factor π, background and face match.
             return uint8_from_linear(seen * np.float32(np.pi * auto_exposure_scale(environment.light_map)))
         known = ", ".join(self.background_names()) or "none"

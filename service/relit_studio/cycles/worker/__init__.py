@@ -1,1 +1,1 @@
-"""What runs inside Cycles' environment: bpy and numpy, nothing else of ours."""
+"""The code that runs inside the environment of Cycles: bpy and numpy only."""

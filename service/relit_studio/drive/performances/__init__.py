@@ -1,1 +1,1 @@
-"""What people do before the webcam: one file a performance."""
+"""The performances of driving videos: what a person does before the webcam, one module each."""
