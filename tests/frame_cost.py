@@ -69,7 +69,7 @@ def camera_frame_cost(video: Path, subject: Path, mode: str, seconds: float) -> 
     )
     scene_controller = SceneController(settings.storage)
     scene_controller.set_look(settings.look)
-    scene_controller.set_subject(str(subject))
+    scene_controller.load_configured_subject(str(subject))
     source = open_source(settings.source)
     sink = NullSink((settings.output.width, settings.output.height))
     with patch("relit_camera.live.pipeline.StageTimer", partial(StageTimer, now=time.thread_time)):

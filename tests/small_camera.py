@@ -14,7 +14,7 @@ import numpy as np
 
 from relit_camera.api.app import create_app
 from relit_camera.api.server.http_server import start_api_server
-from relit_camera.app.camera_service import CameraService
+from relit_camera.app.camera_service import DEFAULT_TIMINGS, CameraService, CameraTimings
 from relit_camera.base.config.look import Lighting, Look
 from relit_camera.base.config.settings import Fallback, OutputSettings, RelitSettings, ServerSettings, StorageSettings
 from relit_camera.base.images.image_types import DisplayImage, Frame
@@ -25,6 +25,7 @@ from relit_camera.face.face_state import FaceState, Tracker
 from relit_camera.lab.bench.live_benchmark import SyntheticTracker
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.subject import Subject
 
 SIZE = (128, 96)
@@ -90,7 +91,7 @@ class RememberingSink(NullSink):
 class Camera:
     """A running camera and a client of its API."""
 
-    daemon: CameraService
+    camera_service: CameraService
     scene_controller: SceneController
     sink: RememberingSink
     http: httpx.Client
@@ -105,9 +106,13 @@ class Camera:
         found: dict[str, object] = self.http.get("status").raise_for_status().json()
         return found
 
+    def degraded(self) -> set[DegradationCode]:
+        """The codes of all that works less well than asked."""
+        return {degradation.code for degradation in self.camera_service.status().degraded}
+
     def troubles(self) -> str:
         """All that works less well than asked, as one text."""
-        return "\n".join(f"{t.what}: {t.why}; {t.cure}" for t in self.daemon.status().degraded)
+        return "\n".join(f"{t.what}: {t.why}; {t.cure}" for t in self.camera_service.status().degraded)
 
 
 @contextmanager
@@ -121,6 +126,7 @@ def running_camera(
     new_tracker: Callable[[], Tracker] | None = None,
     fallback: Fallback = Fallback.PLACEHOLDER,
     on_viewer: Callable[[], None] = lambda: None,
+    timings: CameraTimings = DEFAULT_TIMINGS,
 ) -> Iterator[Camera]:
     """Run a camera with its API on a real port; `folder` is for what it stores."""
     settings = RelitSettings(
@@ -132,16 +138,18 @@ def running_camera(
     scene_controller.set_look(look or Look(lighting=Lighting(transition_s=0)))
     scene_controller.show_subject("small", subject or small_subject())
     sink, tracker = sink or RememberingSink(), tracker or SteadyTracker()
-    daemon = CameraService(settings, scene_controller, source or memory_source(), sink, tracker, new_tracker, on_viewer)
-    daemon.start()
+    camera_service = CameraService(
+        settings, scene_controller, source or memory_source(), sink, tracker, new_tracker, on_viewer, timings
+    )
+    camera_service.start()
     try:
         with (
-            start_api_server(create_app(daemon, settings), settings.server) as server,
+            start_api_server(create_app(camera_service, settings), settings.server) as server,
             httpx.Client(base_url=f"{server.address.url}api/v1/", timeout=WAIT_S) as http,
         ):
-            yield Camera(daemon, scene_controller, sink, http)
+            yield Camera(camera_service, scene_controller, sink, http)
     finally:
-        daemon.stop()
+        camera_service.stop()
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = WAIT_S) -> None:

@@ -24,7 +24,7 @@ MAX_BYTES = 2_000_000
 DEMO = ROOT / "service/relit_camera/app/demo/data"
 """The one exception to "no generated data": what `relit demo` shows."""
 PICTURES = {".png", ".jpg", ".mp4", ".onnx", ".hdr", ".exr", ".npz", ".relit"}
-SEAMS = ("trackers", "methods", "relighters", "reenactors")
+SEAMS = ("trackers", "methods", "relighters", "reenactors", "sources", "sinks")
 LINK = re.compile(r"\[[^\]]*\]\(([^)#\s]+)(?:#[^)]*)?\)")
 COMMAND = re.compile(r"(?:^\s*|[`/])relit ([a-z]+)\b(?! ─)", re.MULTILINE)
 LEFTOVER = re.compile(r"\b(?:TODO|FIXME|XXX)\b|^(?:<{7}|>{7}) |breakpoint\(\)|/(?:root|Users)/", re.MULTILINE)

@@ -16,6 +16,8 @@ from relit_camera.base.config.look import Lighting, Look
 from tests.api.api_client import Client, hdr, png
 from tests.api.fake_camera import FakeCamera
 
+pytestmark = pytest.mark.real_time
+
 Happening = tuple[str, dict[str, Any]]
 
 

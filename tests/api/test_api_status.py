@@ -7,13 +7,20 @@ from dataclasses import replace
 
 from prometheus_client.parser import text_string_to_metric_families
 
-from relit_camera.live.status.camera_status import CameraState, Degradation, Percentiles
+from relit_camera.live.status.camera_status import CameraState, Degradation, DegradationCode, Percentiles
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import STATUS, FakeCamera
 
 
 def test_status_tells_everything(client: Client, camera: FakeCamera) -> None:
-    camera.degraded = [Degradation("model face_mesh runs on cpu", "CUDA is not there", "install the GPU variant")]
+    camera.degraded = [
+        Degradation(
+            code=DegradationCode.PROVIDER_FALLBACK,
+            what="model face_mesh runs on cpu",
+            why="CUDA is not there",
+            cure="install the GPU variant",
+        )
+    ]
     status = client.get("/api/v1/status").json()
     assert status["state"] == "live"
     assert status["tracker"] == {"name": "mesh", "state": "found"}
@@ -23,6 +30,7 @@ def test_status_tells_everything(client: Client, camera: FakeCamera) -> None:
     assert status["frames"] == {"published": 900, "dropped": 3, "repeated": 4}
     assert status["providers"] == {"face_mesh": "CPUExecutionProvider"}
     assert status["degraded"][0]["cure"] == "install the GPU variant"
+    assert status["degraded"][0]["code"] == "provider-fallback"
 
 
 def test_figures_that_are_no_numbers_are_null(client: Client, camera: FakeCamera) -> None:

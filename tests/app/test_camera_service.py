@@ -11,7 +11,7 @@ import httpx
 import numpy as np
 import pytest
 
-from relit_camera.app import camera_service as daemon_module
+from relit_camera.app.camera_service import CameraTimings
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.errors import VideoError
 from relit_camera.base.images.image_types import Frame
@@ -20,8 +20,13 @@ from relit_camera.devices.sources.playback_source import PlaybackSource
 from relit_camera.devices.sources.source import SourceInfo, SourceState
 from relit_camera.face.face_state import LOST, FaceState
 from relit_camera.live.publishing.placeholder_image import placeholder
-from relit_camera.live.supervision import pipeline_supervisor as line_module
+from relit_camera.live.status.camera_status import DegradationCode
+from relit_camera.live.supervision.camera_loop import DEFAULT_TIMINGS as LOOP_TIMINGS
+from relit_camera.live.supervision.camera_loop import LoopTimings
+from relit_camera.live.supervision.pipeline_health import HealthLimits
 from tests.small_camera import FPS, SIZE, SteadyTracker, difference, grey, memory_source, running_camera, wait_until
+
+pytestmark = pytest.mark.real_time
 
 LAMP_LEFT = {"azimuth_deg": -90, "elevation_deg": 0, "intensity": 1.5}
 LAMP_RIGHT = {"azimuth_deg": 90, "elevation_deg": 0, "intensity": 1.5}
@@ -59,20 +64,20 @@ def test_an_eased_change_begins_in_the_second_new_frame(tmp_path: Path) -> None:
         assert (np.diff(shown) >= 0).all()
 
 
-def test_status_tells_what_runs(tmp_path: Path) -> None:
+def test_status_says_what_runs(tmp_path: Path) -> None:
     with running_camera(tmp_path) as camera:
-        wait_until(lambda: camera.status()["state"] == "live" and camera.daemon.status().fps.pipeline > FPS / 3)
+        wait_until(lambda: camera.status()["state"] == "live" and camera.camera_service.status().fps.pipeline > FPS / 3)
         status = camera.status()
         assert status["subject"] == "small"
         assert status["source"] == "still memory"
         assert status["tracker"] == {"name": "nodding", "state": "found"}
         assert status["degraded"] == []
         assert {"track", "light", "relight", "follow", "move", "compose"} <= status["stage_ms"].keys()  # type: ignore[attr-defined]
-        found = camera.daemon.status()
+        found = camera.camera_service.status()
         assert 0 < found.latency_ms.p50 <= found.latency_ms.p95
         assert found.frames.published >= found.frames.repeated >= 0
         # On a busy machine the first second may stutter.
-        wait_until(lambda: camera.daemon.status().fps.published == pytest.approx(FPS, rel=0.35))
+        wait_until(lambda: camera.camera_service.status().fps.published == pytest.approx(FPS, rel=0.35))
 
 
 class SlowTracker(SteadyTracker):
@@ -83,16 +88,17 @@ class SlowTracker(SteadyTracker):
 
 def test_a_slow_pipeline_is_not_taken_for_a_slow_camera(tmp_path: Path) -> None:
     with running_camera(tmp_path, tracker=SlowTracker()) as camera:
-        wait_until(lambda: camera.daemon.status().frames.dropped > 20 and camera.daemon.status().fps.pipeline > 0)
-        status = camera.daemon.status()
+        wait_until(
+            lambda: (
+                camera.camera_service.status().frames.dropped > 20 and camera.camera_service.status().fps.pipeline > 0
+            )
+        )
+        status = camera.camera_service.status()
         assert status.fps.camera > 1.8 * status.fps.pipeline > 0
 
 
-def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(daemon_module, "STALE_AFTER_S", 0.3)
-    with running_camera(tmp_path) as camera:
+def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(tmp_path: Path) -> None:
+    with running_camera(tmp_path, timings=CameraTimings(stale_after_s=0.3)) as camera:
         camera.sink.wait_for(3)
         camera.put("freeze", frozen=True)
         wait_until(lambda: camera.status()["state"] == "frozen")
@@ -100,9 +106,8 @@ def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(
         wait_until(lambda: camera.sink.count >= begun + 3)  # what was on its way
         held, count = camera.sink.new[-1], camera.sink.count
         camera.put("lighting", environment=None, lamps=[LAMP_LEFT], transition_s=0)
-        time.sleep(0.8)
+        wait_until(lambda: camera.sink.count > count + 0.8 * FPS)  # for longer than `stale_after_s`
         assert camera.sink.new[-1] is held
-        assert camera.sink.count > count
         camera.put("freeze", frozen=False)
         wait_until(lambda: difference(camera.sink.new[-1], held) > 5)
         assert camera.status()["state"] == "live"
@@ -119,14 +124,17 @@ class FailingTracker(SteadyTracker):
         return super().track(frame)
 
 
-def test_a_frame_that_raises_does_not_stop_publishing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(line_module, "RETRY_S", 0.1)
+IMPATIENT = CameraTimings(loop=LoopTimings(source_retry_s=0.1), pipeline=HealthLimits(retry_s=0.1))
+
+
+def test_a_frame_that_raises_does_not_stop_publishing(tmp_path: Path) -> None:
     tracker = FailingTracker()
-    with running_camera(tmp_path, tracker=tracker) as camera:
+    with running_camera(tmp_path, tracker=tracker, timings=IMPATIENT) as camera:
         camera.sink.wait_for(3)
         tracker.fails = True
         wait_until(lambda: "a fault in one frame" in camera.troubles())
         assert "fault of ours" in camera.troubles()
+        assert camera.degraded() == {DegradationCode.PICTURE_FAILED}
         count = camera.sink.count
         wait_until(lambda: camera.sink.count > count + 3)
         tracker.fails = False
@@ -139,16 +147,15 @@ class NoFaceTracker(SteadyTracker):
         return LOST
 
 
-def test_without_a_face_it_searches_and_shows_the_still(tmp_path: Path) -> None:
+def test_without_a_face_it_searches_and_shows_the_source_image(tmp_path: Path) -> None:
     with running_camera(tmp_path, tracker=NoFaceTracker()) as camera:
         wait_until(lambda: camera.status()["state"] == "searching")
         assert camera.sink.new[-1].std() > 5
         assert camera.troubles() == ""
 
 
-def test_a_source_that_ends_leaves_the_placeholder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(daemon_module, "STALE_AFTER_S", 0.3)
-    with running_camera(tmp_path, source=memory_source(count=8)) as camera:
+def test_a_source_that_ends_leaves_the_placeholder(tmp_path: Path) -> None:
+    with running_camera(tmp_path, source=memory_source(count=8), timings=CameraTimings(stale_after_s=0.3)) as camera:
         wait_until(lambda: camera.status()["state"] == "waiting")
         waiting = placeholder(SIZE, "waiting for the camera")
         wait_until(lambda: difference(camera.sink.new[-1], waiting) == 0)
@@ -169,7 +176,7 @@ def test_a_source_that_ended_takes_no_time(tmp_path: Path) -> None:
         wait_until(lambda: camera.status()["state"] == "waiting")
         begun, began_at = len(reads), time.monotonic()
         time.sleep(0.5)
-        assert len(reads) - begun <= (time.monotonic() - began_at) / daemon_module.READ_TIMEOUT_S + 2
+        assert len(reads) - begun <= (time.monotonic() - began_at) / LOOP_TIMINGS.read_timeout_s + 2
 
 
 class BrokenSource:
@@ -192,15 +199,13 @@ class BrokenSource:
     ("error", "cure"),
     [(VideoError("clip.mp4 is damaged", "copy it again"), "copy it again"), (KeyError("x"), "a fault of ours")],
 )
-def test_a_source_that_fails_is_told_with_its_cure(
-    error: Exception, cure: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(daemon_module, "RETRY_S", 0.1)
+def test_a_source_that_fails_is_reported_with_its_cure(error: Exception, cure: str, tmp_path: Path) -> None:
     source = BrokenSource()
-    with running_camera(tmp_path, source=source) as camera:  # type: ignore[arg-type]
+    with running_camera(tmp_path, source=source, timings=IMPATIENT) as camera:  # type: ignore[arg-type]
         camera.sink.wait_for(3)
         source.error = error
         wait_until(lambda: cure in camera.troubles())
+        assert camera.degraded() == {DegradationCode.SOURCE_FAILED}
         count = camera.sink.count
         wait_until(lambda: camera.sink.count > count + 3)
         source.error = None
@@ -218,7 +223,7 @@ class SilentSource(BrokenSource):
         return None
 
 
-def test_a_camera_that_never_came_is_told_and_waited_for(tmp_path: Path) -> None:
+def test_a_camera_that_never_came_is_reported_and_waited_for(tmp_path: Path) -> None:
     source = SilentSource()
     with running_camera(tmp_path, source=source) as camera:  # type: ignore[arg-type]
         wait_until(lambda: "another program may be using it" in camera.troubles())
@@ -247,24 +252,24 @@ class LongFaceTracker(SteadyTracker):
         return replace(state, landmarks=middle + (state.landmarks - middle) * np.array([1, 1.2], np.float32))
 
 
-def test_ratio_falls_back_with_a_word_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
+def test_ratio_falls_back_and_says_so_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     source = memory_source(noise.repeat(4, axis=0).repeat(4, axis=1))
     with running_camera(tmp_path, source, LongFaceTracker(), look=Look(mode=Mode.RATIO)) as camera:
-        wait_until(lambda: "mode ratio shows the reenacted still" in camera.troubles())
+        wait_until(lambda: "mode reenact is shown in place of mode ratio" in camera.troubles())
         assert camera.status()["mode"] == "ratio"
         degraded = camera.status()["degraded"]
         assert isinstance(degraded, list)
         assert "choose your own subject" in degraded[0]["cure"]
+        assert degraded[0]["code"] == "face-mismatch"
         camera.sink.wait_for(len(camera.sink.new) + 3)
         camera.put("mode", mode="reenact")
         camera.sink.wait_for(len(camera.sink.new) + 3)
 
 
-def test_a_missing_matte_model_is_told_and_pictures_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_matte_model_is_reported_and_pictures_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "no-models"))
-    monkeypatch.setattr(line_module, "RETRY_S", 0.1)
-    with running_camera(tmp_path, look=Look(mode=Mode.RATIO)) as camera:
+    with running_camera(tmp_path, look=Look(mode=Mode.RATIO), timings=IMPATIENT) as camera:
         camera.sink.wait_for(3)
         camera.put("background", kind="blur")
         wait_until(lambda: "relit models pull" in camera.troubles())
@@ -279,11 +284,10 @@ def test_stop_ends_every_thread(tmp_path: Path) -> None:
     with running_camera(tmp_path) as camera:
         camera.sink.wait_for(2)
         start = time.monotonic()
-        camera.daemon.stop()
+        camera.camera_service.stop()
         assert time.monotonic() - start < 3
-        assert camera.daemon.stopping()
-        assert camera.daemon.status().state == "stopping"
-        camera.daemon.stop()
-    wait_until(
-        lambda: not {t for t in set(threading.enumerate()) - before if t.name in {"worker", "line", "publisher", "api"}}
-    )
+        assert camera.camera_service.stopping()
+        assert camera.camera_service.status().state == "stopping"
+        camera.camera_service.stop()
+    names = {"camera", "pipeline", "renderer_0", "publisher", "api"}
+    wait_until(lambda: not {thread for thread in set(threading.enumerate()) - before if thread.name in names})

@@ -1,4 +1,4 @@
-"""What systemd is told: by a stand-in for its socket, with made-up figures and with a real `relit run`."""
+"""What is reported to systemd: in virtual time, through a socket, and by a real `relit run`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
@@ -16,10 +17,13 @@ from pathlib import Path
 
 import pytest
 
-from relit_camera.app.systemd import SystemdNotifier, notify_systemd, status_line
-from relit_camera.live.status.camera_status import CameraState, Degradation, FrameCounts
+from relit_camera.app.systemd import STATUS_INTERVAL_S, SystemdNotifier, notify_systemd, report_until, status_line
+from relit_camera.live.status.camera_status import CameraState, CameraStatus, Degradation, DegradationCode, FrameCounts
 from tests.api.fake_camera import STATUS
 from tests.cli.relit_command import Material, environment
+from tests.virtual_clock import VirtualClock
+
+pytestmark = pytest.mark.real_time
 
 START_S = 60.0
 WATCHDOG_S = 1.0
@@ -44,7 +48,7 @@ run()
 
 
 class Listener:
-    """Stands for systemd's socket."""
+    """Takes the place of systemd's socket."""
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -76,21 +80,55 @@ class Listener:
             pass
 
 
-@pytest.fixture(params=["path", "abstract"])
-def listener(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Listener]:
-    listener = Listener(str(tmp_path / "notify") if request.param == "path" else f"@relit-test-{os.getpid()}")
+@pytest.fixture
+def listener(tmp_path: Path) -> Iterator[Listener]:
+    listener = Listener(str(tmp_path / "notify"))
+    yield listener
+    listener.close()
+
+
+@pytest.fixture
+def abstract_listener() -> Iterator[Listener]:
+    """One at an address that is no file, as systemd uses for containers."""
+    listener = Listener(f"@relit-test-{os.getpid()}")
     yield listener
     listener.close()
 
 
 class Camera:
-    """Figures of a camera that publishes as it is told."""
+    """The status of a camera in virtual time; schedule what changes, then `report_for`."""
 
-    def __init__(self) -> None:
+    def __init__(self, watchdog_s: float | None = 30.0) -> None:
+        self.clock = VirtualClock()
+        self.start = self.clock.now()
         self.base, self.published = STATUS, 0
+        self.manager = RecordingNotifier(watchdog_s)
 
-    def __call__(self):
+    def status(self) -> CameraStatus:
         return replace(self.base, frames=FrameCounts(self.published, 0, 0))
+
+    def publish(self) -> None:
+        self.published += 1
+
+    def report_for(self, seconds: float) -> list[tuple[float, str]]:
+        """Report for some seconds. Returns when which kind of message was sent."""
+        over = threading.Event()
+        self.clock.at(seconds, over.set)
+        self.manager.on_message = lambda first: sent.append((round(self.clock.now() - self.start, 1), first))
+        sent: list[tuple[float, str]] = []
+        report_until(over, self.manager, self.status, self.clock)
+        return sent
+
+
+class RecordingNotifier(SystemdNotifier):
+    """Hands the first line of each message on instead of sending it."""
+
+    def __init__(self, watchdog_s: float | None) -> None:
+        super().__init__("/nowhere", watchdog_s)
+        self.on_message: Callable[[str], None] = lambda first: None
+
+    def notify(self, *lines: str) -> None:
+        self.on_message(lines[0].partition("=")[0])
 
 
 def test_no_service_manager_no_message() -> None:
@@ -112,55 +150,66 @@ def test_the_watchdog_is_read_for_this_process_alone() -> None:
     assert watchdog(WATCHDOG_USEC="0") is None
 
 
-def test_ready_comes_with_the_first_picture_and_life_with_the_others(listener: Listener) -> None:
-    camera = Camera()
-    with notify_systemd(camera, SystemdNotifier(listener.address, watchdog_s=0.2)):
-        assert listener.next(0.3) == []
-        camera.published = 1
-        assert listener.next()[0] == "READY=1"
-        assert listener.next()[0].startswith("STATUS=")  # nothing was published since
-        camera.published = 2
-        assert "WATCHDOG=1" in listener.wait_for("WATCHDOG=1")
-        assert "WATCHDOG=1" not in listener.next()
+def test_ready_comes_with_the_first_picture_and_life_with_the_others() -> None:
+    camera = Camera(watchdog_s=30.0)
+    camera.clock.at(6.98, camera.publish)
+    camera.clock.at(30.0, camera.publish)  # and no more
+    assert camera.report_for(60.0) == [(7.0, "READY"), (22.0, "STATUS"), (37.0, "WATCHDOG"), (52.0, "STATUS")]
+
+
+def test_without_a_watchdog_the_status_is_renewed_all_the_same() -> None:
+    camera = Camera(watchdog_s=None)
+    camera.publish()
+    assert camera.report_for(11.0) == [(0.0, "READY"), (STATUS_INTERVAL_S, "STATUS"), (2 * STATUS_INTERVAL_S, "STATUS")]
+
+
+def test_a_sink_that_fails_and_is_reported_is_no_camera_that_hangs() -> None:
+    def degraded(code: DegradationCode) -> CameraStatus:
+        return replace(STATUS, degraded=[Degradation(code=code, what="x", why="y")])
+
+    camera = Camera(watchdog_s=2.0)
+    camera.publish()
+    for at, code in ((0.5, DegradationCode.SOURCE_FAILED), (2.5, DegradationCode.SINK_FAILED)):
+        camera.clock.at(at, lambda code=code: setattr(camera, "base", degraded(code)))  # type: ignore[misc]
+    sent = [kind for _, kind in camera.report_for(5.5)]
+    assert sent == ["READY", "STATUS", "STATUS", "WATCHDOG", "WATCHDOG", "WATCHDOG"]
+
+
+@pytest.mark.parametrize("kind", ["listener", "abstract_listener"])
+def test_what_is_reported_reaches_the_socket(kind: str, request: pytest.FixtureRequest) -> None:
+    listener: Listener = request.getfixturevalue(kind)
+    with notify_systemd(lambda: replace(STATUS, frames=FrameCounts(1, 0, 0)), SystemdNotifier(listener.address)):
+        assert listener.next() == ["READY=1", f"STATUS={status_line(STATUS)}"]
     listener.wait_for("STOPPING=1")
 
 
-def test_a_sink_that_fails_and_is_told_is_no_camera_that_hangs(listener: Listener) -> None:
-    camera = Camera()
-    camera.published = 1
-    other, sink = Degradation("source failed", "x"), Degradation("sink failed", "the device takes no pictures")
-    with notify_systemd(camera, SystemdNotifier(listener.address, watchdog_s=0.2)):
-        assert listener.next()[0] == "READY=1"
-        camera.base = replace(STATUS, degraded=[other])
-        assert "WATCHDOG=1" not in listener.next()
-        camera.base = replace(STATUS, degraded=[other, sink])
-        listener.wait_for("WATCHDOG=1")
-        listener.wait_for("WATCHDOG=1")
-
-
 def test_stopped_before_the_first_picture_it_was_never_ready(listener: Listener) -> None:
-    with notify_systemd(Camera(), SystemdNotifier(listener.address)):
+    with notify_systemd(lambda: replace(STATUS, frames=FrameCounts(0, 0, 0)), SystemdNotifier(listener.address)):
         pass
     assert listener.next() == ["STOPPING=1", "STATUS=stopping"]
 
 
 def test_a_manager_that_does_not_listen_changes_nothing(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    with notify_systemd(Camera(), SystemdNotifier(str(tmp_path / "nobody"))):
+    with notify_systemd(
+        lambda: replace(STATUS, frames=FrameCounts(0, 0, 0)), SystemdNotifier(str(tmp_path / "nobody"))
+    ):
         pass
-    assert "cannot be told STOPPING=1" in caplog.text
+    assert "does not take STOPPING=1" in caplog.text
 
 
-def test_the_status_is_one_line_with_the_first_trouble() -> None:
+def test_the_status_is_one_line_with_the_first_degradation() -> None:
     good = replace(STATUS, state=CameraState.LIVE, source="webcam C920", sink="camera /dev/video10", degraded=[])
     assert status_line(good) == "live: webcam C920 to camera /dev/video10"
-    bad = replace(good, degraded=[Degradation("sink failed", "no\nroom", "x"), Degradation("b", "c")])
-    assert status_line(bad).endswith("/dev/video10; sink failed: no room")
+    failed = Degradation(code=DegradationCode.SINK_FAILED, what="sink failed", why="no\nspace", cure="x")
+    other = Degradation(code=DegradationCode.SOURCE_FAILED, what="b", why="c")
+    bad = replace(good, degraded=[failed, other])
+    assert status_line(bad).endswith("/dev/video10; sink failed: no space")
 
 
 @contextmanager
 def service(listener: Listener, material: Material, folder: Path) -> Iterator[subprocess.Popen[str]]:
     """`relit run` as systemd starts it, of the test pattern."""
-    told = {"NOTIFY_SOCKET": listener.address, "WATCHDOG_USEC": str(int(WATCHDOG_S * 1e6))}
+    notify = {"NOTIFY_SOCKET": listener.address, "WATCHDOG_USEC": str(int(WATCHDOG_S * 1e6))}
     small = {"RELIT_SOURCE__WIDTH": "128", "RELIT_SOURCE__HEIGHT": "96"}
     process = subprocess.Popen(
         [
@@ -168,7 +217,7 @@ def service(listener: Listener, material: Material, folder: Path) -> Iterator[su
             "run", "--source", "pattern", "--sink", "null", "--port", "0",
             "--size", "128x96", "--tracker", material.tracker,
         ],
-        env={**environment(folder), **told, **small}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env={**environment(folder), **notify, **small}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
         yield process

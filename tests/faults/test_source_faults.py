@@ -19,6 +19,8 @@ from tests.devices.fake_devices import FakeCapture, FakeTree
 from tests.faults.watched_camera import Survived, Watched, watched_camera
 from tests.small_camera import SIZE, difference, wait_until
 
+pytestmark = pytest.mark.real_time
+
 STALL_S = float(os.environ.get("FAULT_STALL_S", "6"))
 """The table of docs/reliability.md is made with 30."""
 
@@ -98,14 +100,14 @@ def test_it_stops_in_time_while_the_webcam_hangs(tmp_path: Path, tree: FakeTree)
         hanging = cameras.opened[-1]
         hanging.mode = "stuck"
         time.sleep(0.2)
-        daemon, began = watched.camera.daemon, time.monotonic()
-        daemon.request_stop()
+        camera_service, began = watched.camera.camera_service, time.monotonic()
+        camera_service.request_stop()
         time.sleep(2.2)  # what else ends meanwhile
-        daemon.stop()
+        camera_service.stop()
         assert time.monotonic() - began < 3
-        assert [name for name in daemon.hung_threads if name.startswith("source-")]
+        assert [name for name in camera_service.hung_threads if name.startswith("source-")]
         hanging.unstick.set()
-        wait_until(lambda: daemon.hung_threads == [])
+        wait_until(lambda: camera_service.hung_threads == [])
 
 
 class Odd(FakeCapture):

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.app import camera_service as daemon_module
+from relit_camera.app.camera_service import CameraTimings
 from relit_camera.base.errors import DeviceError, StorageError
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.devices.sinks.sink import SinkInfo
@@ -32,6 +32,10 @@ from tests.small_camera import (
     small_subject,
     wait_until,
 )
+
+pytestmark = pytest.mark.real_time
+
+SOON_STALE = CameraTimings(stale_after_s=0.3)
 
 
 def overwritten(path: Path) -> None:
@@ -60,7 +64,7 @@ def test_a_subject_file_is_spoilt_while_in_use(
     file = tmp_path / "me.relit"
     write_subject(file, small_subject())
     with watched_camera(tmp_path / "data") as watched:
-        watched.camera.scene_controller.set_subject(str(file))
+        watched.camera.scene_controller.load_subject_file(file)
         watched.goes_on(20)
         watched.begin()
         spoil(file)
@@ -82,7 +86,7 @@ def test_the_clock_jumps(jump_s: float, tmp_path: Path, survived: Survived, monk
         time.sleep(0.5)
         watched.goes_on(20)
         assert watched.still_told_nothing()
-        assert 0 < watched.camera.daemon.status().latency_ms.p95 < 5000
+        assert 0 < watched.camera.camera_service.status().latency_ms.p95 < 5000
         survived(f"the clock jumps by {jump_s / 3600:+.0f} h", watched)
 
 
@@ -120,13 +124,13 @@ def test_it_stops_in_time_while_the_driver_hangs(tmp_path: Path) -> None:
         sink.release.clear()
         time.sleep(0.2)
         began = time.monotonic()
-        camera.daemon.stop()
+        camera.camera_service.stop()
         assert time.monotonic() - began < 3
-        assert camera.daemon.hung_threads == ["publisher"]
+        assert camera.camera_service.hung_threads == ["publisher"]
         sink.release.set()
 
 
-def test_the_end_of_a_recording_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_end_of_a_recording_is_waited_for(tmp_path: Path) -> None:
     """A disk that is slow to answer costs time, one that does not answer costs the recording: neither is silent."""
 
     class Recording(FaultySink):
@@ -134,24 +138,22 @@ def test_the_end_of_a_recording_is_waited_for(tmp_path: Path, monkeypatch: pytes
             return SinkInfo("file", "rec.mp4", SIZE)
 
     for seconds, lost in ((1.5, False), (60.0, True)):
-        monkeypatch.setattr(daemon_module, "DISK_TIMEOUT_S", 2.0)
         sink = Recording()
         with ExitStack() as ended:
             if lost:
                 ended.enter_context(pytest.raises(StorageError, match="the disk does not answer"))
-            with running_camera(tmp_path, sink=sink) as camera:
+            with running_camera(tmp_path, sink=sink, timings=CameraTimings(disk_timeout_s=2.0)) as camera:
                 sink.wait_for(3)
                 sink.release.clear()
                 time.sleep(0.2)
                 threading.Timer(seconds, sink.release.set).start()
-                camera.daemon.stop()
+                camera.camera_service.stop()
         sink.release.set()
 
 
-def test_a_picture_that_gave_way_does_not_come_back_by_holding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(daemon_module, "STALE_AFTER_S", 0.3)
+def test_a_picture_that_gave_way_does_not_come_back_by_holding(tmp_path: Path) -> None:
     waiting = placeholder(SIZE, "waiting for the camera")
-    with running_camera(tmp_path, source=memory_source(count=8)) as camera:
+    with running_camera(tmp_path, source=memory_source(count=8), timings=SOON_STALE) as camera:
         wait_until(lambda: difference(camera.sink.new[-1], waiting) == 0 and camera.status()["state"] == "waiting")
         for frozen in (True, False):
             camera.put("freeze", frozen=frozen)
@@ -172,8 +174,7 @@ class LateTracker(SteadyTracker):
         return super().track(frame)
 
 
-def test_a_late_picture_does_not_take_the_placeholders_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(daemon_module, "STALE_AFTER_S", 0.3)
+def test_a_late_picture_does_not_replace_the_placeholder(tmp_path: Path) -> None:
     waiting = placeholder(SIZE, "waiting for the camera")
     tracker, more = LateTracker(), threading.Event()
 
@@ -183,22 +184,22 @@ def test_a_late_picture_does_not_take_the_placeholders_place(tmp_path: Path, mon
         yield grey(), 1 / FPS
 
     source = PlaybackSource(SourceInfo("still", "memory", SIZE, FPS), play())
-    with running_camera(tmp_path, source=source, tracker=tracker) as camera:
+    with running_camera(tmp_path, source=source, tracker=tracker, timings=SOON_STALE) as camera:
         wait_until(lambda: camera.status()["state"] == "live")
         tracker.release.clear()
         more.set()
         wait_until(lambda: difference(camera.sink.new[-1], waiting) == 0)
-        with camera.daemon.events.listen() as told:
+        with camera.camera_service.events.listen() as events:
             shown, count = len(camera.sink.new), camera.sink.count
             tracker.release.set()
-            wait_until(lambda: camera.daemon.status().frames.dropped == 1)
+            wait_until(lambda: camera.camera_service.status().frames.dropped == 1)
             wait_until(lambda: camera.sink.count > count + 20)
             assert len(camera.sink.new) == shown
-            assert told.empty()  # nor is it said to be live
+            assert events.empty()  # nor is it said to be live
 
 
 def test_a_tracker_made_anew_may_fail_too(tmp_path: Path, survived: Survived) -> None:
-    """Its model was deleted meanwhile: the still goes on, and says why."""
+    """Its model was deleted meanwhile: the fallback is shown, and the status says why."""
     from relit_camera.base.errors import ModelError
 
     class Broken(SteadyTracker):

@@ -41,7 +41,7 @@ def test_a_point_of_the_field_is_where_the_film_shows_it(files: tuple[Path, Path
 
 
 def test_files_of_two_films_are_refused(files: tuple[Path, Path]) -> None:
-    files[1].write_text(json.dumps({"frames": []}))
+    files[1].write_text(json.dumps({"frames": [{"head": {"to_rest": {"rotation_deg": 0, "translation_px": [0, 0]}}}]}))
     field = Samples(np.zeros((1, 8, 10, 3), np.float32), np.array([[0.0, 0.0, 1.0]]), np.ones((8, 10), np.float32))
     with pytest.raises(InputError, match="tells of frame 1, which"):
         crop_like_capture(field, *files)

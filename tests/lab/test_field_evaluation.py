@@ -103,6 +103,9 @@ def test_the_page_is_whole_in_itself_and_every_figure_has_a_caption(report: Fiel
     assert outline.fetched == []
     assert not re.search(r"(?:https?:)?//|url\(|@import", re.sub(r"base64,[A-Za-z0-9+/=]+", "", page))
     assert outline.figures == outline.captions >= 10
+    assert len(outline.images) >= 10
+    smallest = min(float(each.error_whole.mean()) * 1e3 for each in report.candidate_scores)
+    assert outline.best[0] == f"{smallest:.2f}"
     assert "Ball &lt;&amp;&gt;" in page
     for each in report.candidate_scores:
         assert each.name in page

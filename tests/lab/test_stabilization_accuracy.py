@@ -21,6 +21,7 @@ from relit_camera.lab.evaluate.stabilization.stabilization_accuracy import (
     stabilization_text,
 )
 from tests.capture.film.moving_face_film import CIRCLE, SIZE, Move, film_moving, moved, texture, wandering
+from tests.lab.html_outline import Outline
 
 FRAMES = 90
 
@@ -101,7 +102,11 @@ def test_the_report_tells_everything(report: StabilizationReport) -> None:
     assert "sparse flow, dark frames" in text
     assert "landmarks: left out" in text
     page = stabilization_page(report, "A film")
-    assert page.count("<svg") == 2
+    outline = Outline()
+    outline.feed(page)
+    assert outline.fetched == outline.open == []
+    assert outline.figures == 3
+    assert sum(b"<svg" in image for image in outline.images) == 2
     assert "template matching, bright frames" in page
 
 

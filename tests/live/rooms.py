@@ -10,8 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_types import Frame
-from relit_camera.face.face_state import FaceStatus, HeadPose
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.face_state import FaceStatus
+from relit_camera.face.head_pose import HeadPose
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.face.motion.neutral_face import NeutralFace
 from relit_camera.light.directions import direction_from_degrees, texel_directions
 from relit_camera.light.light_map_rotation import rotate_light_map

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relit_camera.light.directions import direction_from_degrees
-from relit_camera.light.light_map_rotation import irradiance
+from relit_camera.light.light_map import irradiance
 from relit_studio.drive.room import Room
 from relit_studio.drive.rooms import ROOMS, paint_room
 

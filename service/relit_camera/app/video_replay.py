@@ -14,7 +14,7 @@ from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.face.face_state import FaceStatus
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.scene.scene import Scene
 

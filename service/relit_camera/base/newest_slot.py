@@ -1,10 +1,11 @@
-"""One place for the newest value, between a thread that makes values and threads that want the latest."""
+"""A slot that holds the newest value of a stream, between the thread that produces values and those that read them."""
 
 from __future__ import annotations
 
 import threading
-import time
 from typing import Generic, TypeVar
+
+from relit_camera.base.clock import SYSTEM_CLOCK, Clock
 
 T = TypeVar("T")
 
@@ -15,7 +16,8 @@ class NewestSlot(Generic[T]):
     Every value has a number, counted from 1 in the order of putting. Any number of threads may put and read.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock = SYSTEM_CLOCK) -> None:
+        self._clock = clock
         self._changed = threading.Condition()
         self._value: T | None = None
         self._number = 0
@@ -29,18 +31,18 @@ class NewestSlot(Generic[T]):
                 return
             self._value = value
             self._number += 1
-            self._put_at = time.monotonic()
+            self._put_at = self._clock.now()
             self._changed.notify_all()
 
     def newer(self, than: int, timeout_s: float) -> tuple[int, T, float] | None:
         """Give the newest value if its number is above `than`, waiting up to `timeout_s` for one.
 
         Returns:
-            Its number, the value, and the monotonic time in seconds at which it was put; None when time is up, or at
-            once when the slot is closed.
+            Its number, the value, and the time in seconds on the slot's clock at which it was put; None when time is
+            up, or at once when the slot is closed.
         """
         with self._changed:
-            self._changed.wait_for(lambda: self._number > than or self._closed, timeout_s)
+            self._clock.wait_for(self._changed, lambda: self._number > than or self._closed, timeout_s)
             if self._value is None or self._number <= than:
                 return None
             return self._number, self._value, self._put_at
@@ -63,11 +65,11 @@ class NewestSlot(Generic[T]):
 
 
 class SlotReader(Generic[T]):
-    """One reader's memory of what it has seen. Belongs to one thread.
+    """Reads each value of a slot at most once. For use by one thread.
 
     Attributes:
-        dropped: values that were replaced before this reader came for them.
-        put_at: monotonic time in seconds at which the value last got was put.
+        dropped: how many values were replaced before this reader got them.
+        put_at: time in seconds on the slot's clock at which the value last got was put.
     """
 
     def __init__(self, slot: NewestSlot[T]) -> None:

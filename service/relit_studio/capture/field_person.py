@@ -22,13 +22,11 @@ from relit_camera.base.errors import LightsError
 from relit_camera.base.images.color import Gamma
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.capture.picture_import import import_samples
-from relit_camera.capture.reflectance.delaunay_barycentric import (
-    SphericalBarycentric,
-    spherical_barycentric,
-    spherical_delaunay,
-)
+from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
+from relit_camera.capture.reflectance.delaunay_triangulation import spherical_barycentric, spherical_delaunay
 from relit_camera.light.directions import texel_directions, texel_solid_angles
-from relit_camera.light.light_map_rotation import LightMap, rotate_light_map
+from relit_camera.light.light_map import LightMap
+from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_studio.capture.head_motion import Motion
 from relit_studio.capture.person import FACE_REACH_CM, Layers
 from relit_studio.capture.torch import Torch

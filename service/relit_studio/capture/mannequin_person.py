@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from relit_camera.base.images.image_types import LinearImage
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_studio.capture.head_motion import REST, Motion
 from relit_studio.capture.person import FACE_REACH_CM, Layers
 from relit_studio.capture.point_shadow import PointShadow

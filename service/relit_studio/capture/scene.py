@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.light.environment_panorama import Environment
 from relit_camera.light.exposure import WHITE_BALL_LUMINANCE, auto_exposure_scale
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_studio.capture.flash import FlashSchedule, RollingShutter
 from relit_studio.capture.head_motion import HeadMotion, Motion
 from relit_studio.capture.mirror_ball import MirrorBall

@@ -6,9 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.light.builtin import window
-from relit_camera.light.builtin.canvas import Canvas, bearings, blend_over, color, panel_mask, smoothstep, to_map_axes
+from relit_camera.light.builtin.canvas import Canvas, bearings, blend_over, color, panel_mask
 from relit_camera.light.environment_panorama import Environment, environment_from_panorama, panorama_from_radiance
+from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 
 
 def _soft() -> Canvas:
@@ -33,8 +35,10 @@ def _ceiling() -> Canvas:
 def _screen() -> Canvas:
     """At night: the screen alone, and what it throws on the walls near it."""
     bearing, _ = bearings()
-    near = 0.004 + 0.02 * smoothstep(60, 180, np.abs(bearing))[..., None] * color("#9fbdf5")
-    return blend_over(window.paint() * near, panel_mask(0, -9, 48, 28, 1), color("#c3d7ff", 2.4))
+    near = 0.004 + 0.02 * smoothstep(np.abs(bearing), 60, 180)[..., None] * color("#9fbdf5")
+    return blend_over(
+        np.asarray(window.paint() * near, np.float32), panel_mask(0, -9, 48, 28, 1), color("#c3d7ff", 2.4)
+    )
 
 
 _ROOMS: dict[str, Callable[[], Canvas]] = {
@@ -52,4 +56,4 @@ def paint_room(name: str) -> Environment:
     Raises:
         KeyError: `name` is none of `ROOMS`.
     """
-    return environment_from_panorama(name, panorama_from_radiance(to_map_axes(_ROOMS[name]()), name))
+    return environment_from_panorama(name, panorama_from_radiance(between_map_and_viewer_axes(_ROOMS[name]()), name))

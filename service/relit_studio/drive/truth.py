@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from relit_camera.base.images.image_types import Frame
-from relit_camera.face.face_state import LOST, FaceState, FaceStatus, HeadPose
+from relit_camera.face.face_state import LOST, FaceState, FaceStatus
+from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_studio.camera import Camera
 from relit_studio.drive.performance import Moment

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.face.face_state import HeadPose
+from relit_camera.face.head_pose import HeadPose
 from relit_studio.mannequin.figure import PIVOT, Posture
 from relit_studio.pinhole import Pinhole
 

@@ -15,7 +15,8 @@ from relit_camera.face.face_state import FaceState, FaceStatus
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.tracking.track_recording import TrackRecorder
 from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map_rotation import LightMap, pad_poles, padded_positions
+from relit_camera.light.light_map import LightMap
+from relit_camera.light.light_map_interpolation import pad_poles, padded_positions
 from relit_studio.mannequin.camera import DISTANCE_CM, VIEW_CM, Camera
 from relit_studio.mannequin.figure import Posture
 from relit_studio.mannequin.lights import lights_from_map

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Angles, rotation_from_angles
 from relit_studio.mannequin import features
 from relit_studio.mannequin.bust import base, neck, pullover
@@ -82,8 +83,7 @@ class Figure:
                 points = part.vertices
             if name == "neck":
                 low, high = _NECK_TURNS
-                share = np.clip((points[:, 1:2] - low) / (high - low), 0, 1)
-                share = share**2 * (3 - 2 * share)
+                share = smoothstep(points[:, 1:2], low, high)
                 points = points + share * (_turned(points, rotation) - points)
             elif name != "pullover":
                 points = _turned(points, rotation)

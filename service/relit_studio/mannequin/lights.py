@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from relit_camera.base.config.look import Lamp
 from relit_camera.base.images.color import LUMINANCE
 from relit_camera.light.directions import texel_directions, texel_solid_angles
-from relit_camera.light.light_map_rotation import LightMap, check_light_map
+from relit_camera.light.light_map import LightMap, check_light_map
 from relit_camera.light.scene_light import lamp_light_map
 
 

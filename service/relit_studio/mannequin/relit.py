@@ -9,7 +9,7 @@ import numpy as np
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.clip import CLIP_LIGHTS, CLIP_SIZE
 from relit_studio.mannequin.lights import lights_from_map

@@ -189,8 +189,10 @@ def test_the_camera_lives_on_while_its_webcam_is_released(tmp_path: Path):
         wait_until(lambda: camera.status()["state"] == "released")
         wait_until(lambda: difference(camera.sink.new[-1], released) == 0)
         assert camera.status()["degraded"] == []
-        published = camera.daemon.status().frames.published
-        wait_until(lambda: camera.daemon.status().frames.published > published + 5)  # readers find a live camera
+        published = camera.camera_service.status().frames.published
+        wait_until(
+            lambda: camera.camera_service.status().frames.published > published + 5
+        )  # readers find a live camera
 
         readers.on = True
         wait_until(lambda: camera.status()["state"] == "live")
@@ -208,7 +210,7 @@ def test_the_camera_lives_on_while_its_webcam_is_released(tmp_path: Path):
         given = sum(made.index + 1 for made in cameras.made)
 
         def shown_or_dropped() -> int:
-            frames = camera.daemon.status().frames
+            frames = camera.camera_service.status().frames
             return frames.published - frames.repeated + frames.dropped
 
         wait_until(lambda: shown_or_dropped() == given)  # each once: the new source's count goes on

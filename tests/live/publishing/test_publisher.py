@@ -1,256 +1,277 @@
+"""The publisher: a picture at every tick, in virtual time; its thread, and the placeholder picture."""
+
+from __future__ import annotations
+
 import threading
-import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from relit_camera.base.errors import DeviceError, ImageError
+from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.devices.sinks.sink import NullSink
-from relit_camera.live.publishing import publisher as module
 from relit_camera.live.publishing.placeholder_image import BACKGROUND_COLOR, placeholder
-from relit_camera.live.publishing.publisher import PublishedPicture, Publisher
+from relit_camera.live.publishing.publisher import RETRY_S, PublishedPicture, Publisher
 from tests.small_camera import wait_until
+from tests.virtual_clock import VirtualClock
+
+pytestmark = pytest.mark.real_time
 
 SIZE = (64, 48)
-PLACEHOLDER = np.full((48, 64, 3), 7, np.uint8)
+
+
+def image(value: int) -> DisplayImage:
+    return np.full((SIZE[1], SIZE[0], 3), value, np.uint8)
+
+
+PLACEHOLDER = image(7)
 
 
 class RecordingSink(NullSink):
     """Remembers value and time of each picture; fails while `error` is set."""
 
-    def __init__(self):
+    def __init__(self, clock: VirtualClock, write_s: float = 0.0) -> None:
         super().__init__(SIZE)
-        self.values, self.times, self.error, self.attempts = [], [], None, 0
+        self._clock, self._write_s = clock, write_s
+        self.start = clock.now()
+        self.values: list[int] = []
+        self.times: list[float] = []
+        self.attempts: list[float] = []
+        self.error: Exception | None = None
 
-    def write(self, image):
-        self.attempts += 1
-        if self.error:
+    def write(self, image: DisplayImage) -> None:
+        self.attempts.append(self._clock.now() - self.start)
+        if self.error is not None:
             raise self.error
+        self._clock.sleep(self._write_s)
         super().write(image)
         self.values.append(int(image[0, 0, 0]))
-        self.times.append(time.monotonic())
+        self.times.append(self._clock.now() - self.start)
 
 
-def picture(value, captured_at=None):
-    at = time.monotonic() if captured_at is None else captured_at
-    return PublishedPicture(np.full((48, 64, 3), value, np.uint8), at, value)
+class Publishing:
+    """A publisher in virtual time. Schedule what happens, then `run`."""
+
+    def __init__(
+        self,
+        fps: float = 100.0,
+        stale_after_s: float | None = None,
+        write_s: float = 0.0,
+        error: Exception | None = None,
+    ) -> None:
+        self.clock = VirtualClock()
+        self.sink = RecordingSink(self.clock, write_s)
+        self.sink.error = error
+        self.sink_errors: list[Exception | None] = []
+        self.publisher = Publisher(
+            self.sink,
+            fps,
+            PLACEHOLDER,
+            stale_after_s=stale_after_s,
+            on_sink_error=self.sink_errors.append,
+            clock=self.clock,
+        )
+
+    def put(self, at: float, value: int, age_s: float = 0.0) -> None:
+        """At `at` seconds a picture of frame `value` is ready, captured `age_s` before."""
+        self.clock.at(
+            at,
+            lambda: self.publisher.pictures.put(PublishedPicture(image(value), self.clock.now() - age_s, value)),
+        )
+
+    def show_placeholder(self, at: float, value: int, last_index: int) -> None:
+        self.clock.at(at, lambda: self.publisher.show_placeholder(image(value), last_index))
+
+    def run(self, seconds: float) -> RecordingSink:
+        """Publish for some seconds."""
+        self.clock.at(seconds, self.publisher.stop)
+        self.publisher.run()
+        return self.sink
+
+    def shown_at(self, seconds: float) -> int:
+        """The value that the sink shows at a time."""
+        return self.sink.values[int(np.searchsorted(self.sink.times, seconds, side="right")) - 1]
 
 
-@pytest.fixture
-def sink():
-    return RecordingSink()
+def test_there_is_always_a_picture() -> None:
+    camera = Publishing(fps=100)
+    camera.put(0.055, 50)
+    sink = camera.run(0.105)
+    assert sink.values == [7] * 6 + [50] * 5  # repeated while nothing newer comes
+    assert camera.publisher.counts.published == 11
+    assert camera.publisher.counts.repeated == 10
 
 
-@pytest.fixture
-def make(sink):
-    made = []
-
-    def start(fps=100.0, **options):
-        publisher = Publisher(options.pop("sink", sink), fps, PLACEHOLDER, **options)
-        made.append(publisher)
-        publisher.start()
-        return publisher
-
-    yield start
-    for publisher in made:
-        assert publisher.stop()
-
-
-def test_there_is_always_a_picture(make, sink):
-    publisher = make()
-    wait_until(lambda: len(sink.values) >= 5)
-    assert set(sink.values) == {7}
-    publisher.pictures.put(picture(50))
-    wait_until(lambda: sink.values.count(50) >= 5)  # repeated while nothing newer comes
-    assert publisher.counts.repeated >= 8
-    assert publisher.counts.published == pytest.approx(len(sink.values), abs=1)
-
-
-def test_the_newest_picture_wins_and_the_others_are_counted(make, sink):
-    publisher = make(fps=20)
-    wait_until(lambda: sink.values)
+def test_the_newest_picture_wins_and_the_others_are_counted() -> None:
+    camera = Publishing(fps=20)
     for value in range(100, 110):
-        publisher.pictures.put(picture(value))
-    wait_until(lambda: 109 in sink.values)
-    assert publisher.counts.dropped >= 8
+        camera.put(0.01, value)
+    sink = camera.run(0.2)
+    assert sink.values[:2] == [7, 109]
+    assert camera.publisher.counts.dropped == 9
 
 
-def test_a_late_picture_is_waited_for_but_a_missing_one_is_not(make, sink):
-    period = 0.5
-    publisher = make(fps=1 / period)
-    publisher.pictures.put(picture(1))
-    wait_until(lambda: 1 in sink.values)
-    due = sink.times[-1] + period
-    time.sleep(max(0.0, due + period / 5 - time.monotonic()))
-    publisher.pictures.put(picture(2))
-    wait_until(lambda: 2 in sink.values)
-    assert sink.times[sink.values.index(2)] - due < period / 2  # not a whole period later
-    wait_until(lambda: sink.values.count(2) == 5)
-    steps = np.diff(sink.times[-3:])
-    np.testing.assert_allclose(steps, period, atol=period / 4)
+def test_a_late_picture_is_waited_for_but_a_missing_one_is_not() -> None:
+    camera = Publishing(fps=2)
+    camera.put(0.4, 1)
+    camera.put(1.1, 2)  # due at the tick of 1.0
+    sink = camera.run(4.2)
+    assert sink.values[:3] == [7, 1, 2]
+    assert sink.times[2] == pytest.approx(1.1, abs=0.01)  # not a whole period later
+    assert sink.times[3] == pytest.approx(1.5 + 0.2, abs=0.01)  # the next may be late too
+    np.testing.assert_allclose(np.diff(sink.times[4:]), 0.5, atol=0.01)  # then none is expected any more
 
 
-def test_a_picture_that_waited_long_gives_way_to_its_successor(make, sink):
-    period = 0.5
-    publisher = make(fps=1 / period)
-    publisher.pictures.put(picture(1))
-    wait_until(lambda: 1 in sink.values)
-    due = sink.times[-1] + period
-    time.sleep(period / 7)
-    publisher.pictures.put(picture(2))
-    time.sleep(max(0.0, due + period / 7 - time.monotonic()))
-    publisher.pictures.put(picture(3))
-    wait_until(lambda: 3 in sink.values)
-    assert 2 not in sink.values
-    assert sink.times[sink.values.index(3)] - due < period / 2
-    assert publisher.counts.dropped == 1
+def test_a_picture_that_waited_long_gives_way_to_its_successor() -> None:
+    camera = Publishing(fps=2)
+    camera.put(0.4, 1)
+    camera.put(0.55, 2)
+    camera.put(1.05, 3)
+    sink = camera.run(1.4)
+    assert sink.values == [7, 1, 3]
+    assert sink.times[2] == pytest.approx(1.05, abs=0.01)
+    assert camera.publisher.counts.dropped == 1
 
 
-def test_the_rate_is_kept_without_drift(make, sink):
-    start = time.monotonic()
-    publisher = make(fps=25)
-    feeding = threading.Event()
-
-    def feed():  # at another rate than the publisher's
-        while not feeding.wait(0.053):
-            publisher.pictures.put(picture(1))
-
-    feeder = threading.Thread(target=feed)
-    feeder.start()
-    time.sleep(2.5)
-    count, took = len(sink.times), time.monotonic() - start
-    feeding.set()
-    feeder.join()
-    assert count == pytest.approx(25 * took, rel=0.1)
-    assert publisher.fps == pytest.approx(25, rel=0.1)
+@pytest.mark.parametrize("pictures_fps", [19.0, 25.0, 60.0])
+def test_the_rate_is_kept_without_drift(pictures_fps: float) -> None:
+    camera = Publishing(fps=25, write_s=0.003)
+    for number in range(int(60 * pictures_fps)):
+        camera.put(number / pictures_fps, number % 256)
+    sink = camera.run(60.0)
+    assert len(sink.times) == pytest.approx(25 * 60, rel=0.005)
+    assert camera.publisher.fps == pytest.approx(25, rel=0.05)
 
 
-def test_latency_is_from_capture_to_the_end_of_writing(make, sink):
-    publisher = make(fps=100)
-    for value in range(20):
-        publisher.pictures.put(picture(value, captured_at=time.monotonic() - 0.2))
-        time.sleep(0.02)
-    latency = publisher.latency_ms
-    assert 200 <= latency.p50 < 260
-    assert latency.p95 >= latency.p50
+def test_latency_is_from_capture_to_the_end_of_writing() -> None:
+    camera = Publishing(fps=100, write_s=0.002)
+    for number in range(200):
+        camera.put(number / 100, number, age_s=0.2)
+    camera.run(2.0)
+    assert camera.publisher.latency_ms.p50 == pytest.approx(203, abs=1)  # a tenth of a period before the tick
+    assert camera.publisher.latency_ms.p95 >= camera.publisher.latency_ms.p50
 
 
-def test_a_repeated_picture_has_no_latency(make, sink):
-    publisher = make()
-    publisher.pictures.put(picture(1))
-    wait_until(lambda: sink.values.count(1) > 200)
-    assert publisher.latency_ms.p95 < 1000  # not the age of the repeated picture
+def test_a_repeated_picture_has_no_latency() -> None:
+    camera = Publishing(fps=100)
+    camera.put(0.0, 1)
+    sink = camera.run(10.0)
+    assert sink.values.count(1) > 900
+    assert camera.publisher.latency_ms.p95 < 11  # not the age of the repeated picture
 
 
-def test_a_failing_sink_is_told_once_and_tried_again(make, sink, monkeypatch):
-    monkeypatch.setattr(module, "RETRY_S", 0.1)
-    told = []
-    sink.error = DeviceError("the virtual camera is gone")
-    publisher = make(on_sink_error=told.append)
-    wait_until(lambda: sink.attempts >= 3)
-    assert told == [sink.error]
-    assert publisher.counts.published == 0
-    sink.error = None
-    wait_until(lambda: len(sink.values) >= 3)
-    assert told[1:] == [None]
+def test_a_failing_sink_is_reported_once_and_tried_again() -> None:
+    gone = DeviceError("the virtual camera is gone")
+    camera = Publishing(fps=20, error=gone)
+    camera.clock.at(2.5, lambda: setattr(camera.sink, "error", None))
+    sink = camera.run(4.0)
+    pauses = np.diff(sink.attempts[:4])
+    assert (pauses >= RETRY_S).all()  # not at each tick
+    assert (pauses < RETRY_S + 0.06).all()  # but at the next one after the pause
+    assert sink.times[0] == sink.attempts[3]
+    assert camera.sink_errors == [gone, None]
+    assert camera.publisher.counts.published == len(sink.values) > 10
 
 
-def test_a_fault_of_the_sink_does_not_end_the_thread(make, sink, monkeypatch):
-    monkeypatch.setattr(module, "RETRY_S", 0.05)
-    sink.error = ZeroDivisionError("a fault")
-    make()
-    wait_until(lambda: sink.attempts >= 2)
-    sink.error = None
-    wait_until(lambda: sink.values)
+def test_a_fault_in_the_sink_does_not_end_publishing() -> None:
+    camera = Publishing(error=ZeroDivisionError("a fault"))
+    camera.clock.at(0.5, lambda: setattr(camera.sink, "error", None))
+    assert camera.run(2.0).values
 
 
-def test_failed_writes_are_not_hammered(make, sink, monkeypatch):
-    monkeypatch.setattr(module, "RETRY_S", 60.0)
-    sink.error = DeviceError("gone")
-    make(fps=200)
-    wait_until(lambda: sink.attempts)
-    time.sleep(0.5)
-    assert sink.attempts == 1
+def test_the_placeholder_comes_back_when_pictures_are_stale() -> None:
+    camera = Publishing(stale_after_s=3.0)
+    camera.put(1.0, 90)
+    camera.show_placeholder(5.0, 8, last_index=-1)
+    camera.put(6.0, 91)
+    camera.run(7.0)
+    assert [camera.shown_at(at) for at in (0.9, 1.02, 3.99, 4.02, 5.02, 6.02)] == [7, 90, 90, 7, 8, 91]
 
 
-def test_the_placeholder_comes_back_when_pictures_are_stale(make, sink):
-    publisher = make(stale_after_s=0.2)
-    publisher.pictures.put(picture(90))
-    wait_until(lambda: 90 in sink.values)
-    wait_until(lambda: sink.values[-1] == 7)
-    publisher.placeholder = np.full((48, 64, 3), 8, np.uint8)
-    wait_until(lambda: sink.values[-1] == 8)
-    publisher.pictures.put(picture(91))
-    wait_until(lambda: 91 in sink.values)
-
-
-def test_a_late_picture_does_not_take_the_placeholders_place(make, sink):
-    publisher = make(stale_after_s=0.2)
-    publisher.show_placeholder(np.full((48, 64, 3), 8, np.uint8), 0)
-    publisher.pictures.put(picture(1))
-    wait_until(lambda: 1 in sink.values)
-    publisher.show_placeholder(np.full((48, 64, 3), 9, np.uint8), 3)
-    publisher.pictures.put(picture(2))
-    wait_until(lambda: 2 in sink.values)  # late, but the placeholder is not shown yet
-    wait_until(lambda: sink.values[-1] == 9)
-    publisher.hold = True
-    publisher.pictures.put(picture(3))
-    wait_until(lambda: publisher.counts.dropped == 1)
-    publisher.pictures.put(picture(4))
-    wait_until(lambda: 4 in sink.values)
+def test_a_late_picture_does_not_replace_the_placeholder() -> None:
+    camera = Publishing(stale_after_s=3.0)
+    camera.show_placeholder(0.5, 8, last_index=0)
+    camera.put(1.0, 1)
+    camera.show_placeholder(1.5, 9, last_index=3)
+    camera.put(2.0, 2)  # late, but the placeholder is not shown yet
+    camera.put(6.0, 3)
+    camera.clock.at(6.5, lambda: setattr(camera.publisher, "hold", True))
+    camera.put(7.0, 4)
+    sink = camera.run(8.0)
+    assert [camera.shown_at(at) for at in (0.4, 0.6, 1.1, 2.1, 5.1, 6.2, 7.1)] == [7, 8, 1, 2, 9, 9, 4]
     assert 3 not in sink.values
+    assert camera.publisher.counts.dropped == 1
 
 
-def test_previews_get_each_shown_picture_once(make, sink):
-    publisher = make()
-    number, image, _ = publisher.shown.newer(0, 5)
-    assert image is PLACEHOLDER
-    assert publisher.shown.newer(number, 0.1) is None  # repeated pictures are not news
-    publisher.pictures.put(picture(33))
-    number, image, _ = publisher.shown.newer(number, 5)
-    assert image[0, 0, 0] == 33
-    publisher.stop()
-    start = time.monotonic()
-    assert publisher.shown.newer(number, 10) is None
-    assert time.monotonic() - start < 1
+def test_a_held_picture_stays_and_a_replaced_one_does_not_come_back() -> None:
+    camera = Publishing(stale_after_s=3.0)
+    camera.put(0.5, 1)
+    for at, hold in ((1.0, True), (20.0, False), (30.0, True)):
+        camera.clock.at(at, lambda hold=hold: setattr(camera.publisher, "hold", hold))  # type: ignore[misc]
+    camera.run(40.0)
+    assert [camera.shown_at(at) for at in (0.6, 19.9, 22.9, 23.1, 29.0, 39.0)] == [1, 1, 1, 7, 7, 7]
 
 
-def test_stopping_is_quick(sink):
-    publisher = Publisher(sink, 0.5, PLACEHOLDER)  # it would sleep two seconds
+def test_previews_get_each_shown_picture_once() -> None:
+    camera = Publishing()
+    numbers: list[int] = []
+
+    def look() -> None:
+        found = camera.publisher.shown.newer(numbers[-1] if numbers else 0, 0)
+        if found is not None:
+            numbers.append(found[0])
+
+    camera.clock.every(0.001, look)
+    camera.put(0.5, 33)
+    camera.run(1.0)
+    assert numbers == [1, 2]  # repeated pictures are not news
+
+
+def test_a_slow_sink_delays_ticks_but_is_not_made_up_for() -> None:
+    camera = Publishing(fps=50)
+    camera.clock.at(1.0, lambda: camera.clock.sleep(10.0))  # the machine sleeps
+    sink = camera.run(12.0)
+    gaps = np.diff(sink.times)
+    assert gaps.max() == pytest.approx(10.0, abs=0.1)
+    assert np.sort(gaps)[:-1] == pytest.approx(0.02, abs=1e-6)
+
+
+# The thread, in real time.
+
+
+def test_stopping_is_quick_and_may_be_repeated() -> None:
+    clock = VirtualClock()
+    sink = RecordingSink(clock)
+    publisher = Publisher(sink, 0.1, PLACEHOLDER)  # its next tick is ten seconds away
     publisher.start()
-    wait_until(lambda: sink.values)
-    start = time.monotonic()
-    assert publisher.stop()
-    assert time.monotonic() - start < 0.9
+    wait_until(lambda: bool(sink.values))
+    assert publisher.stop()  # within STOP_TIMEOUT_S
+    assert publisher.shown.newer(publisher.shown.count, 60) is None  # who waits for a preview is let go at once
     assert publisher.stop()
     assert Publisher(sink, 30, PLACEHOLDER).stop()  # never started
 
 
-def test_a_stuck_sink_does_not_hold_up_stopping():
+def test_a_sink_that_hangs_does_not_hold_up_stopping() -> None:
     free = threading.Event()
 
-    class StuckSink(NullSink):
-        def write(self, image):
+    class HangingSink(NullSink):
+        def write(self, image: DisplayImage) -> None:
             free.wait(20)
 
-    publisher = Publisher(StuckSink(SIZE), 30, PLACEHOLDER)
+    publisher = Publisher(HangingSink(SIZE), 30, PLACEHOLDER)
     publisher.start()
-    start = time.monotonic()
     assert not publisher.stop()
-    assert time.monotonic() - start < 2
+    assert not publisher.ended()
     free.set()
-    wait_until(publisher.stop)
+    assert publisher.ended(20)
 
 
-def test_the_publisher_never_waits_for_a_slow_pipeline(make, sink):
-    make(fps=50)
-    wait_until(lambda: len(sink.times) >= 25)
-    gaps = np.diff(sink.times)
-    assert np.median(gaps) == pytest.approx(0.02, abs=0.005)
+# The placeholder picture.
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (320, 240), (480, 640), (64, 64)])
-def test_our_placeholder_is_dark_and_of_the_size_asked_for(size):
+def test_our_placeholder_is_dark_and_of_the_size_asked_for(size: tuple[int, int]) -> None:
     image = placeholder(size, "HD Webcam is unplugged")
     assert image.shape == (size[1], size[0], 3)
     assert image.dtype == np.uint8
@@ -258,7 +279,7 @@ def test_our_placeholder_is_dark_and_of_the_size_asked_for(size):
     assert image.max() > 180  # the lit ball and the title
 
 
-def test_the_reason_is_written_below_and_fits():
+def test_the_reason_is_written_below_and_fits() -> None:
     size = (640, 360)
     plain, told = placeholder(size), placeholder(size, "no webcam")
     rows, columns = np.nonzero((plain != told).any(axis=2))
@@ -270,7 +291,7 @@ def test_the_reason_is_written_below_and_fits():
     assert columns.max() < size[0] - 5
 
 
-def test_a_picture_of_the_users_own_is_fitted_whole(tmp_path):
+def test_a_picture_of_the_users_own_is_fitted_whole(tmp_path: Path) -> None:
     from relit_camera.base.images.color import uint8_from_linear
     from relit_camera.base.images.image_files import write_display
 

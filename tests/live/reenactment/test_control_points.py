@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.face.face_state import HeadPose
+from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.live.reenactment.control_points import (
     MAX_LANDMARKS,

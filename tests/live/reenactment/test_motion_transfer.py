@@ -61,14 +61,14 @@ def test_an_expression_moves_landmarks_by_its_centimetres(face, points):
 
 def test_a_step_aside_moves_the_body_and_not_the_head_on_it(face, points):
     target = transfer_motion(face, points, motion(shift=(4, 2, 0)))
-    depth = -(face.pose.rotation.apply(NECK_PIVOT) + face.pose.translation)[2]
+    depth = face.pose.depth_of(NECK_PIVOT)
     np.testing.assert_allclose(target.shift, np.array([4, -2]) * face.pose.focal_px / depth, rtol=1e-6)
     np.testing.assert_allclose(target.landmarks, face.landmarks, atol=1e-3)
     assert target.scale == pytest.approx(1)
 
 
 def test_coming_closer_makes_the_person_larger_and_is_limited(face):
-    depth = -(face.pose.rotation.apply(NECK_PIVOT) + face.pose.translation)[2]
+    depth = face.pose.depth_of(NECK_PIVOT)
     assert split_body_motion(face, motion(shift=(0, 0, 4))).scale == pytest.approx(depth / (depth - 4))
     assert split_body_motion(face, motion(shift=(0, 0, 30))).scale == SCALE_RANGE[1]
     assert split_body_motion(face, motion(shift=(0, 0, -60))).scale == SCALE_RANGE[0]

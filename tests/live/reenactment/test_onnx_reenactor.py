@@ -1,6 +1,8 @@
-"""A user's own network: what it must be is checked, and what it says is done."""
+"""Reenactor `onnx`: the user's network is checked, and its flow or picture is used."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,7 +19,7 @@ from relit_camera.face.landmarks.rotated_crop import Crop
 from relit_camera.live.reenactment.motion_transfer import NECK_PIVOT, rotate_about
 from relit_camera.live.reenactment.onnx_network.head_crop import crop_square, head_crop, tracked_head_crop
 from relit_camera.live.reenactment.onnx_network.onnx_contract import ReenactorNetwork, identity_grid
-from relit_camera.live.reenactment.onnx_network.onnx_reenactor import OnnxReenactor
+from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, open_reenactor
 from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.warp import Warp, source_from_output
 from tests.live.people import (
@@ -26,12 +28,12 @@ from tests.live.people import (
     NOBODY,
     SCHEME,
     close_up,
+    context_of,
     face_of,
     live_frame,
     motion,
     moved_by,
     person,
-    stage_of,
 )
 
 SIDE = 64
@@ -99,6 +101,11 @@ def path(tmp_path):
     return tmp_path / "tiny.onnx"
 
 
+def opened(context: ReenactorContext, network: Path) -> Reenactor:
+    """The reenactor of a network, as settings name it."""
+    return open_reenactor(f"onnx:{network}", context)
+
+
 def texture(subject):
     """A smooth coloured picture of the subject's size, linear."""
     height, width = subject.matte.shape
@@ -116,7 +123,7 @@ def unmoved(subject, relit):
 def test_a_flow_that_moves_nothing_gives_the_still(path):
     subject = person()
     relit = texture(subject)
-    reenactor = OnnxReenactor(stage_of(subject, SIZE), flow_network(path))
+    reenactor = opened(context_of(subject, SIZE), flow_network(path))
     moved = moved_by(reenactor, relit, motion(), live_frame())
     picture, alpha = unmoved(subject, relit)
     assert moved.at == (0, 0)
@@ -128,12 +135,12 @@ def test_a_flow_that_moves_nothing_gives_the_still(path):
 def test_a_shift_of_the_flow_is_that_share_of_the_crop(path, shift):
     """A flow of +s looks s half crop sides further right or down, so what is seen moves left or up by as much."""
     subject = person()
-    stage = stage_of(subject, SIZE)
-    reenactor = OnnxReenactor(stage, flow_network(path, shift, inputs=INPUTS))
+    context = context_of(subject, SIZE)
+    reenactor = opened(context, flow_network(path, shift, inputs=INPUTS))
     relit = texture(subject)
     moved_by(reenactor, relit, motion(), live_frame(np.zeros_like(RED)))  # neutral: the driving face is black
     view = moved_by(reenactor, relit, motion(), live_frame(RED, 1))
-    crop = head_crop(stage.face.pose, stage.face.size)
+    crop = head_crop(context.face.pose, context.face.size)
     pixels = np.array(shift) * crop.width / 2 * (1 - 1 / SIDE) * SIZE[0] / subject.size[0]
     picture, _ = unmoved(subject, relit)
     expected = cv2.warpAffine(picture, np.float64([[1, 0, -pixels[0]], [0, 1, -pixels[1]]]), SIZE)
@@ -143,10 +150,10 @@ def test_a_shift_of_the_flow_is_that_share_of_the_crop(path, shift):
 
 
 def test_a_flow_is_eased_by_presence(path):
-    stage = stage_of(person(), SIZE)
-    relit = texture(stage.subject)
-    reenactor = OnnxReenactor(stage, flow_network(path, (0.2, 0.0), inputs=INPUTS))
-    half = OnnxReenactor(stage, flow_network(path, (0.1, 0.0), inputs=INPUTS))
+    context = context_of(person(), SIZE)
+    relit = texture(context.subject)
+    reenactor = opened(context, flow_network(path, (0.2, 0.0), inputs=INPUTS))
+    half = opened(context, flow_network(path, (0.1, 0.0), inputs=INPUTS))
     for one in (reenactor, half):
         moved_by(one, relit, motion(), live_frame(np.zeros_like(RED)))
     eased = moved_by(reenactor, relit, motion(presence=0.5), live_frame(RED, 1)).picture
@@ -154,31 +161,31 @@ def test_a_flow_is_eased_by_presence(path):
 
 
 def test_a_lost_face_is_driven_by_what_was_seen_last_and_then_rests(path):
-    stage = stage_of(person(), SIZE)
-    relit = texture(stage.subject)
-    reenactor = OnnxReenactor(stage, flow_network(path, (0.2, 0.0), inputs=INPUTS))
+    context = context_of(person(), SIZE)
+    relit = texture(context.subject)
+    reenactor = opened(context, flow_network(path, (0.2, 0.0), inputs=INPUTS))
     moved_by(reenactor, relit, motion(), live_frame(np.zeros_like(RED)))
     seen = moved_by(reenactor, relit, motion(), live_frame(RED, 1)).picture
     noise = live_frame(index=2)
     lost = moved_by(reenactor, relit, motion(status=FaceStatus.LOST), noise).picture
     np.testing.assert_array_equal(lost, seen)
     gone = moved_by(reenactor, relit, motion(status=FaceStatus.LOST, presence=0.0), noise).picture
-    np.testing.assert_allclose(gone, unmoved(stage.subject, relit)[0], atol=1e-4)
+    np.testing.assert_allclose(gone, unmoved(context.subject, relit)[0], atol=1e-4)
 
 
 def test_before_the_first_face_the_still_stands_unmoved(path):
-    stage = stage_of(person(), SIZE)
-    relit = texture(stage.subject)
-    picture = moved_by(OnnxReenactor(stage, mix_network(path, 1.0)), relit, NOBODY, live_frame()).picture
-    np.testing.assert_allclose(picture, unmoved(stage.subject, relit)[0], atol=1e-4)
+    context = context_of(person(), SIZE)
+    relit = texture(context.subject)
+    picture = moved_by(opened(context, mix_network(path, 1.0)), relit, NOBODY, live_frame()).picture
+    np.testing.assert_allclose(picture, unmoved(context.subject, relit)[0], atol=1e-4)
 
 
 def test_a_picture_is_laid_over_the_still_in_its_place(path):
     """Half source, half red: sRGB code values are mixed, inside the crop, within the still's matte."""
-    stage = stage_of(person(), SIZE)
-    relit = texture(stage.subject)
-    moved = moved_by(OnnxReenactor(stage, mix_network(path)), relit, motion(), live_frame(RED))
-    picture, alpha = unmoved(stage.subject, relit)
+    context = context_of(person(), SIZE)
+    relit = texture(context.subject)
+    moved = moved_by(opened(context, mix_network(path)), relit, motion(), live_frame(RED))
+    picture, alpha = unmoved(context.subject, relit)
     middle = np.s_[110:150, 80:112]
     expected = srgb_decode((srgb_encode(picture[middle]) + [1, 0, 0]) / 2)
     assert alpha[middle].min() == 1
@@ -189,9 +196,9 @@ def test_a_picture_is_laid_over_the_still_in_its_place(path):
 
 
 def test_an_alpha_of_its_own_cuts_the_picture_out(path):
-    stage = stage_of(person(), SIZE)
+    context = context_of(person(), SIZE)
     moved = moved_by(
-        OnnxReenactor(stage, mix_network(path, 1.0, alpha=0.25)), texture(stage.subject), motion(), live_frame(RED)
+        opened(context, mix_network(path, 1.0, alpha=0.25)), texture(context.subject), motion(), live_frame(RED)
     )
     middle = np.s_[110:150, 80:112]
     np.testing.assert_allclose(moved.alpha[middle], 0.25, atol=1e-3)
@@ -199,9 +206,9 @@ def test_an_alpha_of_its_own_cuts_the_picture_out(path):
 
 
 def test_the_body_follows_the_neck_and_never_hovers(path):
-    stage = stage_of(person(), SIZE)
-    reenactor = OnnxReenactor(stage, flow_network(path))
-    relit = np.ones((*stage.subject.matte.shape, 3), np.float32)
+    context = context_of(person(), SIZE)
+    reenactor = opened(context, flow_network(path))
+    relit = np.ones((*context.subject.matte.shape, 3), np.float32)
     rest = moved_by(reenactor, relit, motion(), live_frame()).alpha
     right = moved_by(reenactor, relit, motion(shift=(4, 0, 0)), live_frame())
     up = moved_by(reenactor, relit, motion(shift=(0, 6, 0)), live_frame())
@@ -215,12 +222,12 @@ def test_the_body_follows_the_neck_and_never_hovers(path):
 
 
 def test_a_face_cut_off_by_its_border_stays_there(path):
-    stage = stage_of(close_up(), SIZE)
-    relit = texture(stage.subject)
-    reenactor = OnnxReenactor(stage, flow_network(path, (0.1, 0.0), 64, INPUTS))
+    context = context_of(close_up(), SIZE)
+    relit = texture(context.subject)
+    reenactor = opened(context, flow_network(path, (0.1, 0.0), 64, INPUTS))
     moved_by(reenactor, relit, motion(), live_frame(np.zeros_like(RED)))
     moved = moved_by(reenactor, relit, motion(shift=(5, 0, 0)), live_frame(RED, 1))
-    rest, alpha = unmoved(stage.subject, relit)
+    rest, alpha = unmoved(context.subject, relit)
     assert moved.at == (0, 0)
     assert moved.picture.shape == rest.shape
     # Unheld, the left edge, which fades out, would show what lies nine pixels further in, where nothing fades.
@@ -285,7 +292,7 @@ def test_a_large_head_is_shrunk_without_aliasing():
 )
 def test_a_network_that_breaks_the_contract_is_refused_in_one_line(path, build, message):
     with pytest.raises(ModelError, match=message) as error:
-        OnnxReenactor(stage_of(person(), SIZE), build(path))
+        opened(context_of(person(), SIZE), build(path))
     assert str(error.value).startswith("reenactor tiny.onnx: ")
     assert "docs/reenactors.md" in error.value.cure
     assert "\n" not in str(error.value)

@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.errors import LightsError
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import LinearImage, Mask
+from relit_camera.base.images.resize import shrink
 from relit_camera.capture.alignment.outlier_pictures import find_outlier_pictures, masked_correlation, predict_pictures
 from relit_camera.capture.alignment.rigid_transform import (
     RigidTransform,
@@ -124,7 +124,7 @@ def align_samples(
 def downscale_for_alignment(pictures: Floats, matte: Mask) -> tuple[Floats, Mask, float]:
     """Pictures (lights, height, width, 3) and matte as small as they are compared, and by what factor, 1 at most."""
     scale = min(1.0, _LARGEST_SIDE / max(matte.shape))
-    return np.stack([_resized(picture, scale) for picture in pictures]), _resized(matte, scale), scale
+    return np.stack([shrink(picture, scale) for picture in pictures]), shrink(matte, scale), scale
 
 
 def align_to_prediction(picture: LinearImage, predicted: LinearImage, matte: Mask) -> tuple[RigidTransform, float]:
@@ -141,8 +141,8 @@ def align_to_prediction(picture: LinearImage, predicted: LinearImage, matte: Mas
         weak strobe.
     """
     scale = min(1.0, _LARGEST_SIDE / max(matte.shape))
-    here, there = luminance(_resized(picture, scale)), luminance(_resized(predicted, scale))
-    inside = _resized(matte, scale)
+    here, there = luminance(shrink(picture, scale)), luminance(shrink(predicted, scale))
+    inside = shrink(matte, scale)
     here *= np.float32((there * inside).sum() / max(float((here * inside).sum()), 1e-9))
     shade = _SHADE * float(there.mean()) + 1e-9
     template = Template(visible_detail(there, shade), without_border(inside), same_light=False)
@@ -184,14 +184,6 @@ def _gain(light: Floats, predicted: Floats, matte: Mask, saturated: float) -> fl
     seen, expected = light[matte > 0.5], predicted[matte > 0.5]
     lit = (expected > _LIT * np.percentile(expected, 98)) & (seen > _LEAST_SEEN * expected) & (seen < saturated)
     return float(np.exp(np.median(np.log(expected[lit] / seen[lit])))) if lit.sum() >= _LEAST_LIT else 1.0
-
-
-def _resized(picture: Floats, scale: float) -> Floats:
-    """A picture (height, width[, channels]) so many times as large; the same one for 1."""
-    if scale == 1:
-        return picture
-    size = (round(picture.shape[1] * scale), round(picture.shape[0] * scale))
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 _LEAST_SIDE = 32

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.images.affine import opencv_affine
+
 Floats = NDArray[np.float64]
 Size = tuple[int, int]
 """Width and height of the picture in pixels."""
@@ -94,13 +96,8 @@ def warp_to_reference(picture: NDArray[np.float32], transform: RigidTransform) -
 
 
 def warp_affine(picture: NDArray[np.float32], matrix: Floats, size: Size) -> NDArray[np.float32]:
-    """A picture of that size under a (2, 3) matrix that takes points of `picture` to it; bicubic.
-
-    OpenCV counts from pixel centres, points here from pixel corners.
-    """
-    shifted = matrix.copy()
-    shifted[:, 2] += matrix[:, :2] @ (0.5, 0.5) - 0.5
-    moved = cv2.warpAffine(picture, shifted, size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    """`picture` resampled to `size` by a (2, 3) matrix from its points to the result's; bicubic, border repeated."""
+    moved = cv2.warpAffine(picture, opencv_affine(matrix), size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(moved, np.float32)
 
 

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.images.resize import shrink
 from relit_camera.capture.alignment.rigid_transform import (
     RigidTransform,
     transforms_from_array,
@@ -167,9 +168,8 @@ def align_across_lights(
     """
     count, height, width = pictures.shape
     scale = min(1.0, _LARGEST_SIDE / max(height, width))
-    size = (round(width * scale), round(height * scale))
-    small = np.stack([cv2.resize(picture, size, interpolation=cv2.INTER_AREA) for picture in pictures])
-    inside = without_border(cv2.resize(weights, size, interpolation=cv2.INTER_AREA))
+    small = np.stack([shrink(picture, scale) for picture in pictures])
+    inside = without_border(shrink(weights, scale))
     transforms = [each.scaled(scale) for each in start] if start else [RigidTransform()] * count
     groups = np.arange(count) if groups is None else groups
     for done in range(rounds):

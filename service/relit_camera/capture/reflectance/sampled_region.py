@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.capture.reflectance.delaunay_barycentric import SphericalBarycentric, spherical_delaunay
+from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
+from relit_camera.capture.reflectance.delaunay_triangulation import spherical_delaunay
 from relit_camera.capture.reflectance.samples import Samples
 
 DISTANCE_DEG = 25.0

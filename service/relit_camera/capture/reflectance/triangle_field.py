@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.capture.geometry.shape_estimation import Geometry
-from relit_camera.capture.reflectance.delaunay_barycentric import TriangleLookup, find_triangles
+from relit_camera.capture.reflectance.delaunay_triangulation import TriangleLookup, find_triangles
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.subject.reflectance_field import texel_vectors
 

@@ -38,7 +38,7 @@ def bench(
     from relit_camera.lab.bench.relighting_benchmark import benchmark_gpu_transfer, benchmark_relighting
     from relit_camera.lab.bench.synthetic_subject import synthetic_subject
     from relit_camera.light.environment_panorama import read_panorama
-    from relit_camera.light.light_map_rotation import resample_to_light_map
+    from relit_camera.light.light_map import resample_to_light_map
     from relit_camera.live.scene.scene_controller import SceneController
     from relit_camera.subject.subject_store import SubjectStore
 

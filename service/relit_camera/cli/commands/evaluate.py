@@ -152,11 +152,14 @@ def _advance(progress: Progress, task: TaskID, done: int, total: int) -> None:
 
 @contextmanager
 def _report_file(out: Path | None) -> Iterator[Path | None]:
-    """Where to write the report: opened before the work, so that what cannot be written is said at once."""
+    """Open the report's file before the work, so that a report that cannot be made or written fails at once."""
     from relit_camera.base.storage import atomic_path
+    from relit_camera.lab.evaluate.report.html_page import require_report_packages
 
-    if out and out.suffix.lower() not in (".html", ".htm"):
-        raise typer.BadParameter(f"{out} is no .html file", param_hint="--out")
+    if out:
+        if out.suffix.lower() not in (".html", ".htm"):
+            raise typer.BadParameter(f"{out} is no .html file", param_hint="--out")
+        require_report_packages()
     with atomic_path(out) if out else nullcontext() as temporary:
         yield temporary
 

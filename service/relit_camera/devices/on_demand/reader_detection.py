@@ -12,26 +12,14 @@ from __future__ import annotations
 import errno
 import logging
 import os
-import struct
 import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from relit_camera.base.errors import UnsupportedByDriverError
 from relit_camera.devices.device_users import PROC, find_device_users
-
-# linux/videodev2.h, and v4l2loopback's own event
-VIDIOC_DQEVENT, VIDIOC_SUBSCRIBE_EVENT = 0x80885659, 0x4020565A
-EVENT_BYTES, PAYLOAD_OFFSET = 136, 8
-CLIENT_USAGE = 0x08000000 + 0x08E00000 + 1
-EVENT_SUB_FL_SEND_INITIAL = 1
-
-UNSUPPORTED_ERRNOS = (errno.EINVAL, errno.ENOTTY)
-
-
-class ClientUsageUnsupported(Exception):  # noqa: N818 - a finding, no fault
-    """The driver does not tell who takes pictures: it is too old, or no v4l2loopback."""
-
+from relit_camera.devices.v4l2 import query_has_readers
 
 ReaderQuery = Callable[[str], bool]
 """(node) → whether anybody takes pictures from it."""
@@ -40,31 +28,17 @@ ReaderQuery = Callable[[str], bool]
 def driver_reports_readers(node: str) -> bool:
     """Ask the driver whether anybody takes pictures from `node`.
 
-    A fresh subscription each time: its first event is the present state, so that no lost event can mislead for good.
-
     Raises:
-        Unanswerable: the driver has no such event.
+        UnsupportedByDriverError: the driver has no such event.
         OSError: the node is gone, or has as many openers as it takes; ask again later.
     """
     if not sys.platform.startswith("linux"):
-        raise ClientUsageUnsupported
-    import fcntl
-
+        raise UnsupportedByDriverError("only Linux has v4l2loopback")
     device = os.open(node, os.O_RDONLY | os.O_NONBLOCK)
     try:
-        fcntl.ioctl(
-            device, VIDIOC_SUBSCRIBE_EVENT, struct.pack("=8I", CLIENT_USAGE, 0, EVENT_SUB_FL_SEND_INITIAL, *[0] * 5)
-        )
-        event = bytearray(EVENT_BYTES)
-        fcntl.ioctl(device, VIDIOC_DQEVENT, event)
-    except OSError as error:
-        if error.errno in UNSUPPORTED_ERRNOS:
-            raise ClientUsageUnsupported from error
-        raise
+        return query_has_readers(device)
     finally:
         os.close(device)
-    (count,) = struct.unpack_from("=I", event, PAYLOAD_OFFSET)
-    return bool(count)
 
 
 def is_open_elsewhere(node: str, proc: Path = PROC) -> bool:
@@ -116,7 +90,7 @@ class ReaderMonitor:
         try:
             if self._driver_answers:
                 return self._ask(node)
-        except ClientUsageUnsupported:
+        except UnsupportedByDriverError:
             self._driver_answers = False
             log.warning(
                 "%s: this v4l2loopback does not tell who reads it (0.13 and newer do); only programs of the same user "

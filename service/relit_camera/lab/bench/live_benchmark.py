@@ -13,8 +13,8 @@ from relit_camera.base.images.image_types import Frame
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.devices.sinks.sink import NullSink
 from relit_camera.devices.sources.source import Source
-from relit_camera.face.face_state import FaceState, FaceStatus, HeadPose, Tracker
-from relit_camera.face.head_pose import guess_focal, project
+from relit_camera.face.face_state import FaceState, FaceStatus, Tracker
+from relit_camera.face.head_pose import HeadPose, guess_focal, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.live.scene.scene_controller import SceneController
 

@@ -18,10 +18,11 @@ from threadpoolctl import threadpool_limits
 
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.relighting.dense_relighter import DenseRelighter
 from relit_camera.subject.relighting.onnx_relighter import OnnxBasisRelighter
-from relit_camera.subject.relighting.relighter import DenseRelighter, weighted_light
+from relit_camera.subject.relighting.relighter import RelighterOptions, weighted_light
 from relit_camera.subject.subject import Subject
 
 
@@ -78,7 +79,7 @@ def _benchmark_relighting(subject: Subject, maps: Mapping[str, LightMap], option
     }
     result["numpy_ms"] = median_ms(lambda: dense.relight(light_map), 20)
     result["basis_ms"] = median_ms(lambda: basis.relight(light_map), 200)
-    onnx = OnnxBasisRelighter(subject, options)
+    onnx = OnnxBasisRelighter(subject, RelighterOptions(options))
     result["onnx_ms"] = median_ms(lambda: onnx.relight(light_map), 200)
     result["onnx_provider"] = onnx.session.provider
     result["dense_mb"] = round(matrix.nbytes / 1e6, 1)

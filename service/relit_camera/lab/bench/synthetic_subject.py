@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 from relit_camera.base.images.image_types import Points
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.capture.subject_builder import build_subject
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import guess_focal, project
+from relit_camera.face.head_pose import HeadPose, guess_focal, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.light.directions import fibonacci_directions
 from relit_camera.subject.subject import Subject

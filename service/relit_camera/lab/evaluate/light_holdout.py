@@ -20,9 +20,13 @@ from relit_camera.capture.reflectance.sampled_region import boundary_lights
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.candidates import method_candidates
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, select_lights
-from relit_camera.lab.evaluate.field.map_pictures import heat_map_picture, labeled_grid
+from relit_camera.lab.evaluate.field.map_pictures import labeled_grid
 from relit_camera.lab.evaluate.field.relighting_metrics import Colors, compare_relit, finite_psnr
-from relit_camera.lab.evaluate.html_report import heading, page, paragraph, picture, table
+from relit_camera.lab.evaluate.report.html_page import Block, Heading, Paragraph, picture, render_page, table
+from relit_camera.lab.evaluate.report.plots import heat_maps
+
+_LARGEST_SHOWN_ERROR = 0.3
+"""End of the color scale of the error maps, as a share of white."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +60,7 @@ class HoldOutResult:
         rejected: index and reason of pictures that no light could make; they are neither used nor asked for.
         left_out: (some,) indices of those left out.
         scores: best first.
-        hardest: index into `left_out` of the picture that was predicted worst, on average over the methods.
+        worst_index: index into `left_out` of the picture that was predicted worst, on average over the methods.
         truth: (height, width, 3) that picture, aligned.
         predicted: method → prediction of that picture.
     """
@@ -67,7 +71,7 @@ class HoldOutResult:
     rejected: Mapping[int, str]
     left_out: NDArray[np.intp]
     scores: Sequence[HoldOutScores]
-    hardest: int
+    worst_index: int
     truth: Colors
     predicted: dict[str, Colors]
 
@@ -138,7 +142,9 @@ def evaluate_hold_out(
         as_it_is = _peak_255_db(as_captured.pictures_at(asked), known.colors[left_out])
         scores.append(_scores(known, candidate.name, predicted[candidate.name], truth, as_it_is))
         progress(done + 1, len(names))
-    hardest = int(np.mean([((each - truth) ** 2).mean(axis=(1, 2)) for each in predicted.values()], axis=0).argmax())
+    worst_index = int(
+        np.mean([((each - truth) ** 2).mean(axis=(1, 2)) for each in predicted.values()], axis=0).argmax()
+    )
     return HoldOutResult(
         name=name,
         every=every,
@@ -146,9 +152,9 @@ def evaluate_hold_out(
         rejected=rejected,
         left_out=left_out,
         scores=sorted(scores, key=lambda each: -each.peak_255_db),
-        hardest=hardest,
-        truth=known.picture(truth[hardest]),
-        predicted={method: known.picture(colors[hardest]) for method, colors in predicted.items()},
+        worst_index=worst_index,
+        truth=known.picture(truth[worst_index]),
+        predicted={method: known.picture(colors[worst_index]) for method, colors in predicted.items()},
     )
 
 
@@ -212,11 +218,11 @@ def holdout_text(results: Sequence[HoldOutResult]) -> str:
 
 def holdout_page(results: Sequence[HoldOutResult]) -> str:
     """The HTML document."""
-    return page("Lights left out", _blocks(results))
+    return render_page("Lights left out", _blocks(results))
 
 
-def _blocks(results: Sequence[HoldOutResult]) -> Iterator[str]:
-    yield paragraph(
+def _blocks(results: Sequence[HoldOutResult]) -> Iterator[Block]:
+    yield Paragraph(
         "Some of the captured lights are left out, and each method predicts their pictures from the others. Only "
         "lights that others surround are left out, so that nothing is asked beyond the sampled region."
     )
@@ -231,7 +237,7 @@ def _blocks(results: Sequence[HoldOutResult]) -> Iterator[str]:
         "same for all methods.",
     )
     for each in results:
-        yield heading(f"{each.name}: every {each.every} left out")
+        yield Heading(f"{each.name}: every {each.every} left out")
         yield table(
             ["method", "PSNR, dB", "as captured", "bright parts as peak", "SSIM"],
             [[s.method, s.peak_255_db, s.raw_peak_255_db, s.psnr_db, f"{s.ssim:.4f}"] for s in each.scores],
@@ -239,22 +245,27 @@ def _blocks(results: Sequence[HoldOutResult]) -> Iterator[str]:
             "of aligned pictures and of pictures as they are; PSNR with the peak at the truth's 99.5th percentile; "
             "SSIM of luma.",
         )
-        yield _hardest(each)
+        yield from _worst_prediction(each)
 
 
-def _hardest(result: HoldOutResult) -> str:
+def _worst_prediction(result: HoldOutResult) -> Iterator[Block]:
     names = [score.method for score in result.scores]
     peak = np.float32(np.percentile(result.truth, 99.5) or 1.0)
     shown = [uint8_from_linear(each / peak) for each in (result.truth, *(result.predicted[name] for name in names))]
-    errors = [np.abs(result.predicted[name] - result.truth).mean(axis=2) / peak for name in names]
-    heats = [np.zeros_like(shown[0]), *(heat_map_picture(each, 0.3) for each in errors)]
-    pairs = [np.concatenate(pair) for pair in zip(shown, heats, strict=True)]
-    return picture(
-        labeled_grid(pairs, ["truth", *names], 4, 240),
-        f"The left-out light that is predicted worst (number {result.left_out[result.hardest]} of the list, from 0), "
-        "by each method; below it the error, pale yellow where it is 30 % of white. It is largest along the edges of "
-        "shadows, which stand elsewhere in the pictures of the lights around.",
-        exact=False,
+    yield picture(
+        labeled_grid(shown, ["truth", *names], 5, 210),
+        f"The left-out light with the largest mean error (number {result.left_out[result.worst_index]} of the list, "
+        "from 0), predicted by each method.",
+        lossless=False,
+    )
+    yield heat_maps(
+        [np.abs(result.predicted[name] - result.truth).mean(axis=2) / peak for name in names],
+        names,
+        _LARGEST_SHOWN_ERROR,
+        "Error of these predictions as a share of white. It is largest along the edges of shadows, which lie elsewhere "
+        "in the pictures of the neighboring lights.",
+        columns=5,
+        color_label="error, share of white",
     )
 
 

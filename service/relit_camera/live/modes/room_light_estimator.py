@@ -27,7 +27,8 @@ from relit_camera.light.directions import (
     texel_directions,
     texel_solid_angles,
 )
-from relit_camera.light.light_map_rotation import LightMap, rotate_light_map
+from relit_camera.light.light_map import LightMap
+from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.subject.relighting.relighter import weighted_light
 from relit_camera.subject.subject import Subject

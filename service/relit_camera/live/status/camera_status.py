@@ -1,4 +1,4 @@
-"""What the running camera says of itself."""
+"""The state of the running camera, as `GET /api/v1/status` gives it."""
 
 from __future__ import annotations
 
@@ -13,21 +13,42 @@ class CameraState(StrEnum):
     LIVE = "live"
     """Relit pictures of a tracked face."""
     SEARCHING = "searching"
-    """The source gives pictures, but no face is tracked: the subject eases to neutral."""
+    """The source gives frames, but no face is tracked: the subject eases to the neutral pose."""
     WAITING = "waiting"
-    """The source gives no pictures: the placeholder is shown."""
-    STANDING_IN = "standing-in"
-    """Pictures fail or hang: the relit still is shown, or what `output.fallback` says, until they come again."""
+    """The source gives no frames: the placeholder is shown."""
+    FALLBACK = "standing-in"
+    """The pipeline fails or hangs: until it works again the relit source image is shown, or where that fails too, what
+    `output.fallback` says."""
     RELEASED = "released"
-    """On demand, and nobody looks: the webcam is released, the placeholder is shown."""
+    """On demand, and nobody reads the camera: the webcam is released, the placeholder is shown."""
     FROZEN = "frozen"
     STOPPING = "stopping"
 
 
+class DegradationCode(StrEnum):
+    """What works less well than asked, for programs: stays the same when the wording changes."""
+
+    SOURCE_FAILED = "source-failed"
+    """The source gives no frames."""
+    PICTURE_FAILED = "picture-failed"
+    """The pipeline fails or hangs: the fallback is shown."""
+    SINK_FAILED = "sink-failed"
+    """The sink takes no pictures; it is tried again."""
+    CONFIGURATION_FAILED = "configuration-failed"
+    """The configuration file was edited and cannot be used, or counts only from the next start."""
+    NO_SUBJECT = "no-subject"
+    """No subject is chosen: the live picture is shown as it is."""
+    FACE_MISMATCH = "face-mismatch"
+    """Mode ratio: the live face is not the subject's, so mode reenact takes over."""
+    PROVIDER_FALLBACK = "provider-fallback"
+    """A model runs on a slower execution provider than asked."""
+
+
 @dataclass(frozen=True)
 class Degradation:
-    """Something that works less well than asked: what, why, and what cures it."""
+    """Something that works less well than asked: a code for programs, and what, why and what cures it for people."""
 
+    code: DegradationCode = field(kw_only=True)
     what: str
     why: str
     cure: str = ""

@@ -1,15 +1,16 @@
-"""Clocks of the live path: how long each stage takes, how many frames pass, and when the next one is due."""
+"""How long each stage of the live pipeline takes, and how many frames a second pass."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
+from relit_camera.base.clock import SYSTEM_CLOCK, Clock
 from relit_camera.live.status.camera_status import Percentiles
 
 WINDOW_LENGTH = 300
@@ -17,14 +18,14 @@ WINDOW_LENGTH = 300
 
 
 class DurationWindow:
-    """The last durations of one kind. Thread-safe."""
+    """The most recent durations of one stage. Thread-safe."""
 
     def __init__(self, length: int = WINDOW_LENGTH) -> None:
         self._seconds: deque[float] = deque(maxlen=length)
         self._lock = threading.Lock()
 
     def add(self, seconds: float) -> None:
-        """Remember one duration, forgetting the oldest."""
+        """Add one duration; the oldest is dropped when the window is full."""
         with self._lock:
             self._seconds.append(seconds)
 
@@ -45,33 +46,34 @@ class StageTimer:
         state = tracker.track(frame)
     """
 
-    def __init__(self, length: int = WINDOW_LENGTH) -> None:
-        self._length = length
+    def __init__(self, length: int = WINDOW_LENGTH, now: Callable[[], float] = time.perf_counter) -> None:
+        """`length` durations are kept a stage; `now` gives the time in seconds."""
+        self._length, self._now = length, now
         self._windows: dict[str, DurationWindow] = {}
-        self._lap: dict[str, float] = {}
+        self._latest: dict[str, float] = {}
         self._running: list[str] = []
         self._lock = threading.Lock()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Time the body of a with-statement; a body that raises is not counted."""
-        start = time.perf_counter()
+        start = self._now()
         self._running.append(name)
         try:
             yield
         finally:
             self._running.remove(name)
-        self.add(name, time.perf_counter() - start)
+        self.add(name, self._now() - start)
 
     def running(self) -> list[str]:
-        """The stages that have begun and not ended, in the order they began."""
+        """The stages that are running now, in the order in which they began."""
         return list(self._running)
 
     def add(self, name: str, seconds: float) -> None:
-        """Count a duration that was measured elsewhere."""
+        """Add a duration that was measured elsewhere."""
         with self._lock:
             window = self._windows.setdefault(name, DurationWindow(self._length))
-            self._lap[name] = seconds * 1e3
+            self._latest[name] = seconds * 1e3
         window.add(seconds)
 
     def percentiles(self) -> dict[str, Percentiles]:
@@ -79,10 +81,10 @@ class StageTimer:
         return {name: window.percentiles() for name, window in self._copy().items()}
 
     def lap_ms(self) -> dict[str, float]:
-        """Give the milliseconds of the stages that ran since this was last asked."""
+        """The last duration, in milliseconds, of each stage that ran since the previous call."""
         with self._lock:
-            lap, self._lap = self._lap, {}
-        return lap
+            latest, self._latest = self._latest, {}
+        return latest
 
     def _copy(self) -> dict[str, DurationWindow]:
         with self._lock:
@@ -90,23 +92,23 @@ class StageTimer:
 
 
 class RateMeter:
-    """Events a second over the last few seconds; falls to 0 when nothing comes. Thread-safe."""
+    """Events a second over the last few seconds; falls to 0 when none come. Thread-safe."""
 
-    def __init__(self, window_s: float = 3.0) -> None:
-        self._window_s = window_s
+    def __init__(self, window_s: float = 3.0, clock: Clock = SYSTEM_CLOCK) -> None:
+        self._window_s, self._clock = window_s, clock
         self._total = 0
         self._ticks: deque[tuple[float, int]] = deque(maxlen=4096)
         self._lock = threading.Lock()
 
     def tick(self, now: float | None = None, events: int = 1) -> None:
-        """Count `events` since the last tick, the newest of them at monotonic time `now`."""
+        """Count `events` since the last tick, the newest of them at `now` seconds on the clock."""
         with self._lock:
             self._total += events
-            self._ticks.append((time.monotonic() if now is None else now, self._total))
+            self._ticks.append((self._clock.now() if now is None else now, self._total))
 
     def rate(self, now: float | None = None) -> float:
-        """Events a second at monotonic time `now`, 0 for fewer than two ticks in the window."""
-        now = time.monotonic() if now is None else now
+        """Events a second at `now` seconds on the clock, 0 for fewer than two ticks in the window."""
+        now = self._clock.now() if now is None else now
         with self._lock:
             while self._ticks and self._ticks[0][0] < now - self._window_s:
                 self._ticks.popleft()
@@ -117,37 +119,3 @@ class RateMeter:
             span = last - first
             overdue = max(0.0, now - last - span / (len(self._ticks) - 1))
             return (total - before) / max(span + overdue, 1e-6)
-
-
-class Pacer:
-    """Deadlines at a frame rate, by arithmetic on one monotonic clock, so that they do not drift.
-
-    A picture that is ready waits for the next deadline, up to a whole period. When pictures come at about the frame
-    rate, the deadlines are moved by at most 1 % of a period a frame, until pictures are ready a tenth of a period ahead
-    of them: latency falls, and the time between frames stays even. Pictures of any other rate come at all phases and
-    move the deadlines to and fro, by nothing on average.
-    """
-
-    MARGIN = 0.1
-    NUDGE = 0.01
-    LATE = 3.0
-
-    def __init__(self, fps: float, now: float) -> None:
-        self.period = 1.0 / fps
-        self.deadline = now
-
-    def advance(self, now: float, waited_s: float | None = None) -> None:
-        """Set the next deadline; after a hiccup of several periods begin anew at `now` instead of catching up.
-
-        Args:
-            now: monotonic time in seconds.
-            waited_s: how long the picture just shown had been ready; None if nothing new was shown.
-        """
-        self.deadline += self.period
-        if waited_s is not None:
-            half = self.period / 2
-            ahead = (waited_s - self.MARGIN * self.period + half) % self.period - half
-            limit = self.NUDGE * self.period
-            self.deadline -= min(max(ahead, -limit), limit)
-        if now - self.deadline > self.LATE * self.period:
-            self.deadline = now + self.period

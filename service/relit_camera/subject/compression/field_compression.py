@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import Mask
 from relit_camera.base.threads import worker_pool
+from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.compression.compression_quality import (
     CompressionQuality,
-    CompressionTarget,
     dense_bytes,
     worst_light_db,
     worst_map_db,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import InputError, SubjectError
 from relit_camera.base.images.decoder_messages import suppress_decoder_messages
-from relit_camera.base.images.image_files import MAX_IMAGE_PIXELS, image_size_from_bytes
+from relit_camera.base.images.image_limits import MAX_IMAGE_PIXELS, image_size_from_bytes
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.subject.compression.local_basis import global_basis
 from relit_camera.subject.subject import Subject

@@ -16,6 +16,7 @@ from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.candidates import Candidate
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
 from relit_camera.lab.evaluate.json_records import Record, read_json_record
+from relit_camera.lab.evaluate.rendered_truth import HeadTruth, read_truth
 
 
 class _Square(Record):
@@ -36,23 +37,6 @@ class _Report(Record):
     motion: _Motion
 
 
-class _ToRest(Record):
-    rotation_deg: float
-    translation_px: tuple[float, float]
-
-
-class _Head(Record):
-    to_rest: _ToRest
-
-
-class _Frame(Record):
-    head: _Head
-
-
-class _Truth(Record):
-    frames: list[_Frame]
-
-
 def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
     """A field's pictures as they would be in the capture's reference frame, cut out as the capture did.
 
@@ -65,7 +49,7 @@ def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
         InputError: a file is missing or in another form, or they are not of one film.
     """
     found = read_json_record(report, _Report, "give a report of `relit capture build`")
-    known = read_json_record(truth, _Truth, "give the truth.json of a rendered capture")
+    known = read_truth(truth, HeadTruth)
     if found.motion.reference >= len(known.frames):
         raise InputError(
             f"{report} tells of frame {found.motion.reference}, which {truth} has not", "give both of one film"

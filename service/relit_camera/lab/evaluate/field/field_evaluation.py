@@ -30,7 +30,7 @@ from relit_camera.lab.evaluate.field.relighting_metrics import (
 from relit_camera.lab.evaluate.field.sample_points import SamplePoint
 from relit_camera.light import spherical_harmonics
 from relit_camera.light.directions import texel_directions
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 
 HARMONIC_DEGREES = (2, 3, 8)
 """Of the spherical harmonics that environments are put through; 2 is what learned relighting uses."""

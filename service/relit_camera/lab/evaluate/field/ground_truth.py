@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import LightsError
 from relit_camera.capture.lights_file import MIN_LIGHTS
-from relit_camera.capture.reflectance.delaunay_barycentric import PlanarBarycentric, SphericalBarycentric
+from relit_camera.capture.reflectance.barycentric_methods import PlanarBarycentric, SphericalBarycentric
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.light.directions import texel_directions, texel_solid_angles
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 
 SAME_DIRECTION_DEG = 0.1
 """A truth light this near to a captured one is the same picture."""

@@ -12,7 +12,7 @@ from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_quality import psnr, ssim
 from relit_camera.base.images.image_types import DisplayImage, Mask
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 
 Colors = NDArray[np.float32]
 

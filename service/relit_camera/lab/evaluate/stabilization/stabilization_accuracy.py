@@ -13,7 +13,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from relit_camera.base.errors import InputError, ModelError
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, interpolate_transforms, transforms_to_array
@@ -23,8 +22,9 @@ from relit_camera.capture.film.flash.frame_classification import FrameClass, det
 from relit_camera.capture.film.stabilization.film_stabilization import stabilize_film
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
-from relit_camera.lab.evaluate.html_report import chart, line_chart, page, paragraph, table
-from relit_camera.lab.evaluate.json_records import Record, read_json_record
+from relit_camera.lab.evaluate.rendered_truth import HeadTruth, read_truth
+from relit_camera.lab.evaluate.report.html_page import Block, Paragraph, render_page, table
+from relit_camera.lab.evaluate.report.plots import line_plot
 from relit_camera.lab.evaluate.stabilization.baseline_stabilizers import BASELINE_STABILIZERS, register_landmarks
 from relit_camera.lab.evaluate.stabilization.face_crop_sequence import FaceCropSequence, read_face_crops
 
@@ -35,23 +35,6 @@ FramesUsed = Literal["bright", "dark", "both"]
 NO_STABILIZATION, OUR_METHOD = "none", "ours"
 _LANDMARKS = "landmarks"
 _TRACKERS = ("mesh", "openseeface")
-
-
-class _ToRest(Record):
-    rotation_deg: float
-    translation_px: tuple[float, float]
-
-
-class _Head(Record):
-    to_rest: _ToRest
-
-
-class _TrueFrame(Record):
-    head: _Head
-
-
-class _Truth(Record):
-    frames: list[_TrueFrame] = Field(min_length=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +91,7 @@ def compare_stabilization(
         CaptureError: there is no flash in it, or no face can be followed.
         InputError: the truth is missing, in another form, or of another video.
     """
-    known = read_json_record(truth, _Truth, "give the truth.json of a rendered capture")
+    known = read_truth(truth, HeadTruth)
     seen = measure_brightness(video, progress=partial(progress, "Looking for flashes"))
     if len(seen.times_s) != len(known.frames):
         what = f"{video} has {len(seen.times_s)} frames, {truth} {len(known.frames)}"
@@ -194,11 +177,11 @@ def stabilization_text(report: StabilizationReport) -> str:
 
 def stabilization_page(report: StabilizationReport, title: str) -> str:
     """The HTML document."""
-    return page(title, _blocks(report))
+    return render_page(title, _blocks(report))
 
 
-def _blocks(report: StabilizationReport) -> Iterator[str]:
-    yield paragraph(
+def _blocks(report: StabilizationReport) -> Iterator[Block]:
+    yield Paragraph(
         f"A capture was rendered, so that the head's motion is known. In its {len(report.index)} bright frames, what "
         "is left of it after the transform that each way finds. Ways that look at the bright frames see another light "
         "in each; those that look at the dark ones see one light, and interpolate by time. The thesis's choice is "
@@ -210,17 +193,23 @@ def _blocks(report: StabilizationReport) -> Iterator[str]:
         rows,
         "Smaller is better. A constant is taken out: which frame the others are taken to does not matter.",
         digits=3,
+        better="smaller",
     )
     for name, why in report.left_out.items():
-        yield paragraph(f"{name}: left out, {why}.")
+        yield Paragraph(f"{name}: left out, {why}.")
     shown = [each for each in report.errors if each.method == OUR_METHOD or each.seen == "dark"]
     for label, values in (
-        ("px", {_method_label(each): each.distance_px for each in shown}),
-        ("degrees", {_method_label(each): np.abs(each.rotation_deg) for each in shown}),
+        ("translation error, px", {_method_label(each): each.distance_px for each in shown}),
+        ("rotation error, degrees", {_method_label(each): np.abs(each.rotation_deg) for each in shown}),
     ):
-        yield chart(
-            line_chart(report.index, values, "frame", label),
-            "What is left in each bright frame. Peaks are haste, which interpolation by time misses; a slope is drift.",
+        yield line_plot(
+            report.index,
+            values,
+            "frame",
+            label,
+            "Error that is left in each bright frame. Peaks are fast motion, which interpolation by time misses; a "
+            "slope is drift.",
+            from_zero=True,
         )
 
 

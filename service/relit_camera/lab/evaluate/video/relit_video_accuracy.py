@@ -22,7 +22,8 @@ from relit_camera.base.images.image_types import DisplayImage, LinearImage
 from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.lab.evaluate.field.relighting_metrics import finite_psnr
-from relit_camera.lab.evaluate.html_report import chart, heading, line_chart, page, paragraph, picture, table
+from relit_camera.lab.evaluate.report.html_page import Block, Heading, Paragraph, picture, render_page, table
+from relit_camera.lab.evaluate.report.plots import line_plot
 from relit_camera.lab.evaluate.video.head_motion_error import HeadMotion, PoseError, pose_error, second_difference_rms
 
 SHADING_BLUR_SIGMA = 0.04
@@ -224,22 +225,22 @@ def video_text(report: VideoReport) -> str:
 def video_page(report: VideoReport, title: str) -> str:
     """The HTML document."""
     parts = (_light, _jitter, _pose)
-    return page(title, (block for part in parts for block in part(report)))
+    return render_page(title, (block for part in parts for block in part(report)))
 
 
-def _light(report: VideoReport) -> Iterator[str]:
+def _light(report: VideoReport) -> Iterator[Block]:
     light = report.light
-    yield paragraph(
-        "A video was relit, and the same motion was rendered under the same light: the truth. Frame by frame they are "
-        "compared, inside the person's outline."
+    yield Paragraph(
+        "The relit video is compared with the truth, the same motion rendered under the same light, frame by frame and "
+        "inside the person's matte."
     )
-    yield heading("Light")
+    yield Heading("Light")
     indices, relit, truth = zip(*light.shown, strict=True)
     yield picture(
         contact_sheet([list(relit), list(truth)], ["relit", "truth"], [f"frame {i}" for i in indices], 160),
         "Some frames, relit above and in truth below. Shadows should fall on the same side and be as deep, and follow "
         "the head as it turns.",
-        exact=False,
+        lossless=False,
     )
     rows = [
         ["as it is", np.nanmean(light.psnr_db), np.nanmin(light.psnr_db)],
@@ -250,41 +251,47 @@ def _light(report: VideoReport) -> Iterator[str]:
         ["PSNR, dB", "mean", "worst frame"],
         rows,
         f"Larger is better. Brightness aligned: one gain a frame, on average {np.nanmean(light.gain_ev):+.2f} stops. "
-        "Shading alone: both blurred, so that where features stand hardly counts.",
+        "Shading alone: both pictures blurred, so that the position of facial features hardly counts.",
     )
     frames = np.arange(len(light.psnr_db))
     lines = {"as it is": light.psnr_db, "brightness aligned": light.gain_aligned_db, "shading alone": light.shading_db}
-    yield chart(
-        line_chart(frames, lines, "frame", "PSNR, dB"),
-        "It falls where the head turns far: the captured still shows no more of the sides than the camera saw.",
+    yield line_plot(
+        frames,
+        lines,
+        "frame",
+        "PSNR, dB",
+        "It falls where the head turns far: the source image shows no more of the sides than the camera saw.",
     )
 
 
-def _jitter(report: VideoReport) -> Iterator[str]:
+def _jitter(report: VideoReport) -> Iterator[Block]:
     light = report.light
-    yield heading("Steadiness")
+    yield Heading("Temporal stability")
     lines = {"truth": light.true_brightness, "relit": light.brightness}
-    yield chart(
-        line_chart(np.arange(len(light.brightness)), lines, "frame", "mean luminance"),
-        "Brightness of the person. It should rise and fall as in truth, without a tremble of its own. Change of change "
-        f"from frame to frame (RMS): relit {light.flicker:.2%} of the mean, truth {light.true_flicker:.2%}.",
+    yield line_plot(
+        np.arange(len(light.brightness)),
+        lines,
+        "frame",
+        "mean luminance",
+        "Brightness of the person. It should rise and fall as in truth, without flicker of its own. RMS second "
+        f"difference from frame to frame: relit {light.flicker:.2%} of the mean, truth {light.true_flicker:.2%}.",
     )
     measured, known = _landmark_jitter(report.measured), _landmark_jitter(report.truth)
     if measured is not None:
         true_text = "" if known is None else f"; in truth {known:.3f} px"
-        yield paragraph(f"Landmarks tremble by {measured:.3f} px (RMS of their second difference){true_text}.")
+        yield Paragraph(f"Landmark jitter: {measured:.3f} px (RMS of the second difference){true_text}.")
 
 
-def _pose(report: VideoReport) -> Iterator[str]:
+def _pose(report: VideoReport) -> Iterator[Block]:
     pose = report.pose
     if pose is None or report.measured is None or report.truth is None:
         return
-    yield heading("Head pose")
+    yield Heading("Head pose")
     yield table(
         ["angle", "RMS error, degrees", "gain", "offset, degrees"],
         [[name, pose.rms_deg[i], pose.gain[i], pose.offset_deg[i]] for i, name in enumerate(ANGLES)],
-        f"Over {pose.frames} frames, after taking out the offset, which is a matter of what is called neutral. Gain: "
-        f"how far the measured angle moves when the true one moves by 1. The whole rotation is off by "
+        f"Over {pose.frames} frames, after removing the constant offset, since the neutral pose is a convention. Gain: "
+        "how far the measured angle moves when the true one moves by 1. Error of the whole rotation: "
         f"{pose.angle_rms_deg:.2f}° RMS.",
     )
     frames = np.arange(len(report.truth.angles_deg))
@@ -293,7 +300,7 @@ def _pose(report: VideoReport) -> Iterator[str]:
             "truth": report.truth.angles_deg[:, index],
             "measured": report.measured.angles_deg[:, index] - pose.offset_deg[index],
         }
-        yield chart(line_chart(frames, lines, "frame", f"{name}, degrees"), f"Measured {name} over the true one.")
+        yield line_plot(frames, lines, "frame", f"{name}, degrees", f"Measured {name}, its offset removed, and truth.")
 
 
 def _landmark_jitter(motion: HeadMotion | None) -> float | None:

@@ -1,4 +1,4 @@
-"""Headers that state one size to us and another to the decoder."""
+"""Headers of picture files that could state one size to the check and another to the decoder."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.base.images.image_files import image_size_from_bytes
+from relit_camera.base.images.image_limits import image_size_from_bytes
 from tests.bad_pictures import encoded
 
 WIDTH, HEIGHT = 517, 300

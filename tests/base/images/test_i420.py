@@ -2,12 +2,12 @@ import av
 import numpy as np
 import pytest
 
+from relit_camera.base.images.color import rgb_to_i420
 from relit_camera.devices.sources.pattern_source import draw_pattern
-from relit_camera.devices.v4l2loopback import rgb_to_i420
 
 
 @pytest.mark.parametrize("size", [(320, 180), (642, 482), (64, 66)])
-def test_it_is_what_ffmpegs_scaler_makes(size):
+def test_it_is_what_ffmpegs_scaler_makes(size: tuple[int, int]) -> None:
     image = np.random.default_rng(3).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
     if size == (320, 180):
         image = draw_pattern(size, 99)
@@ -21,7 +21,7 @@ def test_it_is_what_ffmpegs_scaler_makes(size):
     assert np.percentile(difference, 99) <= 2
 
 
-def test_black_and_white_are_those_of_the_limited_range():
+def test_black_and_white_are_those_of_the_limited_range() -> None:
     for level, luma in ((0, 16), (255, 235)):
         planes = rgb_to_i420(np.full((64, 64, 3), level, np.uint8))
         assert set(planes[: 64 * 64]) == {luma}

@@ -1,4 +1,4 @@
-"""Barycentric interpolation over the Delaunay triangulation of the sampled directions (thesis 5.2)."""
+"""Delaunay triangulation of the sampled directions on the sphere, and barycentric weights in its triangles."""
 
 from __future__ import annotations
 
@@ -6,75 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, Delaunay, QhullError
+from scipy.spatial import ConvexHull, QhullError
 
 from relit_camera.base.errors import LightsError
-from relit_camera.capture.reflectance.method_registry import factored_field
-from relit_camera.capture.reflectance.samples import Samples
-from relit_camera.light.directions import spherical_from_direction
-from relit_camera.subject.reflectance_field import FactoredField
 
 MAX_GAP_DEG = 60.0
 """A circle of this angular radius with no light in it bounds the sampled region: wider triangles are no data."""
 
 TOLERANCE = np.radians(0.1)
 """So far outside of the sampled region a direction still counts as on its edge: people and files round directions."""
-
-
-@dataclass(frozen=True)
-class SphericalBarycentric:
-    """Triangles on the sphere, weights by areas of spherical sub-triangles (Langer et al. 2006)."""
-
-    max_gap_deg: float = MAX_GAP_DEG
-
-    def build(self, samples: Samples) -> FactoredField:
-        """The field; see `Method.build`."""
-        return factored_field(self, samples)
-
-    def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Weights (lights, queries); see `LinearMethod.weights`."""
-        found = find_triangles(directions, queries, self.max_gap_deg)
-        weights = np.zeros((len(directions), len(queries)), dtype=np.float32)
-        np.add.at(weights, (found.corners.T, found.covered[None, :]), found.weights.T)
-        return weights
-
-
-@dataclass(frozen=True)
-class PlanarBarycentric:
-    """Triangles and weights in the plane of azimuth and elevation: the thesis's first, simpler variant.
-
-    Nothing wraps round the seam behind the subject, as in the thesis.
-    """
-
-    def build(self, samples: Samples) -> FactoredField:
-        """The field; see `Method.build`."""
-        return factored_field(self, samples)
-
-    def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Weights (lights, queries); see `LinearMethod.weights`."""
-        plane = np.stack(spherical_from_direction(directions), axis=1)
-        try:
-            triangulation = Delaunay(plane)
-        except (QhullError, ValueError) as error:
-            raise _degenerate(len(directions)) from error
-        points = np.stack(spherical_from_direction(queries), axis=1)
-        # Not `find_simplex`: its tolerance is a share of each triangle, not an angle. The triangles turn
-        # counter-clockwise, so a point inside lies to the left of every side.
-        corners = plane[triangulation.simplices]
-        sides = np.roll(corners, -1, axis=1) - corners
-        lengths = np.linalg.norm(sides, axis=2)
-        offsets = points[:, None, None] - corners
-        doubled_areas = sides[..., 0] * offsets[..., 1] - sides[..., 1] * offsets[..., 0]
-        inside = (doubled_areas / lengths).min(axis=2)
-        chosen = inside.argmax(axis=1)
-        covered = np.flatnonzero(inside[np.arange(len(queries)), chosen] >= -TOLERANCE)
-        # A corner's weight is the area between the point and the side opposite to it, which starts at the next corner.
-        local = np.maximum(np.roll(doubled_areas[covered, chosen[covered]], -1, axis=1), 0)
-        local /= np.maximum(local.sum(axis=1, keepdims=True), 1e-300)
-        weights = np.zeros((len(directions), len(queries)), dtype=np.float32)
-        vertices = triangulation.simplices[chosen[covered]]
-        np.add.at(weights, (vertices.T, covered[None, :]), local.T.astype(np.float32))
-        return weights
 
 
 @dataclass(frozen=True)
@@ -126,7 +66,7 @@ def spherical_delaunay(directions: NDArray[np.float64], max_gap_deg: float = MAX
     try:
         hull = ConvexHull(directions)
     except (QhullError, ValueError) as error:
-        raise _degenerate(len(directions)) from error
+        raise degenerate_directions_error(len(directions)) from error
     triangles = hull.simplices
     outward = hull.equations[:, :3]
     corners = directions[triangles]
@@ -135,7 +75,7 @@ def spherical_delaunay(directions: NDArray[np.float64], max_gap_deg: float = MAX
     radius = np.arccos(np.clip(-hull.equations[:, 3], -1, 1))
     kept = triangles[radius <= np.radians(max_gap_deg)]
     if not len(kept):
-        raise _degenerate(len(directions))
+        raise degenerate_directions_error(len(directions))
     return np.asarray(kept, dtype=np.intp)
 
 
@@ -156,5 +96,6 @@ def _area(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
     return np.asarray(2 * np.arctan2(volume, 1 + ab + bc + ca))
 
 
-def _degenerate(count: int) -> LightsError:
+def degenerate_directions_error(count: int) -> LightsError:
+    """The error for `count` directions that cannot be triangulated."""
     return LightsError(f"{count} light directions span no region", "at least four, not all on one circle, are needed")

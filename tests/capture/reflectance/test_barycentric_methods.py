@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import LightsError, NotFoundError
-from relit_camera.capture.reflectance.delaunay_barycentric import (
-    PlanarBarycentric,
-    SphericalBarycentric,
-    spherical_barycentric,
-)
+from relit_camera.capture.reflectance.barycentric_methods import PlanarBarycentric, SphericalBarycentric
+from relit_camera.capture.reflectance.delaunay_triangulation import spherical_barycentric
 from relit_camera.capture.reflectance.linear_methods import Nearest
 from relit_camera.capture.reflectance.method_registry import LinearMethod, method_names, open_method
 from relit_camera.light.directions import (
@@ -21,7 +18,7 @@ from relit_camera.light.directions import (
 )
 from tests.synthetic import fibonacci_directions, sphere_samples
 
-METHODS = [SphericalBarycentric(), PlanarBarycentric(), Nearest()]
+METHODS: list[LinearMethod] = [SphericalBarycentric(), PlanarBarycentric(), Nearest()]
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: type(m).__name__)

@@ -1,0 +1,162 @@
+"""Reads the source and decides what is published: the relit picture, the fallback, or a placeholder that says why."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.errors import DeviceError
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.devices.sources.source import Source, SourceState
+from relit_camera.face.face_state import FaceStatus
+from relit_camera.live.pipeline import RenderedFrame
+from relit_camera.live.publishing.publisher import PublishedPicture, Publisher
+from relit_camera.live.scene.scene import Scene
+from relit_camera.live.status.camera_status import CameraState, DegradationCode
+from relit_camera.live.status.stage_timing import RateMeter
+from relit_camera.live.status.status_board import StatusBoard
+from relit_camera.live.supervision.fallback_renderer import FallbackRenderer
+from relit_camera.live.supervision.pipeline_supervisor import PipelineSupervisor, ShownPicture
+
+
+@dataclass(frozen=True)
+class LoopTimings:
+    """Waits of the camera loop, in seconds.
+
+    Attributes:
+        read_timeout_s: how long one read of the source may wait for a frame.
+        source_retry_s: pause after the source has failed.
+    """
+
+    read_timeout_s: float = 0.2
+    source_retry_s: float = 1.0
+
+
+@dataclass(frozen=True)
+class Placeholders:
+    """Pictures for when the source gives no frames: uint8 sRGB RGB (height, width, 3), of the output's size.
+
+    Attributes:
+        waiting: the source is looked for.
+        released: nobody reads the camera, so the webcam is off.
+    """
+
+    waiting: DisplayImage
+    released: DisplayImage
+
+
+DEFAULT_TIMINGS = LoopTimings()
+
+
+class CameraLoop:
+    """Takes each frame from the source to the pipeline, and says what is going on. Belongs to the thread that runs it.
+
+    Attributes:
+        camera_rate: frames a second that the source gives.
+        pipeline_rate: pictures a second that the pipeline renders.
+        skipped: frames that the source dropped, because this loop came too late for them.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        supervisor: PipelineSupervisor,
+        fallback: FallbackRenderer,
+        publisher: Publisher,
+        placeholders: Placeholders,
+        scene: Callable[[], Scene],
+        board: StatusBoard,
+        timings: LoopTimings = DEFAULT_TIMINGS,
+        clock: Clock = SYSTEM_CLOCK,
+    ) -> None:
+        self._source, self._supervisor, self._fallback = source, supervisor, fallback
+        self._publisher, self._placeholders, self._scene, self._board = publisher, placeholders, scene, board
+        self._timings, self._clock = timings, clock
+        self._last_index = -1
+        self.skipped = 0
+        self.camera_rate, self.pipeline_rate = RateMeter(clock=clock), RateMeter(clock=clock)
+
+    def run(self, stopping: threading.Event) -> None:
+        """Go on until `stopping` is set."""
+        while not stopping.is_set():
+            self.step(stopping)
+
+    def step(self, stopping: threading.Event) -> None:
+        """Wait for one frame and handle it, and what the workers did meanwhile."""
+        self._publisher.hold = self._scene().frozen
+        frame = self._read(stopping)
+        for shown in self._supervisor.handle_messages():
+            self._note_shown(shown)
+        if frame is None:
+            return
+        self._count(frame)
+        scene = self._scene()
+        if scene.frozen:
+            return
+        if self._supervisor.submit_frame(frame):
+            self._fallback.release()
+        else:
+            self._publisher.pictures.put(
+                PublishedPicture(self._fallback.picture(frame, scene), frame.captured_at, frame.index)
+            )
+            if self._board.is_degraded(DegradationCode.PICTURE_FAILED):
+                self._board.set_state(CameraState.FALLBACK)
+
+    def _read(self, stopping: threading.Event) -> Frame | None:
+        try:
+            frame = self._source.read(self._timings.read_timeout_s)
+        except Exception as error:  # nothing that a source does may end the camera
+            self._board.report(DegradationCode.SOURCE_FAILED, error)
+            self._show(self._placeholders.waiting, CameraState.WAITING)
+            self._clock.wait(stopping, self._timings.source_retry_s)
+            return None
+        if frame is not None:
+            self._board.report(DegradationCode.SOURCE_FAILED, None)
+            return frame
+        state, reason = self._source.state, self._source.reason
+        if state is SourceState.RELEASED:
+            self._board.report(DegradationCode.SOURCE_FAILED, None)
+            self._show(self._placeholders.released, CameraState.RELEASED)
+        elif state is not SourceState.RUNNING:
+            if reason:
+                why = DeviceError(reason, "it is tried again by itself; see `relit devices`")
+                self._board.report(DegradationCode.SOURCE_FAILED, why)
+            if reason or self._board.state is not CameraState.STARTING:
+                self._show(self._placeholders.waiting, CameraState.WAITING)
+            if state is SourceState.ENDED:
+                self._clock.wait(stopping, self._timings.read_timeout_s)  # its `read` returns at once
+        return None
+
+    def _show(self, placeholder: DisplayImage, state: CameraState) -> None:
+        self._publisher.show_placeholder(placeholder, self._last_index)
+        self._board.set_state(state)
+
+    def _count(self, frame: Frame) -> None:
+        """Count the frames that the source gave, including dropped ones: indices have gaps there."""
+        given = frame.index - self._last_index
+        self._last_index, self.skipped = frame.index, self.skipped + given - 1
+        self.camera_rate.tick(frame.captured_at, given)
+
+    def _note_shown(self, shown: ShownPicture) -> None:
+        self.pipeline_rate.tick(shown.at)
+        motion = shown.rendered.motion
+        face = motion.status if motion else FaceStatus.LOST
+        self._board.set_face(face)
+        if shown.frame.index > self._publisher.superseded_index:
+            tracked = motion is None or face is not FaceStatus.LOST
+            self._board.set_state(CameraState.LIVE if tracked else CameraState.SEARCHING)
+
+
+def publish_if_current(publisher: Publisher, scene: Callable[[], Scene], frame: Frame, rendered: RenderedFrame) -> bool:
+    """Publish a rendered picture unless the scene forbids it by now. Returns whether it is published.
+
+    The picture may come late, from a pipeline that hung: one of another subject or mode must not show, for the live
+    picture may be private by now, nor may a held picture change.
+    """
+    now, then = scene(), rendered.scene
+    if now.frozen or now.subject is not then.subject or now.look.mode is not then.look.mode:
+        return False
+    publisher.pictures.put(PublishedPicture(rendered.image, frame.captured_at, frame.index))
+    return True
