@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import InputError
 from relit_camera.capture.alignment.rigid_transform import RigidTransform
-from relit_camera.capture.film.lamp.head_crop import HeadCrop
+from relit_camera.capture.film.olat.head_crop import HeadCrop
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.candidates import Candidate
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
@@ -78,4 +78,4 @@ def scale_to_truth(
 
 def _cut(picture: NDArray[np.float32], square: HeadCrop, transform: RigidTransform) -> NDArray[np.float32]:
     large = cv2.resize(picture, square.picture, interpolation=cv2.INTER_CUBIC)
-    return np.maximum(square.cut(large, transform), 0)
+    return np.maximum(square.crop(large, transform), 0)

@@ -85,7 +85,7 @@ def read_face_crops(
                 picture = cv2.resize(grey, size, interpolation=cv2.INTER_AREA).astype(np.float32)
                 index.append(frame.index)
                 bright.append(kind is FrameClass.BRIGHT)
-                squares.append(np.clip(window.cut(picture, RigidTransform()), 0, 255).astype(np.uint8))
+                squares.append(np.clip(window.crop(picture, RigidTransform()), 0, 255).astype(np.uint8))
                 landmarks.append(state.landmarks if state else np.zeros((0, 2), np.float32))
             progress(frame.index + 1)
     return FaceCropSequence(np.array(index), np.array(bright), np.stack(squares), landmarks, window, small, scale)

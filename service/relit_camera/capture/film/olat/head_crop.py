@@ -11,20 +11,20 @@ from numpy.typing import NDArray
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, Size, warp_affine
 from relit_camera.capture.film.face_circle import FaceCircle
 
-_REACH = 2.0
+_REACH_RADII = 2.0
 """Half the square's side, in radii of the face: hair above, shoulders below."""
-_LOWER = 0.2
-"""How far its middle is below the face's, in radii."""
+_LOWER_RADII = 0.2
+"""Distance of the square's middle below that of the face, in radii."""
 
 
 @dataclass(frozen=True)
 class HeadCrop:
-    """A square in the reference frame.
+    """A square in the reference frame of a film.
 
     Attributes:
-        left, top, side: in pixels of the video.
-        size: of the pictures cut, pixels a side.
-        picture: width and height of the video.
+        left, top, side: in pixels of the film.
+        size: of the cropped pictures, pixels a side.
+        picture: width and height of the film's pictures.
     """
 
     left: float
@@ -35,14 +35,14 @@ class HeadCrop:
 
     @property
     def scale(self) -> float:
-        """Pixels of a cut picture a pixel of the video."""
+        """Pixels of a cropped picture per pixel of the film."""
         return self.size / self.side
 
-    def cut(self, picture: NDArray[np.float32], transform: RigidTransform) -> NDArray[np.float32]:
-        """What the square holds, (size, size, channels), of a frame (height, width, channels) taken to the reference.
+    def crop(self, picture: NDArray[np.float32], transform: RigidTransform) -> NDArray[np.float32]:
+        """The square (size, size, channels) of a frame (height, width, channels) aligned to the reference.
 
         Args:
-            picture: the frame's.
+            picture: the frame's picture.
             transform: from the frame to the reference.
         """
         finer = max(1, int(np.ceil(self.side / self.size - 1e-6)))
@@ -54,22 +54,28 @@ class HeadCrop:
             return fine
         return np.asarray(cv2.resize(fine, (self.size, self.size), interpolation=cv2.INTER_AREA), np.float32)
 
-    def place(self, x: float, y: float) -> tuple[float, float]:
-        """Where a point of the reference frame, in pixels of the video, is in the cut pictures."""
+    def to_crop(self, x: float, y: float) -> tuple[float, float]:
+        """Position in the cropped pictures of a point of the reference frame, both in pixels."""
         return (x - self.left) * self.scale, (y - self.top) * self.scale
+
+    def disc(self, x: float, y: float, radius: float) -> NDArray[np.bool_]:
+        """Mask (size, size) of a circle of the reference frame, given in pixels of the film."""
+        x, y = self.to_crop(x, y)
+        center = np.arange(self.size) + 0.5
+        return np.asarray(np.hypot(center - x, center[:, None] - y) < radius * self.scale)
 
 
 def place_head_crop(face: FaceCircle, picture: Size, size: int) -> HeadCrop:
-    """The square about a face in a picture (width, height), inside of it, at most as many pixels as the video has.
+    """The square about a face, inside the picture, with at most as many pixels as the film shows there.
 
     Args:
         face: in the reference frame.
-        picture: width and height of the video.
-        size: pixels a side that are wanted; fewer if the video shows fewer.
+        picture: width and height of the film's pictures.
+        size: desired pixels a side.
     """
-    side = min(2 * _REACH * face.radius, *picture)
+    side = min(2 * _REACH_RADII * face.radius, *picture)
     left, top = (
         float(np.clip(middle - side / 2, 0, length - side))
-        for middle, length in zip((face.x, face.y + _LOWER * face.radius), picture, strict=True)
+        for middle, length in zip((face.x, face.y + _LOWER_RADII * face.radius), picture, strict=True)
     )
     return HeadCrop(left, top, float(side), min(size, int(side)), picture)

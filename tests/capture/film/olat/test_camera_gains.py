@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.capture.film.lamp.camera_gains import FrameGains, downsample_for_gains, estimate_gains
+from relit_camera.base.errors import CaptureError
+from relit_camera.capture.film.olat.camera_gains import (
+    FrameGains,
+    downsample_for_gains,
+    estimate_gains,
+    require_uniform_gains,
+)
 
 
 def scene(*, reached: bool, uneven: float = 0.0, seed: int = 0) -> tuple[FrameGains, np.ndarray, np.ndarray]:
@@ -30,7 +36,7 @@ def scene(*, reached: bool, uneven: float = 0.0, seed: int = 0) -> tuple[FrameGa
     return estimate_gains(cells, index / 30, bright, index // 6), gains, bright
 
 
-def test_gains_are_what_the_wall_tells() -> None:
+def test_gains_are_measured_on_the_wall() -> None:
     found, gains, bright = scene(reached=False)
     expected = gains / np.exp(np.log(gains[bright]).mean(axis=0))
     np.testing.assert_allclose(found.rgb, expected, rtol=0.01)
@@ -39,7 +45,7 @@ def test_gains_are_what_the_wall_tells() -> None:
     assert found.can_subtract_room
 
 
-def test_where_the_flash_reaches_everything_dark_frames_tell() -> None:
+def test_where_the_flash_reaches_everything_gains_are_measured_in_dark_frames() -> None:
     found, gains, bright = scene(reached=True)
     assert found.share == 0
     assert not found.too_dim
@@ -48,7 +54,7 @@ def test_where_the_flash_reaches_everything_dark_frames_tell() -> None:
     assert (error - error.mean(axis=0)).std() < 0.02
 
 
-def test_what_no_gain_explains_shows_as_spread() -> None:
+def test_local_changes_raise_the_spread() -> None:
     plain, enhanced = scene(reached=False)[0], scene(reached=False, uneven=0.2)[0]
     assert plain.spread < 0.03
     assert enhanced.spread == pytest.approx(0.2, rel=0.25)
@@ -71,7 +77,7 @@ def before_a_wall(wall: tuple[float, float, float]) -> FrameGains:
     return estimate_gains(light.astype(np.float16), index / 30, bright, index // 6)
 
 
-def test_a_wall_in_warm_light_tells_gains_though_it_is_hardly_blue() -> None:
+def test_gains_are_measured_on_a_wall_in_warm_light_with_little_blue() -> None:
     found = before_a_wall((0.04, 0.025, 0.013))
     assert found.share > 0.3
     assert not found.too_dim
@@ -85,3 +91,9 @@ def test_a_dark_room_is_not_taken_for_one_that_the_flash_reaches() -> None:
     found = estimate_gains(light.astype(np.float16), index / 30, index % 6 < 3, index // 6)
     assert found.share == 0
     assert found.too_dim
+
+
+def test_a_camera_that_improves_pictures_is_refused() -> None:
+    require_uniform_gains(0.03)
+    with pytest.raises(CaptureError, match=r"changes parts of the picture by themselves, by 20%.*turn off HDR"):
+        require_uniform_gains(0.2)

@@ -1,4 +1,4 @@
-"""A disc that is seen in part."""
+"""A highlight fitted as a disc that is visible in part."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def test_a_lamp_behind_a_bright_tube(x: float, y: float) -> None:
     assert off < 0.6 * as_seen
 
 
-def test_too_little_is_seen() -> None:
+def test_a_disc_that_is_mostly_hidden_is_refused() -> None:
     known = beside_band(10, 24)
     assert fit_occluded_disc(disc(25, 20) & known, known, AREA) is None
 
 
-def test_what_is_no_disc() -> None:
+def test_a_shape_that_is_no_disc_is_refused() -> None:
     lit = np.zeros((40, 50), bool)
     lit[18:20, 5:45] = True
     assert fit_occluded_disc(lit, np.ones_like(lit), AREA) is None

@@ -1,4 +1,4 @@
-"""The matte against the mask that was painted."""
+"""The matte against the painted one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.capture.film.lamp.flash_matte import estimate_flash_matte
+from relit_camera.capture.film.olat.flash_matte import estimate_flash_matte
 
 
 def painted(wall_reached: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -39,14 +39,14 @@ def test_the_person_is_found_dark_hair_too(wall_reached: float) -> None:
     assert matte[:15, :15].max() == 0
 
 
-def test_where_nobody_can_be_nobody_is() -> None:
+def test_excluded_places_are_transparent() -> None:
     pictures, room, _, _ = painted(0.0)
     nobody = np.zeros(room.shape[:2], bool)
     nobody[:, :60] = True
     assert estimate_flash_matte(pictures, room, nobody)[:, :55].max() == 0
 
 
-def test_without_flash_there_is_nobody() -> None:
+def test_without_flash_most_is_transparent() -> None:
     noise = np.random.default_rng(0).normal(0, 0.001, (8, 40, 40, 3)).astype(np.float32)
     matte = estimate_flash_matte(noise, np.full((40, 40, 3), 0.1, np.float32))
     assert matte.mean() < 0.35

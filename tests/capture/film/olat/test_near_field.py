@@ -1,4 +1,4 @@
-"""A near lamp made a distant one, and strengths told by the person: against formulas."""
+"""Correction of the near field, and strengths of flashes, against formulas."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.capture.film.lamp.flash_strength import estimate_flash_strengths
-from relit_camera.capture.film.lamp.near_field import CaptureLamp, Surface, distant_light_factor, near_field_irradiance
+from relit_camera.capture.film.olat.flash_strength import estimate_flash_strengths
+from relit_camera.capture.film.olat.near_field import CaptureLamp, Surface, distant_light_factor, near_field_irradiance
 from relit_camera.light.directions import direction_from_degrees
 from tests.capture.film.generated_film import Film
 
@@ -27,7 +27,7 @@ def film_matte(film: Film) -> np.ndarray:
 
 def test_light_falls_with_the_square_of_the_distance_and_off_the_axis() -> None:
     points = np.array([[[0, 0, 0], [0, 0, 10], [30, 0, 0]]], np.float32)
-    surface = Surface(np.tile(np.float32([0, 0, 1]), (1, 3, 1)), points)
+    surface = Surface(np.tile(np.array([0, 0, 1], np.float32), (1, 3, 1)), points)
     toward, light = near_field_irradiance(surface, CaptureLamp(np.array([0.0, 0.0, 100.0]), np.zeros(3)))
     np.testing.assert_allclose(light, [[1, (100 / 90) ** 2, (100**2 / (100**2 + 30**2)) ** 2]], rtol=1e-5)
     np.testing.assert_allclose(toward[0, 2], np.array([-30, 0, 100]) / np.hypot(30, 100), atol=1e-6)
@@ -49,7 +49,7 @@ def test_a_picture_under_a_near_lamp_becomes_one_under_a_distant_lamp() -> None:
         assert corrected.mean() < 0.03 < 0.08 < as_is.mean()
 
 
-def test_strengths_come_back() -> None:
+def test_strengths_are_recovered() -> None:
     film = Film(frames=60)
     indices = range(60)
     pictures = film_pictures(film, indices)
@@ -65,7 +65,7 @@ def test_strengths_come_back() -> None:
     assert np.median(found.misfit) < 0.05
 
 
-def test_flashes_that_light_no_skin_spoil_no_others() -> None:
+def test_flashes_that_light_no_skin_do_not_affect_others() -> None:
     film, spoilt = Film(frames=60), [10, 30]
     pictures = film_pictures(film, range(60))
     lamps = np.stack([film.lamp_cm(index) for index in range(60)])
@@ -80,7 +80,7 @@ def test_flashes_that_light_no_skin_spoil_no_others() -> None:
     np.testing.assert_array_equal(found.consistent(np.inf), others)
 
 
-def test_where_no_flash_lights_skin_none_is_alike() -> None:
+def test_without_lit_skin_no_flash_is_consistent() -> None:
     film = Film(frames=60)
     lamps = np.stack([film.lamp_cm(index) for index in range(0, 60, 6)])
     dark = np.zeros((len(lamps), SIDE, SIDE, 3), np.float32)
@@ -91,14 +91,15 @@ def test_where_no_flash_lights_skin_none_is_alike() -> None:
 
 def test_the_direction_of_a_lamp_far_away_is_the_same_everywhere() -> None:
     surface = Surface(
-        np.tile(np.float32([0, 0, 1]), (4, 4, 1)), np.random.default_rng(0).uniform(-9, 9, (4, 4, 3)).astype(np.float32)
+        np.tile(np.array([0, 0, 1], np.float32), (4, 4, 1)),
+        np.random.default_rng(0).uniform(-9, 9, (4, 4, 3)).astype(np.float32),
     )
     np.testing.assert_allclose(
         distant_light_factor(surface, CaptureLamp(1e5 * direction_from_degrees(20, 30), np.zeros(3))), 1, atol=1e-3
     )
 
 
-def test_a_lamp_that_points_beside_the_head_is_told() -> None:
+def test_the_tilt_of_a_lamp_that_points_beside_the_head() -> None:
     film = Film(frames=60)
     pictures = film_pictures(film, range(60))
     scale, matte = SIDE / 210, film_matte(film)

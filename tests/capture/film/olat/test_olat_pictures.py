@@ -1,4 +1,4 @@
-"""The room taken off, from a film whose room grows brighter all the time."""
+"""The room's light subtracted, in a film whose room grows brighter all the time."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from relit_camera.capture.alignment.rigid_transform import RigidTransform
-from relit_camera.capture.film.lamp import olat_pictures
-from relit_camera.capture.film.lamp.head_crop import HeadCrop
-from relit_camera.capture.film.lamp.olat_pictures import OlatPictures, read_olat_pictures
+from relit_camera.capture.film.olat.head_crop import HeadCrop
+from relit_camera.capture.film.olat.olat_pictures import OlatPictures, RoomSubtraction, read_olat_pictures
 from tests.capture.film.generated_film import write_film
 
 SIZE, FLASH = (64, 48), 0.3
@@ -28,10 +27,10 @@ def read(path: Path, *, subtract: bool = True) -> OlatPictures:
     light = room(index) + FLASH * np.isin(index, BRIGHT)
     codes = np.round(255 * light ** (1 / 2.2)).astype(np.uint8)
     film = write_film(path, np.tile(codes[:, None, None, None], (1, *SIZE[::-1], 3)))
-    square = HeadCrop(0, 0, 48, 48, SIZE)
+    crop = HeadCrop(0, 0, 48, 48, SIZE)
     still, plain = {int(each): RigidTransform() for each in index}, {int(each): np.ones(3) for each in index}
     dark = np.setdiff1d(index, BRIGHT)
-    return read_olat_pictures(film, 2.2, square, still, plain, BRIGHT, dark, subtract=subtract)
+    return read_olat_pictures(film, 2.2, crop, still, plain, BRIGHT, dark, subtract=subtract)
 
 
 def test_the_room_is_that_about_each_flash(tmp_path: Path) -> None:
@@ -43,15 +42,15 @@ def test_the_room_is_that_about_each_flash(tmp_path: Path) -> None:
     np.testing.assert_allclose(as_is, FLASH + room(BRIGHT), atol=0.012)
 
 
-def test_few_dark_pictures_are_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    held: list[int] = []
-    add_dark = olat_pictures._Between.add_dark
-
-    def counted(self: olat_pictures._Between, time_s: float, picture: np.ndarray) -> None:
-        add_dark(self, time_s, picture)
-        held.append(len(self._dark) + len(self._waiting))
-
-    monkeypatch.setattr(olat_pictures._Between, "add_dark", counted)
-    read(tmp_path / "film.mp4")
-    assert len(held) == 60
-    assert max(held) < 8
+def test_few_frames_are_held() -> None:
+    picture = np.zeros((4, 4, 3), np.float32)
+    subtraction = RoomSubtraction(np.empty((len(BRIGHT), 4, 4, 3), np.float16), np.zeros((4, 4, 3)), subtract=True)
+    rows, held = {int(index): row for row, index in enumerate(BRIGHT)}, []
+    for index in range(66):
+        if index in rows:
+            subtraction.add_bright(rows[index], index / 30, picture)
+        else:
+            subtraction.add_dark(index / 30, picture)
+        held.append(subtraction.held)
+    assert 0 < max(held) < 8
+    subtraction.finish()

@@ -1,4 +1,4 @@
-"""Highlights from what is kept of a film about the ball, against the ball's geometry."""
+"""Highlights found in crops of a film, against the ball's geometry."""
 
 from __future__ import annotations
 
@@ -8,28 +8,20 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.image_types import LinearImage
-from relit_camera.capture.film.ball.ball_tracking import BallEpisode
-from relit_camera.capture.film.ball.frame_highlights import BallCrops
-from relit_camera.capture.film.ball.specular_highlight import Highlight, NoHighlight, find_highlight
-from relit_camera.capture.film.ball.sphere_projection import BallOutline, PinholeView
-from tests.capture.film.ball.mirror_scene import MirrorScene, degrees_between, hand_path, unit
+from relit_camera.capture.film.ball.specular_highlight import BallCrops, Highlight, NoHighlight
+from relit_camera.capture.film.ball.sphere_projection import PinholeView
+from tests.capture.film.ball.mirror_scene import (
+    MirrorScene,
+    degrees_between,
+    hand_path,
+    highlight_in,
+    true_normal,
+    view_of,
+)
 
 LAMPS = hand_path(2, 100.0, np.array([0.0, -2.0, -58.0]))
 SMALL = MirrorScene()
 LARGE = MirrorScene((420, 400), 900.0, np.array([0.5, 0.4, -60.0]), 5.5, lamp_radius_cm=2.0, noise=0.002)
-
-
-def true_normal(scene: MirrorScene, lamp: np.ndarray) -> np.ndarray:
-    """By search over the surface: where the ways to camera and lamp make equal angles with the normal."""
-    normal = unit(unit(lamp - scene.center) - unit(scene.center))
-    for _ in range(50):
-        point = scene.center + scene.radius_cm * normal
-        normal = unit(unit(lamp - point) - unit(point))
-    return normal
-
-
-def view_of(scene: MirrorScene) -> PinholeView:
-    return PinholeView(BallOutline(*scene.outline()), scene.size, scene.focal_px)
 
 
 def kept(view: PinholeView, frames: list[LinearImage]) -> BallCrops:
@@ -40,12 +32,12 @@ def kept(view: PinholeView, frames: list[LinearImage]) -> BallCrops:
 
 
 @pytest.mark.parametrize("scene", [SMALL, LARGE], ids=["small", "large"])
-def test_what_is_kept_tells_as_much_as_the_frame(scene: MirrorScene) -> None:
+def test_a_crop_gives_the_same_highlight_as_the_whole_frame(scene: MirrorScene) -> None:
     frames = [scene.photograph(lamp, seed=n) for n, lamp in enumerate([None, *LAMPS])]
     view = view_of(scene)
-    found = kept(view, frames).highlights(range(1, 1 + len(LAMPS)), view)
+    found = kept(view, frames).highlights(range(1, 1 + len(LAMPS)), lambda index: view)
     for index, lamp in enumerate(LAMPS, 1):
-        here, whole = found[index], find_highlight(frames[index], view, frames[0])
+        here, whole = found[index], highlight_in(frames[index], view, frames[0])
         assert isinstance(here, Highlight)
         assert isinstance(whole, Highlight)
         # An angle of the ball's surface that is a fifth of a pixel.
@@ -64,10 +56,17 @@ def test_a_ball_that_was_pushed(pushed_cm: float, seen: bool) -> None:
     film = kept(
         view, [scene.photograph(), scene.photograph(LAMPS[0]), pushed.photograph(), pushed.photograph(LAMPS[0])]
     )
-    found = film.highlights([1, 3], view, [BallEpisode("moved", 2, 3, shift, 0.0)])
+    moved = view.with_outline(view.outline.moved(shift, 0.0))
+    found = film.highlights([1, 3], lambda index: moved if index >= 2 else view)
     assert isinstance(found[1], Highlight)
     if seen:
         assert isinstance(found[3], Highlight)
         assert degrees_between(found[3].normal, true_normal(pushed, LAMPS[0])) < 1
     else:
         assert found[3] == NoHighlight("the ball is out of its place so far that not all of it is seen")
+
+
+def test_a_hidden_ball_has_no_highlight() -> None:
+    view = view_of(SMALL)
+    film = kept(view, [SMALL.photograph(), SMALL.photograph(LAMPS[0])])
+    assert film.highlights([1], lambda index: None)[1] == NoHighlight("something is before the ball")
