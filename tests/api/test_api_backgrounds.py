@@ -68,8 +68,8 @@ def test_a_picture_is_stored_shown_and_deleted(client: Client, camera: FakeCamer
     assert (again.status_code, again.content) == (304, b"")
 
     assert client.put(BACKGROUND, {"kind": "image", "image": "my beach"}).status_code == 200
-    assert camera.scene_controller.scene.backdrop is not None
-    assert abs(int(camera.scene_controller.scene.backdrop.mean()) - 200) <= 1
+    assert camera.scene_controller.scene.background_image is not None
+    assert abs(int(camera.scene_controller.scene.background_image.mean()) - 200) <= 1
     problem = check_problem(client.delete("/api/v1/backgrounds/my beach"), 409)
     assert "in use" in problem["what"]
 

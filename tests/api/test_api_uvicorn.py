@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from importlib.metadata import requires, version
 
 import uvicorn
@@ -26,7 +27,9 @@ def test_uvicorn_is_held_to_one_series() -> None:
 
 
 def test_the_parts_that_are_used_are_there() -> None:
-    protocol = TimeoutHttpProtocol(uvicorn.Config(nothing, log_config=None), ServerState(), {})
+    loop = asyncio.new_event_loop()
+    protocol = TimeoutHttpProtocol(uvicorn.Config(nothing, log_config=None), ServerState(), {}, loop)
+    loop.close()
     assert {"loop", "transport", "flow", "cycle"} <= vars(protocol).keys()
     assert protocol.cycle is None, "no request has begun"
     assert {"response_complete", "more_body"} <= set(RequestResponseCycle.__init__.__code__.co_names)

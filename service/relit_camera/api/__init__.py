@@ -1,20 +1,21 @@
-"""The REST API and the panel, by which people and programs change the camera while it runs. docs/api.md is for users.
+"""The API and the panel: how people and programs change the camera while it runs.
 
 `app.create_app(camera, settings)` builds the application around whatever implements
-`live.camera_control.CameraControl`; `server.http_server.start_api_server` runs it in a thread. A request passes
-`middleware/` (known host and no other site, then the token, then the length of the body) and reaches one function in
-`routes/`. That function asks the scene controller for another scene and answers with the new state. Nothing here is in
-the path of the pictures: the pipeline reads the scene once a frame.
+`live.camera_control.CameraControl`; `server.serve(app, settings.server)` runs it in a thread. A request goes through
+`security` (our names only, no other site), `access` (the token, where one is set), `bodies` (how long it may be) and
+one function in `routes/`, which asks `live.scene.scene_controller` for another scene and answers with what now stands.
+Nothing here touches the picture path: the worker reads the scene when it wants to.
 
-    app.py              the application: routes, middleware, panel
-    dependencies.py     what every route function receives
-    schemas.py          bodies of requests and answers
-    problem_details.py  errors as application/problem+json (RFC 9457)
-    preview_stream.py   motion JPEG: each picture is encoded once for all viewers of one size
-    jpeg_responses.py   single pictures, with caching by ETag
-    routes/             the operations, one file a topic
-    middleware/         same-origin checks, token, limits of bodies, errors
-    server/             uvicorn in a thread, and timeouts for idle connections
-    openapi/            the OpenAPI document, and its export to docs/openapi.json
-    panel/              the page: HTML, CSS and JavaScript modules, as they are served
+    routes/            the operations, one file a topic
+    schemas.py         bodies that `base.config.look` and `live.status.camera_status` do not have
+    problems.py        every error as application/problem+json; error_handlers.py finds the problem for an exception
+    security.py        Host, Origin, Sec-Fetch-Site, security headers
+    access.py          the token and the login page
+    connections.py     an end to clients that ask nothing or take nothing
+    preview.py         each picture encoded once, however many look on
+    presets.py         looks stored as YAML
+    openapi.py         the description; schema_file.py writes it to docs/openapi.json
+    panel/             the page: HTML, CSS and JavaScript modules, as they are served
+
+docs/api.md tells users of it.
 """

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from relit_camera.app.wiring import session_options
+from pathlib import Path
+
+from relit_camera.app.wiring import require_plugins, session_options
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import ModelError
 from relit_camera.live.compositing.matting import matting_factory
@@ -17,12 +19,14 @@ def check_before_devices(settings: RelitSettings) -> None:
 
     Raises:
         ImageError: the placeholder picture cannot be read.
-        NotFoundError: no matte has the name in the settings.
+        NotFoundError: no tracker, relighter, reenactor or matte has the name in the settings.
+        ConfigError: several packages have a plug-in of that name.
         InputError: the recorded mattes cannot be read.
-        ModelError: the file of the reenactor's own model does not exist.
+        ModelError: the file of an ONNX reenactor does not exist.
     """
+    require_plugins(settings)
     placeholder((settings.output.width, settings.output.height), picture=settings.output.placeholder)
     matting_factory(settings.matte, session_options(settings.inference))
-    model = settings.reenact.model
-    if model is not None and not model.is_file():
-        raise ModelError(f"{model} does not exist", "name an ONNX reenactor as reenact.model (docs/reenactors.md)")
+    reenactor, _, file = settings.reenact.reenactor.partition(":")
+    if reenactor == "onnx" and not Path(file).is_file():
+        raise ModelError(f"{file} does not exist", "name the file of an ONNX reenactor (docs/reenactors.md)")

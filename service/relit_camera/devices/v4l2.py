@@ -30,7 +30,7 @@ YU12 = int.from_bytes(b"YU12", "little")
 """The pixel format I420: planes Y, U, V, the last two of half width and height."""
 V4L2_FORMAT = struct.Struct("=I4x7I172x")
 """v4l2_format: the buffers' type, then of v4l2_pix_format width, height, pixel format, field, bytes a line and a
-picture, colour space; the rest is zero."""
+picture, color space; the rest is zero."""
 
 EVENT_BYTES, EVENT_DATA_OFFSET = 136, 8
 EVENT_CLIENT_USAGE = 0x08000000 + 0x08E00000 + 1

@@ -1,1 +1,1 @@
-"""Rendered phone captures with ground truth (thesis 4.3)."""
+"""The phone capture video whose truth is known (thesis 4.3)."""

@@ -1,1 +1,1 @@
-"""Cycles as a renderer: its own Python environment, jobs as files, and the worker that runs them there."""
+"""Cycles as a renderer: an environment of its own, jobs as files, and the worker that runs them there."""

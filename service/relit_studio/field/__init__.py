@@ -1,1 +1,1 @@
-"""Rendered OLAT pictures: a person under one light after another, over the whole sphere."""
+"""A person under one light after another, over the whole sphere."""

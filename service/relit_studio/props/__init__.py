@@ -1,1 +1,1 @@
-"""Things that people hold: a mug, and the hands and sleeves that come with it."""
+"""What people hold: a mug, and the hands and sleeves that come with it."""

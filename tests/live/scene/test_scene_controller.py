@@ -112,7 +112,7 @@ def test_a_picture_lights_the_face_from_its_bright_side(right: bool, scene_contr
     scene_controller.backgrounds.add("room", half_bright(right))
     look = Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=ImageBackground(image="room"))
     scene = scene_controller.set_look(look)
-    assert scene.backdrop is not None
+    assert scene.background_image is not None
     assert (lit_from_right(scene_controller) > 0) == right
 
 
@@ -128,9 +128,9 @@ def test_another_background_lights_anew(scene_controller: SceneController) -> No
 
 def test_an_environment_as_background_picture_is_seen_from_inside(scene_controller: SceneController) -> None:
     scene = scene_controller.set_look(Look(background=ImageBackground(image="window")))
-    assert scene.backdrop is not None
-    assert scene.backdrop.dtype == np.uint8
-    halves = np.split(scene.backdrop.astype(np.float64), 2, axis=1)
+    assert scene.background_image is not None
+    assert scene.background_image.dtype == np.uint8
+    halves = np.split(scene.background_image.astype(np.float64), 2, axis=1)
     brighter_right = float(halves[1].mean() - halves[0].mean())
     lit = Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=ImageBackground(image="window"))
     environment = scene_controller.set_look(lit).environment
@@ -150,7 +150,7 @@ def test_what_a_change_leaves_alone_is_kept(scene_controller: SceneController, m
         update={"lighting": look.lighting.model_copy(update={"exposure_ev": 1.0}), "mode": Mode.RATIO}
     )
     after = scene_controller.update_look(change)
-    assert after.backdrop is before.backdrop
+    assert after.background_image is before.background_image
     assert after.environment is before.environment
     assert after.look.mode is Mode.RATIO
 

@@ -1,4 +1,4 @@
-"""Colour conversions and light colours. Linear values are Rec. 709 primaries, scene-referred, channel order RGB."""
+"""Color conversions and the color of light. Linear values are Rec. 709 RGB, scene-referred, channels in that order."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CHROMA_MATRIX = np.array(
 """U and V of R, G, B from 0 to 255 (ITU-R BT.601, limited range)."""
 
 Gamma = str | float
-"""How a picture's code values map to linear light: "srgb", "linear" or the exponent of a power law."""
+"""Transfer curve of a picture's code values: "srgb", "linear", or the exponent of a power law."""
 
 
 def srgb_decode(encoded: ArrayLike) -> NDArray[np.float32]:
@@ -37,7 +37,7 @@ def srgb_encode(linear: ArrayLike) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=1)
 def _encode_table() -> NDArray[np.uint8]:
-    # 14 bits: the steepest part of the curve (12.92 x 255 codes per unit) still moves by less than a quarter code.
+    # 14 bits: even at its steepest (12.92 x 255 codes per unit) the curve moves less than a quarter code a step.
     return np.round(srgb_encode(np.linspace(0, 1, 1 << 14)) * 255).astype(np.uint8)
 
 
@@ -64,7 +64,7 @@ def linear_from_uint8(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def parse_gamma(text: str) -> Gamma:
-    """Read `srgb`, `linear` or a number between 0.2 and 5.
+    """Parse the name of a transfer curve: `srgb`, `linear`, or an exponent between 0.2 and 5.
 
     Raises:
         InputError: anything else.
@@ -134,7 +134,7 @@ def _daylight_locus(t: float) -> NDArray[np.float64]:
 def rgb_from_kelvin(kelvin: float) -> NDArray[np.float32]:
     """Linear RGB (3,) of a black body or daylight at `kelvin`, scaled to luminance 1; negative parts are cut.
 
-    Chromaticity: black body below 4000 K, CIE daylight above 5000 K, between them from one to the other; clamped to
+    Chromaticity: black body below 4000 K, CIE daylight above 5000 K, between them a mixture of both; clamped to
     1667 to 25000 K.
     """
     t = float(np.clip(kelvin, 1667, 25000))

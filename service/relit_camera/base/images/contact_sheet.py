@@ -1,4 +1,4 @@
-"""Contact sheets: pictures of record side by side, so that a person can look at what was measured."""
+"""Contact sheets: labeled pictures in rows and columns, for people to look at."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def contact_sheet(
         for j, shown in enumerate(row):
             if shown is not None:
                 x = left + j * (cell[0] + _GAP)
-                # Enlarged pixels stay squares: a sheet shows what is there.
+                # Enlarged without interpolation, so that the sheet shows the pixels as they are.
                 sheet[y : y + cell[1], x : x + cell[0]] = letterbox(shown, cell, (_CELL_GRAY,) * 3, cv2.INTER_NEAREST)
     return sheet
 

@@ -14,12 +14,12 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def crop_to_fill(image: DisplayImage, size: tuple[int, int]) -> DisplayImage:
-    """The image scaled to cover `size` (width, height), and its middle cut out."""
+    """Scale the image to cover `size` (width, height), and crop it to that about its middle."""
     return resize_to_fill(image, size, cv2.INTER_CUBIC)
 
 
 def resize_to_fill(picture: NDArray[np.uint8], size: tuple[int, int], enlarging: int) -> NDArray[np.uint8]:
-    """`crop_to_fill` for any uint8 picture (height, width, ...), enlarged with that interpolation of OpenCV's."""
+    """As `crop_to_fill`, for any uint8 picture (height, width, ...); OpenCV interpolates by `enlarging` to enlarge."""
     height, width = picture.shape[:2]
     scale = max(size[0] / width, size[1] / height)
     columns, rows = min(width, round(size[0] / scale)), min(height, round(size[1] / scale))

@@ -66,4 +66,4 @@ def composite_source_image(
 
 
 def _background_request(scene: Scene) -> BackgroundRequest:
-    return BackgroundRequest(scene.look.background, scene.look.lighting, scene.environment, scene.backdrop)
+    return BackgroundRequest(scene.look.background, scene.look.lighting, scene.environment, scene.background_image)

@@ -1,1 +1,1 @@
-"""The code that runs inside the environment of Cycles: bpy and numpy only."""
+"""What runs inside Cycles' environment: bpy and numpy, nothing else of ours."""
