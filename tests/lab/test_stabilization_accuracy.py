@@ -72,12 +72,12 @@ def test_each_way_finds_small_motions_under_one_light(name: str) -> None:
     squares = np.stack([255 * moved(texture(), move) for move in moves]).clip(0, 255).astype(np.uint8)[:, :240]
     found = BASELINE_STABILIZERS[name](squares, CIRCLE)
     assert all(found)
-    # The squares' centre is 20 px above the picture's.
-    centre = np.array([[SIZE[0] / 2, 120]])
+    # The squares' center is 20 px above the picture's.
+    center = np.array([[SIZE[0] / 2, 120]])
     for transform, move in zip(found, moves, strict=True):
         still = RigidTransform(move.degrees, move.x, move.y).inverse()
         first = RigidTransform(found[0].rotation_deg, found[0].x, found[0].y).inverse()
-        left = transform.then(first).apply(centre, (SIZE[0], 240)) - still.apply(centre, SIZE)
+        left = transform.then(first).apply(center, (SIZE[0], 240)) - still.apply(center, SIZE)
         assert np.abs(left).max() < 0.5
 
 

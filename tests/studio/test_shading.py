@@ -8,7 +8,7 @@ from relit_camera.base.errors import ImageError
 from relit_camera.light.directions import direction_from_degrees, fibonacci_directions
 from relit_camera.light.light_map_rotation import irradiance, total
 from relit_camera.light.scene_light import lamp_light_map
-from relit_studio.mannequin.lights import lights_from_map, room
+from relit_studio.mannequin.distant_lights import lights_from_map, room
 from relit_studio.mannequin.mesh import grid_triangles
 from relit_studio.mannequin.shading import ShadowMap, Surface, reflected
 

@@ -1,4 +1,4 @@
-"""A person's skin: the photographed albedo in their colour, with moles and freckles of their own."""
+"""A person's skin: the photographed albedo in their color, with moles and freckles of their own."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
-from relit_studio.people.folds import age_spots, folds
 from relit_studio.people.geometry import Floats, smoothstep
 from relit_studio.people.scan_pictures import lips_mask, scalp_mask
+from relit_studio.people.skin_aging import age_spots, folds
 from relit_studio.people.traits import Traits
 
 SIDE = 2048

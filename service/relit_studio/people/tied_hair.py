@@ -10,14 +10,14 @@ from relit_studio.people.scalp import Obstacle, Roots
 KNOTS = {"ponytail": np.array([0.0, 8.6, -9.0]), "bun": np.array([0.0, 16.0, -3.6])}
 """Where the mean head's hair is tied."""
 POINTS = 30
-_CENTRE = np.array([0.0, 4.0, -0.5])
+_CENTER = np.array([0.0, 4.0, -0.5])
 _BUN_CM = 3.5
 
 
 def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Generator) -> Floats:
     """Polylines (n, 30, 3) over the head from each root to the knot."""
     count = len(roots.place)
-    offset, goal = roots.place - _CENTRE, knot - _CENTRE
+    offset, goal = roots.place - _CENTER, knot - _CENTER
     reach, goal_reach = np.linalg.norm(offset, axis=1), float(np.linalg.norm(goal))
     start, end = offset / reach[:, None], np.tile(goal / goal_reach, (count, 1))
     angle = np.arccos(np.clip((start * end).sum(axis=1), -0.999, 0.999))[:, None]
@@ -27,7 +27,7 @@ def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Ge
     for t in np.linspace(0, 1, POINTS):
         # Along the great circle, which is the way a brush takes.
         direction = (np.sin((1 - t) * angle) * start + np.sin(t * angle) * end) / np.sin(angle)
-        place = _CENTRE + direction * ((1 - t) * reach + t * goal_reach)[:, None] + slack * np.sin(np.pi * t)
+        place = _CENTER + direction * ((1 - t) * reach + t * goal_reach)[:, None] + slack * np.sin(np.pi * t)
         surface, normal = obstacle.nearest(place)
         gap = ((place - surface) * normal).sum(axis=1)
         wanted = layer * min(1.0, 6 * t) + 0.9 * smoothstep(t, 0.75, 1.0)
@@ -63,7 +63,7 @@ def tail(knot: Floats, obstacle: Obstacle, count: int, rng: np.random.Generator)
 
 def bun(knot: Floats, count: int, rng: np.random.Generator) -> Floats:
     """Polylines (count, 30, 3) wound about a ball over the knot."""
-    up = unit(knot - _CENTRE)
+    up = unit(knot - _CENTER)
     aside = unit(np.cross(up, [0, 0, 1]))
     ahead = np.cross(aside, up)
     strand = rng.integers(7, size=count)
