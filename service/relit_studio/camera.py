@@ -41,7 +41,7 @@ class Camera:
 
     @property
     def position_cm(self) -> NDArray[np.float64]:
-        """Where the camera is, (3,) in room axes."""
+        """Position (3,) of the camera in room axes."""
         return np.array([0.0, self.middle_cm, self.distance_cm])
 
     def project(self, points: NDArray) -> Points:

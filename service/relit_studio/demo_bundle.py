@@ -72,7 +72,7 @@ def _write(
     subject = build_subject(samples, DEFAULT_METHOD, "lights.lp", "linear", points)
     write_subject(subject_file, pack_subject(subject, components), small=True)
     shutil.copyfile(_existing(clip / demo_files.CLIP.name), clip_file)
-    # To a thousandth of a pixel, a degree, a centimeter.
+    # Round to a thousandth of a pixel, degree or centimeter.
     text = (clip / demo_files.TRACK.name).read_text(encoding="utf-8")
     track = json.loads(text, parse_float=lambda number: round(float(number), 3))
     write_atomic(track_file, json.dumps(track, separators=(",", ":")) + "\n")
@@ -102,7 +102,7 @@ def _frames(clip: Path, count: int) -> list[Path]:
 
 
 def _matte(path: Path) -> Mask:
-    """Of one frame, at half its size."""
+    """Matte of one frame, at half its size."""
     _, alpha = read_rgba(path)
     height, width = alpha.shape
     small: Mask = cv2.resize(alpha, (width // _MATTE_SHRINK, height // _MATTE_SHRINK), interpolation=cv2.INTER_AREA)

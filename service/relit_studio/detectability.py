@@ -24,7 +24,7 @@ MAX_LANDMARK_ERROR = 0.15
 
 @dataclass(frozen=True)
 class Detectability:
-    """What the models found in one picture.
+    """Detections of the models in one picture.
 
     Attributes:
         yaw_deg, pitch_deg: the true pose.
@@ -38,7 +38,7 @@ class Detectability:
     detected: bool
     errors: Mapping[str, float | None]
 
-    def followed(self, tracker: str) -> bool:
+    def tracked(self, tracker: str) -> bool:
         """Whether the tracker found the face, with its landmarks on it."""
         error = self.errors[tracker]
         return error is not None and error < MAX_LANDMARK_ERROR
@@ -83,7 +83,7 @@ def detectability_table(seen: Sequence[Detectability]) -> list[dict[str, float |
             "detected": float(np.mean([each.detected for each in group])),
         }
         for tracker in group[0].errors:
-            good = [each.errors[tracker] for each in group if each.followed(tracker)]
+            good = [each.errors[tracker] for each in group if each.tracked(tracker)]
             row[f"{tracker} followed"] = len(good) / len(group)
             row[f"{tracker} error"] = float(np.mean(np.array(good, float))) if good else None
         rows.append(row)

@@ -31,8 +31,8 @@ from tests.lab.html_outline import Outline
 
 def test_text_from_outside_is_escaped_everywhere() -> None:
     evil = "<script>alert(1)</script>"
-    blocks = [Heading(evil), Heading(evil), Paragraph(evil), table([evil], [[evil]], evil)]
-    page = render_page(evil, [*blocks, picture(np.zeros((2, 2, 3), np.uint8), evil)])
+    image = picture(np.zeros((2, 2, 3), np.uint8), evil)
+    page = render_page(evil, [Heading(evil), Heading(evil), Paragraph(evil), table([evil], [[evil]], evil), image])
     outline = Outline()
     outline.feed(page)
     assert outline.fetched == outline.open == []

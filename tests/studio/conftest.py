@@ -15,6 +15,7 @@ from relit_studio.people.person import Person
 from relit_studio.people.shirt import Shirt
 
 NOTHING = np.zeros((0, 3))
+NO_FACES = np.zeros((0, 3), np.intp)
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +31,7 @@ def person(shared: Path) -> Person:
     """Adam's face alone."""
     model = read_face_model(shared / "faces" / "ict_facekit_light.npz")
     traits = NAMED_PEOPLE["adam"]
-    bare = Shirt(NOTHING, NOTHING, NOTHING, NOTHING, np.zeros(len(model.vertices), bool))
-    people_assets = PeopleAssets(model, np.zeros((len(model.vertices), 2)), NOTHING, NOTHING, Path())
+    bare = Shirt(NOTHING, NO_FACES, NOTHING, NO_FACES, np.zeros(len(model.vertices), bool))
+    people_assets = PeopleAssets(model, np.zeros((len(model.vertices), 2)), NOTHING, NO_FACES, Path())
     hair = Hairs(np.zeros((0, 2, 3)), np.zeros((0, 2)), np.zeros(0))
     return Person(traits, people_assets, model.neutral(identity_weights(model, traits)), hair, bare)

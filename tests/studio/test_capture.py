@@ -64,7 +64,7 @@ def states(truth: dict[str, Any], state: str) -> list[int]:
 
 def lit_rows(frame: dict[str, Any]) -> np.ndarray:
     y, share = np.array(frame["flash"]["lit_rows_px_share"]).T
-    return np.interp(np.arange(HEIGHT) + 0.5, y, share)
+    return np.asarray(np.interp(np.arange(HEIGHT) + 0.5, y, share))
 
 
 def test_a_frame_for_every_thirtieth_of_six_seconds(plain: tuple[np.ndarray, dict[str, Any]]) -> None:
@@ -122,8 +122,8 @@ def test_ball_is_where_the_truth_has_it(plain: tuple[np.ndarray, dict[str, Any]]
     ball = truth["ball"]
     corner = np.s_[: int(ball["y_px"] + 1.6 * ball["radius_px"]), int(ball["x_px"] - 1.6 * ball["radius_px"]) :]
     differs = np.abs(dark - behind).max(axis=2)[corner] > 2 / 255
-    y, x = np.nonzero(differs)
-    x, y = x + 0.5 + corner[1].start, y + 0.5
+    rows, columns = np.nonzero(differs)
+    x, y = columns + 0.5 + corner[1].start, rows + 0.5
     assert (x.mean(), y.mean()) == pytest.approx((ball["x_px"], ball["y_px"]), abs=0.5)
     assert np.sqrt(len(x) / np.pi) == pytest.approx(ball["radius_px"], abs=0.6)
 

@@ -63,7 +63,7 @@ def test_both_cameras_see_alike() -> None:
     settings = SolverSettings()
     camera, solver = twin_camera(settings), solver_camera(settings)
     points = mannequin_surfaces(np.zeros(3)).vertices
-    placed = points + np.float32([0, -BELOW_AXIS_CM, -DISTANCE_CM])
+    placed = points + np.array([0, -BELOW_AXIS_CM, -DISTANCE_CM], np.float32)
     np.testing.assert_allclose(camera.project(points), solver.project(placed)[:, :2], atol=1e-3)
 
 

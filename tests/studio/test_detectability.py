@@ -35,7 +35,7 @@ class OffTracker:
         if self.off_px is None:
             return LOST
         true = CAMERA.project(landmarks(self.person, POSTURE)[self.scheme])
-        return FaceState(FaceStatus.FOUND, 1.0, self.scheme, true + np.float32([self.off_px, 0]))
+        return FaceState(FaceStatus.FOUND, 1.0, self.scheme, true + np.array([self.off_px, 0], np.float32))
 
     def reset(self) -> None:
         """Nothing is kept."""
@@ -63,12 +63,12 @@ def test_errors_are_in_distances_of_the_eyes(person: Person) -> None:
     assert 60 < eyes_px < 160
     found = seen(person, 0.1 * eyes_px, None)
     assert found.errors["off"] == pytest.approx(0.1, rel=1e-3)
-    assert found.followed("off")
+    assert found.tracked("off")
 
 
 def test_points_beside_the_face_do_not_count(person: Person) -> None:
-    assert not seen(person, 60.0, None).followed("off")
-    assert not seen(person, None, None).followed("off")
+    assert not seen(person, 60.0, None).tracked("off")
+    assert not seen(person, None, None).tracked("off")
 
 
 def test_a_box_must_hold_the_face(person: Person) -> None:

@@ -137,7 +137,7 @@ def test_who_moves_aside_takes_landmarks_and_pose_along(person: Person) -> None:
     assert at_rest.pose is not None
     assert aside.pose is not None
     moved = aside.pose.translation - at_rest.pose.translation
-    np.testing.assert_allclose(moved / np.linalg.norm(moved), shift / np.linalg.norm(shift), atol=1e-9)
+    np.testing.assert_allclose(moved / np.linalg.norm(moved), np.array(shift) / np.linalg.norm(shift), atol=1e-9)
 
 
 def test_nobody_is_found_while_nobody_is_there(person: Person, tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -25,13 +27,13 @@ SOFT = DistantLights(
 )
 
 
-def points_of(**kinds: object) -> np.ndarray:
+def points_of(**kinds: Any) -> np.ndarray:
     return landmarks_px(CAMERA, Posture(**kinds))
 
 
 def color_at(picture: np.ndarray, point: np.ndarray, radius: float = 1.5) -> np.ndarray:
     y, x = np.mgrid[: picture.shape[0], : picture.shape[1]] + 0.5
-    return picture[np.hypot(x - point[0], y - point[1]) < radius].mean(axis=0)
+    return np.asarray(picture[np.hypot(x - point[0], y - point[1]) < radius].mean(axis=0))
 
 
 def rendered_iris(picture: np.ndarray, points: np.ndarray, iris: int) -> np.ndarray:
@@ -40,7 +42,7 @@ def rendered_iris(picture: np.ndarray, points: np.ndarray, iris: int) -> np.ndar
     y, x = np.mgrid[: picture.shape[0], : picture.shape[1]] + 0.5
     near = np.hypot(x - points[iris, 0], y - points[iris, 1]) < 1.2 * radius
     dark = np.clip(0.12 - luminance(picture), 0, None) * near
-    return np.array([(x * dark).sum(), (y * dark).sum()]) / dark.sum()
+    return np.asarray(np.array([(x * dark).sum(), (y * dark).sum()]) / dark.sum())
 
 
 @pytest.mark.parametrize(

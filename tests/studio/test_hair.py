@@ -26,7 +26,7 @@ def distance_outside(person: Person, points: np.ndarray) -> np.ndarray:
     skin = np.unique(triangles)
     normals = vertex_normals(person.neutral, triangles)[skin]
     _, nearest = cKDTree(person.neutral[skin]).query(points)
-    return ((points - person.neutral[skin][nearest]) * normals[nearest]).sum(axis=1)
+    return np.asarray(((points - person.neutral[skin][nearest]) * normals[nearest]).sum(axis=1))
 
 
 @pytest.mark.parametrize("style", get_args(HairStyle))

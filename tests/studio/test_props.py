@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -30,7 +31,7 @@ def directed_edges(solid: Solid) -> np.ndarray:
 
 
 @pytest.mark.parametrize("make", [lambda: throw_mug()[0], lambda: throw_mug()[1], gripping_hand, open_hand, sew_sleeve])
-def test_surfaces_are_closed_and_face_outward(make) -> None:
+def test_surfaces_are_closed_and_face_outward(make: Callable[[], Solid]) -> None:
     solid = make()
     edges = directed_edges(solid)
     # Each edge is used as often in one direction as in the other.

@@ -105,7 +105,7 @@ def test_one_bounce_more_adds_light_and_less_each_time() -> None:
 
 def test_glossy_surface_over_white_gives_back_what_it_gets_and_no_more() -> None:
     directions, weights = white_sky(32)
-    normals = np.tile(np.float32([0, 0, 1]), (3, 1))
+    normals = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
     tilt = np.radians([0, 45, 75])
     views = np.stack([np.sin(tilt), 0 * tilt, np.cos(tilt)], axis=1).astype(np.float32)
     for f0, alpha in ((0.04, 0.15), (0.04, 0.5), (0.9, 0.4)):

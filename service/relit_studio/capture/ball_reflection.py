@@ -147,7 +147,7 @@ def _disc_light(
 ) -> NDArray[np.float64]:
     """Radiance of the disc reflected at positions (count,) by a perfect mirror."""
     hit, points, mirrored = ball.reflect(camera.rays(x, y))
-    # The disc faces along its aim: rays that come from its back see nothing.
+    # The disc emits to its front only.
     facing = -(mirrored @ torch.aim)
     travel = ((torch.position - points) @ torch.aim) / np.where(facing > 1e-9, -facing, np.inf)
     offset = points + travel[:, None] * mirrored - torch.position

@@ -51,7 +51,7 @@ class Timing:
 
     @property
     def frames(self) -> int:
-        """How many frames there are."""
+        """Number of frames."""
         return max(1, round(self.seconds * self.fps))
 
 

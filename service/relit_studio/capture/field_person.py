@@ -70,7 +70,7 @@ class FieldPerson:
         self.camera = Pinhole(round(field_camera.width * scale), height, field_camera.focal_px * scale)
         self._field_camera = field_camera
         self._inside = self._matte > 0.5
-        # At the edge a pixel's depth may be mixed with nothing's.
+        # Depth at the person's edge may be mixed with empty background.
         nearest = distance_transform_edt(~self._inside, return_distances=False, return_indices=True)
         self._points = _unproject(field_camera, depth[tuple(nearest)] - depth_zero_cm)
         self._origin = _head_origin(self._points[self._inside])
@@ -141,7 +141,7 @@ class FieldPerson:
         moved = motion.apply(self._points - self._origin) + self._origin
         x, y, _ = np.moveaxis(field.project(moved.reshape(-1, 3)).reshape(*self._matte.shape, 3), -1, 0)
         rest_x, rest_y = field.pixel_grid()
-        # The movement is smooth but for steps of the depth: drawn over them, the background goes along at the edge.
+        # The movement is smooth except at depth steps, where the background near the edge moves along.
         shift = np.stack([x - rest_x, y - rest_y], axis=-1).astype(np.float32)
         shift = _filled(shift, self._inside)
         wanted = np.stack(self.camera.pixel_grid(), axis=-1) * (field.height / self.camera.height)
@@ -154,7 +154,7 @@ class FieldPerson:
         return source[..., 0] - 0.5, source[..., 1] - 0.5
 
     def _moved(self, picture: NDArray[np.float32], at: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray:
-        # The lower border goes on below the picture, where the body would.
+        # Extend the lower border below the picture, where the body continues.
         return np.asarray(cv2.remap(picture, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 

@@ -26,11 +26,11 @@ class FlashSchedule:
     phase_s: float
 
     def lit_seconds(self, start_s: ArrayLike, end_s: ArrayLike) -> NDArray[np.float64]:
-        """How long it is on within intervals (...) of time."""
+        """Seconds (...) for which the torch is on within time intervals (...)."""
         return self._lit_until(end_s) - self._lit_until(start_s)
 
     def switching_times(self, start_s: float, end_s: float) -> NDArray[np.float64]:
-        """The moments (count,) within an interval at which it goes on or off."""
+        """Times (count,) within an interval at which the torch goes on or off."""
         first, last = (int(np.floor((t - self.phase_s) * self.frequency_hz)) for t in (start_s, end_s))
         periods = np.arange(first - 1, last + 2)
         times = np.sort(np.concatenate([periods, periods + self.duty])) / self.frequency_hz + self.phase_s

@@ -21,7 +21,7 @@ from relit_studio.pinhole import Pinhole
 _SEAT_CM = (0.0, -2.0, -62.0)
 """The head's origin at rest."""
 _HEIGHT_CM = 56.0
-"""What the picture's height spans at the head's origin: the bust, cut below the shoulders, fills it to the bottom."""
+"""Height of the view at the head's origin: the bust, cut below the shoulders, fills it to the bottom."""
 
 _SUPERSAMPLING = 2
 _AMBIENT_LIGHTS = 16
@@ -50,7 +50,7 @@ class MannequinPerson:
         self._figure = mannequin()
         vertices, _ = self._seen(REST)
         normals = self._figure.normals(vertices)
-        # The room's shadows are soft and the head moves by a degree or two: they are found once, at rest.
+        # Room shadows are soft and the head moves by a degree or two, so they are computed once, at rest.
         self._room_lit = [
             ShadowMap(vertices, self._figure.casters, direction, _AMBIENT_SHADOW).lit(vertices, normals)
             for direction in self._room.directions

@@ -56,7 +56,7 @@ def record(
     face = face[:: max(1, len(face) // _FACE_POINTS)]
     whole = capture_truth(scene, stages, video.name, room, seed, face)
     total = scene.timing.frames
-    # With what the truth does not name and the frames depend on.
+    # Includes settings that frames depend on but the truth does not contain.
     settings = {"frames": total, "motion": scene.motion, "room_light": float(scene.room.radiance.mean())}
     store = FrameStore(folder / ".frames", whole | settings)
     gains, truths = Gains(), []

@@ -24,7 +24,7 @@ from relit_studio.field.transport_solver import SolverSettings, write_solver_fie
 
 
 class Renderer(StrEnum):
-    """What renders a field."""
+    """Renderer of a field."""
 
     CYCLES = "cycles"
     SOLVER = "solver"

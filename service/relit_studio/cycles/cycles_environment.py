@@ -75,7 +75,7 @@ def _python311() -> str:
 
 
 def _run(command: list[str], purpose: str) -> None:
-    # Not ours: packages of the calling environment would be found in the new one.
+    # Without PYTHON* variables, or packages of the calling environment would be found in the new one.
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     if done.returncode:

@@ -68,13 +68,13 @@ def _reports(command: Sequence[str], errors: Path) -> Iterator[dict[str, str]]:
     with errors.open("w+", encoding="utf-8") as stderr, _process(command, stderr.fileno()) as process:
         assert process.stdout is not None
         for line in process.stdout:
-            # Blender talks on stdout, too.
+            # Blender writes messages to stdout, too.
             if line.startswith('{"picture"'):
                 yield json.loads(line)
         try:
             failed = process.wait(_WAIT_S)
         except subprocess.TimeoutExpired:
-            return  # It has nothing more to tell; whether a picture is missing, `render` sees.
+            return  # No more output. `render` checks whether pictures are missing.
         if failed:
             stderr.seek(0)
             last = (stderr.read().strip().splitlines() or ["no message"])[-1]

@@ -24,7 +24,7 @@ _CHUNK = 12
 
 @dataclass(frozen=True)
 class DriveSettings:
-    """What a driving video is rendered with.
+    """Settings of a driving video.
 
     Attributes:
         size: width and height of the frames, pixels.

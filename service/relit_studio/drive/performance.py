@@ -31,7 +31,7 @@ class ActorState:
 
 @dataclass(frozen=True)
 class Performance:
-    """What a person does in a driving video.
+    """A person's postures, gestures and place over the time of a driving video.
 
     Attributes:
         name: of the performance.

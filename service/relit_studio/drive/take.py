@@ -48,7 +48,7 @@ class Take:
         if self._held and actor.gesture:
             motions = self._held.motions(actor.posture, actor.gesture)
             shape |= {f"{name}.matrix": motion for name, motion in motions.items()}
-        # Over whatever else moves in an object: vertices, strands, or all of it.
+        # Applied after all other motion of an object.
         shift = np.eye(4)
         shift[:3, 3] = actor.shift_cm
         for each in self.scene.objects:

@@ -40,7 +40,7 @@ class Webcam:
         self.follow(light, _WARM_FRAMES)
 
     def set_at(self, time_s: float) -> Gains:
-        """What it has set for the frame at a time: as its automatics stand, and the drift."""
+        """Gains for the frame at a time: the current auto controls, and the drift."""
         drift = _DRIFT * self._drift.at(time_s)
         red, blue = (each + float(more) for each, more in zip(self.gains.balance, drift, strict=True))
         return replace(self.gains, balance=(red, blue))
@@ -53,7 +53,7 @@ class Webcam:
         """Let the auto controls follow this scene light for so many frames at 24 a second."""
         mean = self._mean(light)
         wanted = self._tint * _WANTED
-        # What looks tinted may be so: it goes part of the way.
+        # The scene itself may be tinted, so correct only part of it.
         trusted = wanted * (mean / wanted) ** (1 - _TRUST)
         for _ in range(frames):
             self.gains = _AUTO_CONTROLS.expose(self.gains, mean, wanted)

@@ -35,7 +35,7 @@ class Transport:
     sky: Values
 
     def gather(self, sent: Values) -> Values:
-        """What vertices receive (vertices, k) from each other when they send `sent` (vertices, k), white-wall units."""
+        """Light (vertices, k) that vertices receive when they send out `sent` (vertices, k), in white-wall units."""
         return np.asarray(self.form_factors @ sent, np.float32)
 
 

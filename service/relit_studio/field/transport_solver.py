@@ -46,7 +46,7 @@ class SolverSettings:
 
     Attributes:
         width, height: of the pictures, pixels.
-        map_rows: the lights stand at the texels of a map of so many rows and twice as many columns.
+        map_rows: rows of the light map, with twice as many columns, at whose texels the lights are.
         bounces: diffuse reflections that light takes before the last one.
         bundles: directions of the ray bundles between surfaces.
         rays: along a side of each bundle.

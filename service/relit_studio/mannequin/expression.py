@@ -23,7 +23,7 @@ from relit_studio.mannequin.mesh import Floats, spread
 JAW_HINGE = np.array([0.0, 0.0, -3.0])
 JAW_RANGE_DEG = 23.0
 _EYES_WIDENED = 0.3
-"""How much wider than the canonical face the mannequin opens its eyes, as a share of the lid gap."""
+"""Extra opening of the mannequin's eyes over the canonical face, as a share of the lid gap."""
 
 _FRIENDLY = 0.2
 """Smile of the neutral face."""

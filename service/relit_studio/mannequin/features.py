@@ -48,7 +48,7 @@ def teeth(name: str, *, upper: bool) -> Part:
     height = top + (bottom - top) * rows[:, None] * np.ones_like(arch)
     edge = rows if upper else 1 - rows
     height = height + (0.07 if upper else -0.07) * (1 - gap) * edge[:, None]
-    # Teeth stand out between their gaps, and lean back towards their edge.
+    # Teeth stand out between their gaps, and lean back toward their edge.
     out = 0.10 * gap * np.sin(np.pi * np.clip(edge, 0.15, 0.85))[:, None] - 0.1 * edge[:, None]
     width, depth = 2.45 + out, 2.3 + out
     vertices = np.stack([width * np.sin(arch), height, front - 2.3 + depth * np.cos(arch)], axis=-1)

@@ -32,7 +32,7 @@ _SKULL_RINGS = (0.1, 0.22, 0.36, 0.52, 0.68, 0.84)
 
 @dataclass(frozen=True, eq=False)
 class ControlHead:
-    """What expressions move.
+    """Control mesh of the head, which expressions deform.
 
     Attributes:
         mesh: the control mesh.

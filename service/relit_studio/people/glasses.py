@@ -78,7 +78,7 @@ def _sag(flat: Floats) -> Floats:
 
 
 def _depth(skin: Floats, marks: Floats, middle: Floats, aside: float, outline: Floats, rim_cm: float) -> float:
-    """How far ahead the frame must stand to clear lids, nose, brows and cheeks."""
+    """Depth at which the frame clears lids, nose, brows and cheeks."""
     lids = marks[36:48]
     wanted = [(lids[:, 2] - _sag(lids[:, :2] - middle[:2])).max() + _LASH_CM]
     front = skin[skin[:, 2] > 5]

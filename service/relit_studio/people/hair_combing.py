@@ -12,7 +12,7 @@ from relit_studio.people.scalp import Obstacle, Roots
 
 @dataclass(frozen=True, eq=False)
 class Combing:
-    """How hairs grow from their roots.
+    """Growth of combed hair.
 
     Attributes:
         direction: (n, 3) unit vectors along which hairs are combed.

@@ -16,7 +16,7 @@ _STRAYS = 0.03
 
 
 class Locks(NamedTuple):
-    """How hairs gather.
+    """Grouping of hairs into locks.
 
     `hairs` a lock, how strongly they are drawn together at the tip, how late that begins (`onset`), by how many
     centimeters a whole lock's tip lies higher or lower than its neighbors', and how much lighter or darker locks are.

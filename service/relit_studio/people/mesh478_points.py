@@ -22,7 +22,7 @@ IBUG_66 = np.delete(np.arange(68), (48, 54))
 """The iBUG points of scheme openseeface66: all but the outer mouth corners."""
 _SKIN_POINTS = 468
 _CANDIDATES = 24
-"""Triangles looked at for the nearest point."""
+"""Number of nearby triangles that are searched for the nearest point."""
 
 
 @lru_cache(maxsize=1)

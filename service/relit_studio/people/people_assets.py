@@ -72,7 +72,7 @@ def _prepare(model: FaceModel, folder: Path) -> None:
     write_display(folder / "clean.png", pictures.clean)
     write_atomic(folder / "pores.png", _gray_png(pictures.pores))
     laid = register(model, scan)
-    # Written last: it says that everything is there.
+    # Written last: its existence means that all files are complete.
     with atomic_path(folder / "registration.npz") as temporary:
         np.savez_compressed(temporary, uv=laid.uv, body=laid.body, body_triangles=scan.triangles)
 

@@ -38,7 +38,7 @@ _EYES_AND_NOSE = ((395, 280), (630, 280), (640, 330), (560, 345), (565, 430), (4
 _FOREHEAD = (slice(100, 230), slice(400, 630))
 """Where pores are copied from to cover removed features."""
 _MOLE_DEPTH = 0.045
-"""How much darker than its surroundings a mole is, in sRGB code values of 0..1."""
+"""Least difference of a mole from its brighter surroundings, in sRGB code values of 0..1."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,10 +13,10 @@ from relit_studio.props.solids import Blob, Solid, union_surface
 
 _STEP_CM = 0.26
 _FINGER_CREASE, _PALM_CREASE, _JOIN = 0.1, 0.45, 0.3
-"""How soft the creases are between fingers, in the palm, and where they meet, in centimeters."""
+"""Softness of the creases between fingers, in the palm, and where they meet, in centimeters."""
 
 GRIP_WRIST = np.array([-9.4, -1.2, -4.6])
-"""Of the hand that holds the mug, in the mug's axes; its arm goes on along `_GRIP_ARM`."""
+"""Wrist of the hand that holds the mug, in the mug's axes; its arm continues along `_GRIP_ARM`."""
 _GRIP_ARM = np.array([-0.5, -0.8, -0.33])
 _OPEN_ARM = np.array([0.0, -1.0, 0.0])
 _STUB_CM = 5.0

@@ -81,7 +81,7 @@ class HeldObjects:
         )
 
     def materials(self) -> dict[str, Material]:
-        """Of the objects, by name."""
+        """Materials of the objects, by name."""
         return {
             "hand": {
                 "kind": "plain",

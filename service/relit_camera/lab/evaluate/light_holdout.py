@@ -172,7 +172,7 @@ def aligned_truth(kept: Samples, pictures: Colors, directions: NDArray[np.float6
 
 
 def _scores(known: GroundTruth, method: str, predicted: Colors, truth: Colors, raw_peak_255_db: float) -> HoldOutScores:
-    """Of colors (some, pixels, 3) against the true ones."""
+    """Scores of predicted colors (some, pixels, 3) against the true ones."""
     relit = [compare_relit(known, seen, expected) for seen, expected in zip(predicted, truth, strict=True)]
     return HoldOutScores(
         method=method,

@@ -61,7 +61,7 @@ def set_light(light: Mapping[str, Any]) -> None:
 
 def _set_sun(direction: Sequence[float], irradiance: float, size_deg: float) -> None:
     lamp = bpy.data.lights.get("sun") or bpy.data.lights.new("sun", "SUN")
-    # Cycles gives a white wall that faces a sun of strength E the radiance E / pi; ours shall read E.
+    # In Cycles a white wall facing a sun of strength E has radiance E / pi; in our unit its value is E.
     lamp.energy, lamp.angle = math.pi * irradiance, math.radians(size_deg)
     placed = bpy.data.objects.get("sun")
     if placed is None:

@@ -28,7 +28,7 @@ SHADING_BLUR_SIGMA = 0.04
 REPORT_FRAMES = 6
 """Approximate number of frames shown in the report."""
 _NO_PERSON = (np.nan,) * 6
-"""The figures of a frame with nobody in it."""
+"""The figures of a frame without a person."""
 
 
 @dataclass(frozen=True)
