@@ -72,7 +72,7 @@ def build(film: Path, shot: Shot, folder: Path) -> Answer:
         (films.black_without_the_flash, "the face shows nothing that can be followed", "a little brighter"),
         (films.black_about_a_small_circle, "only 0 points of the face can be followed", "a little brighter"),
         (films.nobody, "nothing that the flash lights looks like a head", "--face X,Y,RADIUS"),
-        (films.sun_on_the_face, "the person cannot be what from the room", "make the room darker"),
+        (films.sun_on_the_face, "the person cannot be told from the room", "make the room darker"),
     ],
     ids=lambda value: value.__name__ if callable(value) else "",
 )
