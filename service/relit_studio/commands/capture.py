@@ -48,13 +48,13 @@ def capture(
     light, light_map = dimmed(environment, ambient)
     on = not plain
     stages = Stages(on and gamma, on and noise, on and auto_exposure, on and white_balance, on and h264)
-    somebody: Person = (
+    captured_person: Person = (
         MannequinPerson(phone_camera(width, height), light_map)
         if person == "mannequin"
         else FieldPerson(Path(person), height, light_map)
     )
     timing = Timing(seconds=seconds, flash_hz=flash_hz)
-    scene = Scene(somebody, light, timing, seed, motion, balls=2 if second_ball else 1)
+    scene = Scene(captured_person, light, timing, seed, motion, balls=2 if second_ball else 1)
     with shown_progress("Frames") as progress:
         video, truth = record(scene, stages, out, environment.name, seed, progress)
     typer.echo(f"{video}: {scene.timing.frames} frames of {scene.camera.width}x{scene.camera.height}; truth in {truth}")

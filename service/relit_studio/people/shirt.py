@@ -99,7 +99,7 @@ def _fitted(body: Floats, triangles: Indices, low: NDArray[np.bool_], skin: Floa
 
 
 def _neckline(skin: Floats, percentile: float) -> tuple[Floats, Floats]:
-    """A line (96, 3) about the neck in the plane, outside so many per cent of the skin near it; and outward of it."""
+    """Neckline (96, 3) in its plane, outside the given percentile of the skin, and outward unit vectors (96, 3)."""
     neck = skin[(skin[:, 1] < -8) & (np.abs((skin - _POINT) @ _NORMAL) < 1.4)]
     center = np.array([neck[:, 0].mean(), _POINT[1], (neck[:, 2].min() + neck[:, 2].max()) / 2])
     offset = neck - center

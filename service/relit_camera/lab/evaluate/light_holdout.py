@@ -232,6 +232,7 @@ def _blocks(results: Sequence[HoldOutResult]) -> Iterator[Block]:
         "Mean PSNR in dB over all lists, in linear light with 255 as peak (larger is better). People move and flashes "
         "vary in strength: the pictures are aligned, and each one left out is moved and multiplied by one gain, the "
         "same for all methods.",
+        better="larger",
     )
     for each in results:
         yield Heading(f"{each.name}: every {each.every} left out")
@@ -241,6 +242,7 @@ def _blocks(results: Sequence[HoldOutResult]) -> Iterator[Block]:
             f"{len(each.left_out)} of {each.lights} lights are predicted from the others. PSNR with the peak at 255, "
             "of aligned pictures and of pictures as they are; PSNR with the peak at the truth's 99.5th percentile; "
             "SSIM of luma.",
+            better="larger",
         )
         yield from _worst_prediction(each)
 

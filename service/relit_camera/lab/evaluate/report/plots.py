@@ -107,14 +107,15 @@ def heat_maps(
         color_label: what the color scale measures.
         light_map: whether the arrays are light maps; their axes then name the directions.
     """
+    cell = 9.6 / columns
+    columns = min(columns, len(values))
     rows = math.ceil(len(values) / columns)
     height, width = values[0].shape
-    cell = 9.6 / columns
     from matplotlib import colormaps
 
     with _style():
         colors = colormaps["inferno"].with_extremes(bad=_UNKNOWN_COLOR)
-        canvas = _canvas(10.6, rows * (cell * height / width + (0.55 if light_map else 0.3)))
+        canvas = _canvas(cell * columns + 1, rows * (cell * height / width + (0.55 if light_map else 0.3)))
         grid = canvas.subplots(rows, columns, squeeze=False).ravel()
         for axes, shown, name in zip(grid, values, names, strict=False):
             known = np.ma.masked_invalid(shown)
