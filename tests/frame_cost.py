@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from statistics import median
+from statistics import mean, median
 from unittest.mock import patch
 
 import cv2
@@ -78,14 +78,16 @@ def camera_frame_cost(video: Path, subject: Path, mode: str, seconds: float) -> 
     try:
         time.sleep(WARM_UP_S)
         freeze_gc()
-        before, began, clock = camera.status().frames, time.process_time(), time.monotonic()
-        time.sleep(seconds)
-        after, cost, took = camera.status().frames, time.process_time() - began, time.monotonic() - clock
+        began, clock, rates = time.process_time(), time.monotonic(), []
+        while time.monotonic() < clock + seconds:
+            time.sleep(1.0)
+            rates.append(camera.status().fps.pipeline)
+        cost, took = time.process_time() - began, time.monotonic() - clock
         stages = {name: percentiles.p50 for name, percentiles in camera.status().stage_ms.items()}
     finally:
         camera.stop()
-    made = (after.published - after.repeated) - (before.published - before.repeated)
-    return FrameCost(1e3 * cost / made, made / took, stages)
+    frames_per_s = mean(rates)
+    return FrameCost(1e3 * cost / (frames_per_s * took), frames_per_s, stages)
 
 
 def main() -> None:

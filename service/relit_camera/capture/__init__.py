@@ -1,1 +1,1 @@
-"""Capture: from one-light pictures (RTI .lp) or a film to samples, and from samples to a subject."""
+"""Capture: from OLAT pictures (RTI .lp) or a film to samples, and from samples to a subject."""

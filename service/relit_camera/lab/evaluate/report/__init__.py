@@ -1,0 +1,1 @@
+"""HTML reports of evaluations: the page template and the plots."""
