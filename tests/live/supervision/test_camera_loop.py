@@ -217,7 +217,7 @@ def test_a_late_picture_does_not_make_a_waiting_camera_live(camera: LoopUnderTes
     camera.run(1.0)
     camera.supervisor.late = False
     camera.run(1.0)
-    assert camera.board.state is CameraState.WAITING
+    assert [data for kind, data in camera.events() if kind == "state"] == ["live", "waiting"]
 
 
 def test_a_source_that_has_not_begun_is_starting_until_it_says_why(camera: LoopUnderTest) -> None:
