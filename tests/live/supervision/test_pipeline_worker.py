@@ -36,7 +36,7 @@ def frame(index: int) -> Frame:
 
 
 class FakePipeline:
-    """Raises or waits in either half, as it is told by frame index."""
+    """Raises or waits in either half, by frame index."""
 
     def __init__(self) -> None:
         self.begun: list[int] = []
