@@ -4,10 +4,11 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
+PROCESSES ?= 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest vm test-vm vm-picture clean
+.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest coverage vm test-vm vm-picture clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -56,8 +57,12 @@ image-steps: setup ## the image's build without Docker: a wheel, installed by it
 tool-install: setup ## the wheel as users install it, used from an empty home; make tool-install WITH=pipx
 	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
-pytest: setup ## the tests alone
-	$(BIN)/python -m pytest
+pytest: setup ## the tests alone, in two processes, and the share of lines they execute; make pytest PROCESSES=4
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --cov --cov-report=
+	$(BIN)/python scripts/coverage_summary.py
+
+coverage: pytest ## the same, and which lines: build/coverage/index.html
+	$(BIN)/coverage html --quiet --directory build/coverage
 
 vm: ## build the virtual machine in which the camera is tried on a real kernel (root on Debian 12, two minutes)
 	sh tests/vm/build.sh
@@ -69,4 +74,4 @@ vm-picture: setup vm ## the call shown in docs/virtual-camera.md
 	$(BIN)/python -m tests.vm.picture docs/pictures/call.jpg
 
 clean: ## remove what the targets made, the virtual environment too
-	rm -rf $(VENV) build dist test-failures .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) build dist test-failures .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .coverage .coverage.*

@@ -42,7 +42,7 @@ def main() -> str | None:
 
 def _shows_a_picture() -> bool:
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("RELIT_", "XDG_", "PYTHON"))}
-    command = [Path(sys.executable).parent / "relit", "demo", "--headless", "--seconds", "20", "--port", "0"]
+    command = [str(Path(sys.executable).parent / "relit"), "demo", "--headless", "--seconds", "20", "--port", "0"]
     with tempfile.TemporaryDirectory() as empty:
         done = subprocess.run(  # noqa: S603 - our own command
             command, cwd=empty, env={**kept, "HOME": empty}, capture_output=True, text=True, timeout=300, check=False

@@ -119,7 +119,7 @@ def animated_webp(frames: int = 300) -> bytes:
     """A WebP animation of which only the first frame is wanted."""
     animation = cv2.Animation()
     animation.frames = [np.full((32, 64, 3), index % 256, np.uint8) for index in range(frames)]
-    animation.durations = np.full(frames, 40, np.int32)
+    animation.durations = [40] * frames
     with TemporaryDirectory() as folder:
         path = Path(folder) / "a.webp"
         assert cv2.imwriteanimation(str(path), animation)

@@ -1,20 +1,59 @@
-"""Fixtures every test may use."""
+"""Fixtures every test may use, and which tests may run at the same time."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from threadpoolctl import threadpool_limits
 
 from tests.cli.relit_command import Material, write_material
+from tests.made_once import run_folder
+
+pytest_plugins = ["tests.report_tables"]
 
 # A test's time depends on what else the machine does: pytest-timeout holds the whole, not each example.
 # The same examples on every run, so that a red run is of the change it tests; HYPOTHESIS_PROFILE=explore seeks others.
 settings.register_profile("relit", deadline=None, derandomize=True)
 settings.register_profile("explore", deadline=None, max_examples=500)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "relit"))
+
+REAL_TIME = "real time"
+MACHINE = "virtual machine"
+
+
+def pytest_configure() -> None:
+    """Make the run's folder before the processes of pytest-xdist start, which share it."""
+    run_folder()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Group the tests for `pytest -n 2 --dist loadgroup`, and order the groups.
+
+    A group runs in one process, one test after another: the tests of a file, which share its fixtures; all tests marked
+    `real_time`, which would else slow each other; and all that use the virtual machine. The longest groups come first,
+    so that no process waits for the other at the end.
+    """
+    slow = {_group(item) for item in items if item.get_closest_marker("slow")}
+    for item in items:
+        item.add_marker(pytest.mark.xdist_group(_group(item)))
+    items.sort(key=lambda item: (_group(item) != MACHINE, _group(item) != REAL_TIME, _group(item) not in slow))
+
+
+def _group(item: pytest.Item) -> str:
+    if item.path.parent.name == "vm":
+        return MACHINE
+    return REAL_TIME if item.get_closest_marker("real_time") else item.nodeid.partition("::")[0]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_blas_thread() -> Iterator[None]:
+    """As in the running camera: on a busy machine BLAS's threads wait for each other far longer than they work."""
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -24,7 +24,7 @@ MAX_BYTES = 2_000_000
 DEMO = ROOT / "service/relit_camera/app/demo/data"
 """The one exception to "no generated data": what `relit demo` shows."""
 PICTURES = {".png", ".jpg", ".mp4", ".onnx", ".hdr", ".exr", ".npz", ".relit"}
-SEAMS = ("trackers", "methods", "relighters", "reenactors")
+SEAMS = ("trackers", "methods", "relighters", "reenactors", "sources", "sinks")
 LINK = re.compile(r"\[[^\]]*\]\(([^)#\s]+)(?:#[^)]*)?\)")
 COMMAND = re.compile(r"(?:^\s*|[`/])relit ([a-z]+)\b(?! ─)", re.MULTILINE)
 LEFTOVER = re.compile(r"\b(?:TODO|FIXME|XXX)\b|^(?:<{7}|>{7}) |breakpoint\(\)|/(?:root|Users)/", re.MULTILINE)
@@ -100,7 +100,7 @@ def test_pages_name_commands_that_exist() -> None:
 
 def test_the_architecture_page_names_what_there_is() -> None:
     parts = "|".join(path.stem for path in (ROOT / "service/relit_camera").iterdir() if path.name[0] != "_")
-    names = re.findall(rf"\b(?<![./_])(?:{parts})(?:\.[A-Za-z_]+)+", (ROOT / "docs/architecture.md").read_text())
+    names = re.findall(rf"\b(?<![./_])(?:{parts})(?:\.[A-Za-z_0-9]+)+", (ROOT / "docs/architecture.md").read_text())
     named = {name for name in names if name.rpartition(".")[2] not in ("py", "md", "onnx", "lp", "hdr", "yaml")}
     assert len(named) > 20
     assert {name for name in named if not _exists(name)} == set()

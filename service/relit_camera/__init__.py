@@ -4,7 +4,7 @@ import os
 from importlib.metadata import version
 
 # OpenCV reads it when it is loaded: whatever a header says, no decoder takes memory for more than
-# `base.images.image_files` lets through.
+# `base.images.image_limits` lets through.
 os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", "64000000")
 
 __version__ = version("relit-camera")

@@ -11,6 +11,7 @@ import numpy as np
 from fastapi import FastAPI
 
 from relit_camera.api.problem_details import MEDIA_TYPE
+from relit_camera.base.images.image_types import DisplayImage
 
 BASE_URL = "http://127.0.0.1:8470"
 
@@ -73,3 +74,10 @@ def hdr(width: int = 64, height: int = 32) -> bytes:
     radiance = np.full((height, width, 3), 0.2, np.float32)
     radiance[4:8, 10:14] = 30
     return bytes(cv2.imencode(".hdr", radiance)[1])
+
+
+def decoded_picture(data: bytes) -> DisplayImage:
+    """The picture of a JPEG or PNG answer."""
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None, "not a picture"
+    return np.ascontiguousarray(picture[..., ::-1])

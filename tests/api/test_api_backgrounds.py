@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
 
-from tests.api.api_client import Client, check_problem, png
+from tests.api.api_client import Client, check_problem, decoded_picture, png
 from tests.api.fake_camera import FakeCamera
 
 BACKGROUND = "/api/v1/background"
@@ -65,13 +63,13 @@ def test_a_picture_is_stored_shown_and_deleted(client: Client, camera: FakeCamer
 
     thumbnail = client.get(item["thumbnail"])
     assert thumbnail.headers["content-type"] == "image/jpeg"
-    assert cv2.imdecode(np.frombuffer(thumbnail.content, np.uint8), cv2.IMREAD_COLOR).shape == (180, 320, 3)
+    assert decoded_picture(thumbnail.content).shape == (180, 320, 3)
     again = client.get(item["thumbnail"], headers={"if-none-match": thumbnail.headers["etag"]})
     assert (again.status_code, again.content) == (304, b"")
 
     assert client.put(BACKGROUND, {"kind": "image", "image": "my beach"}).status_code == 200
-    assert camera.scene_controller.scene.backdrop is not None
-    assert abs(int(camera.scene_controller.scene.backdrop.mean()) - 200) <= 1
+    assert camera.scene_controller.scene.background_image is not None
+    assert abs(int(camera.scene_controller.scene.background_image.mean()) - 200) <= 1
     problem = check_problem(client.delete("/api/v1/backgrounds/my beach"), 409)
     assert "in use" in problem["what"]
 

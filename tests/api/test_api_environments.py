@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
-from tests.api.api_client import Client, check_problem, hdr, png
+from tests.api.api_client import Client, check_problem, decoded_picture, hdr, png
 from tests.api.fake_camera import FakeCamera
 
 ENVIRONMENTS = "/api/v1/environments"
@@ -49,7 +49,7 @@ def test_clipped_highlights_are_said(client: Client) -> None:
 
 def test_thumbnails_are_kept_by_clients(client: Client) -> None:
     first = client.get(f"{ENVIRONMENTS}/studio/thumbnail.jpg")
-    picture = cv2.imdecode(np.frombuffer(first.content, np.uint8), cv2.IMREAD_COLOR)
+    picture = decoded_picture(first.content)
     assert picture.shape == (128, 256, 3)
     assert picture.std() > 10
     known = {"if-none-match": f'"other", W/{first.headers["etag"]}'}

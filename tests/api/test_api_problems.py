@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
 from fastapi import FastAPI
 
 from relit_camera.api.middleware.body_limits import MAX_JSON_BYTES, MAX_UPLOAD_FORM_BYTES
-from relit_camera.api.problem_details import ConflictError, problem_response_from, redact_folders, status_for_error
-from relit_camera.base.errors import DeviceError, ImageError, NotFoundError, RelitError, StorageError
+from relit_camera.api.problem_details import problem_response_from, redact_folders, status_for_error
+from relit_camera.base.errors import ConflictError, DeviceError, ImageError, NotFoundError, RelitError, StorageError
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera
 
@@ -86,7 +86,7 @@ def test_folders_of_this_machine_are_taken_out(text: str, shown: str) -> None:
 
 
 def test_a_long_body_is_refused_before_it_is_read(client: Client) -> None:
-    async def never() -> Iterator[bytes]:
+    async def never() -> AsyncIterator[bytes]:
         raise AssertionError("the body was read")
         yield b""
 
@@ -100,7 +100,7 @@ def test_a_long_body_is_refused_before_it_is_read(client: Client) -> None:
 def test_a_long_body_of_unknown_length_is_cut_off(client: Client) -> None:
     taken = 0
 
-    async def endless() -> Iterator[bytes]:
+    async def endless() -> AsyncIterator[bytes]:
         nonlocal taken
         while True:
             taken += 1 << 16

@@ -20,6 +20,8 @@ from relit_camera.base.config.settings import ServerSettings
 from relit_camera.base.errors import ConfigError, PortInUseError
 from tests.api.fake_camera import FakeCamera
 
+pytestmark = pytest.mark.real_time
+
 
 def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as taken:

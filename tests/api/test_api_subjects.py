@@ -6,7 +6,6 @@ import json
 import resource
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
@@ -14,7 +13,7 @@ from relit_camera.subject.compression.local_basis import global_basis
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.subject import Subject, SubjectMetadata
 from relit_camera.subject.subject_file import MAX_IN_MEMORY_BYTES, write_subject
-from tests.api.api_client import Client, check_problem
+from tests.api.api_client import Client, check_problem, decoded_picture
 from tests.api.fake_camera import FakeCamera
 
 
@@ -78,7 +77,7 @@ def test_a_subject_is_listed_chosen_and_deleted(client: Client, camera: FakeCame
 
 def test_thumbnail_is_the_neutral_picture(client: Client, stored: Path) -> None:
     answer = client.get("/api/v1/subjects/ada/thumbnail.jpg")
-    picture = cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)
+    picture = decoded_picture(answer.content)
     assert picture.shape == (24, 16, 3)
     assert abs(picture.mean() - 90) < 2
 

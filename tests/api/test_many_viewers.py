@@ -24,6 +24,8 @@ from tests.api.many_viewers import connect
 from tests.cli.relit_command import start, write_material
 from tests.small_camera import FPS, Camera, running_camera, wait_until
 
+pytestmark = pytest.mark.real_time
+
 VIEWERS = 200
 ROOT = Path(__file__).parents[2]
 

@@ -24,6 +24,8 @@ from relit_camera.live.supervision.camera_loop import LoopTimings
 from relit_camera.live.supervision.pipeline_health import HealthLimits
 from tests.small_camera import FPS, SIZE, SteadyTracker, difference, memory_source, running_camera, wait_until
 
+pytestmark = pytest.mark.real_time
+
 LAMP_LEFT = {"azimuth_deg": -90, "elevation_deg": 0, "intensity": 1.5}
 LAMP_RIGHT = {"azimuth_deg": 90, "elevation_deg": 0, "intensity": 1.5}
 

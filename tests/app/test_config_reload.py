@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from relit_camera.app.serve import _apply_reload
+from relit_camera.app.config_reload import apply_edited_settings
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.config.settings_loader import load_settings
 from relit_camera.base.errors import ConfigError, RelitError
@@ -32,7 +32,7 @@ def started(folder: Path, text: str) -> tuple[SceneController, RelitSettings]:
     before = settings(folder, text)
     scene_controller = SceneController(before.storage)
     scene_controller.set_look(before.look)
-    scene_controller.set_subject(before.subject)
+    scene_controller.load_configured_subject(before.subject)
     return scene_controller, before
 
 
@@ -44,7 +44,7 @@ def test_an_edit_of_which_half_cannot_be_used_changes_nothing(folder: Path) -> N
         (f"subject: {folder}/other.relit\nlook: {{lighting: {{environment: nowhere}}}}", "nowhere"),
     ):
         with pytest.raises(RelitError, match=error):
-            _apply_reload(scene_controller, before, before, settings(folder, text))
+            apply_edited_settings(scene_controller, before, before, settings(folder, text))
         assert scene_controller.scene is scene
 
 
@@ -52,9 +52,9 @@ def test_a_subject_that_is_no_longer_named_stays(folder: Path) -> None:
     """An editor that writes an empty file, or a line that was lost, must not show the room."""
     scene_controller, before = started(folder, f"subject: {folder}/me.relit")
     with pytest.raises(ConfigError, match="no longer names the subject"):
-        _apply_reload(scene_controller, before, before, settings(folder, ""))
+        apply_edited_settings(scene_controller, before, before, settings(folder, ""))
     assert scene_controller.scene.subject is not None
-    assert _apply_reload(scene_controller, before, before, settings(folder, "subject: null")) is None
+    assert apply_edited_settings(scene_controller, before, before, settings(folder, "subject: null")) is None
     assert scene_controller.scene.subject is None
 
 
@@ -66,15 +66,18 @@ def test_what_was_not_edited_stays_as_it_was_set(folder: Path) -> None:
         )
     )
     after = settings(folder, "look: {lighting: {environment: studio, yaw_deg: 70}}\noutput: {fps: 25}")
-    note = _apply_reload(scene_controller, before, before, after)
+    note = apply_edited_settings(scene_controller, before, before, after)
     assert "output counts from the next start" in str(note)
     lighting = scene_controller.scene.look.lighting
     assert (lighting.environment, lighting.saturation, lighting.yaw_deg) == ("sunset", 0.5, 70)
-    assert _apply_reload(scene_controller, before, after, before) is None
+    assert apply_edited_settings(scene_controller, before, after, before) is None
     assert scene_controller.scene.look.lighting.yaw_deg == 0
 
 
 def test_another_subject_is_shown(folder: Path) -> None:
     scene_controller, before = started(folder, f"subject: {folder}/me.relit")
-    assert _apply_reload(scene_controller, before, before, settings(folder, f"subject: {folder}/other.relit")) is None
+    assert (
+        apply_edited_settings(scene_controller, before, before, settings(folder, f"subject: {folder}/other.relit"))
+        is None
+    )
     assert scene_controller.scene.subject_name == "other"

@@ -23,6 +23,8 @@ from tests.api.fake_camera import STATUS
 from tests.cli.relit_command import Material, environment
 from tests.virtual_clock import VirtualClock
 
+pytestmark = pytest.mark.real_time
+
 START_S = 60.0
 WATCHDOG_S = 1.0
 INJECTED = """

@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from relit_camera.app.video_replay import ReplayedFrame, replay
+from relit_camera.app.wiring import make_pipeline
 from relit_camera.base.config.look import Lighting, Look
-from relit_camera.base.config.settings import ReenactSettings, TrackerSettings
+from relit_camera.base.config.settings import InferenceSettings, RelitSettings
 from relit_camera.base.errors import VideoError
 from relit_camera.base.images.image_types import DisplayImage, Frame
-from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.face.face_state import LOST, FaceState, Tracker
 from relit_camera.light.builtin.builtin_environments import builtin_environment
-from relit_camera.live.compositing.matting import matting_factory
 from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.scene.scene import Scene
 from tests.small_camera import SteadyTracker, small_subject
@@ -25,7 +24,7 @@ from tests.small_camera import SteadyTracker, small_subject
 COUNT, FPS = 12, 12.5
 
 
-CPU = SessionOptions("cpu")
+CPU = RelitSettings(inference=InferenceSettings(provider="cpu"))
 
 
 def clip(folder: Path, size: tuple[int, int] = (96, 64)) -> Path:
@@ -44,7 +43,7 @@ def play(video: Path, out: Path | None, tracker: Tracker, dark_from_s: float = 9
     )
 
     def pipeline_for(size: tuple[int, int]) -> Pipeline:
-        return Pipeline(tracker, size, TrackerSettings(), ReenactSettings(), CPU, matting_factory("selfie", CPU))
+        return make_pipeline(CPU, tracker, size)
 
     return replay(video, out, pipeline_for, lambda time_s: dark if time_s >= dark_from_s else bright)
 

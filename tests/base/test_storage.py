@@ -49,6 +49,22 @@ def test_a_file_comes_whole_or_not_at_all(tmp_path: Path) -> None:
     assert names(tmp_path) == ["a.yaml"]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="modes are of POSIX")
+def test_files_get_their_mode_when_created_and_the_umask_is_never_touched(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = os.umask(0o027)
+    try:
+        monkeypatch.setattr(os, "umask", lambda _: pytest.fail("other threads would create files without a mask"))
+        with atomic_path(tmp_path / "a.yaml") as temporary:
+            assert temporary.stat().st_mode & 0o777 == 0o640
+            temporary.write_text("x")
+        assert (tmp_path / "a.yaml").stat().st_mode & 0o777 == 0o640
+    finally:
+        monkeypatch.undo()
+        os.umask(before)
+
+
 def test_file_and_folder_are_synced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     synced: list[str] = []
     monkeypatch.setattr(os, "fsync", lambda handle: synced.append(str(Path(f"/proc/self/fd/{handle}").readlink())))

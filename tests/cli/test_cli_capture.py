@@ -21,13 +21,13 @@ from relit_camera.capture.film.pipeline.checkpoint import (
     input_fingerprint,
 )
 from relit_camera.subject.subject_file import HEADER_KEY, read_subject
-from tests.capture.film.generated_film import write_film
+from tests.capture.film.generated_film import FOCAL_PX, write_film
 from tests.capture.film.pipeline import unusable_films as films
 from tests.cli.relit_command import Answer, call, files, finish, start
 from tests.synthetic import sphere_samples
 
 PATIENCE_S = 100
-CHOSEN = {"size": 72, "light-distance-cm": 90}
+CHOSEN: dict[str, object] = {"size": 72, "light-distance-cm": 90}
 KNOWN = [*films.Shot(films.GOOD.codes()[:0], CHOSEN).arguments, "--keep-room", "--far-lamp"]
 
 
@@ -79,7 +79,7 @@ def test_options_are_followed_and_told(built: Built) -> None:
     assert told["room"]["taken_off"] is False
     assert told["near_field"]["corrected"] is False
     assert told["near_field"]["light_distance_cm"] == 90
-    assert (told["focal_px"], told["focal"]["source"]) == (films.FOCAL_PX, "given")
+    assert (told["focal_px"], told["focal"]["source"]) == (FOCAL_PX, "given")
     assert told["face"]["found_by"] == "user"
     assert told["light"]["lights"] == subject.lights
     assert told["light"]["frames"] == sum(frame["kind"] == "bright" for frame in told["frames"])

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
 import httpx
 import numpy as np
 import pytest
@@ -18,7 +17,11 @@ from relit_camera.base.video.video_readers import VideoReader, probe_video
 from relit_camera.cli.commands.demo import opens_in_browser
 from relit_camera.face.tracking.track_recording import read_track
 from relit_camera.subject.subject_file import read_subject
+from tests.api.api_client import decoded_picture
 from tests.cli.relit_command import call, start
+from tests.small_camera import wait_until
+
+pytestmark = pytest.mark.real_time
 
 START_S = 60.0
 
@@ -59,7 +62,7 @@ def status(http: httpx.Client) -> dict[str, Any]:
 
 def snapshot(http: httpx.Client) -> np.ndarray:
     answer = http.get("snapshot.jpg").raise_for_status()
-    return cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR).astype(np.float32)
+    return decoded_picture(answer.content).astype(np.float32)
 
 
 def test_it_says_what_there_is_not_and_when_the_first_picture_came(demo: tuple[list[str], httpx.Client]) -> None:
@@ -81,7 +84,7 @@ def test_the_bundled_person_is_live_and_in_ratio(demo: tuple[list[str], httpx.Cl
 
 def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[str], httpx.Client]) -> None:
     _, http = demo
-    until, seen = time.monotonic() + START_S, set()
+    until, seen = time.monotonic() + START_S, set[tuple[str, float]]()
     while time.monotonic() < until and len(seen) < 4:
         lighting = http.get("lighting").raise_for_status().json()
         seen.add((lighting["environment"], round(lighting["split"], 1)))
@@ -92,8 +95,7 @@ def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[
     assert http.get("lighting").json()["environment"] == "party"
     party = snapshot(http)
     http.patch("lighting", json={"environment": "overcast"}).raise_for_status()
-    time.sleep(2)
-    assert np.abs(snapshot(http) - party).mean() > 10
+    wait_until(lambda: bool(np.abs(snapshot(http) - party).mean() > 10))
 
 
 def test_it_ends_by_itself_when_told_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,7 +146,12 @@ def test_the_bundled_subject_is_as_any_other() -> None:
 
 def test_no_browser_of_the_terminal_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
-    monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url) or True)
+
+    def open_browser(url: str) -> bool:
+        opened.append(url)
+        return True
+
+    monkeypatch.setattr("webbrowser.open", open_browser)
     monkeypatch.setattr("sys.platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER"):
         monkeypatch.delenv(name, raising=False)

@@ -16,6 +16,8 @@ import pytest
 
 from tests.cli.relit_command import Material, call, finish, start
 
+pytestmark = pytest.mark.real_time
+
 END_S = 3.0
 START_S = 60.0
 

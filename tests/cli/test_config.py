@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -14,7 +15,7 @@ from tests.cli.relit_command import call
 
 
 @pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder without a configuration file."""
     folder = tmp_path / "elsewhere"
     folder.mkdir()
@@ -29,41 +30,43 @@ def write(folder: Path, text: str) -> Path:
     return path
 
 
-def shown(*arguments):
+def shown(*arguments: object) -> Any:
     answer = call(*arguments, "config", "show")
     assert answer.code == 0, answer
     return yaml.safe_load(answer.out)
 
 
-def test_check_says_which_file_is_right(elsewhere):
+def test_check_says_which_file_is_right(elsewhere: Path) -> None:
     answer = call("config", "check", write(elsewhere, "server:\n  port: 9000\n"))
     assert (answer.code, answer.out) == (0, f"{elsewhere / 'mine.yaml'} is right\n")
     assert call("config", "check").out == "there is no configuration file: the defaults hold\n"
 
 
-def test_check_takes_the_global_option_too(elsewhere):
+def test_check_takes_the_global_option_too(elsewhere: Path) -> None:
     path = write(elsewhere, "server:\n  port: 9000000\n")
     call("--config", path, "config", "check").complains("mine.yaml line 2", "server.port", "9000000")
 
 
-def test_check_names_file_line_key_and_value(elsewhere):
+def test_check_names_file_line_key_and_value(elsewhere: Path) -> None:
     path = write(elsewhere, "output:\n  sink: camera\n  with: 640\n")
     call("config", "check", path).complains(f"{path} line 3", "output.with", "640", "relit config schema")
 
 
-def test_a_missing_file_and_broken_yaml_are_one_line(elsewhere):
+def test_a_missing_file_and_broken_yaml_are_one_line(elsewhere: Path) -> None:
     call("config", "check", elsewhere / "none.yaml").complains("no configuration file", "none.yaml")
     call("config", "check", write(elsewhere, "server: [\n")).complains("mine.yaml line", "correct the YAML")
 
 
-def test_an_unknown_variable_is_refused_and_the_models_folder_is_none(elsewhere, monkeypatch):
+def test_an_unknown_variable_is_refused_and_the_models_folder_is_none(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("RELIT_MODELS_DIR", str(elsewhere))
     assert call("config", "check").code == 0
     monkeypatch.setenv("RELIT_PRT", "3")
     call("config", "check").complains("RELIT_PRT", "is no setting")
 
 
-def test_show_is_what_holds_after_file_environment_and_options(elsewhere, monkeypatch):
+def test_show_is_what_holds_after_file_environment_options(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(elsewhere, "server:\n  port: 1000\nlog_level: error\noutput:\n  width: 640\n")
     monkeypatch.setenv("RELIT_SERVER__PORT", "2000")
     settings = shown("--config", path, "--log-level", "debug")
@@ -73,7 +76,7 @@ def test_show_is_what_holds_after_file_environment_and_options(elsewhere, monkey
     assert settings["output"]["height"] == 720
 
 
-def test_what_show_prints_is_a_configuration_file(elsewhere, monkeypatch):
+def test_what_show_prints_is_a_configuration_file(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(elsewhere, "look:\n  lighting:\n    lamps:\n      - kelvin: 3000\n  background:\n    kind: blur\n")
     answer = call("--config", path, "config", "show")
     again = elsewhere / "again.yaml"
@@ -83,7 +86,7 @@ def test_what_show_prints_is_a_configuration_file(elsewhere, monkeypatch):
     assert call("config", "check", again).code == 0
 
 
-def test_schema_has_every_key_with_range_and_default():
+def test_schema_has_every_key_with_range_and_default() -> None:
     schema = json.loads(call("config", "schema").out)
     assert set(schema["properties"]) == set(RelitSettings.model_fields)
     assert schema["additionalProperties"] is False

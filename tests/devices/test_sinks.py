@@ -12,7 +12,7 @@ import pytest
 from relit_camera.base.config.settings import OutputSettings
 from relit_camera.base.errors import DeviceError, ImageError, InputError, StorageError, VideoError
 from relit_camera.base.video.video_readers import VideoReader
-from relit_camera.devices import v4l2loopback
+from relit_camera.devices import v4l2, v4l2loopback
 from relit_camera.devices.device_users import DeviceUser
 from relit_camera.devices.sinks import virtual_camera_sink as camera_module
 from relit_camera.devices.sinks.sink import NullSink, SinkInfo
@@ -112,8 +112,8 @@ def test_a_missing_camera_comes_with_its_command(tmp_path):
         (OSError(errno.EBUSY, "a program still shows it"), "is in use: a program still shows it; stop"),
         (OSError(errno.EBUSY, "Device or resource busy"), "is in use: Device or resource busy; stop that program"),
         (OSError(errno.ENOTTY, "Inappropriate ioctl for device"), "cannot be opened: Inappropriate ioctl for device"),
-        (RuntimeError("no backend"), "there is no virtual camera: no backend; install OBS Studio"),
-        (ImportError("no such module"), "pip install pyvirtualcam"),
+        (RuntimeError("no backend"), "there is no virtual camera: no backend; `relit doctor` says"),
+        (ImportError("no such module"), "pyvirtualcam cannot be used: no such module; `relit doctor` says"),
     ],
 )
 def test_why_it_cannot_be_opened_is_explained(tree, error, message):
@@ -210,14 +210,14 @@ class FakeDevice:
 
     def ioctl(self, device, request, argument):
         self.calls.append(request)
-        if request == v4l2loopback.VIDIOC_QUERYCAP:
+        if request == v4l2.VIDIOC_QUERYCAP:
             assert len(argument) == 104
             argument[88:92] = self.capabilities.to_bytes(4, "little")
             return 0
-        if request in (v4l2loopback.VIDIOC_S_FMT, v4l2loopback.VIDIOC_G_FMT):
+        if request in (v4l2.VIDIOC_S_FMT, v4l2.VIDIOC_G_FMT):
             assert len(argument) == 208
             asked = int.from_bytes(argument[8:12], "little"), int.from_bytes(argument[12:16], "little")
-            if self.refuses and request == v4l2loopback.VIDIOC_S_FMT and asked != self.kept[:2]:
+            if self.refuses and request == v4l2.VIDIOC_S_FMT and asked != self.kept[:2]:
                 raise OSError(errno.EBUSY, "Device or resource busy")
             if self.kept is not None:
                 width, height, layout = self.kept
@@ -302,7 +302,7 @@ def test_only_a_stuck_device_is_revived(tmp_path, monkeypatch, capabilities, sta
     monkeypatch.setattr(v4l2loopback.sys, "platform", "linux")
     device = FakeDevice(monkeypatch, capabilities)
     assert v4l2loopback.reset_stuck_device(node, tree) is revived
-    assert (v4l2loopback.VIDIOC_STREAMON in device.calls) is revived
+    assert (v4l2.VIDIOC_STREAMON in device.calls) is revived
 
 
 @pytest.mark.parametrize("is_reader", [True, False])

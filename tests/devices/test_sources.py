@@ -7,20 +7,14 @@ import numpy as np
 import pytest
 
 from relit_camera.base.config.settings import SourceSettings
-from relit_camera.base.errors import DeviceError, ImageError, InputError, VideoError
+from relit_camera.base.errors import DeviceError, IllegalTransitionError, ImageError, InputError, VideoError
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.devices.sources.pattern_source import draw_pattern, pattern_source, read_number
 from relit_camera.devices.sources.playback_source import PlaybackSource
-from relit_camera.devices.sources.source import (
-    TRANSITIONS,
-    IllegalTransitionError,
-    SourceInfo,
-    SourceState,
-    SourceStateMachine,
-)
+from relit_camera.devices.sources.source import TRANSITIONS, SourceInfo, SourceState, SourceStateMachine
 from relit_camera.devices.sources.source_factory import open_source
-from relit_camera.devices.sources.webcam_source import BACKOFF_S, WebcamSource
+from relit_camera.devices.sources.webcam_source import BACKOFF_S, WebcamSource, stall_timeout
 from relit_camera.devices.video_devices import DeviceTree
 from tests.devices.fake_devices import FakeCapture, FakeTree
 from tests.small_camera import WAIT_S, wait_until
@@ -61,10 +55,20 @@ def test_every_state_can_be_left_for_the_end_and_reached_from_idle():
     assert reached == set(TRANSITIONS)
 
 
+def machine_in(state: SourceState) -> SourceStateMachine:
+    """A machine brought to a state by a shortest way of legal transitions."""
+    ways: list[list[SourceState]] = [[S.IDLE]]
+    while (way := ways.pop(0))[-1] is not state:
+        ways += [[*way, target] for target in TRANSITIONS[way[-1]]]
+    machine = SourceStateMachine()
+    for step in way[1:]:
+        machine.transition(step)
+    return machine
+
+
 @pytest.mark.parametrize(("start", "to"), [(a, b) for a in TRANSITIONS for b in TRANSITIONS if a is not b])
 def test_only_moves_of_the_table_are_legal(start, to):
-    machine = SourceStateMachine()
-    machine._state = start
+    machine = machine_in(start)
     if to in TRANSITIONS[start]:
         machine.transition(to)
         assert machine.state is to
@@ -109,9 +113,18 @@ def test_playback_keeps_the_pictures_own_time():
 
 
 def test_playback_drops_what_nobody_came_for():
-    source = PlaybackSource(INFO, pictures())
+    played = itertools.count()
+    last = 0
+
+    def play():
+        nonlocal last
+        for picture in pictures():
+            last = next(played)
+            yield picture
+
+    source = PlaybackSource(INFO, play())
     source.read(WAIT_S)
-    wait_until(lambda: source._slot.count >= 10)
+    wait_until(lambda: last >= 10)
     assert source.read(WAIT_S).index >= 9
     source.close()
 
@@ -374,9 +387,9 @@ def test_a_webcam_that_is_missing_at_the_start_is_an_error(tree):
         webcam(tree, text="usb-other")
 
 
-def test_the_patience_is_at_least_two_seconds(tree):
-    assert WebcamSource("webcam", (64, 48), 30, tree=tree)._stall_timeout_s == 2.0
-    assert WebcamSource("webcam", (64, 48), 1, tree=tree)._stall_timeout_s == 4.0
+def test_a_stall_is_four_frames_or_two_seconds() -> None:
+    assert stall_timeout(30) == 2.0
+    assert stall_timeout(1) == 4.0
 
 
 def test_opencv_is_asked_for_motion_jpeg_first_and_a_queue_of_one(monkeypatch):

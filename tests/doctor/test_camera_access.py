@@ -139,4 +139,4 @@ def test_the_groups_to_join_are_those_of_shut_devices(machine):
 
 def test_another_system_has_obs_studios_camera(tmp_path):
     other = FakeMachine(tmp_path / "mac", is_linux=False)
-    expect(check_virtual_camera(OutputSettings(), other.host, everybody_may), Severity.OK, "OBS Studio")
+    expect(check_virtual_camera(OutputSettings(), other.host, everybody_may), Severity.OK, "install OBS Studio")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from relit_camera.base.rotations import rotation_from_angles
-from relit_camera.face.face_state import FaceState, FaceStatus, HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.face_state import FaceState, FaceStatus
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 
 SIZE = (640, 480)

@@ -8,7 +8,7 @@ import pytest
 from relit_camera.base.errors import NotFoundError, TrackError
 from relit_camera.base.rotations import angles_from_rotation, rotation_from_angles
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus
-from relit_camera.face.motion.motion_smoothing import FaceFollower, FaceMotion
+from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
 from tests.face.faces import RATE, SCHEME, SIZE, face, open_mouth, shut_eyes
 
 SETTLED = 90

@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from relit_camera.base.rotations import angles_from_rotation, rotation_from_angles
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import fit_pose, guess_focal, project, unproject
+from relit_camera.face.head_pose import HeadPose, fit_pose, guess_focal, project, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 
 SIZE = (640, 480)

@@ -9,8 +9,8 @@ from relit_camera.base.errors import InputError, ModelError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.base.rotations import rotation_from_angles
-from relit_camera.face.face_state import FaceStatus, HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.face_state import FaceStatus
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.tracking.face_detector import Detection
 from relit_camera.face.tracking.mediapipe_mesh_tracker import (

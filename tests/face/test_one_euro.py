@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relit_camera.base.rotations import angles_from_rotation, rotation_from_angles
-from relit_camera.face.motion.motion_smoothing import OneEuroFilter, OneEuroParameters, RotationOneEuroFilter
+from relit_camera.face.motion.one_euro_filter import OneEuroFilter, OneEuroParameters, RotationOneEuroFilter
 
 RATE = 30.0
 

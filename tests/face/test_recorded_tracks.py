@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from relit_camera.base.images.image_types import Frame
 from relit_camera.face.face_state import FaceState, FaceStatus
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_camera.face.motion.motion_smoothing import FaceFollower, FaceMotion
+from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
 
 FOCAL_PX = 320 * 50 / 24

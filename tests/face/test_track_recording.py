@@ -178,5 +178,5 @@ def test_pictures_of_another_size_are_refused(track_path: Path):
 
 
 def test_an_unknown_tracker_names_those_there_are():
-    with pytest.raises(NotFoundError, match=r"'eyes'; use one of .*mesh.*openseeface.*recorded"):
+    with pytest.raises(NotFoundError, match=r"'eyes'; there are: .*mesh.*openseeface.*recorded"):
         open_tracker("eyes")

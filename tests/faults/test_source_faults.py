@@ -20,6 +20,8 @@ from tests.devices.fake_devices import FakeCapture, FakeTree
 from tests.faults.watched_camera import Survived, Watched, watched_camera
 from tests.small_camera import SIZE, difference, wait_until
 
+pytestmark = pytest.mark.real_time
+
 STALL_S = float(os.environ.get("FAULT_STALL_S", "6"))
 """The table of docs/reliability.md is made with 30."""
 

@@ -34,6 +34,8 @@ from tests.small_camera import (
     wait_until,
 )
 
+pytestmark = pytest.mark.real_time
+
 SOON_STALE = CameraTimings(stale_after_s=0.3)
 
 
@@ -63,7 +65,7 @@ def test_a_subject_file_is_spoilt_while_in_use(
     file = tmp_path / "me.relit"
     write_subject(file, small_subject())
     with watched_camera(tmp_path / "data") as watched:
-        watched.camera.scene_controller.set_subject(str(file))
+        watched.camera.scene_controller.load_subject_file(file)
         watched.goes_on(20)
         watched.begin()
         spoil(file)

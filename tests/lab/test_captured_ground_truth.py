@@ -41,7 +41,7 @@ def test_a_point_of_the_field_is_where_the_film_shows_it(files: tuple[Path, Path
 
 
 def test_files_of_two_films_are_refused(files: tuple[Path, Path]) -> None:
-    files[1].write_text(json.dumps({"frames": []}))
+    files[1].write_text(json.dumps({"frames": [{"head": {"to_rest": {"rotation_deg": 0, "translation_px": [0, 0]}}}]}))
     field = Samples(np.zeros((1, 8, 10, 3), np.float32), np.array([[0.0, 0.0, 1.0]]), np.ones((8, 10), np.float32))
     with pytest.raises(InputError, match="tells of frame 1, which"):
         crop_like_capture(field, *files)
@@ -49,7 +49,7 @@ def test_files_of_two_films_are_refused(files: tuple[Path, Path]) -> None:
 
 def test_the_unit_is_the_truths() -> None:
     truth = GroundTruth(sphere_samples(12, 16))
-    gains = np.float32([0.5, 1.0, 2.0])
+    gains = np.array([0.5, 1.0, 2.0], np.float32)
     candidate = Candidate("dim", truth.inside, lambda directions, pixels: truth.colors * gains)
     same, found = scale_to_truth(candidate, truth, np.arange(12))
     np.testing.assert_allclose(found, 1 / gains, rtol=1e-5)

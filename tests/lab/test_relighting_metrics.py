@@ -15,7 +15,7 @@ from relit_camera.lab.evaluate.field.relighting_metrics import (
     squared_distances,
 )
 from relit_camera.light.directions import direction_from_degrees, texel_directions, texel_solid_angles
-from relit_camera.light.light_map_rotation import resample_to_light_map, total
+from relit_camera.light.light_map import resample_to_light_map, total
 from tests.lab.lit_sphere import cap, grid, lambert
 
 

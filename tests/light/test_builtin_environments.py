@@ -8,11 +8,12 @@ import pytest
 
 from relit_camera.base.images.color import LUMINANCE
 from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
-from relit_camera.light.builtin.canvas import bearings, directions, to_map_axes
+from relit_camera.light.builtin.canvas import bearings, directions
 from relit_camera.light.directions import direction_from_degrees, texel_directions
 from relit_camera.light.environment_store import EnvironmentStore
 from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map_rotation import irradiance, total
+from relit_camera.light.light_map import irradiance, total
+from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 
 
 def reading(name: str, azimuth: float, elevation: float = 10) -> np.ndarray:
@@ -26,7 +27,7 @@ def bright(rgb: np.ndarray) -> float:
 
 
 def test_the_canvas_turns_into_map_axes() -> None:
-    np.testing.assert_allclose(to_map_axes(directions()), texel_directions(512, 1024), atol=1e-6)
+    np.testing.assert_allclose(between_map_and_viewer_axes(directions()), texel_directions(512, 1024), atol=1e-6)
     bearing, elevation = bearings()
     right = directions()[(bearing > 45) & (bearing < 135) & (np.abs(elevation) < 30)]
     assert (right[:, 0] > 0.5).all()

@@ -16,7 +16,7 @@ from relit_camera.base.images.color import srgb_decode
 from relit_camera.light import environment_panorama as panorama_module
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.environment_panorama import panorama_from_radiance, read_panorama
-from relit_camera.light.light_map_rotation import irradiance, resample_to_light_map, total
+from relit_camera.light.light_map import irradiance, resample_to_light_map, total
 
 SHARED_MAPS = [
     "dikhololo_night_1k", "lebombo_1k", "potsdamer_platz_1k", "rooitou_park_1k", "spot1Lux", "studio_small_03_1k",

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from relit_camera.base.config.look import Lamp
 from relit_camera.base.images.color import LUMINANCE
 from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map_rotation import irradiance
+from relit_camera.light.light_map import irradiance
 from relit_camera.light.scene_light import lamp_light_map
 
 

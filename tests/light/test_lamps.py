@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from relit_camera.base.config.look import Lamp
 from relit_camera.base.images.color import LUMINANCE, rgb_from_kelvin
 from relit_camera.light.directions import direction_from_degrees, texel_directions, texel_solid_angles
-from relit_camera.light.light_map_rotation import irradiance, total
+from relit_camera.light.light_map import irradiance, total
 from relit_camera.light.scene_light import lamp_light_map
 
 directions = st.tuples(st.floats(-180, 180), st.floats(-90, 90))

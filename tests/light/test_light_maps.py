@@ -16,14 +16,8 @@ from relit_camera.light.directions import (
     texel_directions,
     texel_solid_angles,
 )
-from relit_camera.light.light_map_rotation import (
-    LightMap,
-    check_light_map,
-    irradiance,
-    resample_to_light_map,
-    rotate_light_map,
-    total,
-)
+from relit_camera.light.light_map import LightMap, check_light_map, irradiance, resample_to_light_map, total
+from relit_camera.light.light_map_rotation import rotate_light_map
 
 texels = st.tuples(st.integers(0, 31), st.integers(0, 63))
 seeds = st.integers(0, 2**32 - 1)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from relit_camera.light.directions import direction_from_degrees, texel_directions, texel_solid_angles
-from relit_camera.light.light_map_rotation import pad_poles, padded_positions, splat
+from relit_camera.light.light_map_interpolation import pad_poles, padded_positions, splat
 
 
 def fibonacci(count: int) -> np.ndarray:

@@ -8,7 +8,7 @@ from scipy.integrate import lebedev_rule
 from scipy.special import sph_harm_y
 
 from relit_camera.light.directions import direction_from_spherical, texel_directions
-from relit_camera.light.light_map_rotation import total
+from relit_camera.light.light_map import total
 from relit_camera.light.spherical_harmonics import basis, coefficient_count, project, reconstruct
 
 

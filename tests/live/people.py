@@ -1,4 +1,4 @@
-"""A small person whose face is known exactly, and live faces that move as told."""
+"""A small person whose face is known exactly, and live faces that move as given."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import dataclasses
 from functools import cache
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from relit_camera.base.images.image_types import Frame
+from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.face.face_state import FaceStatus, HeadPose
-from relit_camera.face.head_pose import guess_focal, project
+from relit_camera.face.face_state import LOST, FaceState, FaceStatus
+from relit_camera.face.head_pose import HeadPose, guess_focal, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.face.motion.neutral_face import NeutralFace
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
-from relit_camera.live.reenactment.reenactor import ReenactorContext
+from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, WarpedLayer
 from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
-from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.subject import Subject
 
 SCHEME = landmark_scheme("mesh478")
@@ -27,10 +27,16 @@ LIVE_NEUTRAL = HeadPose(Rotation.from_euler("Y", 4, degrees=True), np.array([3.0
 NEUTRAL = NeutralFace(SCHEME.canonical.copy(), LIVE_NEUTRAL)
 
 
-class Looker:
-    """A recording: it is only asked for its scheme."""
+class Blind:
+    """A tracker that finds no face: so the landmarks stored with a subject count."""
 
-    name, scheme = "recorded", "mesh478"
+    name, scheme = "blind", "mesh478"
+
+    def track(self, frame: Frame) -> FaceState:
+        return LOST
+
+    def reset(self) -> None:
+        """Nothing is kept between frames."""
 
 
 @cache
@@ -54,15 +60,21 @@ def person() -> Subject:
 
 def face_of(subject: Subject) -> SourceFace:
     """Its face, as stored with it."""
-    return find_source_face(subject, Looker())
+    return find_source_face(subject, Blind())
 
 
-def stage_of(subject: Subject, size: tuple[int, int]) -> ReenactorContext:
-    """A stage for pictures of `size`."""
-    return ReenactorContext(subject, BasisRelighter(subject), face_of(subject), size, SessionOptions())
+def context_of(subject: Subject, size: tuple[int, int], argument: str = "") -> ReenactorContext:
+    """What a reenactor gets for pictures of `size`."""
+    return ReenactorContext(subject, face_of(subject), size, SessionOptions(), argument)
 
 
-def motion(turn=None, shift=(0, 0, 0), expression=None, presence=1.0, status=FaceStatus.FOUND) -> FaceMotion:
+def motion(
+    turn: Rotation | None = None,
+    shift: ArrayLike = (0, 0, 0),
+    expression: NDArray[np.float64] | None = None,
+    presence: float = 1.0,
+    status: FaceStatus = FaceStatus.FOUND,
+) -> FaceMotion:
     """A live face that has moved from `LIVE_NEUTRAL` by a rotation, centimetres, and head-space centimetres a point."""
     turn = turn or Rotation.identity()
     expression = np.zeros((SCHEME.count, 3)) if expression is None else expression
@@ -78,12 +90,12 @@ NOBODY = FaceMotion(
 )  # fmt: skip
 
 
-def moved_by(reenactor, relit, motion, frame):
-    """A frame as the pipeline does it: follow the face, then move the relit picture."""
+def moved_by(reenactor: Reenactor, relit: LinearImage, motion: FaceMotion, frame: Frame) -> WarpedLayer:
+    """A frame as mode reenact does it: plan the warp, then warp the relit picture."""
     return reenactor.plan_warp(motion, frame)(relit)
 
 
-def live_frame(image=None, index=0) -> Frame:
+def live_frame(image: DisplayImage | None = None, index: int = 0) -> Frame:
     """A frame of the live size: grey noise unless given."""
     if image is None:
         image = np.random.default_rng(index).integers(60, 180, (LIVE_SIZE[1], LIVE_SIZE[0], 3)).astype(np.uint8)

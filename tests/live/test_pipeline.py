@@ -1,37 +1,39 @@
-"""One frame from left to right."""
+"""The picture of one frame, from tracking to compositing, in every mode."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
 import pytest
 
+from relit_camera.app.wiring import make_follower, make_pipeline, mode_factories
 from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
-from relit_camera.base.config.settings import ReenactSettings, TrackerSettings
-from relit_camera.base.errors import ModelError
+from relit_camera.base.config.settings import InferenceSettings, RelitSettings
+from relit_camera.base.errors import ModelError, SubjectError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
-from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.lab.bench.live_benchmark import SyntheticTracker
 from relit_camera.light.builtin.builtin_environments import builtin_environment
-from relit_camera.live.compositing.matting import matting_factory
-from relit_camera.live.pipeline import Pipeline, fit_frame
+from relit_camera.live.modes.frame_fitting import fit_frame
+from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
+from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.scene.scene import Scene
+from relit_camera.subject.relighting.relighter import open_relighter
 from tests.small_camera import SIZE, SteadyTracker, difference, grey, small_subject
 
-CPU = SessionOptions("cpu")
+CPU = RelitSettings(inference=InferenceSettings(provider="cpu"))
 STUDIO = builtin_environment("studio")
 LAMP_RIGHT = Lighting(environment=None, lamps=(Lamp(azimuth_deg=90, elevation_deg=0),), transition_s=0)
 LAMP_LEFT = Lighting(environment=None, lamps=(Lamp(azimuth_deg=-90, elevation_deg=0),), transition_s=0)
 
 
 def pipeline(tracker: Tracker | None = None, size: tuple[int, int] = SIZE) -> Pipeline:
-    return Pipeline(
-        tracker or SteadyTracker(), size, TrackerSettings(), ReenactSettings(), CPU, matting_factory("selfie", CPU)
-    )
+    return make_pipeline(CPU, tracker or SteadyTracker(), size)
 
 
 def scene(subject: bool = True, mode: Mode = Mode.REENACT, **look: object) -> Scene:
@@ -141,7 +143,7 @@ def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None
     made, ratio = pipeline(LongFace()), scene(mode=Mode.RATIO)
     for index in range(45):
         last = made.process(frame(index, image), ratio).image
-    assert [trouble.what for trouble in made.troubles] == ["mode ratio shows the reenacted still"]
+    assert [trouble.what for trouble in made.troubles] == ["mode reenact is shown in place of mode ratio"]
     still = made.process(frame(45, image), scene()).image
     assert difference(last, still) < 2
     other = replace(ratio, subject=replace(small_subject()))
@@ -169,18 +171,73 @@ def test_reenact_stands_before_its_background_without_any_model() -> None:
     assert (red[:, 0] == [255, 0, 0]).all()
 
 
-def test_fitted_covers_and_centres() -> None:
-    wide = np.zeros((100, 400, 3), np.uint8)
-    wide[:, 190:210] = 255
-    cut = fit_frame(frame(3, wide), (200, 100))
-    assert cut.size == (200, 100)
-    assert cut.index == 3
-    np.testing.assert_array_equal(cut.image, wide[:, 100:300])
-    same = frame(0, wide)
-    assert fit_frame(same, (400, 100)) is same
-    small = fit_frame(frame(0, wide), (100, 50)).image
-    expected = cv2.resize(wide[:, 100:300], (100, 50), interpolation=cv2.INTER_AREA)
-    assert difference(small, expected) < 2
-    stripes = np.zeros((90, 180, 3), np.uint8)
-    stripes[:, ::3] = 255
-    assert (fit_frame(frame(0, stripes), (60, 30)).image == 85).all()  # what is finer than its pixels is averaged
+def test_without_a_face_mode_ratio_shows_the_live_picture() -> None:
+    class Blind(SteadyTracker):
+        def track(self, frame: Frame) -> FaceState:
+            return LOST
+
+    bright = np.tile(np.arange(0, 256, 2, dtype=np.uint8), (SIZE[1], 1))[..., None].repeat(3, axis=2)
+    assert bright.shape == (SIZE[1], SIZE[0], 3)
+    picture = pipeline(Blind()).process(frame(0, bright), scene(mode=Mode.RATIO)).image
+    assert np.abs(picture.astype(int) - bright).max() <= 2  # highlights are not dimmed
+
+
+class OneGrey:
+    """A third mode: the whole picture in the grey of the subject's relit mean. It refuses a face that is not found."""
+
+    def __init__(self, context: ModeContext) -> None:
+        self.context = context
+
+    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene) -> RenderTask | FaceMismatch:
+        if motion.status is FaceStatus.LOST:
+            return FaceMismatch("nobody is there", "come back")
+        relit = self.context.scene_relighting.relight(scene, motion.rotation, frame.time_s)
+        width, height = self.context.size
+        value = np.uint8(np.clip(255 * relit.mean(), 1, 255))
+        return lambda: RenderedFrame(np.full((height, width, 3), value, np.uint8), motion, scene)
+
+
+def with_third_mode(tracker: Tracker) -> Pipeline:
+    """A pipeline whose mode ratio is another: its logic knows no mode by name but the fallback."""
+    modes = {**mode_factories(CPU), Mode.RATIO: OneGrey}
+    follower = make_follower(CPU.tracker, tracker)
+    return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
+
+
+def test_a_third_mode_needs_nothing_of_the_pipeline() -> None:
+    made = with_third_mode(SteadyTracker())
+    one, two = (
+        made.process(frame(index), scene(mode=Mode.RATIO, lighting={"exposure_ev": ev, "transition_s": 0})).image
+        for index, ev in enumerate((-1, 1))
+    )
+    assert len(np.unique(one)) == len(np.unique(two)) == 1
+    assert two[0, 0, 0] > 2 * one[0, 0, 0] > 0
+    assert made.troubles == []
+
+
+def test_any_mode_may_find_a_mismatch_and_the_fallback_takes_over_until_the_subject_changes() -> None:
+    made, wanted = with_third_mode(Vanishing()), scene(mode=Mode.RATIO)
+    pictures = [made.process(frame(index), wanted).image for index in range(30)]
+    assert len(np.unique(pictures[24])) == 1
+    assert len(np.unique(pictures[25])) > 1
+    assert [(t.what, t.why, t.cure) for t in made.troubles] == [
+        ("mode reenact is shown in place of mode ratio", "nobody is there", "come back")
+    ]
+
+
+def test_a_fallback_that_takes_no_face_either_is_an_error() -> None:
+    modes = {Mode.REENACT: OneGrey, Mode.RATIO: OneGrey}
+    tracker = Vanishing()
+    made = Pipeline(
+        tracker, make_follower(CPU.tracker, tracker), SIZE, modes, partial(open_relighter, "basis"), pytest.fail
+    )
+    made.process(frame(24), scene(mode=Mode.RATIO))
+    with pytest.raises(SubjectError, match="nobody is there; come back"):
+        made.process(frame(25), scene(mode=Mode.RATIO))
+
+
+def test_the_relighter_at_work_is_named_for_the_status() -> None:
+    made = pipeline()
+    assert made.providers == {}
+    made.process(frame(), scene())
+    assert made.providers == {"relighter basis": "numpy"}

@@ -13,7 +13,7 @@ from relit_camera.app.video_replay import ReplayedFrame
 from relit_camera.base.images.image_files import read_display
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.face_state import FaceStatus
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from tests.replay.case import CASES, Case, CaseError, read_case
 from tests.replay.expectations import differences, read_pose, record
 from tests.replay.failures import keep

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.head_pose import HeadPose, project
 from relit_studio.camera import Camera
 
 

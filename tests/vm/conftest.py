@@ -1,4 +1,4 @@
-"""One machine for each version of v4l2loopback, and at the end of the run a table of what was seen in them."""
+"""One machine for each version of v4l2loopback, and a table of what was seen in them (`tests.report_tables`)."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ NEWEST = pytest.mark.parametrize("version", VERSIONS[-1:], indirect=True)
 """For what does not depend on the version."""
 LONG = pytest.mark.parametrize("version", CHOSEN or VERSIONS[-1:], indirect=True)
 """For what takes minutes: by itself with one version, with all of them where they are asked for."""
-
-ROWS: list[tuple[str, str, str]] = []
 
 
 @pytest.fixture(scope="session")
@@ -56,16 +54,6 @@ def machine(booted: Machine) -> Machine:
 
 
 @pytest.fixture
-def saw(version: str) -> Callable[[str, str], None]:
+def saw(version: str, note_row: Callable[[str, tuple[str, ...]], None]) -> Callable[[str, str], None]:
     """Notes what a reader saw, for the table."""
-    return lambda reader, what: ROWS.append((reader, version, what))
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    if not ROWS:
-        return
-    terminalreporter.section("readers of the virtual camera")
-    terminalreporter.write_line("| reader | v4l2loopback | saw |")
-    terminalreporter.write_line("|---|---|---|")
-    for row in sorted(ROWS):
-        terminalreporter.write_line(f"| {' | '.join(row)} |")
+    return lambda reader, what: note_row("readers of the virtual camera", (reader, version, what))

@@ -1,13 +1,16 @@
 """The virtual camera on a real kernel: who finds it, what they see, and what they see when the camera is restarted."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from relit_camera.devices.sources.pattern_source import draw_pattern, read_number
-from tests.vm.camera import SIZE, relit, running, without_models
+from tests.vm.camera import SIZE, Camera, relit, running, without_models
 from tests.vm.conftest import NEWEST
-from tests.vm.machine import MachineError
+from tests.vm.machine import Machine, MachineError
 from tests.vm.readers import FRAMES, NODE, READERS, Watcher, difference, finds_label
 
 pytestmark = pytest.mark.timeout(900)
@@ -15,7 +18,7 @@ pytestmark = pytest.mark.timeout(900)
 LARGER = (480, 270)
 
 
-def test_where_nobody_publishes_readers_find_no_camera(machine):
+def test_where_nobody_publishes_readers_find_no_camera(machine: Machine) -> None:
     raw = machine.host / "nobody.raw"
     stream = f"timeout 20 v4l2-ctl -d {NODE} --stream-mmap --stream-count=1 --stream-to=/host/{raw.name}"
     machine.run(stream, check=False)
@@ -26,7 +29,7 @@ def test_where_nobody_publishes_readers_find_no_camera(machine):
 
 
 @pytest.fixture(scope="class")
-def camera(machine):
+def camera(machine: Machine) -> Iterator[Camera]:
     """One camera for all tests that leave it as it is."""
     with running(machine) as camera:
         yield camera
@@ -34,7 +37,9 @@ def camera(machine):
 
 class TestWhileItRuns:
     @pytest.mark.parametrize("reader", READERS)
-    def test_a_reader_gets_the_right_pixels(self, camera, machine, saw, reader):
+    def test_a_reader_gets_the_right_pixels(
+        self, camera: Camera, machine: Machine, saw: Callable[[str, str], None], reader: str
+    ) -> None:
         seen = READERS[reader](machine)
         number = read_number(seen.image)
         assert number is not None
@@ -43,7 +48,7 @@ class TestWhileItRuns:
         assert worst <= 6
 
     @NEWEST
-    def test_a_second_camera_is_refused(self, camera, machine):
+    def test_a_second_camera_is_refused(self, camera: Camera, machine: Machine) -> None:
         before = camera.status()["frames"]["published"]
         outcome = relit(machine, f"run --source pattern --port 0 {without_models(machine)}")
         assert outcome.status == 1
@@ -54,20 +59,22 @@ class TestWhileItRuns:
         assert camera.status()["frames"]["published"] > before
 
     @NEWEST
-    def test_it_never_films_itself(self, camera, machine):
+    def test_it_never_films_itself(self, camera: Camera, machine: Machine) -> None:
         outcome = relit(machine, f"run --source {NODE} --port 0 {without_models(machine)}")
         assert outcome.status == 1
         assert outcome.errors == (
             f"relit: '{NODE}' is our own virtual camera: it would film itself; choose another source\n"
         )
 
-    def test_it_is_listed_by_its_label(self, camera, machine):
+    def test_it_is_listed_by_its_label(self, camera: Camera, machine: Machine) -> None:
         assert finds_label(machine) == {"v4l2-ctl": True, "ffmpeg": True}
         listed = json.loads(relit(machine, "devices --json").output)["virtual_cameras"]
         assert listed == [{"label": "Relit Camera", "node": NODE, "ours": True, "size": list(SIZE)}]
 
 
-def test_a_reader_stays_through_kill_stop_and_another_size(machine, version, saw):
+def test_a_reader_stays_through_kill_stop_and_another_size(
+    machine: Machine, version: str, saw: Callable[[str, str], None]
+) -> None:
     with running(machine) as camera, Watcher(machine, "generations") as watcher:
         watcher.wait_for(5)
         camera.kill()
@@ -85,6 +92,8 @@ def test_a_reader_stays_through_kill_stop_and_another_size(machine, version, saw
         numbers = [row["number"] for row in generation]
         assert None not in numbers[-5:]
         assert numbers[-1] > numbers[-5]
-    assert difference(image, draw_pattern(SIZE, read_number(image))) <= 6
+    number = read_number(image)
+    assert number is not None
+    assert difference(image, draw_pattern(SIZE, number)) <= 6
     gaps = [rows[end]["at"] - rows[end - 1]["at"] for end in (killed, stopped)]
     saw("OpenCV, reading on", f"kill -9 and start, stop and start with another size: goes on after {max(gaps):.0f} s")

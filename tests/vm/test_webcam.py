@@ -1,10 +1,15 @@
 """A webcam that a kernel makes (vivid), unplugged and plugged in again while a call goes on, and used on demand."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
 import numpy as np
 import pytest
 
 from tests.vm.camera import SIZE, running
 from tests.vm.conftest import LONG
+from tests.vm.machine import Machine
 from tests.vm.readers import LABEL, Call, difference
 
 pytestmark = pytest.mark.timeout(900)
@@ -26,7 +31,7 @@ ENDS_TRACK_S = 10.0
 
 
 @pytest.fixture
-def webcam(machine):
+def webcam(machine: Machine) -> Iterator[Vivid]:
     """A webcam that can be plugged in under a number, and unplugged."""
     vivid = Vivid(machine)
     vivid.plug(0)
@@ -37,29 +42,31 @@ def webcam(machine):
 class Vivid:
     """The fake webcam."""
 
-    def __init__(self, machine):
+    def __init__(self, machine: Machine) -> None:
         self._machine, self._number = machine, 0
 
-    def plug(self, number):
+    def plug(self, number: int) -> None:
         """Load it as /dev/videoN."""
         self._machine.load(f"vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0 vid_cap_nr={number}")
         self._machine.run(f"v4l2-ctl -d /dev/video{number} -c test_pattern=1,osd_text_mode=2")
         self._number = number
 
-    def unplug(self):
+    def unplug(self) -> None:
         """Have its calls fail, as an unplugged webcam's do, and take its module away as soon as nobody holds it."""
         disconnect = f"v4l2-ctl -d /dev/video{self._number} -c disconnect=1"
         unload = "while grep -q '^vivid ' /proc/modules; do rmmod vivid 2>/dev/null; done"
         self._machine.run(f"{disconnect}; {unload}", timeout_s=RECOVERY_S)
 
-    def is_held(self):
+    def is_held(self) -> bool:
         """Whether a program has it open."""
         find = f"ls -l /proc/[0-9]*/fd 2>/dev/null | grep /dev/video{self._number}$"
         return bool(self._machine.run(find, check=False).output)
 
 
 @LONG
-def test_a_call_outlives_an_unplugged_webcam_and_the_webcam_is_held_only_while_somebody_looks(machine, webcam, saw):
+def test_a_call_outlives_an_unplugged_webcam_and_the_webcam_is_held_only_while_somebody_looks(
+    machine: Machine, webcam: Vivid, saw: Callable[[str, str], None]
+) -> None:
     with running(machine, "webcam", more="--on-demand", state="released") as camera:
         assert not webcam.is_held()
         with Call(machine, "call") as call:
@@ -81,7 +88,7 @@ def test_a_call_outlives_an_unplugged_webcam_and_the_webcam_is_held_only_while_s
     assert found["label"] == LABEL
     assert {row["state"] for row in rows} == {"live"}
     assert {(row["width"], row["height"]) for row in rows} == {SIZE}
-    expected = np.repeat(np.uint8([BARS]), SIZE[1], axis=0).repeat(SIZE[0] // len(BARS), axis=1)
+    expected = np.repeat(np.array([BARS], np.uint8), SIZE[1], axis=0).repeat(SIZE[0] // len(BARS), axis=1)
     worst = difference(image, expected)
     cameras = ", ".join(f'"{label}"' for label in found["labels"])
     gap_s = max(row["longest_gap_s"] for row in rows)

@@ -1,4 +1,4 @@
-"""The application: routes, errors, panel, and the checks in front of them."""
+"""Builds the web application: routes, error handlers, panel, and the middleware in front of them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def create_app(camera: CameraControl, settings: RelitSettings) -> FastAPI:
     """The API and the panel of a running camera.
 
     Raises:
-        ConfigError: as `read_token`.
+        ConfigError: the token of the settings cannot be used (see `read_token`).
     """
     app = create_app_without_camera()
     app.state.context = create_context(camera, settings)
@@ -48,7 +48,7 @@ def create_app(camera: CameraControl, settings: RelitSettings) -> FastAPI:
     app.add_middleware(BodyLimitMiddleware)
     if token is not None:
         app.add_middleware(TokenAuthMiddleware, token=token)
-    app.add_middleware(SameOriginMiddleware, names=AllowedHosts.of(settings.server))  # the last is met first
+    app.add_middleware(SameOriginMiddleware, names=AllowedHosts.of(settings.server))  # the one added last runs first
     return app
 
 
@@ -60,7 +60,7 @@ def create_app_without_camera() -> FastAPI:
         description="Errors are RFC 9457 problems. Only GET and HEAD are without effect.",
         version=__version__,
         openapi_url=f"{API_PREFIX}/openapi.json",
-        docs_url=None,  # those pages load their scripts from elsewhere
+        docs_url=None,  # FastAPI's pages load their scripts from other sites
         redoc_url=None,
         generate_unique_id_function=operation_id,
     )

@@ -1,4 +1,4 @@
-"""What every route needs, handed to it by FastAPI."""
+"""The context that FastAPI passes to every route function: the camera, and what the API keeps beside it."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from relit_camera.api.preview_stream import PreviewBroadcaster
-from relit_camera.api.problem_details import NotReadyError
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.errors import NotReadyError
 from relit_camera.live.camera_control import CameraControl
 
 
 @dataclass(frozen=True)
 class ApiContext:
-    """The running camera and what the API keeps beside it.
+    """The running camera and the API's own state.
 
     Attributes:
         camera: the running camera.
         presets: stored looks.
         preview: pictures for viewers, each encoded once.
-        closing: set when the server is to end: long answers must end.
-        image_work_lock: held by work of a second or so.
+        closing: set when the server shuts down: endless answers must end.
+        image_work_lock: held while a picture is read, drawn or encoded.
     """
 
     camera: CameraControl
@@ -36,15 +36,15 @@ class ApiContext:
     image_work_lock: threading.Lock = field(default_factory=threading.Lock)
 
     def is_stopping(self) -> bool:
-        """Whether long answers must end now."""
+        """Whether endless answers must end now."""
         return self.closing.is_set() or self.camera.stopping()
 
     @contextmanager
     def exclusive_image_work(self) -> Iterator[None]:
-        """Around reading, painting and encoding pictures: one at a time, so that the camera keeps its cores.
+        """Do the block's work on pictures alone: one at a time, so that the camera keeps its cores.
 
         Raises:
-            NotReadyError: the camera stops: what waited for its turn is not begun any more.
+            NotReadyError: the camera is stopping.
         """
         with self.image_work_lock:
             if self.is_stopping():
@@ -52,7 +52,7 @@ class ApiContext:
             yield
 
     def publish_collection_changed(self, collection: str) -> None:
-        """Tell listeners that a stored collection, such as `environments`, has another content."""
+        """Send an event that the content of a stored collection, such as `environments`, has changed."""
         self.camera.events.publish("collection", name=collection)
 
 
@@ -62,7 +62,10 @@ def create_context(camera: CameraControl, settings: RelitSettings) -> ApiContext
 
 
 async def get_context(request: Request) -> ApiContext:
-    """The context that `create_app` put into the application. Async: else each request would borrow a thread for it."""
+    """The context that `create_app` put into the application.
+
+    It is async, since FastAPI would run a plain function in a thread, for each request.
+    """
     context: ApiContext = request.app.state.context
     return context
 

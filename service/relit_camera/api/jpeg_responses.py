@@ -1,4 +1,4 @@
-"""Small pictures as answers, which browsers keep and only ask whether they are still the same."""
+"""JPEG pictures as answers, with an ETag: a browser that has the same picture gets 304 instead."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ from http import HTTPStatus
 from typing import Any
 from urllib.parse import quote
 
-import cv2
-import numpy as np
 from fastapi import Request
 from starlette.responses import Response
 
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.images.resize import shrink
 
 THUMBNAIL_WIDTH = 320
 THUMBNAIL_QUALITY = 88
@@ -27,21 +26,17 @@ JPEG_RESPONSE: dict[int | str, dict[str, Any]] = {
 
 
 def thumbnail_url_path(collection: str, name: str) -> str:
-    """Where the small picture of a stored thing is to be had."""
+    """The URL path of the small picture of a stored environment, background or subject."""
     return f"/api/v1/{collection}/{quote(name)}/thumbnail.jpg"
 
 
 def encode_thumbnail(picture: DisplayImage) -> bytes:
     """A JPEG file of uint8 sRGB RGB (height, width, 3), scaled down to at most 320 pixels wide."""
-    height, width = picture.shape[:2]
-    if width > THUMBNAIL_WIDTH:
-        size = THUMBNAIL_WIDTH, max(1, round(height * THUMBNAIL_WIDTH / width))
-        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    return encode_display(picture, ".jpg", THUMBNAIL_QUALITY)
+    return encode_display(shrink(picture, THUMBNAIL_WIDTH / picture.shape[1]), ".jpg", THUMBNAIL_QUALITY)
 
 
 def jpeg_response(request: Request, jpeg: bytes) -> Response:
-    """The picture, or 304 to a client that has it."""
+    """Answer with the picture, or with 304 if the request's If-None-Match names it."""
     tag = f'"{hashlib.sha256(jpeg).hexdigest()[:32]}"'
     headers = {"ETag": tag, "Cache-Control": "private, no-cache"}
     known = [known.strip().removeprefix("W/") for known in request.headers.get("if-none-match", "").split(",")]

@@ -1,8 +1,8 @@
-"""Preview pictures: each is scaled and encoded once, however many look on.
+"""Motion JPEG for viewers: each picture is scaled and encoded once for all viewers of one size, mirroring and rate.
 
-All viewers who ask for the same size, mirroring and rate share one channel: one task takes the published pictures,
-encodes them in a thread, and wakes those who wait. A viewer has no thread and is sent the newest picture when it has
-taken the one before: a slow viewer skips pictures and delays nobody. All of this belongs to the server's event loop.
+Those viewers share one stream: one task takes the published pictures, encodes them in a thread, and wakes the viewers
+that wait. A viewer has no thread of its own; it is sent the newest picture when it has received the previous one, so a
+slow viewer skips pictures and delays nobody. Everything here runs in the server's event loop.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from anyio import CapacityLimiter, to_thread
 
-from relit_camera.api.problem_details import NotReadyError
+from relit_camera.base.errors import NotReadyError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.live.camera_control import CameraControl
@@ -26,13 +26,13 @@ from relit_camera.live.camera_control import CameraControl
 log = logging.getLogger(__name__)
 
 MAX_VARIANTS = 8
-"""Each is encoded for itself, in a thread."""
+"""Streams of different size, mirroring or rate at a time: each is encoded in a thread of its own."""
 MAX_VIEWERS = 256
-"""Each is an open connection, of the 1024 files that a process may usually have open."""
+"""Viewers at a time: each is an open connection, and a process may usually have 1024 files open."""
 MAX_FRAMES_SENT_PER_S = 1000
-"""Pictures sent a second to all viewers together: beyond that each gets fewer, so that the camera keeps its cores."""
+"""Pictures a second to all viewers together: with more viewers each gets fewer, so that the camera keeps its cores."""
 FRAME_WAIT_S = 0.25
-"""How long to wait for a picture before looking whether to end."""
+"""Wait for a picture this long before checking whether to end."""
 PREVIEW_JPEG_QUALITY = 82
 
 
@@ -60,11 +60,11 @@ class EncodedFrame:
 
 
 class PreviewStream:
-    """The pictures of one variant, while `run` makes them.
+    """The encoded pictures of one variant, while `run` makes them.
 
     Attributes:
-        viewers: how many look on.
-        ended: `run` is over: no more pictures come.
+        viewers: number of viewers.
+        ended: whether `run` has ended: no more pictures come.
     """
 
     def __init__(self, camera: CameraControl, variant: PreviewVariant, fps: Callable[[], float] | None = None) -> None:
@@ -73,7 +73,7 @@ class PreviewStream:
         Args:
             camera: whose pictures they are.
             variant: how they are wanted.
-            fps: pictures a second that may be made at present; the variant's if not given.
+            fps: gives the pictures a second that may be made now; the variant's if not given.
         """
         self.viewers = 0
         self.ended = False
@@ -100,7 +100,7 @@ class PreviewStream:
                 made = await to_thread.run_sync(self._make, limiter=limiter, abandon_on_cancel=True)
                 if made is None:
                     continue
-                # From the last due time, not from now: else waking late would slow the rate, each time a little.
+                # Counted from the last due time, not from now: otherwise every late wake-up would lower the rate.
                 due = max(due + 1 / self._fps(), time.monotonic())
                 self._newest = made
                 self._wake()
@@ -120,59 +120,59 @@ class PreviewStream:
 
 
 class PreviewBroadcaster:
-    """The channels that somebody looks at."""
+    """The streams that have viewers; a stream starts with its first viewer and ends with its last."""
 
     def __init__(self, camera: CameraControl) -> None:
         self._camera = camera
-        self._channels: dict[PreviewVariant, tuple[PreviewStream, asyncio.Task[None]]] = {}
+        self._streams: dict[PreviewVariant, tuple[PreviewStream, asyncio.Task[None]]] = {}
         self._limiter: CapacityLimiter | None = None
 
     @property
     def viewers(self) -> int:
-        """How many look on now."""
-        return sum(channel.viewers for channel, _ in list(self._channels.values()))
+        """Number of viewers of all streams now."""
+        return sum(stream.viewers for stream, _ in list(self._streams.values()))
 
     def check_capacity(self, variant: PreviewVariant) -> None:
-        """Check that one more may look on.
+        """Check that one more viewer is allowed.
 
         Raises:
-            NotReadyError: `MAX_VIEWERS` look on already, or at `MAX_VARIANTS` other variants.
+            NotReadyError: there are `MAX_VIEWERS` viewers already, or `MAX_VARIANTS` streams of other variants.
         """
         if self.viewers >= MAX_VIEWERS:
             raise NotReadyError(f"{MAX_VIEWERS} previews are open already", "close one of them")
-        if variant not in self._channels and len(self._channels) >= MAX_VARIANTS:
+        if variant not in self._streams and len(self._streams) >= MAX_VARIANTS:
             raise NotReadyError(
                 f"previews of {MAX_VARIANTS} sizes and rates are open already", "ask for one of those, or close one"
             )
 
     @contextmanager
     def subscribe(self, variant: PreviewVariant) -> Iterator[PreviewStream]:
-        """The channel of a variant, inside the event loop; it lasts as long as somebody watches.
+        """Within the block: be a viewer of the variant's stream. Only in the event loop.
 
         Raises:
             NotReadyError: as `check_capacity`.
         """
         self.check_capacity(variant)
-        if self._limiter is None:  # its own threads: those of the other operations stay free
+        if self._limiter is None:  # threads apart from those of the other operations
             self._limiter = CapacityLimiter(MAX_VARIANTS)
-        if variant not in self._channels:
-            made = PreviewStream(
+        if variant not in self._streams:
+            created = PreviewStream(
                 self._camera, variant, lambda: min(variant.fps, MAX_FRAMES_SENT_PER_S / max(1, self.viewers))
             )
-            self._channels[variant] = made, asyncio.get_running_loop().create_task(made.run(self._limiter))
-        channel, task = self._channels[variant]
-        channel.viewers += 1
+            self._streams[variant] = created, asyncio.get_running_loop().create_task(created.run(self._limiter))
+        stream, task = self._streams[variant]
+        stream.viewers += 1
         try:
-            yield channel
+            yield stream
         finally:
-            channel.viewers -= 1
-            if channel.viewers == 0:
-                del self._channels[variant]
+            stream.viewers -= 1
+            if stream.viewers == 0:
+                del self._streams[variant]
                 task.cancel()
 
 
 def encode_preview(picture: DisplayImage, variant: PreviewVariant) -> bytes:
-    """The JPEG file of a published picture, uint8 sRGB RGB (height, width, 3), as a viewer wants it."""
+    """The JPEG file of a published picture, uint8 sRGB RGB (height, width, 3), in the viewer's variant."""
     if variant.width is not None and variant.width < picture.shape[1]:
         picture = _downscale(picture, variant.width)
     if variant.mirror:
@@ -181,7 +181,7 @@ def encode_preview(picture: DisplayImage, variant: PreviewVariant) -> bytes:
 
 
 def _downscale(picture: DisplayImage, width: int) -> DisplayImage:
-    """Halved as often as it goes, then bilinear: no jagged edges, at a tenth of INTER_AREA's time for odd ratios."""
+    """Scale down by halving as often as possible, then bilinearly: smooth, in a tenth of INTER_AREA's time."""
     height = max(1, round(picture.shape[0] * width / picture.shape[1]))
     while picture.shape[1] >= 2 * width:
         half = picture.shape[1] // 2, max(1, picture.shape[0] // 2)

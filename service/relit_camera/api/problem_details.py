@@ -1,4 +1,4 @@
-"""Every error answer: application/problem+json (RFC 9457), with what is wrong and what cures it."""
+"""Error answers as application/problem+json (RFC 9457): what is wrong, and what cures it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,17 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 from starlette.responses import Response
 
-from relit_camera.base.errors import DeviceError, InputError, NotFoundError, RelitError, StorageError
+from relit_camera.base.errors import (
+    ConflictError,
+    DeviceError,
+    ForbiddenError,
+    InputError,
+    NotFoundError,
+    NotReadyError,
+    RelitError,
+    StorageError,
+    TooLargeError,
+)
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -49,22 +59,6 @@ class Problem(BaseModel):
     """Every wrong field, where fields are at fault."""
 
 
-class ConflictError(RelitError):
-    """The thing is in use, built in, or of that name already."""
-
-
-class TooLargeError(RelitError):
-    """The request's body is larger than is taken."""
-
-
-class ForbiddenError(RelitError):
-    """The request came from another site."""
-
-
-class NotReadyError(RelitError):
-    """The camera cannot answer that now."""
-
-
 STATUS_BY_ERROR = {
     NotFoundError: HTTPStatus.NOT_FOUND,
     InputError: HTTPStatus.UNPROCESSABLE_ENTITY,
@@ -93,7 +87,7 @@ PROBLEM_TYPES = {
 }
 """Status → the last part of the problem's type, and its title."""
 
-# A path's folders tell of the person's machine: only the last part is shown. API paths are ours and stay.
+# Folders of a path would reveal the person's machine: only the last part is shown. Paths of the API itself stay.
 _FOLDER_PATTERN = re.compile(r"(?<![\w.:/\\])(?!/api/|/panel/)(?:[A-Za-z]:)?[/\\](?:[^\s/\\:'\",;]+[/\\])+")
 
 
@@ -112,7 +106,7 @@ def problem_response(
     errors: Sequence[FieldProblem] | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    """The answer that says so."""
+    """The error answer of this status, with what is wrong and what cures it."""
     slug, title = PROBLEM_TYPES.get(status) or ("http", HTTPStatus(status).phrase)
     body = Problem(
         type=f"urn:relit-camera:problem:{slug}",
@@ -127,14 +121,14 @@ def problem_response(
 
 
 def problem_response_from(error: RelitError) -> Response:
-    """The answer to one of our own errors, without the folders of this machine."""
+    """The error answer for a `RelitError`, without the folders of this machine."""
     return problem_response(status_for_error(error), redact_folders(error.what), redact_folders(error.cure))
 
 
 def redact_folders(text: str) -> str:
     """`text` with every absolute path cut down to its last part."""
     for folder in (Path.home(), Path(tempfile.gettempdir())):
-        text = text.replace(f"{folder}/", "/…/").replace(f"{folder}\\", "/…/")  # the home's own name may hold spaces
+        text = text.replace(f"{folder}/", "/…/").replace(f"{folder}\\", "/…/")  # the home folder's name may hold spaces
     return _FOLDER_PATTERN.sub("", text)
 
 

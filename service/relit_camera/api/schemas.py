@@ -1,4 +1,4 @@
-"""Bodies of requests and answers that `base.config.look` and `live.status.camera_status` do not have."""
+"""Bodies of requests and answers, but for those that `base.config.look` and `live.status.camera_status` define."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relit_camera.subject.subject import SubjectMetadata
 
 
 class ApiModel(BaseModel):
-    """Base of the bodies here: immutable, unknown keys refused."""
+    """Base class of the bodies: immutable, unknown keys are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 

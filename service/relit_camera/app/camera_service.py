@@ -213,7 +213,7 @@ class CameraService:
             latency_ms=self._publisher.latency_ms,
             stage_ms=pipeline.timer.percentiles(),
             frames=replace(counts, dropped=counts.dropped + self._loop.skipped + self._supervisor.dropped),
-            providers={session.name: session.provider for session in sessions},
+            providers={session.name: session.provider for session in sessions} | pipeline.providers,
             degraded=[*self._board.degradations(), *pipeline.troubles, *slower],
             version=__version__,
             uptime_s=self._clock.now() - self._started_at,

@@ -1,18 +1,45 @@
-"""Putting the parts together from the settings: the one place where names of plug-ins become objects."""
+"""Putting the parts together from the settings: the one place where names in settings become objects."""
 
 from __future__ import annotations
 
-from relit_camera.base.config.settings import InferenceSettings, RelitSettings
+from collections.abc import Mapping
+from functools import partial
+
+from relit_camera.base.config.look import Mode
+from relit_camera.base.config.settings import InferenceSettings, RelitSettings, TrackerSettings
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import Tracker
-from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
+from relit_camera.face.motion.face_follower import FaceFollower, FaceFollowerSettings
+from relit_camera.face.tracking.trackers import TRACKERS, TrackerOptions, open_tracker
 from relit_camera.live.compositing.matting import matting_factory
+from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderMode
+from relit_camera.live.modes.ratio_mode import RatioMode
+from relit_camera.live.modes.ratio_relighting import RatioRelighting
+from relit_camera.live.modes.reenact_mode import ReenactMode
+from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.pipeline import Pipeline
+from relit_camera.live.reenactment.dense_motion import DenseMotion
+from relit_camera.live.reenactment.reenactor import REENACTORS, ReenactorContext, open_reenactor
+from relit_camera.subject.relighting.relighter import RELIGHTERS, open_relighter
 
 
 def session_options(inference: InferenceSettings) -> SessionOptions:
     """How ONNX Runtime shall run every model."""
     return SessionOptions(inference.provider, inference.threads, inference.strict)
+
+
+def require_plugins(settings: RelitSettings) -> None:
+    """Check that the tracker, relighter and reenactor that the settings name are installed, without opening them.
+
+    Sources and sinks are checked by opening them: their names may be files or devices as well.
+
+    Raises:
+        NotFoundError: one is not installed; the cure lists those that are.
+        ConfigError: several packages have one of that name.
+    """
+    TRACKERS.require(settings.tracker.name)
+    RELIGHTERS.require(settings.relight.name)
+    REENACTORS.require(settings.reenact.reenactor)
 
 
 def make_tracker(settings: RelitSettings) -> Tracker:
@@ -28,13 +55,49 @@ def make_tracker(settings: RelitSettings) -> Tracker:
 
 
 def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, int]) -> Pipeline:
-    """The picture path for an output of `size` (width, height).
+    """The pipeline for an output of `size` (width, height).
 
     Raises:
-        NotFoundError: no matte of the settings' name.
+        NotFoundError: no relighter, reenactor or matte of the settings' name.
+        ConfigError: several packages have a plug-in of that name.
         InputError: `recorded:FILE` names no recorded mattes.
     """
-    options = session_options(settings.inference)
+    require_plugins(settings)
+    session = session_options(settings.inference)
     return Pipeline(
-        tracker, size, settings.tracker, settings.reenact, options, matting_factory(settings.matte, options)
+        tracker,
+        make_follower(settings.tracker, tracker),
+        size,
+        mode_factories(settings),
+        partial(open_relighter, settings.relight.name, session=session),
+        matting_factory(settings.matte, session),
     )
+
+
+def make_follower(settings: TrackerSettings, tracker: Tracker) -> FaceFollower:
+    """What smooths the tracker's faces into motion, as the settings say."""
+    rotation = FaceFollowerSettings().rotation
+    return FaceFollower(
+        tracker.scheme,
+        FaceFollowerSettings(
+            reach_yaw_deg=settings.reach_yaw_deg,
+            reach_pitch_deg=settings.reach_pitch_deg,
+            rotation=type(rotation)(rotation.min_cutoff_hz, rotation.beta, settings.dead_band_deg),
+        ),
+    )
+
+
+def mode_factories(settings: RelitSettings) -> Mapping[Mode, ModeFactory]:
+    """How each mode is made for a subject. A new mode is one more entry here."""
+    session = session_options(settings.inference)
+
+    def reenact(context: ModeContext) -> RenderMode:
+        reenactor = ReenactorContext(context.subject, context.face, context.size, session)
+        return ReenactMode(context, open_reenactor(settings.reenact.reenactor, reenactor))
+
+    def ratio(context: ModeContext) -> RenderMode:
+        room_light = RoomLightEstimator(context.subject, context.face)
+        relighting = RatioRelighting(context.subject, context.face, context.relighter, room_light, DenseMotion(session))
+        return RatioMode(context, relighting)
+
+    return {Mode.REENACT: reenact, Mode.RATIO: ratio}

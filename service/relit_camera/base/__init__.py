@@ -1,0 +1,1 @@
+"""What every other part builds on: errors, storage, pictures, video, neural networks, settings."""

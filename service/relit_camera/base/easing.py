@@ -1,27 +1,50 @@
-"""How what changes is eased over time."""
+"""Easing curves: a cubic ease-out over time, the smoothstep between two values, and eased keyframes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, TypeVar, overload
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floating = TypeVar("Floating", bound=np.floating)
 
 
 def ease_out_cubic(elapsed_s: float, transition_s: float) -> float:
-    """How much of a change is there, 0..1: fast at first, so that it is seen at once, then settling (cubic).
+    """Share 0..1 of a change that is reached after `elapsed_s` of `transition_s` seconds: fast at first, then settling.
 
-    A change that is begun anew every few milliseconds, as a slider does, is so followed closely. Before its beginning,
-    which is where a file that starts again sets its clock, a change is over.
+    A change that restarts every few milliseconds, as while a slider is dragged, is so followed closely. A negative
+    `elapsed_s` (the clock of a file that starts again) counts as the end of the change: 1.
     """
     if not 0 <= elapsed_s < transition_s:
         return 1.0
     return 1 - (1 - elapsed_s / transition_s) ** 3
 
 
-def interpolate_keyframes(at: float, keys: Sequence[tuple[float, float]]) -> float:
-    """The value between keys (place, value) of rising places, eased in and out of each (Hermite)."""
-    places, values = np.array(keys).T
-    after = int(np.clip(np.searchsorted(places, at, side="right"), 1, len(keys) - 1))
-    share = np.clip((at - places[after - 1]) / (places[after] - places[after - 1]), 0, 1)
-    eased = share**2 * (3 - 2 * share)
-    return float(values[after - 1] + (values[after] - values[after - 1]) * eased)
+@overload
+def smoothstep(value: NDArray[Floating], low: float = ..., high: float = ...) -> NDArray[Floating]: ...
+
+
+@overload
+def smoothstep(value: ArrayLike, low: float = ..., high: float = ...) -> NDArray[Any]: ...
+
+
+def smoothstep(value: ArrayLike, low: float = 0.0, high: float = 1.0) -> NDArray[Any]:
+    """Hermite interpolation 3t² − 2t³ with t = (value − low) / (high − low), clamped to 0..1.
+
+    Elementwise, in the precision of `value`. With `low` above `high` the curve falls instead of rising.
+    """
+    share = np.clip((np.asarray(value) - low) / (high - low), 0, 1)
+    return np.asarray(share * share * (3 - 2 * share))
+
+
+def interpolate_keyframes(position: float, keys: Sequence[tuple[float, float]]) -> float:
+    """The value at `position` between keys (position, value) of rising positions, by `smoothstep` between neighbours.
+
+    Before the first key and after the last their values hold.
+    """
+    positions, values = np.array(keys).T
+    after = int(np.clip(np.searchsorted(positions, position, side="right"), 1, len(keys) - 1))
+    share = smoothstep(position, positions[after - 1], positions[after])
+    return float(values[after - 1] + (values[after] - values[after - 1]) * share)

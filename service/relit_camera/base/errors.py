@@ -1,29 +1,38 @@
 """Every error that Relit Camera raises on purpose.
 
-RelitError                   what happened, and what cures it
-├── InputError               the user's input is at fault; the command line exits with 1
-│   ├── ConfigError          a setting is unknown, mistyped or out of range
-│   ├── NotFoundError        no environment, subject, preset, tracker … of that name
-│   ├── ImageError           a picture cannot be read or has the wrong shape or values
-│   ├── PanoramaError        a panorama is not 2:1, has NaN or negative light …
-│   ├── LightsError          an .lp file, or the pictures that it names, are wrong
-│   ├── SubjectError         a .relit file is damaged or of another version
-│   ├── VideoError           a video cannot be read, is truncated, or shows no face
-│   ├── CaptureError         what a capture needs is not in its pictures: no flash, no mirror ball …
-│   ├── TrackError           a recorded track does not fit
-│   └── ModelError           a model is missing, has the wrong hash, or breaks its contract
-├── DeviceError              a camera, virtual camera or provider is missing or in use
-├── PortInUseError           another program listens there
-└── StorageError             a file could not be written (disk full, no permission)
+RelitError                       what is wrong, and what cures it
+├── InputError                   the user's input is wrong; the command line exits with 1, the API answers 422
+│   ├── ConfigError              a setting is unknown, mistyped or out of range
+│   ├── NotFoundError            no environment, subject, preset, tracker … of that name
+│   ├── ImageError               a picture cannot be read or has the wrong shape or values
+│   ├── PanoramaError            a panorama is not 2:1, or has NaN or negative light …
+│   ├── LightsError              an .lp file, or the pictures that it names, are wrong
+│   ├── SubjectError             a .relit file is damaged or of another version
+│   ├── VideoError               a video cannot be read, is truncated, or shows no face
+│   ├── CaptureError             something a capture needs is not in its pictures: no flash, no mirror ball …
+│   ├── TrackError               a recorded track does not fit
+│   └── ModelError               a model is missing, has the wrong hash, or breaks its contract
+├── DeviceError                  a camera, virtual camera or provider is missing or in use
+│   └── UnsupportedByDriverError the device's driver is too old for what it is asked
+├── PortInUseError               another program listens on the port
+├── StorageError                 a file cannot be written (disk full, no permission)
+├── PipelineHangError            a frame took so long that its thread was given up
+├── ConflictError                API: the thing is in use, built in, or has that name already (409)
+├── TooLargeError                API: the request's body is too large (413)
+├── ForbiddenError               API: the request came from another site (403)
+└── NotReadyError                API: the camera cannot answer that now (503)
 
-The command line and the API only print them: the cure is decided where the error is known.
+RuntimeError
+└── IllegalTransitionError       a fault of the program: a source went to a state that it may not go to
+
+The command line and the API only print `what` and `cure`: the code that knows the error writes both.
 """
 
 from __future__ import annotations
 
 
 class RelitError(Exception):
-    """Something a person can cure.
+    """An error that a person can cure.
 
     Attributes:
         what: one clause saying what is wrong, with the value and the place.
@@ -40,7 +49,7 @@ class RelitError(Exception):
 
 
 class InputError(RelitError):
-    """The user's input is at fault."""
+    """The user's input is wrong."""
 
 
 class ConfigError(InputError):
@@ -48,7 +57,7 @@ class ConfigError(InputError):
 
 
 class NotFoundError(InputError):
-    """Nothing of that name is stored."""
+    """Nothing has that name: no stored file, and no plug-in."""
 
 
 class ImageError(InputError):
@@ -72,7 +81,7 @@ class VideoError(InputError):
 
 
 class CaptureError(InputError):
-    """What a capture needs is not in its pictures."""
+    """Something that a capture needs is not in its pictures."""
 
 
 class TrackError(InputError):
@@ -87,9 +96,37 @@ class DeviceError(RelitError):
     """A camera, a virtual camera or an execution provider is missing or in use."""
 
 
+class UnsupportedByDriverError(DeviceError):
+    """The device's driver is too old for what it is asked, or another one than expected."""
+
+
 class PortInUseError(RelitError):
     """Another program listens on the port."""
 
 
 class StorageError(RelitError):
     """A file could not be written."""
+
+
+class PipelineHangError(RelitError):
+    """A frame took so long in the pipeline that its thread was given up."""
+
+
+class ConflictError(RelitError):
+    """What the request names is in use, built in, or exists already."""
+
+
+class TooLargeError(RelitError):
+    """The request's body is larger than the API takes."""
+
+
+class ForbiddenError(RelitError):
+    """The request came from another site."""
+
+
+class NotReadyError(RelitError):
+    """The camera cannot answer the request now."""
+
+
+class IllegalTransitionError(RuntimeError):
+    """A source went to a state that it may not go to from its present one: a fault of the program."""

@@ -1,6 +1,6 @@
-"""Writing files so that a failure leaves nothing behind, and a crash nothing that stays.
+"""Writing files whole or not at all: to a temporary file beside the target, which is renamed when it is complete.
 
-Arrays in a safetensors file, written whole or not at all.
+What a crash leaves of temporary files is deleted at the next start. Arrays are written as safetensors files.
 """
 
 from __future__ import annotations
@@ -8,8 +8,8 @@ from __future__ import annotations
 import errno
 import os
 import re
+import secrets
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -25,10 +25,11 @@ if sys.platform != "win32":
     import fcntl
 
 NEW_FILE_GRACE_S = 60.0
-"""An unfinished file without content may have been made just now, by a writer who is about to lock it."""
+"""An empty temporary file younger than this is left alone: its writer may be about to lock it."""
 STALE_FILE_AGE_S = 86400.0
-"""Where files cannot be locked, an unfinished one is left over when nobody has written to it for so long."""
+"""Where the file system has no locks, a temporary file is abandoned when it was not written to for this long."""
 
+_CREATE_NEW = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
 _UNFINISHED_MARK = ".unfinished-"
 _UNFINISHED_PATTERN = re.compile(rf"^\..{{1,40}}{re.escape(_UNFINISHED_MARK)}[a-z0-9_]{{8}}(\.\w+)?$")
 
@@ -39,9 +40,8 @@ def atomic_path(target: Path) -> Iterator[Path]:
 
     The temporary file keeps the target's suffix (encoders choose the format by it), is fsynced and renamed, and the
     folder is fsynced: whenever the program or the machine stops, `target` is the old file or the new one, whole.
-    On any failure the temporary file is deleted and an existing target is left as it was. Where the program is killed,
-    it stays, and `remove_unfinished_files` finds it: a lock, which ends with the process, tells it from one in the
-    making.
+    On any failure the temporary file is deleted and an existing target is left as it was. A killed program leaves it
+    behind, for `remove_unfinished_files` to delete: a lock, which ends with the process, marks one still being written.
 
     Raises:
         StorageError: the folder does not exist, is not writable, the name is too long, or the disk is full.
@@ -50,18 +50,17 @@ def atomic_path(target: Path) -> Iterator[Path]:
     try:
         if target.is_dir():
             raise StorageError(f"cannot write {target}: it is a folder", "name a file in it")
-        handle, name = tempfile.mkstemp(
-            prefix=f".{target.stem[:40]}{_UNFINISHED_MARK}", suffix=target.suffix, dir=target.parent
-        )
+        temporary = target.with_name(f".{target.stem[:40]}{_UNFINISHED_MARK}{secrets.token_hex(4)}{target.suffix}")
+        # Created with the mode it shall have in the end (not by `tempfile`, which creates private files): the kernel
+        # applies the umask and the folder's access list, and nothing has to read or set the umask of all threads.
+        handle = os.open(temporary, _CREATE_NEW, 0o666)
     except OSError as error:
         raise storage_error(target, error) from error
-    temporary = Path(name)
     try:
         with _locked(handle):
             yield temporary
             with temporary.open("rb") as written:
                 os.fsync(written.fileno())
-            temporary.chmod(0o666 & ~_umask())
             temporary.replace(target)
         _sync_folder(target.parent)
     except OSError as error:
@@ -73,19 +72,19 @@ def atomic_path(target: Path) -> Iterator[Path]:
 
 
 def remove_unfinished_files(folder: Path) -> list[Path]:
-    """Delete what killed programs have left of `atomic_path` in a folder; returns what was deleted.
+    """Delete the temporary files of `atomic_path` that killed programs left in a folder; returns those deleted.
 
-    Files that are being written, by whatever process of this machine, are left alone, and so are all others. A folder
-    that is not there or may not be written to is no error.
+    Files that any process of this machine is still writing are left alone, and so are all other files. A folder that
+    does not exist or may not be written to is no error.
     """
-    swept = []
+    removed = []
     with suppress(OSError):
         for path in [path for path in folder.iterdir() if _UNFINISHED_PATTERN.match(path.name)]:
             with suppress(OSError):
                 if _is_abandoned(path):
                     path.unlink()
-                    swept.append(path)
-    return swept
+                    removed.append(path)
+    return removed
 
 
 def write_atomic(target: Path, data: bytes | str) -> None:
@@ -99,7 +98,7 @@ def write_atomic(target: Path, data: bytes | str) -> None:
 
 
 def make_folder(folder: Path, private: bool = False) -> None:
-    """Create a folder and those above it, where they are missing; a private one only its owner may enter.
+    """Create a folder and its parents where they are missing; with `private` only its owner may enter it.
 
     Raises:
         StorageError: it cannot be created.
@@ -113,7 +112,7 @@ def make_folder(folder: Path, private: bool = False) -> None:
 
 
 def storage_error(target: Path, error: OSError) -> StorageError:
-    """What a person is told when `target` cannot be written: why, and the cure."""
+    """The error for a file that cannot be written: the reason, and a cure that suits it."""
     cures = {
         errno.ENOENT: "create the folder first",
         errno.ENAMETOOLONG: "choose a shorter name",
@@ -128,7 +127,7 @@ def storage_error(target: Path, error: OSError) -> StorageError:
 
 @contextmanager
 def _locked(handle: int) -> Iterator[None]:
-    """Hold an open file for oneself, and close it. Windows can rename no open file: there it is closed at once."""
+    """Lock an open file within the block, and close it. On Windows, which renames no open file, it is closed first."""
     if sys.platform == "win32":
         os.close(handle)
         yield
@@ -172,18 +171,12 @@ def _sync_folder(folder: Path) -> None:
             os.close(handle)
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
 def write_tensors(path: Path, tensors: Mapping[str, NDArray], header: Mapping[str, str]) -> None:
-    """Write arrays of any shape and type, and texts beside them.
+    """Write a safetensors file: arrays of any shape and type by name, and texts by name as its header.
 
     Raises:
         StorageError: the file cannot be written.
     """
     contiguous = {name: np.ascontiguousarray(value) for name, value in tensors.items()}
-    # In memory: `save_file` would write beside the target, to a file of its own that a crash leaves behind.
+    # Serialized in memory: `save_file` would write a temporary file of its own, which a crash leaves behind.
     write_atomic(path, save(contiguous, metadata=dict(header)))

@@ -1,4 +1,4 @@
-"""How this process uses the machine: threads of the libraries that start their own, and memory of pictures."""
+"""Limits how many threads the libraries use, and keeps the memory of pictures allocated."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from threadpoolctl import threadpool_limits
 
 OPENCV_THREADS = 2
 BLAS_THREADS = 1
-"""OpenBLAS's threads spin while they wait: two of them gain a millisecond on an idle machine, and lose thirty when a
-call app wants the other core."""
+"""OpenBLAS's threads spin while they wait: two of them save a millisecond on an idle machine, but cost thirty when a
+call app uses the other core."""
 MAX_WORKERS = 4
-"""Each holds a block of its own in memory."""
+"""Threads of a `worker_pool` at most: each holds a block of its own in memory."""
 LARGE_ALLOCATION_BYTES = 31 << 20
-"""More than any array of a frame, and less than the 32 MB up to which glibc adapts."""
+"""More than any array of a frame, and less than the 32 MB up to which glibc adapts its threshold."""
 
 
 def limit_threads() -> None:
-    """Give OpenCV and BLAS an explicit share, for the whole process; ONNX Runtime's is in each session's options.
+    """Limit the threads of OpenCV and BLAS for the whole process, and call `retain_large_allocations`.
 
-    And keep the memory of pictures.
+    The threads of ONNX Runtime are set in the options of each session.
     """
     cv2.setNumThreads(min(os.cpu_count() or 1, OPENCV_THREADS))
     threadpool_limits(limits=BLAS_THREADS, user_api="blas")
@@ -34,9 +34,9 @@ def limit_threads() -> None:
 
 @contextmanager
 def worker_pool() -> Iterator[ThreadPoolExecutor]:
-    """Threads, one a core, for work on blocks of large arrays: NumPy and BLAS let go of Python's lock meanwhile.
+    """A pool of threads, one a core, for work on blocks of large arrays.
 
-    BLAS starts no threads of its own under them.
+    NumPy and BLAS release the interpreter lock during such work. BLAS starts no threads of its own meanwhile.
     """
     count = min(os.cpu_count() or 1, MAX_WORKERS)
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(count) as pool:
@@ -44,21 +44,21 @@ def worker_pool() -> Iterator[ThreadPoolExecutor]:
 
 
 def retain_large_allocations() -> None:
-    """Let freed arrays of a frame's size stay with the process.
+    """Make the C library keep freed arrays of a frame's size for the process.
 
-    glibc gives every large block back to the system and takes it again for the next frame, page by page: several
-    milliseconds a frame. Freeing one such block raises the size from which it does so (mallopt(3), M_MMAP_THRESHOLD).
-    Elsewhere it does nothing.
+    glibc returns every large block to the system when it is freed, and requests it again for the next frame, page by
+    page: several milliseconds a frame. Freeing one block of `LARGE_ALLOCATION_BYTES` raises the size from which it does
+    so (mallopt(3), M_MMAP_THRESHOLD). With other C libraries this has no effect.
     """
     block = np.empty(LARGE_ALLOCATION_BYTES, dtype=np.uint8)
     del block
 
 
 def freeze_gc() -> None:
-    """Tell Python's garbage collector that all there is now stays: modules, networks, the subject.
+    """Exclude all present objects (modules, networks, the subject) from Python's garbage collection.
 
-    A collection then looks at what came since: it holds the camera up for a millisecond, not for fifty.
+    A full collection then inspects newer objects only: it stops the camera for a millisecond instead of fifty.
     """
     gc.collect()
     gc.freeze()
-    gc.collect()  # the next full one comes once there are a quarter as many new objects as this one leaves: none
+    gc.collect()  # a full collection is due when new objects exceed a quarter of those left by the last: now none

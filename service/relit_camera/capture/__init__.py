@@ -1,1 +1,1 @@
-"""From pictures or video to samples. Today: one-light pictures with known directions (RTI .lp)."""
+"""Capture: from one-light pictures (RTI .lp) or a film to samples, and from samples to a subject."""

@@ -1,1 +1,1 @@
-"""The command line: one file a command group; heavy imports stay inside the commands."""
+"""The command line: one module for each command. Heavy imports stay inside the commands."""

@@ -1,7 +1,4 @@
-"""The settings as a command sees them: file and environment, with the command line's options on top.
-
-Reading values that the command line packs into one word.
-"""
+"""What commands do with their arguments: load the settings with the options on top, and parse compound values."""
 
 from __future__ import annotations
 
@@ -27,7 +24,11 @@ from relit_camera.base.config.settings_loader import load_settings
 
 
 def load_command_settings(context: typer.Context, **overrides: Any) -> RelitSettings:
-    """Load the settings, and log as they say; `overrides` are nested values, None meaning: not given.
+    """Load the settings of file, environment and command line, and set the log level that they name.
+
+    Args:
+        context: of the command, with the global options.
+        overrides: the command's options as nested values; None where an option is not given.
 
     Raises:
         ConfigError: see `load_settings`.
@@ -39,7 +40,7 @@ def load_command_settings(context: typer.Context, **overrides: Any) -> RelitSett
 
 
 def parse_numbers(text: str, count: int, option: str) -> list[float]:
-    """Comma-separated finite numbers.
+    """Parse `count` finite numbers with commas between.
 
     Raises:
         typer.BadParameter: another count, or something that is no number (exit 2: usage).
@@ -54,10 +55,10 @@ def parse_numbers(text: str, count: int, option: str) -> list[float]:
 
 
 def parse_background(text: str) -> Background:
-    """`none`, `blur`, `environment`, #RRGGBB, or the name of a stored picture.
+    """Parse a background: `none`, `blur`, `environment`, #RRGGBB, or the name of a stored picture.
 
     Raises:
-        typer.BadParameter: a name that cannot be one (exit 2: usage).
+        typer.BadParameter: the name is not allowed (exit 2: usage).
     """
     kinds: dict[str, Background] = {
         "none": NoBackground(),
@@ -73,7 +74,7 @@ def parse_background(text: str) -> Background:
 
 
 def parse_lighting(environment: str, rotate: str, exposure_ev: float) -> Lighting:
-    """An environment's name, its YAW,PITCH,ROLL in degrees and the exposure as lighting.
+    """Make a lighting of an environment's name, its YAW,PITCH,ROLL in degrees, and the exposure.
 
     Raises:
         typer.BadParameter: not three numbers, or one out of its range (exit 2: usage).
@@ -87,7 +88,7 @@ def parse_lighting(environment: str, rotate: str, exposure_ev: float) -> Lightin
 
 
 def parse_mode(text: str) -> Mode:
-    """`reenact` or `ratio`.
+    """Parse a mode: `reenact` or `ratio`.
 
     Raises:
         typer.BadParameter: neither (exit 2: usage).
@@ -99,7 +100,7 @@ def parse_mode(text: str) -> Mode:
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """WIDTHxHEIGHT in pixels.
+    """Parse WIDTHxHEIGHT in pixels.
 
     Raises:
         typer.BadParameter: not two whole numbers (exit 2: usage).

@@ -1,4 +1,4 @@
-"""The `relit` command: mounts the command groups and prints errors."""
+"""The command `relit`: finds the module of each command, and prints errors as one line."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ COMMANDS = {
         "Run the camera: webcam in, relit virtual camera out, REST API and panel.",
     ),
     "replay": ("relit_camera.cli.commands.replay", "Relight a recorded video into another video."),
-    "track": ("relit_camera.cli.commands.track", "Follow the face in a video and write what was seen as JSON."),
-    "relight": ("relit_camera.cli.commands.relight", "Relight a subject's still."),
+    "track": ("relit_camera.cli.commands.track", "Track the face in a video and write pose and landmarks as JSON."),
+    "relight": ("relit_camera.cli.commands.relight", "Relight a subject: one picture under one light."),
     "capture": ("relit_camera.cli.commands.capture", "Build a subject from pictures or video."),
     "subject": ("relit_camera.cli.commands.subject", "Look into subject files."),
     "models": ("relit_camera.cli.commands.models", "List, pull and verify the public models."),
@@ -53,7 +53,7 @@ class LogLevel(StrEnum):
 
 
 class _LazyGroup(TyperGroup):
-    """Imports a command's module only when it is needed, so that `relit --help` answers at once."""
+    """A command group that imports a command's module only when it is called, so that `relit --help` is fast."""
 
     _listing = False
 
@@ -96,19 +96,19 @@ def _print_version(wanted: bool) -> None:
 def options(
     context: typer.Context,
     config: Annotated[Path | None, typer.Option(help="Configuration file (YAML).", metavar="FILE")] = None,
-    log_level: Annotated[LogLevel | None, typer.Option(help="How much our log says, on stderr.")] = None,
+    log_level: Annotated[LogLevel | None, typer.Option(help="The least severe messages of the log on stderr.")] = None,
     version: Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True)] = False,
 ) -> None:
-    """Keep the global options for the commands; they load the settings when they need them."""
+    """Store the global options for the commands, which load the settings when they need them."""
     context.obj = {"config": config, "log_level": log_level.value if log_level else None}
-    # Only our own log follows the level: the libraries' chatter stays out of it.
+    # The level holds for Relit Camera's own log; libraries log warnings and errors only.
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     logging.getLogger("relit_camera").setLevel((log_level or LogLevel.WARNING).upper())
 
 
 def run() -> None:
-    """Exit with 0: done; 1: the input is at fault, one line on stderr; 2: usage. Our own faults show a traceback."""
-    # Told to end, a command cleans up as one that fails; `relit run` has its own way.
+    """Run the command line. Exit status 0: done; 1: wrong input, a line on stderr; 2: usage. Bugs show a traceback."""
+    # On SIGTERM a command cleans up as if it failed; `relit run` has a handler of its own.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     try:
         app()
@@ -118,7 +118,7 @@ def run() -> None:
     except BrokenPipeError:
         sys.exit(1)
     except OSError as error:
-        if error.errno != errno.ENAMETOOLONG:  # that one only a name that a person gave can be
+        if error.errno != errno.ENAMETOOLONG:  # which only a name given by a person can cause
             raise
         print(f"relit: cannot use {error.filename}: the name is too long; choose a shorter one", file=sys.stderr)
         sys.exit(1)

@@ -1,4 +1,4 @@
-"""Which programs have a device open, as Linux tells in /proc."""
+"""Finds the programs that have a device open, by Linux's /proc."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ class DeviceUser:
 
 
 def find_device_users(node: str, proc: Path = PROC) -> list[DeviceUser]:
-    """List who else has a device node open, by number of process.
+    """List the other programs that have a device node open, by process number.
 
-    Other users' programs are seen by root alone: /proc shows nobody else what they have open. psutil's `open_files`
-    names regular files only, no devices, so the links are read here.
+    Only root sees the programs of other users, for /proc shows open files to their owner alone. The links are read
+    here since psutil's `open_files` lists regular files only, no devices.
     """
     return [_device_user(folder) for folder in _processes(proc) if _has_open(folder, node)]
 
 
-def has_mapped_buffers(holder: DeviceUser, node: str, proc: Path = PROC) -> bool:
-    """Whether a program has the device's buffers in its memory, as one that reads pictures from it has."""
+def has_mapped_buffers(user: DeviceUser, node: str, proc: Path = PROC) -> bool:
+    """Whether a program has mapped the device's buffers into its memory, as programs do that read pictures from it."""
     try:
-        lines = (proc / str(holder.pid) / "maps").read_text(errors="replace").splitlines()
-    except OSError:  # ended meanwhile, or guarded
+        lines = (proc / str(user.pid) / "maps").read_text(errors="replace").splitlines()
+    except OSError:  # it has ended, or may not be read
         return False
     return any(line.endswith(f" {node}") for line in lines)
 
@@ -63,7 +63,7 @@ def _has_open(folder: Path, node: str) -> bool:
     try:
         with os.scandir(folder / "fd") as links:
             return any(_link_target(Path(link)) == node for link in links)
-    except OSError:  # ended meanwhile, or another user's
+    except OSError:  # it has ended, or is another user's
         return False
 
 

@@ -1,7 +1,7 @@
-"""Cameras and virtual cameras of this machine, as Linux tells of them in /sys and /dev. Nothing is opened here.
+"""Lists the webcams and virtual cameras of this machine from Linux's /sys and /dev, without opening any.
 
-Elsewhere the system gives no names without opening devices: a webcam goes by its index there, and the virtual camera
-by its program's default.
+Other systems give no names without opening devices: there a webcam is named by its index, and the virtual camera is the
+default of the program that provides it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FIRST_WEBCAM = "webcam"
 
 @dataclass(frozen=True)
 class DeviceTree:
-    """Where devices are looked for; tests put a tree of their own here.
+    """The folders in which devices are found; tests use folders of their own.
 
     Attributes:
         sys: the root of sysfs.
@@ -53,10 +53,10 @@ class Webcam:
     """A camera to take pictures from.
 
     Attributes:
-        id: names the same camera after a restart or in another socket order: the by-id name where udev gives one,
-            else USB path and name.
-        name: as its maker calls it.
-        node: the device file now, such as /dev/video0.
+        id: the same after a restart, or when cameras are plugged in in another order: udev's by-id name where there is
+            one, else USB path and name.
+        name: the name given by its maker.
+        node: the present device file, such as /dev/video0.
     """
 
     id: str
@@ -97,7 +97,7 @@ def list_webcams(tree: DeviceTree = SYSTEM_TREE) -> list[Webcam]:
 
 
 def list_virtual_cameras(tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CAMERA_LABEL) -> list[VirtualCamera]:
-    """All v4l2loopback devices; `label` is the one that counts as ours."""
+    """All v4l2loopback devices; the one with this label is marked as the program's own."""
     cameras = []
     for folder in tree.nodes:
         if _is_virtual(folder):
@@ -108,12 +108,13 @@ def list_virtual_cameras(tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CA
 
 
 def find_webcam(text: str, tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CAMERA_LABEL) -> Webcam:
-    """Find the camera of an id, name, node, node number, or `webcam` for the first one.
+    """Find a camera by id, name, node or node number; `webcam` is the first one.
 
-    Other programs' virtual cameras are found by name or node; ours never, for it would film itself.
+    Virtual cameras of other programs are found by name or node. The program's own, which has this label, never is: it
+    would film itself.
 
     Raises:
-        DeviceError: there is none; the cure lists what there is.
+        DeviceError: there is none; the cure lists the cameras.
     """
     if not sys.platform.startswith("linux") and tree is SYSTEM_TREE:
         return _by_index(text)
@@ -137,7 +138,7 @@ def find_virtual_camera(tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CAM
     """Find the v4l2loopback device of that label.
 
     Raises:
-        DeviceError: the module is not loaded, or has no such device; the cure is the command.
+        DeviceError: the module is not loaded, or has no such device; the cure is the command that loads it.
     """
     cameras = list_virtual_cameras(tree, label)
     for camera in cameras:
@@ -149,22 +150,22 @@ def find_virtual_camera(tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CAM
         what = f"no virtual camera is called '{label}' (there are {labels})"
         raise DeviceError(what, f"run: sudo modprobe -r v4l2loopback && {load}")
     what = f"there is no virtual camera '{label}': the kernel module v4l2loopback is not loaded"
-    raise DeviceError(what, f"run: sudo apt install v4l2loopback-dkms && {load}")
+    raise DeviceError(what, f"run: {load}; if it is not installed, `relit doctor` says how to install it")
 
 
 def modprobe_command(label: str = VIRTUAL_CAMERA_LABEL) -> str:
-    """Write the shell command that makes the virtual camera; `exclusive_caps` is what lets Chrome list it."""
+    """The shell command that creates the virtual camera; with `exclusive_caps` Chrome lists it."""
     return f"sudo modprobe v4l2loopback {module_options(label)}"
 
 
 def module_options(label: str = VIRTUAL_CAMERA_LABEL) -> str:
-    """Write the module's options for one device of that label, as modprobe and its configuration files take them."""
+    """The module's options for one device of that label, as modprobe and its configuration files take them."""
     return f'devices=1 video_nr=10 exclusive_caps=1 card_label="{label}"'
 
 
 def negotiated_size(node: str, tree: DeviceTree = SYSTEM_TREE) -> tuple[int, int] | None:
-    """Read the size that a loopback device really has, such as `YU12:640x480@30`; None while nobody publishes."""
-    text = tree.read(tree.sys / "class" / "video4linux" / Path(node).name / "format")
+    """The present width and height of a loopback device; None while no program publishes to it."""
+    text = tree.read(tree.sys / "class" / "video4linux" / Path(node).name / "format")  # such as YU12:640x480@30
     found = re.fullmatch(r".{4}:(\d+)x(\d+)(@.*)?", text)
     return (int(found[1]), int(found[2])) if found else None
 
@@ -174,14 +175,14 @@ def _is_virtual(folder: Path) -> bool:
 
 
 def _links_by_node(tree: DeviceTree) -> dict[str, str]:
-    """Stable names that udev made: node name → name in /dev/v4l/by-id."""
+    """Stable names by udev: node name → name in /dev/v4l/by-id."""
     return {link.resolve().name: link.name for link in _inside(tree.dev / "v4l" / "by-id", "*")}
 
 
 def _inside(folder: Path, pattern: str) -> list[Path]:
     try:
         return list(folder.glob(pattern))
-    except OSError:  # it goes with the last camera, maybe just now
+    except OSError:  # it disappears with the last camera
         return []
 
 

@@ -1,1 +1,1 @@
-"""What keeps the camera from working on this machine, and the cure: `relit doctor`."""
+"""`relit doctor`: checks of everything that the camera needs on this machine, each with its cure."""

@@ -1,7 +1,4 @@
-"""The webcam that is read and the virtual camera that is written to.
-
-Browsers in sandboxes, which see no camera unless they are let.
-"""
+"""Checks of access to cameras: the webcam, the virtual camera, and browsers whose sandbox hides cameras."""
 
 from __future__ import annotations
 
@@ -28,13 +25,13 @@ JOIN_GROUP_CURE = 'run: sudo usermod -aG {group} "$USER", and log in again'
 SOURCES_WITHOUT_DEVICE = ("pattern",)
 
 AccessCheck = Callable[[str, int], bool]
-"""`os.access` or a stand-in: (path, mode) → whether this user may."""
+"""(path, mode) → whether this user may access it: `os.access`, or a test's own."""
 
 
 def check_webcam(
     settings: SourceSettings, host: Host, access: AccessCheck = os.access, own_label: str = VIRTUAL_CAMERA_LABEL
 ) -> Finding:
-    """The camera that the settings name: there, readable, free, and not our own virtual one, called `own_label`."""
+    """Check the webcam in the settings: it exists, is readable, free, and not the virtual camera named `own_label`."""
     tree = host.tree
     topic, found = "webcam", list_webcams(tree)
     names = ", ".join(f"{webcam.id} ({webcam.node})" for webcam in found) or "none"
@@ -50,7 +47,7 @@ def check_webcam(
             topic, f"{webcam.name} at {webcam.node} may only be read by group {group}", _join_group_cure(group)
         )
     users = host.find_device_users(webcam.node)
-    foreign = [str(holder) for holder in users if not holder.is_relit]
+    foreign = [str(user) for user in users if not user.is_relit]
     if foreign:
         who = f"{webcam.name} at {webcam.node} is in use by {', '.join(foreign)}"
         return warning(topic, who, "close it there: a webcam serves one program at a time")
@@ -60,12 +57,13 @@ def check_webcam(
 
 
 def check_virtual_camera(settings: OutputSettings, host: Host, access: AccessCheck = os.access) -> Finding:
-    """The virtual camera that the settings name: module, label, rights, and that browsers will list it."""
+    """Check the virtual camera in the settings: module, label, permissions, and that browsers will list it."""
     topic, tree = "virtual camera", host.tree
     if settings.sink != "camera" and not settings.sink.startswith(str(tree.dev / "video")):
         return ok(topic, f"not needed: the sink is '{settings.sink}'")
     if not host.is_linux:
-        return ok(topic, "OBS Studio's is used here; it shows when the camera starts")
+        cure = "if the camera does not start, install OBS Studio, and start and stop its virtual camera once"
+        return ok(topic, f"OBS Studio's is used here; {cure}")
     cameras = list_virtual_cameras(tree, settings.label)
     named = next((camera for camera in cameras if camera.node == settings.sink), None)
     if named is None and settings.sink != "camera":
@@ -100,7 +98,7 @@ def check_virtual_camera(settings: OutputSettings, host: Host, access: AccessChe
 
 
 def _exclusive_caps(tree: DeviceTree) -> list[bool]:
-    """The module's parameter for each of its devices, in their order; empty where it is not told."""
+    """The module's parameter for each of its devices, in their order; empty where the module does not show it."""
     text = tree.read(tree.sys / "module" / "v4l2loopback" / "parameters" / "exclusive_caps")
     return [value.strip() in ("Y", "1") for value in text.split(",")] if text else []
 
@@ -119,8 +117,8 @@ def _join_group_cure(group: str) -> str:
 def groups_to_join(tree: DeviceTree, access: AccessCheck = os.access) -> tuple[str, ...]:
     """The groups that own video devices which this user may not use."""
     nodes = [str(tree.dev / folder.name) for folder in tree.nodes]
-    shut = [node for node in nodes if Path(node).exists() and not access(node, os.R_OK | os.W_OK)]
-    return tuple(sorted({_owning_group(node) for node in shut}))
+    denied = [node for node in nodes if Path(node).exists() and not access(node, os.R_OK | os.W_OK)]
+    return tuple(sorted({_owning_group(node) for node in denied}))
 
 
 FLATPAK_APPS = (
@@ -136,16 +134,16 @@ FLATPAK_ROOTS = ("var/lib/flatpak", "{home}/.local/share/flatpak")
 
 
 def check_browsers(host: Host, home: Path | None = None) -> Finding:
-    """Which Flatpak browsers are not given devices, and which Snaps may have to be connected.
+    """Check for Flatpak browsers without access to devices, and for Snap browsers that may have to be connected.
 
-    A Flatpak's own metadata and the overrides of user and system are read; a portal may give a camera all the same.
+    A Flatpak's own metadata and the overrides of user and system are read; a portal may still give it a camera.
     """
     topic, home = "browsers", home or Path.home()
     installations = [host.root / path.format(home=str(home).lstrip("/")) for path in FLATPAK_ROOTS]
-    shut = [app for app in FLATPAK_APPS if _lacks_device_access(app, installations, host)]
-    if shut:
-        cure = " && ".join(f"flatpak override --user --device=all {app}" for app in shut)
-        return warning(topic, f"the Flatpak {', '.join(shut)} is given no devices", f"run: {cure}")
+    denied = [app for app in FLATPAK_APPS if _lacks_device_access(app, installations, host)]
+    if denied:
+        cure = " && ".join(f"flatpak override --user --device=all {app}" for app in denied)
+        return warning(topic, f"the Flatpak {', '.join(denied)} is given no devices", f"run: {cure}")
     snaps = [name for name in SNAP_APPS if (host.root / "snap" / name).is_dir()]
     if snaps:
         lines = ", ".join(f"sudo snap connect {name}:camera" for name in snaps)

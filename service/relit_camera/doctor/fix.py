@@ -1,7 +1,7 @@
-"""`relit doctor --fix`: writes what is the user's own, and says what others must do.
+"""`relit doctor --fix`: writes the user's missing files, and lists the commands for everything else.
 
-Nothing that a person wrote or changed is touched, nothing is downloaded, started or asked of root. Run twice, it does
-nothing the second time.
+It changes no file that a person wrote or changed, downloads and starts nothing, and asks for no password. Run twice, it
+does nothing the second time.
 """
 
 from __future__ import annotations
@@ -35,27 +35,27 @@ source:
   on_demand: false          # true: the webcam is released while nobody reads the virtual camera or watches a preview
 
 look:
-  mode: reenact             # reenact: the subject's still, moved as you move. ratio: the live picture itself, relit
+  mode: reenact             # reenact: the subject's picture, moved as you move. ratio: the live picture itself, relit
   lighting:
     environment: studio     # studio, window, sunset, night-street, party, overcast, or one of your own
 """
 
 
 def user_config_file() -> Path:
-    """The user's configuration file, which holds for the service too."""
+    """The user's configuration file, which the systemd service reads too."""
     return user_config_path("relit-camera", appauthor=False) / "config.yaml"
 
 
 def apply_fixes(
     settings: RelitSettings, host: Host, access: AccessCheck = os.access, with_folders: bool = True
 ) -> FixResult:
-    """Write the missing files and folders of the user.
+    """Write the user's missing files and folders.
 
     Args:
-        settings: that hold now; their folders are made.
-        host: this machine.
-        access: `os.access` or a stand-in.
-        with_folders: false where the configuration is at fault, and nobody knows which folders it means.
+        settings: of this run; their folders are created.
+        host: the machine.
+        access: whether this user may access a path: `os.access`, or a test's own.
+        with_folders: whether to create folders; not where the configuration has an error and may mean other folders.
     """
     storage = settings.storage
     folders = [storage.subjects, storage.environments, storage.backgrounds, storage.presets, models_folder()]
@@ -73,14 +73,14 @@ def apply_fixes(
 
 
 def _fix_folder(path: Path) -> FixedFile:
-    with suppress(OSError):  # where one may not look one may not write, which `_create` says
+    with suppress(OSError):  # without permission to look there is none to write, which `_create` reports
         if path.is_dir():
             return FixedFile(path=str(path), state=FileOutcome.UNCHANGED)
     return _create(path, FileOutcome.WRITTEN, None)
 
 
 def _fix_config(path: Path) -> FixedFile:
-    if os.path.lexists(path):  # it is there to be changed; a link that leads nowhere is the user's too
+    if os.path.lexists(path):  # the user's own, even if it is a broken link
         return FixedFile(path=str(path), state=FileOutcome.UNCHANGED)
     return _create(path, FileOutcome.WRITTEN, DEFAULT_CONFIG_TEXT)
 

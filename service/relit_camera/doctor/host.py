@@ -1,4 +1,4 @@
-"""The machine as its own files tell of it: nothing is run, nothing needs root."""
+"""Facts about the machine, read from files of the system: no program is run, and root is not needed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ KERNEL_MODULE = "v4l2loopback"
 
 @dataclass(frozen=True)
 class Host:
-    """The machine that this runs on, or one that a test made up.
+    """The machine to check: this one, or a test's own.
 
     Attributes:
         root: where its files are.
@@ -39,7 +39,7 @@ class Host:
 
     @property
     def family(self) -> str:
-        """`debian` (Ubuntu too), `fedora`, `arch`, or empty: what its packages are installed with."""
+        """The family of Linux distributions: `debian` (Ubuntu too), `fedora`, `arch`, or empty."""
         fields = dict(line.split("=", 1) for line in self.read("etc/os-release").splitlines() if "=" in line)
         names = [" ".join(shlex.split(fields.get(key, ""))) for key in ("ID", "ID_LIKE")]
         words = " ".join(names).split()
@@ -60,7 +60,7 @@ class Host:
 
     @property
     def module_version(self) -> str:
-        """Of the loaded module; empty for 0.12, which does not tell."""
+        """Version of the loaded module; empty for 0.12, which does not show it."""
         return self.tree.read(self.tree.sys / "module" / KERNEL_MODULE / "version")
 
     @property
@@ -75,7 +75,7 @@ class Host:
         return (self.root / "var/lib/dkms" / KERNEL_MODULE).is_dir()
 
     def configured(self, folder: str, words: str) -> list[Path]:
-        """Files of a folder such as etc/modprobe.d with a line that begins with these words, comments left out."""
+        """Files of a folder such as etc/modprobe.d that have a line, no comment, that begins with these words."""
         return [
             path
             for path in sorted((self.root / folder).glob("*.conf"))

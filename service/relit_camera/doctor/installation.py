@@ -1,4 +1,4 @@
-"""Python, packages, cores, and the folders that are written to."""
+"""Checks of the installation: Python, packages, cores and memory, and the folders that are written to."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ EQUIVALENT_PACKAGES = {
     "onnxruntime": ("onnxruntime-gpu", "onnxruntime-directml", "onnxruntime-openvino"),
     "opencv-contrib-python-headless": ("opencv-contrib-python",),
 }
-"""Packages that bring the same module as the one that is asked for."""
+"""Package → other packages that provide the same module."""
 LOW_DISK_BYTES, MIN_DISK_BYTES = 1 << 30, 50 << 20
-"""Bytes: a subject of the default size has some 20 MB, the models 12 MB."""
+"""Free bytes below which there is a warning, or a problem: a subject has some 20 MB, the models 12 MB."""
 MIN_CORES = 2
 
 
 def check_python() -> Finding:
-    """The interpreter's version."""
+    """Check the version of Python."""
     found, needed = platform.python_version(), _needed_python()
     if needed.contains(found, prereleases=True):
         return ok("python", f"{found} at {sys.executable}")
@@ -38,7 +38,7 @@ def check_python() -> Finding:
 
 
 def check_packages() -> Finding:
-    """Every package that we depend on, in a version that we take."""
+    """Check that every required package is installed, in an allowed version."""
     try:
         wanted = [Requirement(text) for text in metadata.requires(PACKAGE_NAME) or []]
     except metadata.PackageNotFoundError:
@@ -49,7 +49,7 @@ def check_packages() -> Finding:
     wrong = [text for text in map(_package_error, needed) if text]
     twice = next((names for names in map(_installed_names, EQUIVALENT_PACKAGES) if len(names) > 1), ())
     if not wrong and twice:
-        # Their files lie in one folder: whichever came last works, and a GPU may be left unused without a word.
+        # They install into one folder: the last one installed is used, so a GPU may stay unused without a message.
         seen = f"{' and '.join(twice)} are both installed and own the same folder"
         return warning("packages", seen, f"run: pip uninstall {' '.join(twice)}, then install the one that you want")
     if not wrong:
@@ -58,7 +58,7 @@ def check_packages() -> Finding:
 
 
 def check_cores(settings: RelitSettings) -> Finding:
-    """Cores and memory for one network thread beside the picture arithmetic."""
+    """Check that there are cores for the networks' threads beside the picture processing; reports memory too."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     memory = psutil.virtual_memory()
     threads = settings.inference.threads
@@ -72,7 +72,7 @@ def check_cores(settings: RelitSettings) -> Finding:
 
 
 def check_folder(topic: str, folder: Path, cure: str) -> Finding:
-    """Whether a folder, or the one that it would be made in, can be written to, and has space."""
+    """Check that a folder, or the one in which it would be created, can be written to and has space."""
     place = next((path for path in (folder, *folder.parents) if path.exists()), folder)
     try:
         if not place.is_dir():
@@ -98,7 +98,7 @@ def _needed_python() -> SpecifierSet:
 
 
 def _package_error(requirement: Requirement) -> str:
-    """What is wrong with an installed package, or ""."""
+    """What is wrong with a required package, or ""."""
     name, version = _installed(requirement.name)
     if version is None:
         return f"{requirement.name} is missing"
@@ -115,7 +115,7 @@ def _installed(name: str) -> tuple[str, str | None]:
 
 
 def _installed_names(name: str) -> list[str]:
-    """Of a package and those that bring the same module: the installed ones."""
+    """The installed ones of a package and its equivalents."""
     found = []
     for candidate in (name, *EQUIVALENT_PACKAGES.get(name, ())):
         with contextlib.suppress(metadata.PackageNotFoundError):

@@ -1,6 +1,6 @@
-"""What only root may do, as lines to paste: the doctor itself never asks for a password.
+"""Checks of the kernel module v4l2loopback, and the commands for root that install, load and configure it.
 
-The kernel module v4l2loopback: installed for this kernel, loaded, and loaded again after a restart.
+The commands are printed for the user to run: the doctor itself never asks for a password.
 """
 
 from __future__ import annotations
@@ -37,24 +37,24 @@ BUILD_COMMANDS = {
 
 
 def install_commands(host: Host) -> tuple[str, ...]:
-    """The lines that install the module with this distribution's packages."""
+    """The commands that install the module from this distribution's packages."""
     by_hand = f"# install {KERNEL_MODULE} 0.12.7 or newer for kernel {host.release}: https://github.com/v4l2loopback/v4l2loopback"
     return INSTALL_COMMANDS.get(host.family, (by_hand,))
 
 
 def options_command(label: str) -> str:
-    """The line that writes the module's options where modprobe finds them."""
+    """The command that writes the module's options to the file where modprobe finds them."""
     line = f"options {KERNEL_MODULE} {module_options(label)}"
     return f"echo {shlex.quote(line)} | sudo tee /{MODULE_OPTIONS_FILE}"
 
 
 def root_commands(settings: OutputSettings, host: Host, groups: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """The lines that are still needed, in order; none where all is done.
+    """The commands for root that are still needed, in order; none where all is done.
 
     Args:
-        settings: their label is the device's name.
-        host: as it is now.
-        groups: that this user has to join for the devices.
+        settings: their label becomes the device's name.
+        host: the machine in its present state.
+        groups: groups that this user has to join to use the devices.
     """
     lines: list[str] = []
     foreign = [
@@ -84,13 +84,13 @@ def root_commands(settings: OutputSettings, host: Host, groups: tuple[str, ...] 
 
 
 def needs_module(settings: OutputSettings, host: Host) -> bool:
-    """Whether the sink that is set is a virtual camera of this system's kernel."""
+    """Whether the sink in the settings is a virtual camera that the kernel module provides."""
     is_camera = settings.sink == "camera" or settings.sink.startswith(str(host.tree.dev / "video"))
     return is_camera and host.is_linux
 
 
 def check_module(settings: OutputSettings, host: Host) -> Finding:
-    """Whether the running kernel has the module, and if not, at which step it is missing."""
+    """Check that the running kernel has loaded the module, and if not, which step of its installation is missing."""
     topic = "kernel module"
     if not needs_module(settings, host):
         return ok(topic, "not needed")
@@ -121,7 +121,7 @@ def check_module(settings: OutputSettings, host: Host) -> Finding:
 
 
 def check_load_at_boot(settings: OutputSettings, host: Host) -> Finding:
-    """Whether the virtual camera is there again after a restart, by one set of options."""
+    """Check that the module is loaded at boot, and that only one file sets its options."""
     topic = "after a restart"
     if not needs_module(settings, host):
         return ok(topic, "nothing has to be loaded")

@@ -1,16 +1,13 @@
-"""The networks: are they there, and where do they really run.
-
-Who is shown.
-"""
+"""Checks of the models, of the execution provider that really runs them, and of the subject."""
 
 from __future__ import annotations
 
 from importlib.resources import files
 
 from relit_camera.base.config.settings import RelitSettings
-from relit_camera.base.errors import RelitError
+from relit_camera.base.errors import DeviceError, RelitError
 from relit_camera.base.models.model_store import ModelState, ModelStore
-from relit_camera.base.models.provider_names import available_providers
+from relit_camera.base.models.provider_names import CPU, available_providers, choose_provider, full_name
 from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
 from relit_camera.doctor.report import Finding, ok, problem, problem_from_error, warning
 from relit_camera.subject.subject_store import SubjectStore
@@ -19,11 +16,11 @@ REQUIRED_MODELS = {
     "mesh": ("face_mesh", "face_detector_yunet"),
     "openseeface": ("openseeface", "face_detector_yunet"),
 }
-"""Models without which a tracker does not open. `recorded` needs none; others' plug-ins know their own."""
+"""Models without which a tracker does not open. `recorded` needs none; a plug-in checks its own when it opens."""
 
 
 def check_models(settings: RelitSettings, registry: ModelStore | None = None) -> Finding:
-    """The public models, by their sha256."""
+    """Check the public models by their sha256: stored, missing or damaged."""
     topic = "models"
     try:
         registry = registry or ModelStore()
@@ -49,23 +46,36 @@ def check_models(settings: RelitSettings, registry: ModelStore | None = None) ->
 
 
 def check_provider(settings: RelitSettings) -> Finding:
-    """Open the packaged motion graph with the configured provider, and see where its nodes were placed."""
+    """Open the packaged motion network with the configured provider, and report where its nodes were placed."""
     topic, inference = "provider", settings.inference
     graph = files("relit_camera.live.reenactment").joinpath("first_order_motion.onnx").read_bytes()
     try:
         session = open_session(
             graph, "first_order_motion", SessionOptions(inference.provider, inference.threads, inference.strict)
         )
+    except DeviceError as error:
+        return problem(topic, error.what, _provider_cure(choose_provider(inference.provider)))
     except RelitError as error:
         return problem_from_error(topic, error)
     report = session.report
     nodes = f"{report.placement.get(report.provider, 0)} of {sum(report.placement.values())} nodes"
     seen = f"{report.provider} ({nodes}; asked for: {report.requested}; built in: {', '.join(available_providers())})"
-    return warning(topic, f"{seen}; {report.why}", report.cure) if report.why else ok(topic, seen)
+    if report.why:
+        return warning(topic, f"{seen}; {report.why}", _provider_cure(choose_provider(report.requested)))
+    return ok(topic, seen)
+
+
+def _provider_cure(provider: str) -> str:
+    """How to install a provider, or do without it."""
+    if provider == "cuda":
+        install = "install the NVIDIA driver, replace the package onnxruntime by onnxruntime-gpu[cuda,cudnn]"
+    else:
+        install = f"install a build of ONNX Runtime with {full_name(provider)}"
+    return f"{install}, or set the provider to {CPU}"
 
 
 def check_subject(settings: RelitSettings) -> Finding:
-    """The subject that the settings name: there and whole. With none the live picture passes through."""
+    """Check that the subject in the settings exists and can be read. Without one the live picture passes through."""
     topic, store = "subject", SubjectStore(settings.storage.subjects, in_memory=True)  # as the camera does
     stored = ", ".join(store.names())
     if settings.subject is None:

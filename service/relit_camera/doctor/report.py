@@ -1,7 +1,4 @@
-"""What the doctor says: one finding a topic.
-
-The report as lines of plain text.
-"""
+"""The doctor's report: one finding a topic, what `--fix` did, and both as lines of plain text."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from relit_camera.base.errors import RelitError
 
 
 class Severity(StrEnum):
-    """How bad it is."""
+    """How serious a finding is."""
 
     OK = "ok"
     WARNING = "warning"
@@ -24,7 +21,7 @@ class Severity(StrEnum):
 
 
 class Finding(BaseModel):
-    """One topic."""
+    """The result of one check."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
@@ -38,42 +35,42 @@ class Finding(BaseModel):
 
 
 class FileOutcome(StrEnum):
-    """What became of a file or folder that `--fix` looks after."""
+    """What `--fix` did with one of its files or folders."""
 
     WRITTEN = "written"
     RENEWED = "renewed"
-    """It was an older one of ours, which nobody had changed."""
+    """It was written by an older version, and nobody had changed it."""
     UNCHANGED = "unchanged"
     KEPT = "kept"
-    """A person has changed it, or wrote it: it was left alone."""
+    """A person wrote or changed it, so it was left as it is."""
     FAILED = "failed"
 
 
 class FixedFile(BaseModel):
-    """A file or folder, and what became of it."""
+    """A file or folder, and what `--fix` did with it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     path: str
     state: FileOutcome
     note: str = ""
-    """Why it failed, or from what was kept to what we would have written, as a unified diff."""
+    """The reason of a failure; or for a kept file a unified diff to the one that `--fix` would write."""
 
 
 class FixResult(BaseModel):
-    """What `--fix` did: files of the user's own. The rest are lines to paste."""
+    """What `--fix` did: it writes the user's own files, and prints commands for the rest."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     files: tuple[FixedFile, ...]
     root_commands: tuple[str, ...]
-    """For root, in order; empty where nothing is left to do."""
+    """Commands that need root, in order; empty where nothing is left to do."""
     user_commands: tuple[str, ...]
-    """Worth running as oneself: nothing is downloaded or started unasked."""
+    """Commands for the user: `--fix` itself downloads and starts nothing."""
 
 
 class Report(BaseModel):
-    """Everything that was looked at."""
+    """The results of all checks."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
@@ -81,31 +78,31 @@ class Report(BaseModel):
     """Of Relit Camera."""
     findings: tuple[Finding, ...]
     fix: FixResult | None = None
-    """What `--fix` did, and what is left for others."""
+    """What `--fix` did, and which commands are left."""
 
     @property
     def healthy(self) -> bool:
-        """Whether there is no problem; warnings may be."""
+        """Whether no finding is a problem; there may be warnings."""
         return all(finding.state is not Severity.PROBLEM for finding in self.findings)
 
 
 def ok(topic: str, seen: str) -> Finding:
-    """All is well."""
+    """A finding that needs no action."""
     return Finding(topic=topic, state=Severity.OK, seen=seen)
 
 
 def warning(topic: str, seen: str, cure: str) -> Finding:
-    """It could be better."""
+    """A finding with which the camera works, but not as well as it could."""
     return Finding(topic=topic, state=Severity.WARNING, seen=seen, cure=cure)
 
 
 def problem(topic: str, seen: str, cure: str) -> Finding:
-    """It will not work."""
+    """A finding with which the camera will not work."""
     return Finding(topic=topic, state=Severity.PROBLEM, seen=seen, cure=cure)
 
 
 def problem_from_error(topic: str, error: RelitError) -> Finding:
-    """What an error says, which knows its cure."""
+    """The finding for an error, with the error's own cure."""
     return problem(topic, error.what, error.cure)
 
 

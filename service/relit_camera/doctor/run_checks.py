@@ -1,4 +1,4 @@
-"""All checks, one after the other. None of them changes anything, and none ends the others."""
+"""Runs all checks of the doctor. None of them changes anything, and none prevents the others."""
 
 from __future__ import annotations
 
@@ -26,21 +26,22 @@ from relit_camera.doctor.systemd_unit import check_service
 def run_checks(
     config: Path | None = None, host: Host | None = None, access: AccessCheck = os.access, with_fix: bool = False
 ) -> Report:
-    """Look at everything that the camera needs.
+    """Check everything that the camera needs.
 
     Args:
-        config: the configuration file; the usual places if not given. Where it is at fault, the defaults are examined.
-        host: this machine if not given.
-        access: `os.access` or a stand-in.
-        with_fix: first write the user's files that are missing (`doctor.fix`), though no folders where the
-            configuration is at fault; the report is of what is then.
+        config: the configuration file; searched in the usual places if not given. If it has an error, the defaults are
+            checked instead.
+        host: the machine to check; this one if not given.
+        access: whether this user may access a path: `os.access`, or a test's own.
+        with_fix: first write the user's missing files (`doctor.fix`), but no folders if the configuration has an
+            error; the checks run afterwards.
     """
     host = host or Host()
     settings, configuration = _check_configuration(config)
     fixed = None
     if with_fix:
         fixed = apply_fixes(settings, host, access, with_folders=configuration.state is Severity.OK)
-        settings, configuration = _check_configuration(config)  # there may be a file now
+        settings, configuration = _check_configuration(config)  # the fix may have written the file
     checks: tuple[Callable[[], Finding], ...] = (
         check_python,
         check_packages,
@@ -68,7 +69,7 @@ def _check_configuration(config: Path | None) -> tuple[RelitSettings, Finding]:
     try:
         settings, path = load_settings(config), config_path(config)
     except ConfigError as error:
-        # Everything else is examined with the defaults: one fault shall not hide the others.
+        # The other checks go on with the defaults: one error must not hide the others.
         return RelitSettings.model_construct(), problem_from_error(topic, error)
     set_in = sorted(name for name in os.environ if name.startswith("RELIT_") and name not in NON_SETTING_VARIABLES)
     seen = str(path.resolve()) if path else "no file, the defaults"

@@ -1,4 +1,4 @@
-"""What runs already: the port's owner, another Relit Camera."""
+"""Checks for programs that are in the way: on the API's port, or another Relit Camera."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ CAMERA_COMMANDS = ("run", "demo")
 
 
 def check_port(settings: ServerSettings) -> Finding:
-    """Whether API and panel can listen."""
-    topic, place = "port", f"{settings.port} on {settings.host}"
+    """Check that API and panel can listen on their port."""
+    topic, where = "port", f"{settings.port} on {settings.host}"
     if settings.port == 0:
         return ok(topic, "a free one is picked when the camera starts")
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
@@ -25,19 +25,19 @@ def check_port(settings: ServerSettings) -> Finding:
         socket.create_server((settings.host, settings.port), family=family).close()
     except OSError as error:
         if error.errno != errno.EADDRINUSE:
-            return problem(topic, f"{place} cannot be used: {error.strerror}", "choose another with --port")
+            return problem(topic, f"{where} cannot be used: {error.strerror}", "choose another with --port")
         owner = _port_owner(settings.port)
         if owner == "relit":
-            return ok(topic, f"{place}: a Relit Camera is running there")
+            return ok(topic, f"{where}: a Relit Camera is running there")
         who = f"in use by {owner}" if owner else "in use by another program"
         return problem(
-            topic, f"{place} is {who}", "end that program, or choose another with --port; 0 picks a free one"
+            topic, f"{where} is {who}", "end that program, or choose another with --port; 0 picks a free one"
         )
-    return ok(topic, f"{place} is free")
+    return ok(topic, f"{where} is free")
 
 
 def check_running() -> Finding:
-    """Other Relit Cameras of this machine: one can publish, a second is refused."""
+    """Check how many Relit Cameras run: one may publish to the virtual camera, a second is refused."""
     topic, found = "running", running_cameras()
     if len(found) > 1:
         numbers = " ".join(str(pid) for pid in found[1:])
@@ -48,7 +48,7 @@ def check_running() -> Finding:
 
 
 def running_cameras() -> list[int]:
-    """Processes that are `relit run` or `relit demo`, those that this user may look at."""
+    """Numbers of the processes that are `relit run` or `relit demo`, as far as this user may see them."""
     found = []
     for process in psutil.process_iter(["cmdline"]):
         command = process.info["cmdline"] or []
@@ -63,7 +63,7 @@ def _format_pids(pids: list[int]) -> str:
 
 
 def _port_owner(port: int) -> str:
-    """Name of the program that listens on a port; "" where the system does not tell it."""
+    """Name of the program that listens on a port; "" where the system does not show it."""
     try:
         for connection in psutil.net_connections("tcp"):
             if connection.status == psutil.CONN_LISTEN and connection.laddr[1:] == (port,) and connection.pid:

@@ -1,7 +1,7 @@
-"""The systemd user unit that runs the camera from login on.
+"""The systemd user unit that runs the camera from login on: its text, and the check of the installed one.
 
-The first line of what we write carries a checksum of the rest: by it an old unit of ours is told from one that a
-person has changed, and that is never overwritten.
+Its first line holds a checksum of the rest. A unit whose checksum fits was written by some version of this program and
+may be replaced; any other was changed by a person and is never overwritten.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ FIX_CURE = "run: relit doctor --fix"
 
 # No mount namespaces (PrivateTmp, ProtectHome …): the user's manager would need user namespaces for them, in which the
 # groups that own the cameras are lost. No MemoryDenyWriteExecute: CUDA and OpenVINO make code while they run.
-# No limit of starts: without its webcam the camera ends at once, and it shall be there when the webcam is, hours later.
+# No limit of starts: without its webcam the camera exits at once, and must start when the webcam is back hours later.
 UNIT_TEMPLATE = """\
 [Unit]
 Description=Relit Camera: a virtual webcam that shows you lit by any place you choose
@@ -55,31 +55,34 @@ WantedBy=default.target
 
 
 def unit_path() -> Path:
-    """Where systemd looks for the user's own units."""
+    """The file of the unit, in the folder in which systemd looks for the user's own units."""
     return user_config_path("systemd", appauthor=False) / "user" / UNIT_NAME
 
 
 def relit_command() -> Path:
-    """The command `relit` as it was called, else the one beside this Python. Links are kept: pipx's outlive updates."""
+    """The path of the command `relit` as it was called, else beside this Python.
+
+    Links are not resolved: those of pipx stay the same over updates.
+    """
     called = Path(sys.argv[0])
     return called.absolute() if called.name == "relit" and called.is_file() else Path(sys.executable).parent / "relit"
 
 
 def unit_text(command: Path) -> str:
-    """The unit that runs a command, with its stamp."""
+    """The text of the unit that runs a command, with its checksum line."""
     quoted = str(command).replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%").replace("$", "$$")
     body = UNIT_TEMPLATE.format(command=f'"{quoted}"')
     return f"{CHECKSUM_PREFIX}{_checksum(body)}{CHECKSUM_SUFFIX}{body}"
 
 
 def is_unmodified(text: str) -> bool:
-    """Whether `unit_text` wrote it, in this version or another, and nobody has changed it since."""
+    """Whether `unit_text` of this or another version wrote the text, and nobody has changed it."""
     stamp, _, body = text.partition("\n")
     return stamp.startswith(CHECKSUM_PREFIX) and stamp.removeprefix(CHECKSUM_PREFIX).startswith(_checksum(body))
 
 
 def check_service(host: Host) -> Finding:
-    """Whether the camera starts by itself, and starts what is here."""
+    """Check that an installed unit starts this installation."""
     topic, path = "service", unit_path()
     if not host.is_linux:
         return ok(topic, "systemd's alone; not on this system")

@@ -1,1 +1,1 @@
-"""Frame → face state: detector, landmarks, head pose, smoothing. Trackers stand behind one interface."""
+"""The face in a frame: trackers, landmarks, head pose, and its motion relative to neutral."""

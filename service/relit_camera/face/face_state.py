@@ -8,10 +8,9 @@ from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import Frame, Points
+from relit_camera.face.head_pose import HeadPose
 
 
 class FaceStatus(StrEnum):
@@ -21,25 +20,6 @@ class FaceStatus(StrEnum):
     UNCERTAIN = "uncertain"
     """Landmarks are there, but the detector disagrees or confidence is low."""
     LOST = "lost"
-
-
-@dataclass(frozen=True)
-class HeadPose:
-    """Where the head is: camera_from_head, x_camera = rotation · x_head + translation.
-
-    Axes of both frames: X right in the picture, Y up, Z toward the camera; the camera is at the origin, so a visible
-    head has translation z < 0. Projection: x_px = cx + focal_px · X / −Z, y_px = cy − focal_px · Y / −Z about the
-    picture's centre (cx, cy) = (width / 2, height / 2).
-
-    Attributes:
-        rotation: camera_from_head; identity is a face looking along +Z into the camera.
-        translation: (3,) float64 centimetres, of the canonical face's origin.
-        focal_px: focal length used for the fit, in pixels.
-    """
-
-    rotation: Rotation
-    translation: NDArray[np.float64]
-    focal_px: float
 
 
 @dataclass(frozen=True)

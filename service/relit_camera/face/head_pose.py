@@ -6,14 +6,39 @@ ours turned by 180° about X: x_cv = (x, −y, −z).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import Points
-from relit_camera.face.face_state import HeadPose
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
+
+
+@dataclass(frozen=True)
+class HeadPose:
+    """Where the head is: camera_from_head, x_camera = rotation · x_head + translation.
+
+    Axes of both frames: X right in the picture, Y up, Z toward the camera; the camera is at the origin, so a visible
+    head has translation z < 0. Projection: x_px = cx + focal_px · X / −Z, y_px = cy − focal_px · Y / −Z about the
+    picture's centre (cx, cy) = (width / 2, height / 2).
+
+    Attributes:
+        rotation: camera_from_head; identity is a face looking along +Z into the camera.
+        translation: (3,) float64 centimetres, of the canonical face's origin.
+        focal_px: focal length used for the fit, in pixels.
+    """
+
+    rotation: Rotation
+    translation: NDArray[np.float64]
+    focal_px: float
+
+    def depth_of(self, point: NDArray[np.float64]) -> float:
+        """Distance in centimetres, along the camera's axis, from the camera to a head-space point (3,)."""
+        return float(-(self.rotation.apply(point) + self.translation)[2])
+
 
 _CV_FROM_OURS = np.array([1.0, -1.0, -1.0])
 

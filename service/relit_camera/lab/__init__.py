@@ -1,0 +1,1 @@
+"""Measurements of quality and speed for developers: evaluations and benchmarks."""

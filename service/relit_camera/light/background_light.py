@@ -12,9 +12,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import LinearImage
+from relit_camera.base.images.resize import shrink
 from relit_camera.light.directions import texel_directions
 from relit_camera.light.environment_panorama import Panorama
+from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 
 BACKGROUND_HEIGHT_DEG = 35.0
 """How high an environment is seen behind the person, in degrees."""
@@ -43,9 +46,9 @@ def panorama_from_background(picture: LinearImage, height_deg: float = BACKGROUN
     if _is_panorama(picture):
         # It is shown as it is: what stands at its left is seen at the left, and must light from there. A file of an
         # environment has its middle before the person instead.
-        radiance = np.roll(picture[:, ::-1], picture.shape[1] // 2, axis=1)
-        return Panorama(np.ascontiguousarray(radiance), notes=("The background is a panorama: its light is exact.",))
-    bright = _with_highlights(_downscaled(picture))
+        radiance = between_map_and_viewer_axes(picture)
+        return Panorama(radiance, notes=("The background is a panorama: its light is exact.",))
+    bright = _with_highlights(shrink(picture, _WORKING_ROWS / picture.shape[0]))
     radiance = _extrapolate_to_sphere(bright, height_deg)
     return Panorama(radiance, notes=("Guessed from an ordinary picture: the light in front of it is not known.",))
 
@@ -59,12 +62,6 @@ def _is_panorama(picture: LinearImage) -> bool:
     seam = np.abs(encoded[:, 0] - encoded[:, -1]).mean()
     poles = encoded[[0, -1]].std(axis=1).mean()
     return bool(seam <= _MAX_SEAM_RATIO * neighbours + 0.01 and poles <= 0.05)
-
-
-def _downscaled(picture: LinearImage) -> LinearImage:
-    scale = min(1.0, _WORKING_ROWS / picture.shape[0])
-    size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _with_highlights(picture: LinearImage) -> LinearImage:
@@ -83,8 +80,7 @@ def _extrapolate_to_sphere(picture: LinearImage, height_deg: float) -> NDArray[n
     # Seen from the front a direction lies at its mirror image in the unseen half. The floor under the depth keeps both
     # coordinates smooth at the sides and poles, where only the picture's edges are seen.
     depth = np.maximum(np.abs(z), 0.3)
-    unseen = np.clip((z + 0.6) / 1.2, 0, 1)
-    unseen = unseen * unseen * (3 - 2 * unseen)
+    unseen = smoothstep((z + 0.6) / 1.2)
     across = (1 - unseen) * np.clip(x / (depth * half_width), -1, 1) + unseen * x
     up = (1 - unseen) * np.clip(y / (depth * half_height), -1, 1) + unseen * y
     softness = _angle_outside_picture(x, y, z, half_width, half_height) / _MAX_BLUR_AT_DEG

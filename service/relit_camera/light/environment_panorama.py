@@ -7,19 +7,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.errors import ImageError, PanoramaError
-from relit_camera.base.images.image_files import image_size_from_header, read_linear
+from relit_camera.base.images.image_files import read_linear
+from relit_camera.base.images.image_limits import image_size_from_header
 from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.light_map_rotation import LightMap, resample_by_area, resample_to_light_map
-
-Axes = Literal["picture", "map"]
-"""How a panorama file is laid out: `picture` as seen from inside the sphere, so that −X lies to the right of its middle
-(what cameras and renderers write); `map` as a light map is, +X to the right."""
+from relit_camera.light.light_map import LightMap, resample_by_area, resample_to_light_map
+from relit_camera.light.panorama_axes import Axes, between_map_and_picture_axes
 
 PANORAMA_SUFFIXES = frozenset({".hdr", ".exr", ".png", ".jpg", ".jpeg"})
 MAX_PANORAMA_PIXELS = 1 << 25
@@ -125,7 +122,7 @@ def _to_map_axes(image: NDArray[np.float32], axes: Axes, name: str) -> NDArray[n
     height = max(1, image.shape[1] // 2)
     if radiance.shape[:2] != (height, 2 * height):
         radiance = resample_by_area(radiance, height, 2 * height)
-    return np.ascontiguousarray(radiance[:, ::-1] if axes == "picture" else radiance)
+    return between_map_and_picture_axes(radiance) if axes == "picture" else np.ascontiguousarray(radiance)
 
 
 def _require_usable_radiance(image: NDArray[np.float32], name: str) -> NDArray[np.float32]:

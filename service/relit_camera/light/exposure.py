@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from relit_camera.base.images.color import LUMINANCE
-from relit_camera.light.light_map_rotation import LightMap, irradiance, total
+from relit_camera.light.light_map import LightMap, irradiance, total
 
 WHITE_BALL_LUMINANCE = 0.8
 """What a white diffuse ball reads, in luminance, at the point that faces the camera."""

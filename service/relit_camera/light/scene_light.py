@@ -15,7 +15,9 @@ from relit_camera.base.images.color import luminance, rgb_from_kelvin
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.light.directions import MAP_HEIGHT, MAP_WIDTH
 from relit_camera.light.environment_panorama import Environment
-from relit_camera.light.light_map_rotation import LightMap, irradiance, rotate_light_map, splat
+from relit_camera.light.light_map import LightMap, irradiance
+from relit_camera.light.light_map_interpolation import splat
+from relit_camera.light.light_map_rotation import rotate_light_map
 
 _POINTS_PER_STERADIAN = 1600
 _MIN_POINTS = 64

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import lpmv
 
 from relit_camera.light.directions import spherical_from_direction, texel_directions, texel_solid_angles
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 
 Floats = NDArray[np.float64]
 

@@ -1,1 +1,1 @@
-"""Frames through the house: sources, the latest-frame slot, the pipeline, the worker, the publisher, sinks."""
+"""What runs for every frame: pipeline, modes, reenactment, compositing, scene, supervision, publishing, status."""

@@ -2,51 +2,51 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 
 from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.named_files import NamedFiles
 from relit_camera.subject.subject import Subject, SubjectMetadata
 from relit_camera.subject.subject_file import SUFFIX, read_metadata, read_neutral, read_subject
 
 
-class SubjectStore:
+class SubjectStore(NamedFiles):
     """A folder of .relit files; a subject's name is its file's stem."""
 
     def __init__(self, folder: Path, in_memory: bool = False) -> None:
-        """`in_memory`: subjects are read into memory, not mapped (see `read_subject`)."""
-        self.folder = folder
+        """Set up; nothing is read.
+
+        Args:
+            folder: where the files are.
+            in_memory: whether subjects are read into memory instead of mapped (see `read_subject`).
+        """
+        # Subjects come into the folder by hand (`relit capture --out`), so their names may be any file's.
+        super().__init__(folder, "subject", [SUFFIX], any_name=True)
         self._in_memory = in_memory
 
-    def names(self) -> list[str]:
-        """Stored names in alphabetical order."""
-        # Hidden files are temporary ones of a write under way.
-        return sorted(path.stem for path in self.folder.glob(f"[!.]*{SUFFIX}"))
-
-    def path(self, name: str) -> Path:
-        """The file of a stored subject.
-
-        Raises:
-            NotFoundError: none of that name.
-        """
-        if name not in self.names():
-            close = get_close_matches(name, self.names(), 1)
-            cure = f"did you mean '{close[0]}'?" if close else f"stored are: {', '.join(self.names()) or 'none'}"
-            raise NotFoundError(f"no subject '{name}'", cure)
-        return self.folder / f"{name}{SUFFIX}"
-
     def load(self, name: str) -> Subject:
-        """Open a stored subject.
+        """Read a stored subject.
 
         Raises:
-            NotFoundError: none of that name.
+            NotFoundError: there is none of that name.
             SubjectError: its file is damaged, or too large.
         """
         return read_subject(self.path(name), self._in_memory)
 
+    def load_file(self, path: Path) -> tuple[str, Subject]:
+        """Read a subject's file anywhere. Returns the name to show, which is the file's stem, and the subject.
+
+        Raises:
+            NotFoundError: there is no such file.
+            SubjectError: it is damaged, or too large.
+        """
+        if not path.exists():
+            raise NotFoundError(f"no subject file {path}", "check the path")
+        return path.stem, read_subject(path, self._in_memory)
+
     def metadata(self, name: str) -> SubjectMetadata:
-        """What a stored subject's header says, whatever the size of its file.
+        """The header of a stored subject's file, which is read alone, whatever the size of the file.
 
         Raises:
             NotFoundError, SubjectError: as `load`.
@@ -62,23 +62,18 @@ class SubjectStore:
         return read_neutral(self.path(name))
 
     def resolve(self, name_or_path: str) -> tuple[str, Subject]:
-        """A stored name first, else a path. Returns the name to show and the subject.
+        """Read what a person named: a stored subject, else a file. Returns the name to show and the subject.
+
+        For names from the command line and the configuration only: a name that came over the API must not reach a file.
 
         Raises:
             NotFoundError: neither a stored name nor a file.
-            SubjectError: its file is damaged.
+            SubjectError: the file is damaged, or too large.
         """
-        if name_or_path in self.names():
-            return name_or_path, self.load(name_or_path)
-        path = Path(name_or_path)
-        if not path.exists():
-            self.path(name_or_path)
-        return path.stem, read_subject(path, self._in_memory)
+        if self.names_file(name_or_path):
+            return self.load_file(Path(name_or_path))
+        return name_or_path, self.load(name_or_path)
 
-    def remove(self, name: str) -> None:
-        """Delete a stored subject.
-
-        Raises:
-            NotFoundError: none of that name.
-        """
-        self.path(name).unlink()
+    def names_file(self, name_or_path: str) -> bool:
+        """Whether what a person named is a file, and no stored subject: those come first."""
+        return name_or_path not in self.names() and Path(name_or_path).exists()

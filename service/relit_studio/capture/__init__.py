@@ -1,1 +1,1 @@
-"""The phone capture video whose truth is known (thesis 4.3)."""
+"""Simulated phone capture videos with known truth (thesis 4.3)."""

@@ -1,1 +1,1 @@
-"""A person-like bust made by code alone, its pictures under any light, and the truth of all of it."""
+"""Procedural mannequin: a bust made by code alone, with pictures under any light and their truth."""

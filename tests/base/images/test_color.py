@@ -14,6 +14,7 @@ from relit_camera.base.images.color import (
     linear_from_uint8,
     luminance,
     parse_gamma,
+    rgb_from_hex,
     rgb_from_kelvin,
     srgb_decode,
     srgb_encode,
@@ -122,3 +123,13 @@ def test_redness_falls_with_temperature() -> None:
 def test_temperatures_outside_the_fit_are_clamped() -> None:
     np.testing.assert_array_equal(rgb_from_kelvin(500), rgb_from_kelvin(1667))
     np.testing.assert_array_equal(rgb_from_kelvin(1e6), rgb_from_kelvin(25000))
+
+
+def test_a_hex_color_is_three_codes() -> None:
+    assert rgb_from_hex("#ff8001") == (255, 128, 1)
+
+
+@pytest.mark.parametrize("code", ["", "ff8001", "#ff80", "#ff80012", "#gg8001"])
+def test_anything_else_is_no_hex_color(code: str) -> None:
+    with pytest.raises(ValueError):  # noqa: PT011
+        rgb_from_hex(code)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import ImageError
-from relit_camera.base.images import image_files
-from relit_camera.base.images.image_files import image_size_from_header, read_linear, read_mask, write_linear
+from relit_camera.base.images import image_files, image_limits
+from relit_camera.base.images.image_files import read_linear, read_mask, write_linear
+from relit_camera.base.images.image_limits import image_size_from_header
 
 GREY = np.array([[0, 51, 255], [102, 255, 0]], np.uint8)
 
@@ -54,7 +55,7 @@ def test_the_header_tells_the_size_and_too_large_is_refused_unread(
     assert cv2.imwrite(str(path), picture.astype(np.float32) if suffix == ".hdr" else picture, options)
     assert image_size_from_header(path) == (517, 300)
     assert read_linear(path).shape == (300, 517, 3)
-    monkeypatch.setattr(image_files, "MAX_IMAGE_PIXELS", 517 * 300 - 1)
+    monkeypatch.setattr(image_limits, "MAX_IMAGE_PIXELS", 517 * 300 - 1)
     monkeypatch.setattr(cv2, "imdecode", None)  # calling it would raise TypeError
     for read in (read_linear, read_mask):
         with pytest.raises(ImageError, match="517x300 pixels, more than"):
@@ -68,7 +69,7 @@ def test_the_header_tells_the_size_and_too_large_is_refused_unread(
 def test_openexr_too_large_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.exr"
     write_linear(path, np.ones((30, 51, 3), np.float32))
-    monkeypatch.setattr(image_files, "MAX_IMAGE_PIXELS", 51 * 30 - 1)
+    monkeypatch.setattr(image_limits, "MAX_IMAGE_PIXELS", 51 * 30 - 1)
     monkeypatch.setattr(image_files, "_read_exr", None)
     with pytest.raises(ImageError, match="51x30 pixels, more than"):
         read_linear(path)

@@ -16,8 +16,8 @@ from relit_camera.capture.reflectance.appearance_field import (
     choose_kernel,
     residual_weights,
 )
+from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.blend import Blend, choose_model_share
-from relit_camera.capture.reflectance.delaunay_barycentric import SphericalBarycentric
 from relit_camera.capture.reflectance.gaussian_process import Kernel
 from relit_camera.capture.reflectance.linear_methods import RadialBasis
 from relit_camera.capture.reflectance.method_registry import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_camera.capture.reflectance.delaunay_barycentric import SphericalBarycentric
+from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.sampled_region import (
     boundary_lights,
     region_coverage,
@@ -35,6 +35,14 @@ def test_each_black_sample_lies_farther_out_on_its_lights_way() -> None:
     np.testing.assert_allclose(np.degrees(np.arccos((ring * rim).sum(axis=1))), 20, atol=1e-6)
     # The cap's middle is the camera's axis, but for the spiral's unevenness.
     np.testing.assert_allclose(np.degrees(np.arccos(ring[:, 2])), 70, atol=1.5)
+
+
+def test_no_black_sample_lies_beyond_the_pole_opposite_to_the_middle() -> None:
+    captured = cap(120, 50)
+    ring, rim = ring_directions(captured, 175), captured[boundary_lights(captured)]
+    moved_deg = np.degrees(np.arccos((ring * rim).sum(axis=1)))
+    # The pole is 130 degrees from the rim, which is uneven; nine tenths of the way is as far as a sample goes.
+    np.testing.assert_allclose(moved_deg, 0.9 * 130, atol=2)
 
 
 def test_the_field_fades_over_the_ring_and_stays_the_same_inside() -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relit_camera.capture.geometry.horizon_map import HorizonMap, compute_horizon_map
 from relit_camera.capture.geometry.shape_estimation import Geometry
-from relit_camera.capture.reflectance.delaunay_barycentric import SphericalBarycentric
+from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.method_registry import ReflectanceMethod
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.capture.reflectance.shadow_aware_interpolation import (

@@ -11,13 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from relit_camera.devices.on_demand import reader_detection
+from relit_camera.base.errors import UnsupportedByDriverError
+from relit_camera.devices import v4l2
 from relit_camera.devices.on_demand.on_demand_source import IDLE_TIMEOUT_S, DemandMonitor
-from relit_camera.devices.on_demand.reader_detection import (
-    ClientUsageUnsupported,
-    ReaderMonitor,
-    driver_reports_readers,
-)
+from relit_camera.devices.on_demand.reader_detection import ReaderMonitor, driver_reports_readers
 from tests.small_camera import wait_until
 from tests.virtual_clock import VirtualClock
 
@@ -131,7 +128,7 @@ def test_the_first_answer_is_no_guess() -> None:
 
 def test_an_old_driver_is_asked_once_then_proc_is_scanned(caplog: pytest.LogCaptureFixture) -> None:
     watching = Watching()
-    watching.ask.error = ClientUsageUnsupported()
+    watching.ask.error = UnsupportedByDriverError("it is too old")
     watching.at(3.5, watching.scan, there=True)
     with caplog.at_level(logging.WARNING):
         assert watching.run(10.0) == [(0.1, False), (4.3, True)]
@@ -200,8 +197,8 @@ def test_the_first_event_of_a_subscription_is_the_answer(
     monkeypatch: pytest.MonkeyPatch, node: str, count: int
 ) -> None:
     def answer(request: int, argument: bytearray) -> int:
-        if request == reader_detection.VIDIOC_DQEVENT:
-            struct.pack_into("=I4xI", argument, 0, reader_detection.CLIENT_USAGE, count)
+        if request == v4l2.VIDIOC_DQEVENT:
+            struct.pack_into("=I4xI", argument, 0, v4l2.EVENT_CLIENT_USAGE, count)
         return 0
 
     asked = driver(monkeypatch, answer)
@@ -209,11 +206,11 @@ def test_the_first_event_of_a_subscription_is_the_answer(
     assert driver_reports_readers(node) is (count > 0)
     assert open_files() == before
     assert [request for request, _ in asked] == [
-        reader_detection.VIDIOC_SUBSCRIBE_EVENT,
-        reader_detection.VIDIOC_DQEVENT,
+        v4l2.VIDIOC_SUBSCRIBE_EVENT,
+        v4l2.VIDIOC_DQEVENT,
     ]
     assert struct.unpack("=8I", asked[0][1]) == (0x10E00001, 0, 1, 0, 0, 0, 0, 0)
-    assert len(asked[1][1]) == (reader_detection.VIDIOC_DQEVENT >> 16) & 0x3FFF  # the size that the request announces
+    assert len(asked[1][1]) == (v4l2.VIDIOC_DQEVENT >> 16) & 0x3FFF  # the size that the request announces
 
 
 @pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTTY])
@@ -222,12 +219,12 @@ def test_a_driver_without_the_event_cannot_answer(monkeypatch: pytest.MonkeyPatc
         raise OSError(number, "no")
 
     driver(monkeypatch, refuse)
-    with pytest.raises(ClientUsageUnsupported):
+    with pytest.raises(UnsupportedByDriverError):
         driver_reports_readers(node)
 
 
 def test_a_plain_file_cannot_answer_and_a_missing_one_is_an_os_error(node: str, tmp_path: Path) -> None:
-    with pytest.raises(ClientUsageUnsupported):
+    with pytest.raises(UnsupportedByDriverError):
         driver_reports_readers(node)
     with pytest.raises(FileNotFoundError):
         driver_reports_readers(str(tmp_path / "video11"))

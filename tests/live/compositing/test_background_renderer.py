@@ -54,8 +54,8 @@ def room() -> MattedFrame:
     return MattedFrame(image, person)
 
 
-def still(wanted: BackgroundRequest) -> np.ndarray:
-    return BackgroundRenderer(SIZE).still(wanted, 0.0)
+def static(wanted: BackgroundRequest) -> np.ndarray:
+    return BackgroundRenderer(SIZE).static_background(wanted, 0.0)
 
 
 def halves(picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -68,20 +68,22 @@ def halves(picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def test_every_kind_gives_a_picture_of_the_size_that_is_made_once(
     background: NoBackground, environment: Environment
 ) -> None:
-    backdrop = BackgroundRenderer(SIZE)
-    first = backdrop.still(BackgroundRequest(background, Lighting(), environment, PICTURE), 0.0)
-    again = backdrop.still(BackgroundRequest(background.model_copy(), Lighting(), environment, PICTURE), 5.0)
+    renderer = BackgroundRenderer(SIZE)
+    first = renderer.static_background(BackgroundRequest(background, Lighting(), environment, PICTURE), 0.0)
+    again = renderer.static_background(
+        BackgroundRequest(background.model_copy(), Lighting(), environment, PICTURE), 5.0
+    )
     assert first.shape == (90, 160, 3)
     assert first.dtype == np.uint8
     assert again is first
 
 
 def test_a_colour_is_that_colour() -> None:
-    assert (still(BackgroundRequest(ColorBackground(color="#336699"), Lighting())) == (0x33, 0x66, 0x99)).all()
+    assert (static(BackgroundRequest(ColorBackground(color="#336699"), Lighting())) == (0x33, 0x66, 0x99)).all()
 
 
 def test_none_is_a_dark_neutral_without_bands() -> None:
-    picture = still(BackgroundRequest(NoBackground(), Lighting()))
+    picture = static(BackgroundRequest(NoBackground(), Lighting()))
     assert picture.max() < 64
     assert np.ptp(picture.astype(int), axis=2).max() < 12
     smooth = neutral_background((640, 360))[180, :, 1].astype(int)
@@ -90,10 +92,10 @@ def test_none_is_a_dark_neutral_without_bands() -> None:
 
 @pytest.mark.parametrize("background", [BlurBackground(strength=0.3), EnvironmentBackground()], ids=lambda b: b.kind)
 def test_the_environment_is_seen_turned_as_it_lights(background: BlurBackground, environment: Environment) -> None:
-    left, right = halves(still(BackgroundRequest(background, Lighting(), environment)))
+    left, right = halves(static(BackgroundRequest(background, Lighting(), environment)))
     assert left[0] > 2 * left[2]
     assert right[2] > 2 * right[0]
-    turned_left, turned_right = halves(still(BackgroundRequest(background, Lighting(yaw_deg=180), environment)))
+    turned_left, turned_right = halves(static(BackgroundRequest(background, Lighting(yaw_deg=180), environment)))
     assert turned_left[2] > 2 * turned_left[0]
     assert turned_right[0] > 2 * turned_right[2]
 
@@ -102,7 +104,7 @@ def test_exposure_and_gain_brighten_the_environment(environment: Environment) ->
     background = EnvironmentBackground()
     dark, darker = (
         linear_from_uint8(
-            still(BackgroundRequest(background, Lighting(exposure_ev=ev, background_gain_ev=-3), environment))
+            static(BackgroundRequest(background, Lighting(exposure_ev=ev, background_gain_ev=-3), environment))
         )
         for ev in (0, -1)
     )
@@ -112,7 +114,7 @@ def test_exposure_and_gain_brighten_the_environment(environment: Environment) ->
 def test_lamps_do_not_change_how_the_environment_is_seen(environment: Environment) -> None:
     background = EnvironmentBackground()
     plain, lit = (
-        still(BackgroundRequest(background, Lighting(lamps=lamps), environment))
+        static(BackgroundRequest(background, Lighting(lamps=lamps), environment))
         for lamps in ((), (Lamp(intensity=50),))
     )
     np.testing.assert_array_equal(plain, lit)
@@ -120,12 +122,12 @@ def test_lamps_do_not_change_how_the_environment_is_seen(environment: Environmen
 
 @pytest.mark.parametrize("background", [BlurBackground(), EnvironmentBackground()], ids=lambda b: b.kind)
 def test_without_an_environment_there_is_the_neutral(background: BlurBackground) -> None:
-    np.testing.assert_array_equal(still(BackgroundRequest(background, Lighting())), neutral_background(SIZE))
+    np.testing.assert_array_equal(static(BackgroundRequest(background, Lighting())), neutral_background(SIZE))
 
 
 def test_an_image_background_without_its_image_is_a_fault() -> None:
     with pytest.raises(ValueError, match="'office' was not given"):
-        still(BackgroundRequest(ImageBackground(image="office"), Lighting()))
+        static(BackgroundRequest(ImageBackground(image="office"), Lighting()))
 
 
 @pytest.mark.parametrize("size", [(40, 40), (80, 20), (200, 60), (13, 77)])
@@ -157,82 +159,86 @@ def test_a_live_picture_stays_as_it_is_with_none(room: MattedFrame) -> None:
     assert not needs_matte(NoBackground(), Lighting())
     assert needs_matte(NoBackground(), Lighting(background_gain_ev=-1))
     assert needs_matte(BlurBackground(), Lighting())
-    live = BackgroundRenderer(SIZE).live(BackgroundRequest(NoBackground(), Lighting()), room, 0.0)
+    live = BackgroundRenderer(SIZE).live_background(BackgroundRequest(NoBackground(), Lighting()), room, 0.0)
     np.testing.assert_array_equal(live, room.image)
-    dimmed = BackgroundRenderer(SIZE).live(
+    dimmed = BackgroundRenderer(SIZE).live_background(
         BackgroundRequest(NoBackground(), Lighting(background_gain_ev=-1)), room, 0.0
     )
     assert dimmed.max() == 188
 
 
 def test_a_live_room_is_blurred_but_replaced_by_the_other_kinds(room: MattedFrame, environment: Environment) -> None:
-    blurred = BackgroundRenderer(SIZE).live(BackgroundRequest(BlurBackground(), Lighting(), environment), room, 0.0)
+    blurred = BackgroundRenderer(SIZE).live_background(
+        BackgroundRequest(BlurBackground(), Lighting(), environment), room, 0.0
+    )
     assert linear_from_uint8(blurred)[..., 1].mean() == pytest.approx(0.25, abs=0.01)
     assert blurred[..., 0].max() == 0
     for background in STILLS[2:]:
         wanted = BackgroundRequest(background, Lighting(), environment, PICTURE)
-        np.testing.assert_array_equal(BackgroundRenderer(SIZE).live(wanted, room, 0.0), still(wanted))
+        np.testing.assert_array_equal(BackgroundRenderer(SIZE).live_background(wanted, room, 0.0), static(wanted))
 
 
 @pytest.mark.parametrize("background", STILLS, ids=lambda background: background.kind)
 def test_no_trace_of_the_live_room_outlives_the_live_picture(
     background: NoBackground, environment: Environment, room: MattedFrame
 ) -> None:
-    """Straight after a live picture, and in the middle of every transition, a still is that of a fresh backdrop."""
-    backdrop = BackgroundRenderer(SIZE)
+    """After a live picture, in the middle of any transition, a static background is that of a new renderer."""
+    renderer = BackgroundRenderer(SIZE)
     for shown in (NoBackground(), BlurBackground()):
-        backdrop.live(BackgroundRequest(shown, Lighting(transition_s=10)), room, 1.0)
+        renderer.live_background(BackgroundRequest(shown, Lighting(transition_s=10)), room, 1.0)
         wanted = BackgroundRequest(background, Lighting(transition_s=10), environment, PICTURE)
-        np.testing.assert_array_equal(backdrop.still(wanted, 1.01), still(wanted))
+        np.testing.assert_array_equal(renderer.static_background(wanted, 1.01), static(wanted))
 
 
 def test_a_change_is_faded_in_and_seen_at_once() -> None:
-    backdrop, lighting = BackgroundRenderer(SIZE), Lighting(transition_s=2)
+    renderer, lighting = BackgroundRenderer(SIZE), Lighting(transition_s=2)
     black, white = (BackgroundRequest(ColorBackground(color=color), lighting) for color in ("#000000", "#ffffff"))
-    backdrop.still(black, 4.5)
-    shown = [int(backdrop.still(white, now)[0, 0, 0]) for now in (5.0, 5.5, 6.5, 7.5)]
+    renderer.static_background(black, 4.5)
+    shown = [int(renderer.static_background(white, now)[0, 0, 0]) for now in (5.0, 5.5, 6.5, 7.5)]
     assert shown == [round(255 * (1 - (1 - share) ** 3)) for share in (0.25, 0.5, 1, 1)]
 
 
 def test_a_change_during_a_fade_goes_on_from_what_is_shown() -> None:
-    backdrop, lighting = BackgroundRenderer(SIZE), Lighting(transition_s=2)
+    renderer, lighting = BackgroundRenderer(SIZE), Lighting(transition_s=2)
     colours = [BackgroundRequest(ColorBackground(color=color), lighting) for color in ("#000000", "#ffffff", "#ff0000")]
-    backdrop.still(colours[0], 0.0)
-    backdrop.still(colours[1], 0.0)
-    middle = backdrop.still(colours[1], 1.0).copy()
-    np.testing.assert_array_equal(backdrop.still(colours[2], 1.0), middle)
-    assert tuple(backdrop.still(colours[2], 3.1)[0, 0]) == (255, 0, 0)
+    renderer.static_background(colours[0], 0.0)
+    renderer.static_background(colours[1], 0.0)
+    middle = renderer.static_background(colours[1], 1.0).copy()
+    np.testing.assert_array_equal(renderer.static_background(colours[2], 1.0), middle)
+    assert tuple(renderer.static_background(colours[2], 3.1)[0, 0]) == (255, 0, 0)
 
 
 def test_a_background_that_is_turned_all_the_time_is_followed(environment: Environment) -> None:
-    backdrop, now = BackgroundRenderer(SIZE), 0.0
+    renderer, now = BackgroundRenderer(SIZE), 0.0
     for now in np.arange(0, 4, 0.04):
         turning = Lighting(yaw_deg=45 * now)
-        shown = backdrop.still(BackgroundRequest(EnvironmentBackground(), turning, environment), now)
+        shown = renderer.static_background(BackgroundRequest(EnvironmentBackground(), turning, environment), now)
     errors = []
     for behind_s in (0.0, 0.15, 4.0):
         then = BackgroundRequest(EnvironmentBackground(), Lighting(yaw_deg=45 * max(now - behind_s, 0)), environment)
-        errors.append(np.abs(shown.astype(int) - still(then)).mean())
+        errors.append(np.abs(shown.astype(int) - static(then)).mean())
     assert min(errors[:2]) < 0.25 * errors[2]
 
 
 def test_a_clock_set_back_ends_the_fade() -> None:
-    backdrop, lighting = BackgroundRenderer(SIZE), Lighting(transition_s=2)
+    renderer, lighting = BackgroundRenderer(SIZE), Lighting(transition_s=2)
     black, white = (BackgroundRequest(ColorBackground(color=color), lighting) for color in ("#000000", "#ffffff"))
-    backdrop.still(black, 5.0)
-    backdrop.still(white, 5.1)
-    assert (backdrop.still(white, 0.0) == 255).all()
+    renderer.static_background(black, 5.0)
+    renderer.static_background(white, 5.1)
+    assert (renderer.static_background(white, 0.0) == 255).all()
 
 
 def test_lighting_that_a_background_does_not_show_does_not_make_it_anew() -> None:
-    backdrop = BackgroundRenderer(SIZE)
-    first = backdrop.still(BackgroundRequest(ImageBackground(image="office"), Lighting(), None, PICTURE), 0.0)
+    renderer = BackgroundRenderer(SIZE)
+    first = renderer.static_background(
+        BackgroundRequest(ImageBackground(image="office"), Lighting(), None, PICTURE), 0.0
+    )
     other = BackgroundRequest(ImageBackground(image="office"), Lighting(yaw_deg=40, exposure_ev=1), None, PICTURE)
-    assert backdrop.still(other, 1.0) is first
+    assert renderer.static_background(other, 1.0) is first
 
 
 def test_another_picture_of_the_same_name_is_shown() -> None:
-    backdrop = BackgroundRenderer(SIZE)
-    backdrop.still(BackgroundRequest(ImageBackground(image="office"), AT_ONCE, None, PICTURE), 0.0)
+    renderer = BackgroundRenderer(SIZE)
+    renderer.static_background(BackgroundRequest(ImageBackground(image="office"), AT_ONCE, None, PICTURE), 0.0)
     other = BackgroundRequest(ImageBackground(image="office"), AT_ONCE, None, np.full_like(PICTURE, 9))
-    assert (backdrop.still(other, 1.0) == 9).all()
+    assert (renderer.static_background(other, 1.0) == 9).all()

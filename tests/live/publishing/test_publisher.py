@@ -16,6 +16,8 @@ from relit_camera.live.publishing.publisher import RETRY_S, PublishedPicture, Pu
 from tests.small_camera import wait_until
 from tests.virtual_clock import VirtualClock
 
+pytestmark = pytest.mark.real_time
+
 SIZE = (64, 48)
 
 

@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import pytest
 
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.head_pose import project
+from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
 from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor, fade_flow_at_border
 from relit_camera.live.reenactment.motion_transfer import split_body_motion, transfer_motion
-from relit_camera.live.reenactment.reenactor import open_reenactor
+from relit_camera.live.reenactment.reenactor import WarpedLayer, open_reenactor
 from relit_camera.live.reenactment.source_image import feather_edges
 from relit_camera.live.reenactment.warp import FlowPatch, inverse_affine, move_body, source_from_output
-from tests.live.people import NOBODY, SCHEME, close_up, live_frame, motion, moved_by, person, stage_of
+from relit_camera.subject.subject import Subject
+from tests.live.people import NOBODY, SCHEME, close_up, context_of, live_frame, motion, moved_by, person
 
 SIZE = (480, 360)
 FEATURES = {"nose": 1, "chin": 152, "brow": 105, "cheek": 50, "mouth corner": 61}
 """Vertices of the canonical face that lie well inside it."""
 
 
-def relit_picture(subject):
+def relit_picture(subject: Subject):
     """A smooth, bright picture of the subject's size."""
     height, width = subject.matte.shape
     x, y = np.meshgrid(np.linspace(0, 5, width), np.linspace(0, 7, height))
     return np.stack([0.5 + 0.3 * np.sin(x), 0.5 + 0.3 * np.cos(y), 0.4 + 0.2 * np.sin(x + y)], 2).astype(np.float32)
 
 
-def marked(subject, point):
+def marked(subject: Subject, point: np.ndarray):
     """Black but for a soft dot at a still position."""
     height, width = subject.matte.shape
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -35,14 +40,14 @@ def marked(subject, point):
     return np.repeat(dot[..., None], 3, axis=2).astype(np.float32)
 
 
-def centroid(moved):
+def centroid(moved: WarpedLayer):
     """Where the light is, in output pixels."""
     weight = moved.picture.sum(axis=2)
     x, y = np.meshgrid(np.arange(weight.shape[1]) + 0.5, np.arange(weight.shape[0]) + 0.5)
     return np.array([(weight * x).sum(), (weight * y).sum()]) / weight.sum() + moved.at
 
 
-def placed_still(picture, subject):
+def placed_still(picture: np.ndarray, subject: Subject):
     """The still fitted into the output on its bottom edge, by cv2's resize alone."""
     scale = SIZE[1] / subject.size[1]
     width = round(subject.size[0] * scale)
@@ -52,7 +57,7 @@ def placed_still(picture, subject):
     return cv2.copyMakeBorder(large, 0, 0, left, SIZE[0] - width - left, cv2.BORDER_CONSTANT), left
 
 
-def in_output(moved):
+def in_output(moved: WarpedLayer):
     """The moved picture and its alpha in the whole output."""
     picture, alpha = np.zeros((SIZE[1], SIZE[0], 3), np.float32), np.zeros((SIZE[1], SIZE[0]), np.float32)
     area = np.s_[moved.at[1] : moved.at[1] + moved.alpha.shape[0], moved.at[0] : moved.at[0] + moved.alpha.shape[1]]
@@ -60,13 +65,13 @@ def in_output(moved):
     return picture, alpha
 
 
-@pytest.mark.parametrize("subject", [person, close_up])
+@pytest.mark.parametrize("make", [person, close_up])
 @pytest.mark.parametrize("at_rest", [motion(), NOBODY], ids=["at rest", "nobody"])
-def test_a_face_at_rest_gives_back_the_still(subject, at_rest):
-    subject = subject()
+def test_a_face_at_rest_gives_back_the_still(make: Callable[[], Subject], at_rest: FaceMotion) -> None:
+    subject = make()
     colours = relit_picture(subject)
     over_black = colours * (subject.matte[..., None] if subject.metadata.over_black else 1)
-    reenactor = open_reenactor("first-order", stage_of(subject, SIZE))
+    reenactor = open_reenactor("first-order", context_of(subject, SIZE))
     picture, alpha = in_output(moved_by(reenactor, over_black, at_rest, live_frame()))
     matte = feather_edges(subject.matte)
     expected = placed_still(colours * matte[..., None], subject)[0]
@@ -76,64 +81,65 @@ def test_a_face_at_rest_gives_back_the_still(subject, at_rest):
 
 @pytest.mark.parametrize("feature", FEATURES)
 @pytest.mark.parametrize("angles", [(14, 0, 0), (0, 9, 0), (0, 0, 10), (-10, -6, 5)])
-def test_features_go_where_the_turned_head_has_them(feature, angles):
+def test_features_go_where_the_turned_head_has_them(feature: str, angles: tuple[float, float, float]) -> None:
     subject = person()
-    stage = stage_of(subject, SIZE)
+    context = context_of(subject, SIZE)
     index = FEATURES[feature]
     moving = motion(rotation_from_angles(*angles))
-    moved = moved_by(FirstOrderReenactor(stage), marked(subject, stage.face.landmarks[index]), moving, live_frame())
-    body = split_body_motion(stage.face, moving)
-    in_still = project(stage.face.head_points, body.turned, stage.face.size)[index]
+    moved = moved_by(FirstOrderReenactor(context), marked(subject, context.face.landmarks[index]), moving, live_frame())
+    body = split_body_motion(context.face, moving)
+    in_still = project(context.face.head_points, body.turned, context.face.size)[index]
     placed = move_body(source_from_output(subject.size, SIZE), body.pivot, body.shift, body.scale, subject.size[1])
     inverse = inverse_affine(placed)
     expected = inverse[:, :2] @ in_still + inverse[:, 2]
     pixel = SIZE[1] / subject.size[1]
     before = inverse_affine(source_from_output(subject.size, SIZE))
-    start = before[:, :2] @ stage.face.landmarks[index] + before[:, 2]
+    start = before[:, :2] @ context.face.landmarks[index] + before[:, 2]
     way = np.linalg.norm(expected - start)
     assert way > pixel  # it had somewhere to go
     assert np.linalg.norm(centroid(moved) - expected) < 0.5 * pixel + 0.15 * way
 
 
-def test_brows_go_up_with_the_drivers():
+def test_brows_go_up_with_the_drivers() -> None:
     subject = person()
-    stage = stage_of(subject, SIZE)
+    context = context_of(subject, SIZE)
     expression = np.zeros((SCHEME.count, 3))
     brow = list(SCHEME.right_brow)
     away = np.linalg.norm(SCHEME.canonical[:, None, :2] - SCHEME.canonical[None, brow, :2], axis=2).min(axis=1)
     expression[:, 1] = 0.6 * np.exp(-((away / 1.5) ** 2))  # a brow takes the skin above and below it along
-    relit = marked(subject, stage.face.landmarks[brow].mean(axis=0))
-    reenactor = FirstOrderReenactor(stage)
+    relit = marked(subject, context.face.landmarks[brow].mean(axis=0))
+    reenactor = FirstOrderReenactor(context)
     rest = centroid(moved_by(reenactor, relit, motion(), live_frame()))
     raised = centroid(moved_by(reenactor, relit, motion(expression=expression), live_frame()))
-    points = reenactor._points
+    points = control_points(context.face, head_and_shoulder_anchors(context.face.pose, context.face.size))
     expected = (
-        transfer_motion(stage.face, points, motion(expression=expression)).landmarks[brow] - stage.face.landmarks[brow]
+        transfer_motion(context.face, points, motion(expression=expression)).landmarks[brow]
+        - context.face.landmarks[brow]
     )
     np.testing.assert_allclose(raised - rest, expected.mean(axis=0) * SIZE[1] / subject.size[1], atol=1.5)
     assert raised[1] < rest[1] - 3
 
 
-def test_an_opening_mouth_shows_a_dark_inside():
+def test_an_opening_mouth_shows_a_dark_inside() -> None:
     subject = person()
-    stage = stage_of(subject, SIZE)
+    context = context_of(subject, SIZE)
     expression = np.zeros((SCHEME.count, 3))
     expression[list(SCHEME.lower_lip_inner[1:-1]), 1] = -2.0
     expression[list(SCHEME.lower_lip_outer[1:-1]), 1] = -2.0
     relit = np.full((*subject.matte.shape, 3), 0.5, np.float32)
-    reenactor = FirstOrderReenactor(stage)
+    reenactor = FirstOrderReenactor(context)
     shut, _ = in_output(moved_by(reenactor, relit, motion(), live_frame()))
     opened, alpha = in_output(moved_by(reenactor, relit, motion(expression=expression), live_frame()))
-    lips = stage.face.landmarks[[13, 14]].mean(axis=0) + [0, 6]
+    lips = context.face.landmarks[[13, 14]].mean(axis=0) + [0, 6]
     column, row = (inverse_affine(source_from_output(subject.size, SIZE)) @ [*lips, 1]).astype(int)
     assert shut[row, column].min() > 0.4
     assert opened[row, column].max() < 0.12
     assert alpha[row, column] == pytest.approx(1, abs=1e-3)
 
 
-def test_no_motion_lets_the_body_hover_and_all_stays_in_the_output():
+def test_no_motion_lets_the_body_hover_and_all_stays_in_the_output() -> None:
     subject = person()
-    reenactor = FirstOrderReenactor(stage_of(subject, SIZE))
+    reenactor = FirstOrderReenactor(context_of(subject, SIZE))
     relit = relit_picture(subject)
     for shift in ((0, 9, 0), (-12, 5, 4), (12, -6, -20), (0, 0, 12)):
         moved = moved_by(reenactor, relit, motion(rotation_from_angles(10, -8, 4), shift=shift), live_frame())
@@ -149,17 +155,17 @@ def test_no_motion_lets_the_body_hover_and_all_stays_in_the_output():
         assert moved.alpha.max() <= 1
 
 
-def test_light_and_picture_are_proportional():
+def test_light_and_picture_are_proportional() -> None:
     """The warp is linear in the light: twice the light is twice the picture."""
     subject = person()
     relit = relit_picture(subject)
-    reenactor = FirstOrderReenactor(stage_of(subject, SIZE))
+    reenactor = FirstOrderReenactor(context_of(subject, SIZE))
     moving = motion(rotation_from_angles(10, 5, 0))
     once, twice = (moved_by(reenactor, relit * gain, moving, live_frame()).picture for gain in (1, 2))
     np.testing.assert_allclose(twice, 2 * once, atol=1e-5)
 
 
-def test_a_face_cut_off_by_its_border_does_not_move_there():
+def test_a_face_cut_off_by_its_border_does_not_move_there() -> None:
     flow = np.full((41, 31, 2), 3, np.float32)
     held = fade_flow_at_border(FlowPatch(flow, np.array([-10.0, 0, 110, 160])), (100, 150)).flow
     x, y = np.meshgrid(np.linspace(-10, 110, 31), np.linspace(0, 160, 41))

@@ -23,7 +23,7 @@ from relit_camera.base.config.look import (
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import InputError, NotFoundError, SubjectError
 from relit_camera.base.images.image_files import encode_display, write_linear
-from relit_camera.light.light_map_rotation import irradiance
+from relit_camera.light.light_map import irradiance
 from relit_camera.live.scene.scene_controller import BACKGROUND_ENVIRONMENT, SceneController
 from relit_camera.subject.subject_file import write_subject
 from tests.small_camera import small_subject
@@ -112,7 +112,7 @@ def test_a_picture_lights_the_face_from_its_bright_side(right: bool, scene_contr
     scene_controller.backgrounds.add("room", half_bright(right))
     look = Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=ImageBackground(image="room"))
     scene = scene_controller.set_look(look)
-    assert scene.backdrop is not None
+    assert scene.background_image is not None
     assert (lit_from_right(scene_controller) > 0) == right
 
 
@@ -128,9 +128,9 @@ def test_another_background_lights_anew(scene_controller: SceneController) -> No
 
 def test_an_environment_as_background_picture_is_seen_from_inside(scene_controller: SceneController) -> None:
     scene = scene_controller.set_look(Look(background=ImageBackground(image="window")))
-    assert scene.backdrop is not None
-    assert scene.backdrop.dtype == np.uint8
-    halves = np.split(scene.backdrop.astype(np.float64), 2, axis=1)
+    assert scene.background_image is not None
+    assert scene.background_image.dtype == np.uint8
+    halves = np.split(scene.background_image.astype(np.float64), 2, axis=1)
     brighter_right = float(halves[1].mean() - halves[0].mean())
     lit = Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=ImageBackground(image="window"))
     environment = scene_controller.set_look(lit).environment
@@ -150,7 +150,7 @@ def test_what_a_change_leaves_alone_is_kept(scene_controller: SceneController, m
         update={"lighting": look.lighting.model_copy(update={"exposure_ev": 1.0}), "mode": Mode.RATIO}
     )
     after = scene_controller.update_look(change)
-    assert after.backdrop is before.backdrop
+    assert after.background_image is before.background_image
     assert after.environment is before.environment
     assert after.look.mode is Mode.RATIO
 
@@ -167,20 +167,52 @@ def test_a_file_takes_no_name_that_means_something_else(
     assert environment is scene_controller.temporary_environments()[name]
 
 
-def test_subjects_by_path_by_name_and_none(scene_controller: SceneController, tmp_path: Path) -> None:
-    path = tmp_path / "me.relit"
-    write_subject(path, small_subject())
-    assert scene_controller.set_subject(str(path)).subject_name == "me"
+@pytest.fixture
+def subject_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A subject file in the working folder, which is no store."""
+    monkeypatch.chdir(tmp_path)
+    write_subject(tmp_path / "me.relit", small_subject())
+    return tmp_path / "me.relit"
+
+
+@pytest.fixture
+def stored_subject(subject_file: Path, scene_controller: SceneController) -> Path:
+    """The same subject in the store, called `stored`."""
     scene_controller.subjects.folder.mkdir(parents=True)
-    shutil.copy(path, scene_controller.subjects.folder / "stored.relit")
-    assert scene_controller.set_subject("stored").subject is not None
+    return Path(shutil.copy(subject_file, scene_controller.subjects.folder / "stored.relit"))
+
+
+@pytest.mark.usefixtures("stored_subject")
+def test_the_api_chooses_stored_subjects_only(scene_controller: SceneController, subject_file: Path) -> None:
+    assert scene_controller.choose_stored_subject("stored").subject_name == "stored"
     kept = scene_controller.scene
-    path.write_bytes(b"damaged")
-    for wrong, error in ((str(path), SubjectError), ("nobody", NotFoundError)):
-        with pytest.raises(error):
-            scene_controller.set_subject(wrong)
+    for name in ("nobody", "me", "me.relit", "./me.relit", str(subject_file)):
+        with pytest.raises(NotFoundError):
+            scene_controller.choose_stored_subject(name)
     assert scene_controller.scene is kept
-    assert scene_controller.set_subject(None).subject is None
+    assert scene_controller.choose_stored_subject(None).subject is None
+
+
+def test_a_subject_file_is_shown_under_its_name(scene_controller: SceneController, subject_file: Path) -> None:
+    assert scene_controller.load_subject_file(subject_file).subject_name == "me"
+    kept = scene_controller.scene
+    with pytest.raises(NotFoundError, match=r"none\.relit"):
+        scene_controller.load_subject_file(subject_file.with_name("none.relit"))
+    subject_file.write_bytes(b"damaged")
+    with pytest.raises(SubjectError):
+        scene_controller.load_subject_file(subject_file)
+    assert scene_controller.scene is kept
+
+
+@pytest.mark.usefixtures("stored_subject")
+def test_the_configuration_names_a_stored_subject_or_a_file(
+    scene_controller: SceneController, subject_file: Path
+) -> None:
+    assert scene_controller.load_configured_subject("stored").subject_name == "stored"
+    assert scene_controller.load_configured_subject(str(subject_file)).subject_name == "me"
+    with pytest.raises(NotFoundError, match="no subject 'nobody'; stored are: stored"):
+        scene_controller.load_configured_subject("nobody")
+    assert scene_controller.load_configured_subject(None).subject is None
 
 
 def test_changes_from_many_threads_are_all_made(scene_controller: SceneController) -> None:

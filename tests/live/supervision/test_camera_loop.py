@@ -17,7 +17,7 @@ from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.devices.sinks.sink import NullSink
 from relit_camera.devices.sources.source import SourceInfo, SourceState
 from relit_camera.face.face_state import FaceStatus
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.pipeline import RenderedFrame
 from relit_camera.live.publishing.publisher import PublishedPicture, Publisher
 from relit_camera.live.scene.scene import Scene

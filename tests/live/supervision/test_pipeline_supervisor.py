@@ -10,7 +10,7 @@ import pytest
 
 from relit_camera.base.clock import Clock
 from relit_camera.base.config.look import Look
-from relit_camera.base.errors import TrackError
+from relit_camera.base.errors import PipelineHangError, TrackError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.live.pipeline import Pipeline, RenderedFrame
 from relit_camera.live.scene.scene import Scene
@@ -23,7 +23,7 @@ from relit_camera.live.supervision.pipeline_health import (
     PictureRendered,
     WorkerEnded,
 )
-from relit_camera.live.supervision.pipeline_supervisor import PipelineHangError, PipelineSupervisor, Worker
+from relit_camera.live.supervision.pipeline_supervisor import PipelineSupervisor, Worker
 from tests.virtual_clock import VirtualClock
 
 FPS = 30.0

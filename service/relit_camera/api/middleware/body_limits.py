@@ -1,7 +1,4 @@
-"""Small middleware about bodies: how long a request's may be, and that HEAD's answer has none.
-
-Files that clients send.
-"""
+"""Bodies of requests and answers: the longest that are accepted, uploaded files, and HEAD's answer, which has none."""
 
 from __future__ import annotations
 
@@ -12,21 +9,22 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from relit_camera.api.problem_details import TooLargeError, problem_response_from
-from relit_camera.base.errors import InputError
+from relit_camera.api.problem_details import problem_response_from
+from relit_camera.base.errors import InputError, TooLargeError
 
 MAX_UPLOAD_BYTES = 64 << 20
 MAX_UPLOAD_FORM_BYTES = MAX_UPLOAD_BYTES + (1 << 16)
 """A file and the form around it."""
 MAX_JSON_BYTES = 1 << 20
 ENDLESS_PATHS = ("/api/v1/events", "/api/v1/preview.mjpg")
-"""Answers that do not end, which HEAD would wait for."""
+"""Paths whose answers do not end: a HEAD request would wait for ever."""
 
 
 class BodyLimitMiddleware:
-    """ASGI middleware: 413 for a longer body, before it is read where its length is announced.
+    """ASGI middleware that answers 413 to a body that is too long, before reading it if its length is announced.
 
-    Starlette's own limit answers in plain text where the operation reads no body; ours is always a problem.
+    Starlette's own limit answers in plain text where the operation reads no body; this one always answers with
+    application/problem+json.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -51,7 +49,7 @@ class BodyLimitMiddleware:
             message = await receive()
             seen += len(message.get("body", b""))
             if seen > limit:
-                # FastAPI lets only this type through while it reads a body.
+                # The only type of exception that FastAPI passes on while it reads a body.
                 raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, body_too_large(seen, limit).what)
             return message
 
@@ -59,14 +57,14 @@ class BodyLimitMiddleware:
 
 
 def body_too_large(size: int, limit: int) -> TooLargeError:
-    """The error for a body of `size` bytes or more, where `limit` are taken."""
+    """The error for a body of at least `size` bytes, where up to `limit` are accepted."""
     return TooLargeError(
         f"the body has {size / 1e6:.1f} MB or more; {limit / 1e6:.0f} MB are taken", "send a smaller file"
     )
 
 
 class HeadRequestMiddleware:
-    """ASGI middleware: answers HEAD as GET without the body. FastAPI's routes know no HEAD of their own."""
+    """ASGI middleware that answers HEAD like GET, without the body: FastAPI's routes do not answer HEAD."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -84,7 +82,7 @@ class HeadRequestMiddleware:
 
 
 def read_upload(file: UploadFile) -> bytes:
-    """The bytes of a file in a multipart form.
+    """Read an uploaded file of a multipart form.
 
     Raises:
         TooLargeError: more than 64 MiB.

@@ -1,4 +1,4 @@
-"""Turns everything that can go wrong while a request is answered into a problem."""
+"""Turns every exception raised while a request is answered into an application/problem+json answer."""
 
 from __future__ import annotations
 

@@ -1,15 +1,16 @@
-"""Who may ask: no other web page, and only by a name that is ours.
+"""Refuses requests made by other web sites, and requests that name another host.
 
-A page anywhere on the web can make its visitor's browser send requests to 127.0.0.1, and to machines of the visitor's
-network. Three checks keep it out:
+Any page on the web can make its visitor's browser send requests to 127.0.0.1 and to machines of the visitor's network.
+Three checks prevent it:
 
-- the Host header must be a name of ours with our port, so that a foreign name that resolves to our address
-  (DNS rebinding) is refused;
-- the Origin of a change must be our own panel (cross-site request forgery);
-- Sec-Fetch-Site, where the browser sends it, must not be another site, except for following a link to the panel:
-  so nobody else's page can show the preview.
+- Host must be one of this server's names with its port: refuses a foreign name that resolves to this server's address
+  (DNS rebinding);
+- Origin of a changing request must be the panel's own (cross-site request forgery);
+- Sec-Fetch-Site, where the browser sends it, must not be another site, except when a link to the panel is followed: so
+  no other site's page can embed the preview.
 
-Programs that are no browsers send neither Origin nor Sec-Fetch-Site and are not hindered. `access` asks for the token.
+Programs that are no browsers send neither Origin nor Sec-Fetch-Site and pass. The token is checked in
+`token_authentication`.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from relit_camera.api.problem_details import ForbiddenError, problem_response, problem_response_from
+from relit_camera.api.problem_details import problem_response, problem_response_from
 from relit_camera.base.config.settings import ServerSettings
+from relit_camera.base.errors import ForbiddenError
 
 LOOPBACK_HOSTS = frozenset({"127.0.0.1", "localhost", "::1"})
 SAFE_METHODS = frozenset({"GET", "HEAD"})
@@ -52,7 +54,7 @@ SECURITY_HEADERS = {
 
 @dataclass(frozen=True)
 class ServerEndpoint:
-    """Where a request arrived: the address and port of our end of its connection."""
+    """The address and port at which a request arrived: the server's end of the connection."""
 
     address: str
     port: int | None
@@ -60,11 +62,11 @@ class ServerEndpoint:
 
 @dataclass(frozen=True)
 class AllowedHosts:
-    """The names by which clients may reach us.
+    """The host names by which clients may reach the server.
 
     Attributes:
-        hosts: names that come with our own port.
-        proxied: `server.names` as they are written: what a browser names where something stands before us.
+        hosts: names that are used with the server's own port.
+        proxied: the entries of `server.names` as they are written: what browsers send through a reverse proxy.
     """
 
     hosts: frozenset[str] = LOOPBACK_HOSTS
@@ -72,21 +74,22 @@ class AllowedHosts:
 
     @classmethod
     def of(cls, settings: ServerSettings) -> AllowedHosts:
-        """Loopback names, the address listened on, and the names given."""
+        """The loopback names, the address that is listened on, and `server.names`."""
         bare = {name for name in settings.names if _split_netloc(name)[1] is None}
         return cls(LOOPBACK_HOSTS | {settings.host.lower(), *bare}, frozenset(settings.names))
 
     def allows_host(self, netloc: str, place: ServerEndpoint) -> bool:
-        """Whether a Host header, `name:port`, is ours.
+        """Whether a Host header, `name:port`, names this server.
 
-        The address that the connection came to is: a page of a foreign name cannot make a browser name it.
+        The address at which the connection arrived is allowed too: a page under a foreign name cannot make a browser
+        send it.
         """
         name, port = _split_netloc(netloc)
         known = name in self.hosts or (name is not None and name == place.address)
         return (known and (port or DEFAULT_HTTP_PORT) == place.port) or netloc.lower() in self.proxied
 
     def allows_origin(self, origin: str, place: ServerEndpoint) -> bool:
-        """Whether an Origin header, `scheme://name:port`, is our panel's; https only where it is proxied."""
+        """Whether an Origin header, `scheme://name:port`, is the panel's; https only behind a proxy."""
         scheme, separator, netloc = origin.partition("://")
         if not separator:
             return False
@@ -98,7 +101,7 @@ class AllowedHosts:
 
 
 class SameOriginMiddleware:
-    """ASGI middleware: refuses requests of other sites and adds the security headers to every answer."""
+    """ASGI middleware that refuses requests of other sites and adds the security headers to every answer."""
 
     def __init__(self, app: ASGIApp, names: AllowedHosts | None = None) -> None:
         self.app = app

@@ -1,8 +1,8 @@
-"""The token, where one is set: programs send it with each request, a browser shows it once at `/login`.
+"""Checks the token, where one is set: programs send it with each request, people enter it once at `/login`.
 
-Once shown, the browser keeps a cookie, which comes with the preview's `<img>` and with events too, where a page can set
-no header. It holds a secret that is made anew for each run, never the token; scripts cannot read it, and it is not sent
-from other sites' pages.
+After the login the browser keeps a cookie, which it also sends for the preview's `<img>` and for events, where a page
+can set no header. The cookie holds a random secret of this run, never the token; scripts cannot read it, and it is not
+sent from other sites' pages.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from relit_camera.api.problem_details import problem_response
 
 LOGIN_PATH = "/login"
 PUBLIC_PATHS = frozenset({"/healthz", LOGIN_PATH, "/panel/panel.css", "/panel/icon.svg"})
-"""Served without the token: that the process lives, and the page that asks for the token."""
+"""Paths served without the token: the liveness probe, and the login page with its style and icon."""
 SESSION_COOKIE = "relit_session"
 MAX_LOGIN_FORM_BYTES = 4096
 ERROR_PLACEHOLDER = "<!-- wrong -->"
@@ -31,7 +31,7 @@ _LOGIN_PAGE = Path(__file__).parents[1] / "panel" / "login.html"
 
 
 class TokenAuthMiddleware:
-    """ASGI middleware: answers 401, or shows the way to the login page, where the token is not shown."""
+    """ASGI middleware that answers requests without the token by 401, or by a redirect to the login page."""
 
     def __init__(self, app: ASGIApp, token: bytes) -> None:
         self.app = app
@@ -48,7 +48,7 @@ class TokenAuthMiddleware:
         await self.app(scope, receive, send)
 
     async def _answer(self, request: Request) -> Response | None:
-        """Our own answer, or None for a request that may go on."""
+        """The middleware's answer, or None for a request that may pass."""
         path = request.url.path
         if path == LOGIN_PATH:
             return await self._login(request)
@@ -75,7 +75,7 @@ class TokenAuthMiddleware:
         if not hmac.compare_digest(await _token_in_form(request), self.token):
             return _login_page(wrong=True)
         answer = RedirectResponse("/", HTTPStatus.SEE_OTHER)
-        by_tls = request.headers.get("origin", "").startswith("https://")  # at a proxy, which speaks http to us
+        by_tls = request.headers.get("origin", "").startswith("https://")  # through a proxy that ends TLS
         answer.set_cookie(SESSION_COOKIE, self.session.decode(), secure=by_tls, httponly=True, samesite="strict")
         return answer
 

@@ -1,0 +1,1 @@
+"""The OpenAPI description of the REST API, as served and as written to a file."""

@@ -1,4 +1,4 @@
-"""The OpenAPI description of the API."""
+"""Builds the OpenAPI document of the API, with every error as application/problem+json."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OTHER_ERRORS = "Any other error: 401 the token is needed, 403 another site, 421 
 
 
 def operation_id(route: APIRoute) -> str:
-    """An operation is called as its function."""
+    """The operationId of a route: the name of its function."""
     return route.name
 
 

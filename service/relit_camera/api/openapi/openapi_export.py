@@ -14,7 +14,7 @@ DEFAULT_PATH = Path("docs/openapi.json")
 
 
 def openapi_text() -> str:
-    """The description as it is kept in the repository."""
+    """The OpenAPI document as docs/openapi.json holds it."""
     return json.dumps(create_app_without_camera().openapi(), indent=2, ensure_ascii=False) + "\n"
 
 

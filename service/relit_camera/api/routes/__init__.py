@@ -1,1 +1,1 @@
-"""The operations, one file a topic."""
+"""The operations of the REST API, one module for each topic."""

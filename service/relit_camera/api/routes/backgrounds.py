@@ -1,4 +1,4 @@
-"""What is seen behind the person, and the pictures stored for it."""
+"""Routes of the background behind the person, and of the pictures stored for it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from starlette.responses import Response
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, encode_thumbnail, jpeg_response, thumbnail_url_path
 from relit_camera.api.middleware.body_limits import read_upload
-from relit_camera.api.problem_details import ConflictError, error_responses
+from relit_camera.api.problem_details import error_responses
 from relit_camera.api.schemas import BackgroundPicture
 from relit_camera.base.config.look import Background, ImageBackground, StoredName
+from relit_camera.base.errors import ConflictError
 
 router = APIRouter(tags=["background"])
 
@@ -41,7 +42,7 @@ def list_backgrounds(api: ApiContextDep) -> list[BackgroundPicture]:
 def add_background(api: ApiContextDep, name: Annotated[StoredName, Form()], file: UploadFile) -> BackgroundPicture:
     """Store a picture (.jpg, .png, .webp …) to be used as background."""
     scene_controller, data = api.camera.scene_controller, read_upload(file)
-    with api.exclusive_image_work():  # the check too: of two at a time with one name, one must hear of the other
+    with api.exclusive_image_work():  # with the check: of two uploads of one name at a time, one must fail
         if name in scene_controller.background_names():
             raise ConflictError(f"a background or environment '{name}' is stored already", "choose another name")
         scene_controller.backgrounds.add(name, data)

@@ -1,4 +1,4 @@
-"""Stored light from all sides."""
+"""Routes of the stored environments: light from all sides."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from starlette.responses import Response
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response, thumbnail_url_path
 from relit_camera.api.middleware.body_limits import read_upload
-from relit_camera.api.problem_details import ConflictError, error_responses
+from relit_camera.api.problem_details import error_responses
 from relit_camera.api.schemas import EnvironmentDetails, EnvironmentItem
 from relit_camera.base.config.look import ImageBackground, StoredName
+from relit_camera.base.errors import ConflictError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
 from relit_camera.light.environment_store import RESERVED_NAMES
@@ -37,7 +38,7 @@ def list_environments(api: ApiContextDep) -> list[EnvironmentItem]:
 def add_environment(api: ApiContextDep, name: Annotated[StoredName, Form()], file: UploadFile) -> EnvironmentDetails:
     """Store a 360° panorama (.hdr, .exr, .png or .jpg, twice as wide as high), as seen from inside."""
     scene_controller, data = api.camera.scene_controller, read_upload(file)
-    with api.exclusive_image_work():  # the check too: of two at a time with one name, one must hear of the other
+    with api.exclusive_image_work():  # with the check: of two uploads of one name at a time, one must fail
         if name in RESERVED_NAMES or name in {
             *scene_controller.background_names(),
             *scene_controller.temporary_environments(),
@@ -70,10 +71,11 @@ def get_environment_thumbnail(api: ApiContextDep, request: Request, name: Stored
     """A small picture of an environment as seen from inside, in an exposure that suits it."""
     with api.exclusive_image_work():
         scene_controller = api.camera.scene_controller
-        guest = scene_controller.temporary_environments().get(name)
-        jpeg = (
-            encode_display(thumbnail_image(guest.panorama)) if guest else scene_controller.environments.thumbnail(name)
-        )
+        temporary = scene_controller.temporary_environments().get(name)
+        if temporary is None:
+            jpeg = scene_controller.environments.thumbnail(name)
+        else:
+            jpeg = encode_display(thumbnail_image(temporary.panorama))
     return jpeg_response(request, jpeg)
 
 

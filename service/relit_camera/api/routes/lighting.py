@@ -1,4 +1,4 @@
-"""The light that falls on the face."""
+"""Routes of the light that falls on the face."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mode, freezing and the neutral pose."""
+"""Routes of the mode, of freezing the picture, and of the neutral pose."""
 
 from __future__ import annotations
 

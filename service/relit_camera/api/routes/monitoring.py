@@ -1,7 +1,4 @@
-"""The camera's status in the Prometheus text format.
-
-How the camera is doing.
-"""
+"""Routes for monitoring: the status as JSON, the liveness and readiness probes, and the metrics for Prometheus."""
 
 from __future__ import annotations
 
@@ -19,22 +16,23 @@ from prometheus_client.core import (
 from starlette.responses import Response
 
 from relit_camera.api.dependencies import ApiContextDep
-from relit_camera.api.problem_details import NotReadyError, error_responses
+from relit_camera.api.problem_details import error_responses
 from relit_camera.api.schemas import Health, Readiness
+from relit_camera.base.errors import NotReadyError
 from relit_camera.live.status.camera_status import CameraState, CameraStatus, Percentiles
 
 METRICS_CONTENT_TYPE: str = CONTENT_TYPE_LATEST
 
 
 def prometheus_exposition(status: CameraStatus) -> bytes:
-    """The status as a scrape's answer. The registry is made for it alone: nothing of the process is mixed in."""
+    """The status in the Prometheus text format, by a registry of its own: without metrics of the Python process."""
     registry = CollectorRegistry(auto_describe=False)
     registry.register(_StatusCollector(status))
     return bytes(generate_latest(registry))
 
 
 class _StatusCollector:
-    """One status, as a Prometheus collector."""
+    """A Prometheus collector of one status."""
 
     def __init__(self, status: CameraStatus) -> None:
         self.status = status

@@ -1,4 +1,4 @@
-"""Stored looks: lighting, background and mode under a name."""
+"""Routes of the presets: looks (lighting, background, mode) stored under a name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The published picture, for looking at."""
+"""Routes of the published picture: a snapshot, and a preview as motion JPEG."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from starlette.responses import Response, StreamingResponse
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE
 from relit_camera.api.preview_stream import FRAME_WAIT_S, PreviewVariant
-from relit_camera.api.problem_details import NotReadyError, error_responses
+from relit_camera.api.problem_details import error_responses
+from relit_camera.base.errors import NotReadyError
 from relit_camera.base.images.image_files import encode_display
 
 router = APIRouter(tags=["preview"])
@@ -53,16 +54,16 @@ async def get_preview(
 
 
 async def motion_jpeg(api: ApiContext, variant: PreviewVariant) -> AsyncIterator[bytes]:
-    """The parts of a multipart/x-mixed-replace body (the server-push type of Netscape, kept by browsers).
+    """The parts of a multipart/x-mixed-replace body (Netscape's server push, which browsers still support).
 
-    Each part is followed at once by the next boundary: browsers show a part when they see its end. Cancelling it, which
-    is what happens when the client leaves, frees the viewer's place.
+    Each part is followed at once by the next boundary, since browsers show a part when they see its end. The generator
+    is cancelled when the client leaves, which ends the viewing.
     """
-    with suppress(NotReadyError), api.preview.subscribe(variant) as channel:  # the last place may be taken by now
+    with suppress(NotReadyError), api.preview.subscribe(variant) as stream:  # others may have taken the last place
         count = -1
         yield f"--{MULTIPART_BOUNDARY}\r\n".encode()
-        while not api.is_stopping() and not channel.ended:
-            picture = await channel.next(count, FRAME_WAIT_S)
+        while not api.is_stopping() and not stream.ended:
+            picture = await stream.next(count, FRAME_WAIT_S)
             if picture is None:
                 continue
             count = picture.count

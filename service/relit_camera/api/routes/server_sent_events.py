@@ -1,4 +1,4 @@
-"""What happens, as it happens: server-sent events."""
+"""The route of server-sent events: changes of the scene, the status every second, and the camera's own events."""
 
 from __future__ import annotations
 
@@ -45,17 +45,17 @@ async def get_events(api: ApiContextDep) -> EventSourceResponse:
 async def event_stream(api: ApiContext) -> AsyncIterator[ServerSentEvent]:
     """Events for one listener.
 
-    The scene is looked at, not waited for: so whoever changes it is heard, and a slow listener gets the newest only.
+    The scene is polled: so every change counts, whoever made it, and a slow listener gets the newest scene only.
     """
-    with api.camera.events.listen() as heard:
+    with api.camera.events.listen() as queued:
         revision, status_due = None, 0.0
         while not api.is_stopping():
             scene = api.camera.scene_controller.scene
             if scene.revision != revision:
                 revision = scene.revision
                 yield _server_sent_event("scene", scene_body(scene))
-            while (happening := _next_event(heard)) is not None:
-                yield _server_sent_event(happening.kind, {**happening.data, "at": happening.at})
+            while (event := _next_event(queued)) is not None:
+                yield _server_sent_event(event.kind, {**event.data, "at": event.at})
             if time.monotonic() >= status_due:
                 status_due = time.monotonic() + STATUS_INTERVAL_S
                 yield _server_sent_event("status", api.camera.status())
@@ -75,13 +75,13 @@ def scene_body(scene: Scene) -> SceneBody:
     )
 
 
-def _next_event(heard: queue.Queue[Event]) -> Event | None:
+def _next_event(queued: queue.Queue[Event]) -> Event | None:
     try:
-        return heard.get_nowait()
+        return queued.get_nowait()
     except queue.Empty:
         return None
 
 
 def _server_sent_event(kind: str, data: object) -> ServerSentEvent:
-    # Not json.dumps: a figure that is not a number becomes null, as in the other answers.
+    # Not json.dumps: NaN and infinity become null, as in the other answers.
     return ServerSentEvent(to_json(data, inf_nan_mode="null").decode(), event=kind, retry=RECONNECT_DELAY_MS)

@@ -1,4 +1,4 @@
-"""Who is shown: the stored subjects and the chosen one."""
+"""Routes of the stored subjects and of the one that is shown."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from starlette.responses import Response
 
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, encode_thumbnail, jpeg_response, thumbnail_url_path
-from relit_camera.api.problem_details import ConflictError, error_responses
+from relit_camera.api.problem_details import error_responses
 from relit_camera.api.schemas import CurrentSubject, SubjectChoice, SubjectDetails, SubjectItem
 from relit_camera.base.config.look import StoredName
+from relit_camera.base.errors import ConflictError
 
 router = APIRouter(tags=["subjects"])
 
@@ -25,10 +26,7 @@ def get_subject(api: ApiContextDep) -> CurrentSubject:
 @router.put("/subject", responses=error_responses(404, 422))
 def set_subject(api: ApiContextDep, choice: SubjectChoice) -> CurrentSubject:
     """Show another stored subject, or nobody."""
-    scene_controller = api.camera.scene_controller
-    if choice.name is not None:
-        scene_controller.subjects.path(choice.name)  # a stored name only: `set_subject` would take a file's path too
-    return CurrentSubject(name=scene_controller.set_subject(choice.name).subject_name)
+    return CurrentSubject(name=api.camera.scene_controller.choose_stored_subject(choice.name).subject_name)
 
 
 @router.get("/subjects")

@@ -1,4 +1,4 @@
-"""Runs the application in a thread of this process, on an address that is taken before anything else starts."""
+"""Runs the web application in a thread, on a socket that is bound before anything else of the camera starts."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ import uvicorn
 from fastapi import FastAPI
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from relit_camera.api.problem_details import NotReadyError, problem_response_from
+from relit_camera.api.problem_details import problem_response_from
 from relit_camera.api.server.connection_timeouts import SEND_BUFFER_BYTES, TimeoutHttpProtocol
 from relit_camera.base.config.access_token import read_token
 from relit_camera.base.config.settings import ServerSettings
-from relit_camera.base.errors import ConfigError, PortInUseError, RelitError
+from relit_camera.base.errors import ConfigError, NotReadyError, PortInUseError, RelitError
 
 START_TIMEOUT_S = 10.0
 SHUTDOWN_GRACE_S = 1
-"""How long answers may take to end when the server stops, before they are cut off."""
+"""When the server stops, answers may take this long to end before they are aborted."""
 LISTEN_BACKLOG = 128
 
 
 @dataclass(frozen=True)
 class ServerAddress:
-    """Where the server listens."""
+    """Host and port at which the server listens."""
 
     host: str
     port: int
@@ -59,12 +59,12 @@ class ApiServer:
             timeout_graceful_shutdown=SHUTDOWN_GRACE_S,
         )
         self._server = uvicorn.Server(config)
-        # In a thread uvicorn leaves the signals to whoever owns the main thread. No daemon thread, nor are the workers
-        # that it starts: Python cuts those off inside C++ code when it exits, which aborts the process.
+        # Outside the main thread uvicorn handles no signals. It is no daemon thread, nor are the workers that it
+        # starts: at exit Python would stop those inside C++ code, which aborts the process.
         self._thread = threading.Thread(target=self._server.run, args=([listener],), name="api")
 
     def start(self) -> None:
-        """Begin to answer; returns when it does.
+        """Start the server; returns when it answers.
 
         Raises:
             RelitError: it did not start within ten seconds.
@@ -73,12 +73,12 @@ class ApiServer:
         deadline = time.monotonic() + START_TIMEOUT_S
         while not self._server.started:
             if not self._thread.is_alive() or time.monotonic() > deadline:
-                self.stop()  # its thread would keep the process from ending
+                self.stop()  # otherwise its thread keeps the process from ending
                 raise RelitError(f"the server at {self.address.url} did not start", "see the log")
             time.sleep(0.01)
 
     def stop(self, timeout_s: float = 2.0) -> None:
-        """End: long answers end within a moment, others get a second. Returns when all have, or when time is up."""
+        """Stop: endless answers end at once, others get a second. Returns when all have ended, or after the timeout."""
         self._closing.set()
         self._server.should_exit = True
         self._thread.join(timeout_s)
@@ -93,7 +93,7 @@ class ApiServer:
 
 
 class _ShutdownResponder:
-    """ASGI wrapper: an answer that is cut off because the server ends is a 503, not a traceback in the log."""
+    """ASGI wrapper by which a request aborted by the shutdown is answered by 503, instead of a traceback in the log."""
 
     def __init__(self, app: ASGIApp, closing: threading.Event) -> None:
         self.app = app
@@ -119,7 +119,7 @@ class _ShutdownResponder:
 
 
 def open_listener(settings: ServerSettings) -> socket.socket:
-    """Take the address, so that nobody else can; answers begin with `start_api_server`. Port 0 takes any free one.
+    """Bind the address, so that no other program can; `start_api_server` answers on it. Port 0 takes any free one.
 
     Raises:
         PortInUseError: another program listens there.
@@ -128,7 +128,7 @@ def open_listener(settings: ServerSettings) -> socket.socket:
     """
     read_token(settings)
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
-    place = f"port {settings.port} on {settings.host}"
+    where = f"port {settings.port} on {settings.host}"
     try:
         listener = socket.create_server((settings.host, settings.port), family=family, backlog=LISTEN_BACKLOG)
         listener.setsockopt(
@@ -141,10 +141,10 @@ def open_listener(settings: ServerSettings) -> socket.socket:
                 "another program listens there (an open Relit Camera?): end it, or choose another with --port; "
                 + _FREE_PORT_HINT
             )
-            raise PortInUseError(f"{place} is in use", cure) from error
+            raise PortInUseError(f"{where} is in use", cure) from error
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise ConfigError(
-            f"{place} cannot be used: {reason}", f"choose another with --host and --port; {_FREE_PORT_HINT}"
+            f"{where} cannot be used: {reason}", f"choose another with --host and --port; {_FREE_PORT_HINT}"
         ) from error
 
 
@@ -157,7 +157,7 @@ def start_api_server(app: FastAPI, settings: ServerSettings, listener: socket.so
     Args:
         app: from `create_app`.
         settings: host and port, used where no listener is given.
-        listener: from `open_listener`, for a caller who wants to know early that the port is free.
+        listener: from `open_listener`, for callers that bind the address before they start other things.
 
     Raises:
         PortInUseError, ConfigError: as `open_listener`.

@@ -1,1 +1,1 @@
-"""The demonstration: a bundled person, their video, and a tour of places that light them."""
+"""The demonstration: a bundled person, a clip of them, and a tour through several environments."""

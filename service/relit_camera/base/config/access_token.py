@@ -1,4 +1,4 @@
-"""The token that clients show where the server can be reached from other machines."""
+"""Reads and checks the token that clients need where the server can be reached from other machines."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _TOKEN_PATTERN = re.compile(r"[\x21-\x7e]+")
 
 
 def read_token(settings: ServerSettings) -> bytes | None:
-    """The token that clients must show, or None where none is asked for.
+    """The token that clients must send, or None if none is needed.
 
     Raises:
-        ConfigError: the server is to be reached from other machines and there is no token; the token's file is
-            missing, or may be read by other users; the token is short, or holds what a header cannot carry. The token
-            itself is never said.
+        ConfigError: the server can be reached from other machines and there is no token; the token's file is missing,
+            or may be read by other users; the token is too short, or has characters that no header can carry. The
+            message never shows the token.
     """
     if settings.token is not None:
         return _validated(settings.token.get_secret_value(), TOKEN_VARIABLE)
@@ -49,11 +49,11 @@ def _read_token_file(path: Path) -> str:
         raise ConfigError(f"cannot read the token's file {path}: {error.strerror}", TOKEN_HINT) from error
 
 
-def _validated(token: str, place: str) -> bytes:
+def _validated(token: str, origin: str) -> bytes:
     if not _TOKEN_PATTERN.fullmatch(token):
-        raise ConfigError(f"the token in {place} is empty, or not of visible ASCII characters alone", TOKEN_HINT)
+        raise ConfigError(f"the token in {origin} is empty, or not of visible ASCII characters alone", TOKEN_HINT)
     if len(token) < MIN_TOKEN_LENGTH:
         raise ConfigError(
-            f"the token in {place} has {len(token)} characters, {MIN_TOKEN_LENGTH} are needed", TOKEN_HINT
+            f"the token in {origin} has {len(token)} characters, {MIN_TOKEN_LENGTH} are needed", TOKEN_HINT
         )
     return token.encode("ascii")

@@ -1,4 +1,4 @@
-"""Notices that the configuration file was edited while the camera runs."""
+"""Watches the configuration file while the camera runs, and has edits applied."""
 
 from __future__ import annotations
 
@@ -21,29 +21,73 @@ SettingsApplier = Callable[[RelitSettings, RelitSettings], RelitError | None]
 _FileVersion = tuple[int, int, int] | None
 
 
+class ConfigWatcher:
+    """Finds edits of the configuration file and has them applied; `check` is to be called regularly.
+
+    An edit that cannot be used is reported and changes nothing; the next edit is tried again.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        load: SettingsLoader,
+        settings: RelitSettings,
+        apply: SettingsApplier,
+        report: Callable[[Exception | None], None],
+    ) -> None:
+        """Take the file as it is now for the one that the settings were read from.
+
+        Args:
+            path: of the configuration file.
+            load: reads the settings from it; raises RelitError.
+            settings: the present settings.
+            apply: applies an edit, given the settings before and after; returns what a person should know, or None, and
+                raises RelitError if the edit cannot be used.
+            report: is called with the error or note of an edit, and with None by the first edit without one.
+        """
+        self._path, self._load, self._settings, self._apply, self._report = path, load, settings, apply, report
+        self._used = self._seen = _file_version(path)
+        self._was_reported = False
+
+    def check(self) -> None:
+        """Apply an edit, once the file is the same at two calls: until then it may still be written to."""
+        before, self._seen = self._seen, _file_version(self._path)
+        if self._seen == self._used or self._seen != before:
+            return
+        self._used = self._seen
+        note: Exception | None = None
+        try:
+            after = self._load(self._path)
+            note = self._apply(self._settings, after)
+            self._settings = after
+        except RelitError as error:
+            note = error
+        except Exception as error:  # a bug must not end the watching
+            note = error
+        if note is not None:
+            log.warning("%s was edited: %s", self._path, note)
+        if note is not None or self._was_reported:
+            self._report(note)
+        self._was_reported = note is not None
+
+
 @contextmanager
 def watch_config(
     path: Path,
     load: SettingsLoader,
     settings: RelitSettings,
     apply: SettingsApplier,
-    tell: Callable[[Exception | None], None],
+    report: Callable[[Exception | None], None],
 ) -> Iterator[None]:
-    """Look at the file once a second within the with-statement, in a thread of its own.
-
-    What cannot be used leaves everything as it was: it is told, and the file is waited for to change again.
-
-    Args:
-        path: of the configuration file.
-        load: reads the settings from it; raises RelitError.
-        settings: as they are.
-        apply: takes the settings before and after; returns what a person should know, and raises RelitError where
-            they cannot be used.
-        tell: gets what is wrong or should be known, and None once there is no more of that.
-    """
+    """Within the block: let a `ConfigWatcher` of these arguments check the file once a second, in a thread."""
+    watcher = ConfigWatcher(path, load, settings, apply, report)
     stopping = threading.Event()
-    arguments = (path, _file_version(path), load, settings, apply, tell, stopping)
-    thread = threading.Thread(target=_watch, args=arguments, name="config", daemon=True)
+
+    def run() -> None:
+        while not stopping.wait(POLL_INTERVAL_S):
+            watcher.check()
+
+    thread = threading.Thread(target=run, name="config", daemon=True)
     thread.start()
     try:
         yield
@@ -52,40 +96,8 @@ def watch_config(
         thread.join(STOP_TIMEOUT_S)
 
 
-def _watch(
-    path: Path,
-    used: _FileVersion,
-    load: SettingsLoader,
-    settings: RelitSettings,
-    apply: SettingsApplier,
-    tell: Callable[[Exception | None], None],
-    stopping: threading.Event,
-) -> None:
-    last = used
-    told = False
-    while not stopping.wait(POLL_INTERVAL_S):
-        before, last = last, _file_version(path)
-        if last == used or last != before:  # one that was just written may be written on
-            continue
-        used = last
-        note: Exception | None = None
-        try:
-            after = load(path)
-            note = apply(settings, after)
-            settings = after
-        except RelitError as error:
-            note = error
-        except Exception as error:  # a fault of ours must not end the watch
-            note = error
-        if note is not None:
-            log.warning("%s was edited: %s", path, note)
-        if note is not None or told:
-            tell(note)
-        told = note is not None
-
-
 def _file_version(path: Path) -> _FileVersion:
-    """What is another after every edit, in place or by another file; None while there is none."""
+    """A value that changes with every edit of the file, or its replacement; None while there is no file."""
     try:
         found = path.stat()
     except OSError:

@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from enum import StrEnum
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
+from relit_camera.base.named_files import NAME_PATTERN, require_portable_name
+
 ColorChannel = Annotated[float, Field(ge=0, le=100)]
 LinearRgb = tuple[ColorChannel, ColorChannel, ColorChannel]
-_RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9]) *(\..*)?", re.IGNORECASE)
-"""Names that stand for devices on Windows, in every folder and with every suffix."""
-
-
-def _reject_reserved_name(name: str) -> str:
-    if _RESERVED_NAMES.fullmatch(name):
-        raise ValueError(f"'{name}' is a device on Windows")
-    return name
-
-
-StoredName = Annotated[
-    str, Field(pattern=r"^[A-Za-z0-9]([A-Za-z0-9 _.-]{0,62}[A-Za-z0-9_-])?$"), AfterValidator(_reject_reserved_name)
-]
+StoredName = Annotated[str, Field(pattern=NAME_PATTERN), AfterValidator(require_portable_name)]
 """A stored thing's name: letters, digits, space, dot, dash, underscore; no dot or space last, and no device of Windows,
 so that it is safe as a file name everywhere."""
 

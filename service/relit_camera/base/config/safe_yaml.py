@@ -1,4 +1,4 @@
-"""YAML that others may have written: settings and presets."""
+"""Parses YAML from untrusted files (settings and presets), within limits."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Any
 import yaml
 
 MAX_YAML_BYTES = 1 << 20
-"""Of a file. What it holds takes some fifty times that in memory."""
+"""Largest YAML file. Parsed, it takes some fifty times as much memory."""
 MAX_YAML_DEPTH = 32
 
 
 def parse_yaml(text: str) -> Any:
-    """What a text of up to `MAX_YAML_BYTES` says: mappings, sequences, strings, numbers, booleans, dates, None.
+    """Parse a text of up to `MAX_YAML_BYTES`: mappings, sequences, strings, numbers, booleans, dates, None.
 
-    Nothing in it can run, and it cannot be larger than it looks: aliases, by which a few lines stand for billions
-    ("billion laughs"), are refused.
+    Tags that create objects or run code are refused, and so are aliases, by which a few lines can stand for billions of
+    values ("billion laughs").
 
     Raises:
         ValueError: it is not YAML, has aliases, or is nested too deeply. The message begins with the line, if one is
@@ -33,7 +33,7 @@ def parse_yaml(text: str) -> Any:
     except yaml.YAMLError as error:
         reason = getattr(error, "problem", None) or str(error)
         raise ValueError(f"{_line(getattr(error, 'problem_mark', None))}: {' '.join(reason.split())}") from error
-    except ValueError as error:  # of ours, or of a date or number that is none
+    except ValueError as error:  # raised above, or by an invalid date or number
         raise ValueError(str(error) if str(error).startswith(" line") else f": {error}") from error
 
 

@@ -1,14 +1,14 @@
-"""What is fixed for one run of the camera: where pictures come from and go to, models, server, folders."""
+"""The settings that are fixed for one run of the camera: source and sink of pictures, models, server, folders."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from platformdirs import user_data_path
-from pydantic import Field, SecretStr, field_validator
+from pydantic import Field, SecretStr, field_validator, model_validator
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
@@ -23,7 +23,8 @@ class SourceSettings(SettingsModel):
     """Where live pictures come from."""
 
     source: str = "webcam"
-    """`webcam`, a camera's id from `relit devices`, a video or picture file, or `pattern`."""
+    """`webcam`, a camera's id from `relit devices`, a video or picture file, `pattern`, or a plug-in's `NAME` or
+    `NAME:ARGUMENT`."""
     width: EvenSize = 1280
     """Asked of a webcam; it may answer with another size."""
     height: EvenSize = 720
@@ -33,7 +34,7 @@ class SourceSettings(SettingsModel):
 
 
 class Fallback(StrEnum):
-    """What is shown where not even the still can be relit."""
+    """What is shown where not even the source image can be relit."""
 
     PLACEHOLDER = "placeholder"
     LIVE = "live"
@@ -44,7 +45,7 @@ class OutputSettings(SettingsModel):
     """Where relit pictures go."""
 
     sink: str = "camera"
-    """`camera` (the virtual camera), a video file to write, or `null`."""
+    """`camera` (the virtual camera), a video file to write, `null`, or a plug-in's `NAME` or `NAME:ARGUMENT`."""
     label: Annotated[str, Field(min_length=1, max_length=31)] = "Relit Camera"
     """Name of the virtual camera device, as call apps show it."""
     width: EvenSize = 1280
@@ -52,10 +53,10 @@ class OutputSettings(SettingsModel):
     height: EvenSize = 720
     fps: Annotated[float, Field(ge=1, le=120)] = 30.0
     placeholder: Path | None = None
-    """Picture shown while there is nothing else to show; ours if not given."""
+    """Picture shown while there is nothing else to show; a built-in one if not given."""
     fallback: Fallback = Fallback.PLACEHOLDER
-    """While pictures cannot be made the still is shown, relit; and where that cannot be either, this: `placeholder`, or
-    `live`, the webcam's picture as it is, room and all."""
+    """While pictures cannot be made the source image is shown, relit; and where that cannot be either, this:
+    `placeholder`, or `live`, the webcam's picture as it is, room and all."""
 
     @field_validator("sink", mode="before")
     @classmethod
@@ -64,10 +65,10 @@ class OutputSettings(SettingsModel):
 
 
 class TrackerSettings(SettingsModel):
-    """How the face is followed."""
+    """How the face is tracked."""
 
     name: str = "mesh"
-    """`mesh`, `openseeface`, or `recorded:FILE.json`."""
+    """`mesh`, `openseeface`, `recorded:FILE.json`, or a plug-in's `NAME` or `NAME:ARGUMENT`."""
     dead_band_deg: Annotated[float, Field(ge=0, le=5)] = 0.3
     """Head turns smaller than this do not move the light."""
     reach_yaw_deg: Annotated[float, Field(ge=5, le=80)] = 40.0
@@ -75,11 +76,32 @@ class TrackerSettings(SettingsModel):
     reach_pitch_deg: Annotated[float, Field(ge=5, le=80)] = 30.0
 
 
-class ReenactSettings(SettingsModel):
-    """How the still is moved."""
+class RelightSettings(SettingsModel):
+    """How the subject is relit."""
 
+    name: str = "auto"
+    """`auto` (`onnx-basis` where a GPU is proven to run it, else `basis`), `basis`, `onnx-basis`, `dense`, or a
+    plug-in's `NAME` or `NAME:ARGUMENT`."""
+
+
+class ReenactSettings(SettingsModel):
+    """How the source image is moved."""
+
+    name: str = "first-order"
+    """`first-order`, `onnx:FILE.onnx` (docs/reenactors.md), or a plug-in's `NAME` or `NAME:ARGUMENT`."""
     model: Path | None = None
-    """An ONNX reenactor of your own (docs/reenactors.md); the built-in first-order motion if not given."""
+    """An ONNX reenactor of your own: the same as `name: onnx:FILE.onnx`."""
+
+    @model_validator(mode="after")
+    def _one_reenactor(self) -> Self:
+        if self.model is not None and self.name != "first-order":
+            raise ValueError("give a name or a model, not both")
+        return self
+
+    @property
+    def reenactor(self) -> str:
+        """The reenactor that both settings together name."""
+        return self.name if self.model is None else f"onnx:{self.model}"
 
 
 class InferenceSettings(SettingsModel):
@@ -87,7 +109,7 @@ class InferenceSettings(SettingsModel):
 
     provider: Literal["auto", "cpu", "cuda", "tensorrt", "directml", "coreml", "openvino"] = "auto"
     strict: bool = False
-    """Refuse to start when the provider is not really used, instead of falling back with a word."""
+    """Fail where the provider is not really used, instead of falling back to the CPU with a warning."""
     threads: Annotated[int, Field(ge=1, le=64)] = 1
     """Threads of each model; the picture arithmetic has the other cores."""
 
@@ -166,6 +188,7 @@ class RelitSettings(BaseSettings):
     tracker: TrackerSettings = TrackerSettings()
     matte: str = "selfie"
     """What finds the person in the live picture (mode ratio): `selfie`, or `recorded:FILE.npz`."""
+    relight: RelightSettings = RelightSettings()
     reenact: ReenactSettings = ReenactSettings()
     inference: InferenceSettings = InferenceSettings()
     server: ServerSettings = ServerSettings()

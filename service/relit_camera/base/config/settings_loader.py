@@ -1,4 +1,4 @@
-"""Reading the configuration: defaults < YAML file < RELIT_* environment < command line."""
+"""Loads the configuration: defaults < YAML file < RELIT_* environment < command line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from relit_camera.base.errors import ConfigError
 
 CONFIG_VARIABLE = "RELIT_CONFIG"
 NON_SETTING_VARIABLES = frozenset({CONFIG_VARIABLE, "RELIT_MODELS_DIR", "RELIT_SHARED"})
-"""Variables of our prefix that are no settings."""
+"""Variables with the prefix RELIT_ that are no settings."""
 
 NestedValues = Mapping[str, Any]
 _SECTIONS = frozenset(name for name, field in RelitSettings.model_fields.items() if field.default is not None)
@@ -64,7 +64,7 @@ def load_settings(path: Path | None = None, overrides: NestedValues | None = Non
         # A section whose every line is commented out reads as null: its defaults.
         given = {str(k): v for k, v in document.items() if v is not None or k not in _SECTIONS}
         return _settings_class(given)(**_without_none(overrides or {}))
-    except SettingsError as error:  # a variable of a whole section is JSON; its text may hold the token
+    except SettingsError as error:  # for a whole section in JSON; its text is not shown, for it may hold the token
         raise ConfigError(f"the environment holds no setting: {error}", "give JSON, or one variable a field") from None
     except ValidationError as error:
         raise _config_error(error, overrides or {}, found, text) from error
@@ -110,7 +110,7 @@ def _read(path: Path) -> str:
 
 
 def _check_environment() -> None:
-    """Refuse misspelt RELIT_* variables: pydantic-settings would ignore them in silence."""
+    """Refuse misspelled RELIT_* variables, which pydantic-settings would ignore silently."""
     known = set(RelitSettings.model_fields)
     for variable in os.environ:
         if not variable.startswith("RELIT_") or variable in NON_SETTING_VARIABLES:
@@ -123,7 +123,7 @@ def _check_environment() -> None:
 
 
 def _check_no_secret(document: NestedValues, path: Path | None) -> None:
-    """Refuse a token beside the other settings: those are shown, shared and readable by others."""
+    """Refuse a token among the other settings, which are shown, shared and readable by others."""
     server = document.get("server")
     if isinstance(server, dict) and "token" in server:
         raise ConfigError(
@@ -141,7 +141,7 @@ def _config_error(error: ValidationError, overrides: NestedValues, path: Path | 
     location = [part for part in first["loc"] if not str(part).startswith("function-")]
     key = ".".join(map(str, location))
     message = first["msg"].removeprefix("Value error, ")
-    # Nothing that may be the token: the word may be misspelt.
+    # A value that may be the token is not shown; its key may be misspelled.
     misspelt = first["type"] == "extra_forbidden" and isinstance(first["input"], str)
     secret = location[:1] == ["server"] and (misspelt or "token" in location)
     tells = not secret and not isinstance(first["input"], dict)
@@ -151,7 +151,7 @@ def _config_error(error: ValidationError, overrides: NestedValues, path: Path | 
 
 
 def _origin_of(location: list[Any], overrides: NestedValues, path: Path | None, text: str, missing: bool) -> str:
-    """Where the value that holds was given: command line, then environment, then the file's line."""
+    """Where the effective value was given: command line, else environment, else a line of the file."""
     given: Any = overrides
     for part in location:
         given = given.get(part) if isinstance(given, Mapping) else None

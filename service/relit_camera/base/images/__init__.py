@@ -1,4 +1,4 @@
-"""Directions, rotations, colour curves and image types: the only place that knows axes, colour order and gamma.
+"""Image types, files, colour and display curves, resizing: the only place that knows colour order and gamma.
 
-Axes are right-handed: X right in the picture, Y up, Z toward the camera.
+Pictures are float32 or uint8 arrays (height, width, 3), RGB.
 """

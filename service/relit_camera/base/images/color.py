@@ -1,4 +1,4 @@
-"""Colour curves and light colours. Linear values are Rec. 709 primaries, scene-referred, channel order RGB."""
+"""Color conversions and the color of light. Linear values are Rec. 709 RGB, scene-referred, channels in that order."""
 
 from __future__ import annotations
 
@@ -9,12 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from relit_camera.base.errors import InputError
+from relit_camera.base.images.image_types import DisplayImage
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 """Rec. 709 luminance weights of linear R, G, B."""
 
+CHROMA_MATRIX = np.array(
+    [[-37.797, -74.203, 112.0, 128 * 255], [112.0, -93.786, -18.214, 128 * 255]], dtype=np.float32
+) / np.float32(255)
+"""U and V of R, G, B from 0 to 255 (ITU-R BT.601, limited range)."""
+
 Gamma = str | float
-"""How a picture's code values map to linear light: "srgb", "linear" or the exponent of a power law."""
+"""Transfer curve of a picture's code values: "srgb", "linear", or the exponent of a power law."""
 
 
 def srgb_decode(encoded: ArrayLike) -> NDArray[np.float32]:
@@ -31,7 +37,7 @@ def srgb_encode(linear: ArrayLike) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=1)
 def _encode_table() -> NDArray[np.uint8]:
-    # 14 bits: the steepest part of the curve (12.92 x 255 codes per unit) still moves by less than a quarter code.
+    # 14 bits: even at its steepest (12.92 x 255 codes per unit) the curve moves less than a quarter code a step.
     return np.round(srgb_encode(np.linspace(0, 1, 1 << 14)) * 255).astype(np.uint8)
 
 
@@ -58,7 +64,7 @@ def linear_from_uint8(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def parse_gamma(text: str) -> Gamma:
-    """Read `srgb`, `linear` or a number between 0.2 and 5.
+    """Parse the name of a transfer curve: `srgb`, `linear`, or an exponent between 0.2 and 5.
 
     Raises:
         InputError: anything else.
@@ -89,6 +95,18 @@ def luminance(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     return result
 
 
+def rgb_from_hex(code: str) -> tuple[int, int, int]:
+    """The three 8-bit sRGB codes of a color written as `#rrggbb`.
+
+    Raises:
+        ValueError: `code` is not of that form.
+    """
+    if len(code) != 7 or code[0] != "#":
+        raise ValueError(f"'{code}' is no color; write it as #rrggbb")
+    red, green, blue = bytes.fromhex(code[1:])
+    return red, green, blue
+
+
 def _planckian_locus(t: float) -> NDArray[np.float64]:
     """CIE x and y of a black body at 1667 to 25000 K, after Kim et al. 2002."""
     if t < 4000:
@@ -116,7 +134,7 @@ def _daylight_locus(t: float) -> NDArray[np.float64]:
 def rgb_from_kelvin(kelvin: float) -> NDArray[np.float32]:
     """Linear RGB (3,) of a black body or daylight at `kelvin`, scaled to luminance 1; negative parts are cut.
 
-    Chromaticity: black body below 4000 K, CIE daylight above 5000 K, between them from one to the other; clamped to
+    Chromaticity: black body below 4000 K, CIE daylight above 5000 K, between them a mixture of both; clamped to
     1667 to 25000 K.
     """
     t = float(np.clip(kelvin, 1667, 25000))
@@ -128,3 +146,17 @@ def rgb_from_kelvin(kelvin: float) -> NDArray[np.float32]:
     )
     rgb = np.maximum(rgb_from_xyz @ xyz, 0).astype(np.float32)
     return np.asarray(rgb / (rgb @ LUMINANCE), dtype=np.float32)
+
+
+def rgb_to_i420(image: DisplayImage) -> NDArray[np.uint8]:
+    """Convert uint8 sRGB RGB (height, width, 3), both even, to uint8 (height · width · 3/2,): planes Y, U, V.
+
+    Chroma is the mean of each two by two pixels: OpenCV's own conversion takes that of every second pixel, which frays
+    edges.
+    """
+    height, width = image.shape[:2]
+    planes: NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_RGB2YUV_I420).reshape(-1)
+    half = cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+    chroma = cv2.transform(half, CHROMA_MATRIX)
+    planes[height * width :].reshape(2, height // 2, width // 2)[:] = chroma.transpose(2, 0, 1)
+    return planes

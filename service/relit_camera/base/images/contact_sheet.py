@@ -1,4 +1,4 @@
-"""Contact sheets: pictures of record side by side, so that a person can look at what was measured."""
+"""Contact sheets: labeled pictures in rows and columns, for people to look at."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from relit_camera.base.errors import ImageError
 from relit_camera.base.images.image_types import DisplayImage, check_image
+from relit_camera.base.images.resize import letterbox
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _TEXT_HEIGHT = 13
@@ -65,21 +66,9 @@ def contact_sheet(
         for j, shown in enumerate(row):
             if shown is not None:
                 x = left + j * (cell[0] + _GAP)
-                sheet[y : y + cell[1], x : x + cell[0]] = _letterbox(shown, cell)
+                # Enlarged without interpolation, so that the sheet shows the pixels as they are.
+                sheet[y : y + cell[1], x : x + cell[0]] = letterbox(shown, cell, (_CELL_GRAY,) * 3, cv2.INTER_NEAREST)
     return sheet
-
-
-def _letterbox(picture: DisplayImage, cell: tuple[int, int]) -> DisplayImage:
-    """The picture fitted whole into the middle of a cell (width, height)."""
-    height, width = picture.shape[:2]
-    scale = min(cell[0] / width, cell[1] / height)
-    size = (min(cell[0], max(1, round(width * scale))), min(cell[1], max(1, round(height * scale))))
-    # Enlarged pixels stay squares: a sheet shows what is there.
-    resized = cv2.resize(picture, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_NEAREST)
-    filled = np.full((cell[1], cell[0], 3), _CELL_GRAY, dtype=np.uint8)
-    x, y = (cell[0] - size[0]) // 2, (cell[1] - size[1]) // 2
-    filled[y : y + size[1], x : x + size[0]] = resized
-    return filled
 
 
 def _text_width(text: str) -> int:

@@ -1,4 +1,4 @@
-"""Keeping decoders from writing on the terminal."""
+"""Suppresses what picture decoders print on the terminal."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ _lock = threading.Lock()
 
 @contextlib.contextmanager
 def suppress_decoder_messages() -> Iterator[None]:
-    """Within this block nothing that libpng, OpenCV or OpenEXR say of a damaged file reaches the terminal.
+    """Within this block nothing that libpng, OpenCV or OpenEXR print about a damaged file reaches the terminal.
 
-    Their C code writes to file descriptor 2 itself, and OpenEXR prints on `sys.stdout`; we raise one clear error
-    instead. Both belong to the whole process: keep only the decoding inside.
+    Their C code writes to file descriptor 2, and OpenEXR prints on `sys.stdout`; callers raise one clear error instead.
+    Both streams are those of the whole process, so only the decoding itself belongs inside the block.
     """
     with _lock, Path(os.devnull).open("w") as nowhere, contextlib.ExitStack() as restore:
         restore.enter_context(contextlib.redirect_stdout(nowhere))
         try:
             saved = os.dup(2)
-        except OSError:  # a daemon may have closed it: then there is nothing to keep clean
+        except OSError:  # a background process may have closed it: then nothing is printed
             yield
             return
         restore.callback(os.close, saved)

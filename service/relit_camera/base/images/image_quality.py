@@ -1,4 +1,4 @@
-"""Picture quality as the project measures it everywhere."""
+"""Measures of picture quality: PSNR of linear pictures and SSIM of sRGB ones, inside a matte."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Image types and their checks.
 
-Inside the program a picture is float32 linear RGB (height, width, 3), scene-referred. At the borders it is uint8 sRGB
-RGB. BGR exists only inside file readers, sources and sinks. Points are (x, y) in pixels with pixel centres at
-integers + ½; a flow is backward: out(x) = in(x + flow(x)).
+Inside the program a picture is float32 linear RGB (height, width, 3), scene-referred. At the program's edges (sources,
+sinks, files) it is uint8 sRGB, channel order RGB; BGR exists only inside the code that reads and writes those. Points
+are (x, y) in pixels with pixel centers at integers + ½; a flow is backward: out(x) = in(x + flow(x)).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Mask = NDArray[np.float32]
 """(height, width) float32 in 0..1."""
 
 Points = NDArray[np.float32]
-"""(count, 2) float32 pixel positions (x, y), pixel centres at integers + ½."""
+"""(count, 2) float32 pixel positions (x, y), pixel centers at integers + ½."""
 
 Flow = NDArray[np.float32]
 """(height, width, 2) float32 backward flow (dx, dy) in pixels: out(x) = in(x + flow(x))."""
@@ -35,8 +35,8 @@ class Frame:
     """One picture from a source.
 
     Attributes:
-        image: uint8 sRGB RGB (height, width, 3); not written to by anybody.
-        index: counts from 0 in the order the source gave them.
+        image: uint8 sRGB RGB (height, width, 3); must not be written to.
+        index: counts from 0 in the order in which the source delivered the frames.
         captured_at: seconds on the monotonic clock when it was received: latency is measured from here.
         time_s: seconds on the source's own clock (presentation time of a file; since the start for a camera).
     """

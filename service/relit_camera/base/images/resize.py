@@ -1,6 +1,8 @@
-"""Resizing pictures to the size and shape of the output."""
+"""Resizing pictures: shrink by a factor, crop to fill a size, or fit whole into a size with bars around."""
 
 from __future__ import annotations
+
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -8,14 +10,16 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import DisplayImage
 
+Scalar = TypeVar("Scalar", bound=np.generic)
+
 
 def crop_to_fill(image: DisplayImage, size: tuple[int, int]) -> DisplayImage:
-    """The image scaled to cover `size` (width, height), and its middle cut out."""
+    """Scale the image to cover `size` (width, height), and crop it to that about its middle."""
     return resize_to_fill(image, size, cv2.INTER_CUBIC)
 
 
 def resize_to_fill(picture: NDArray[np.uint8], size: tuple[int, int], enlarging: int) -> NDArray[np.uint8]:
-    """`crop_to_fill` for any uint8 picture (height, width, ...), enlarged with that interpolation of OpenCV's."""
+    """As `crop_to_fill`, for any uint8 picture (height, width, ...); OpenCV interpolates by `enlarging` to enlarge."""
     height, width = picture.shape[:2]
     scale = max(size[0] / width, size[1] / height)
     columns, rows = min(width, round(size[0] / scale)), min(height, round(size[1] / scale))
@@ -23,3 +27,33 @@ def resize_to_fill(picture: NDArray[np.uint8], size: tuple[int, int], enlarging:
     cut = np.ascontiguousarray(picture[top : top + rows, left : left + columns])
     filled: NDArray[np.uint8] = cv2.resize(cut, size, interpolation=cv2.INTER_AREA if scale < 1 else enlarging)
     return filled
+
+
+def scaled_size(size: tuple[int, int], scale: float) -> tuple[int, int]:
+    """Width and height `scale` times those of `size`, rounded, at least 1 px each."""
+    return max(1, round(size[0] * scale)), max(1, round(size[1] * scale))
+
+
+def shrink(picture: NDArray[Scalar], scale: float) -> NDArray[Scalar]:
+    """A picture (height, width[, channels]) at `scale` of its size, by the mean over areas; the same one from 1 up."""
+    if scale >= 1:
+        return picture
+    size = scaled_size((picture.shape[1], picture.shape[0]), scale)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), picture.dtype)
+
+
+def letterbox(
+    picture: DisplayImage, size: tuple[int, int], color: tuple[int, int, int], enlarging: int
+) -> DisplayImage:
+    """The picture fitted whole into the middle of `size` (width, height), bars of `color` beside or above and below.
+
+    Shrunk by the mean over areas, enlarged with the interpolation `enlarging` of OpenCV's.
+    """
+    scale = min(size[0] / picture.shape[1], size[1] / picture.shape[0])
+    width, height = scaled_size((picture.shape[1], picture.shape[0]), scale)
+    canvas: DisplayImage = np.full((size[1], size[0], 3), color, np.uint8)
+    x, y = (size[0] - width) // 2, (size[1] - height) // 2
+    canvas[y : y + height, x : x + width] = cv2.resize(
+        picture, (width, height), interpolation=cv2.INTER_AREA if scale < 1 else enlarging
+    )
+    return canvas

@@ -1,8 +1,8 @@
-"""The display curve: scene-referred light to sRGB pictures, and back.
+"""The tone curve from scene-referred light to sRGB pictures, and its inverse.
 
-The curve is linear up to 0.8, where a white ball facing the camera is put (see `light.exposure`). Above, a hyperbola
-leaves that line with the same slope and approaches 1: highlights keep their gradation instead of being cut. It works on
-each channel alone, so a coloured highlight turns whiter as it grows brighter, as film and eye have it.
+The curve is linear up to 0.8, the value that auto exposure gives a white ball facing the camera (see `light.exposure`).
+Above, a hyperbola continues it with the same slope and approaches 1, so that highlights keep their gradation instead of
+being clipped. Each channel is mapped by itself: a colored highlight becomes whiter as it becomes brighter, as on film.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from relit_camera.base.images.color import linear_from_uint8, srgb_encode
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, check_image
 
 SHOULDER = 0.8
-"""Display light below this is the scene's own."""
+"""Up to this value the curve is the identity."""
 
 _MAX_LIGHT = 16.0
 """Brighter light reads 255."""
 
 _MAX_RECOVERABLE = 2.0
-"""Brightest light that a picture is taken to hold. White in a live frame may be any light from here up; taken for the
-sun, it would stay white however far the picture is dimmed."""
+"""Brightest light that `inverse_tone_curve` assumes. White in a live frame may be any light from here up; assumed to be
+as bright as the sun, it would stay white however far the picture is dimmed."""
 
 _STEPS = 8191
-"""Steps of the table over √light up to the peak; √ since sRGB is steep near black. A code is at least 5 steps wide."""
+"""Steps of the table, even in √light since sRGB is steep near black. Each code is at least 5 steps wide."""
 
 
 _STRIPE_ROWS = 32
-"""Rows done at a time: the intermediate values stay in the processor's cache, and no large memory is taken."""
+"""Rows processed at a time, so that the intermediate values stay in the processor's cache."""
 
 
 def tone_curve(linear: ArrayLike) -> NDArray[np.float32]:
-    """Display light in 0..1 of scene light of any shape, float32: x up to 0.8, above 1 - 0.04 / (x - 0.6).
+    """Display light in 0..1 for scene light of any shape, float32: x up to 0.8, above it 1 - 0.04 / (x - 0.6).
 
     Negative light is 0. Value and slope are continuous; 1 reads 0.9, 2 reads 0.971, infinity 1.
     """
@@ -46,7 +46,7 @@ def tone_curve(linear: ArrayLike) -> NDArray[np.float32]:
 
 
 def inverse_tone_curve(display: ArrayLike) -> NDArray[np.float32]:
-    """Scene light, float32, that `tone_curve` shows as these values in 0..1; 2 from 0.971 up."""
+    """Scene light, float32, that `tone_curve` maps to these values in 0..1; 2 for values from 0.971 up."""
     shown = np.clip(np.asarray(display, dtype=np.float32), 0, tone_curve(_MAX_RECOVERABLE))
     span = 1 - SHOULDER
     above = span**2 / (1 - np.maximum(shown, SHOULDER)) + SHOULDER - span
@@ -54,7 +54,7 @@ def inverse_tone_curve(display: ArrayLike) -> NDArray[np.float32]:
 
 
 def display_from_linear(linear: LinearImage) -> DisplayImage:
-    """SRGB picture, uint8 of the same shape, of scene light; negative light and NaN are black.
+    """Map scene light to an sRGB picture, uint8 of the same shape; negative light and NaN become black.
 
     Raises:
         ImageError: `linear` is not (height, width, 3) float32.
@@ -73,7 +73,7 @@ def display_from_linear(linear: LinearImage) -> DisplayImage:
 
 
 def linear_from_display(display: DisplayImage) -> LinearImage:
-    """Scene light, float32 of the same shape, that `display_from_linear` shows as this sRGB picture.
+    """Scene light, float32 of the same shape, that `display_from_linear` maps to this sRGB picture.
 
     Codes from 252 up come back as 2, which shows as 252.
     """

@@ -1,5 +1,1 @@
-"""Neural networks: the one place that opens them, and the public ones that are pulled by name.
-
-`session` is the only user of ONNX Runtime, `registry` the only owner of the folder of pulled models, `tflite` the
-converter that turns the upstream files into ONNX on the user's machine.
-"""
+"""Neural networks: the store of public models, and the one place that opens networks with ONNX Runtime."""

@@ -1,4 +1,4 @@
-"""Getting an upstream file, from the network or from a local mirror. What is returned has the right sha256."""
+"""Downloads the files of public models, or takes them from a local folder; their sha256 is checked."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relit_camera.base.errors import ModelError, NotFoundError
 from relit_camera.base.models.model_manifest import Download
 
 _TIMEOUT_S = 20.0
-"""Without an answer for so long, the next url is tried."""
+"""Without an answer for this long, the next URL is tried."""
 
 
 def sha256_of(path: Path) -> str:
@@ -52,7 +52,7 @@ def fetch(name: str, download: Download, folder: Path) -> Path:
     import pooch
     import requests
 
-    pooch.get_logger().setLevel(logging.ERROR)  # it would repeat on stderr what our error says
+    pooch.get_logger().setLevel(logging.ERROR)  # it would print on stderr what the error says
     downloader = pooch.HTTPDownloader(timeout=_TIMEOUT_S)
     failures = []
     for url in download.urls:

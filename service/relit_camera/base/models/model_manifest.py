@@ -1,4 +1,4 @@
-"""The list of public models: where they come from, what they must be, and how they are made ready."""
+"""The list of public models: where they are published, their checksums, and how they are converted."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The folder of pulled public models.
+"""The folder of downloaded public models, and `relit models pull`, which fills it.
 
-A stored model is one ONNX file with the sha256 of the manifest, whether its authors publish it so or it was converted
-on this machine. The upstream files stay beside them in `downloads`, so that a repair needs no network.
+A stored model is one ONNX file with the sha256 in the manifest, whether it is published as ONNX or was converted on
+this machine. The published files stay in the folder `downloads` beside them, so that a repair needs no network.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class ModelState(StrEnum):
     PULLED = "pulled"
     MISSING = "missing"
     DAMAGED = "damaged"
-    """Something with another sha256: half a file, or one that an older Relit Camera converted."""
+    """A file with another sha256: incomplete, or converted by an older Relit Camera."""
 
 
 def models_folder() -> Path:
@@ -52,7 +52,7 @@ def model_path(name: str) -> Path:
 
 
 class ModelStore:
-    """Public models and what of them is stored. `folder` and `manifest` are the user's and ours unless given."""
+    """The public models of a manifest, stored in a folder; by default the packaged manifest and the user's folder."""
 
     def __init__(self, folder: Path | None = None, manifest: Manifest | None = None) -> None:
         self.folder = folder or models_folder()
@@ -107,11 +107,11 @@ class ModelStore:
         Args:
             chosen: names; none for all.
             mirror: a local folder with the upstream files, instead of the network.
-            say: told what is done, a line for each model.
+            say: called with a line for each model.
 
         Raises:
             NotFoundError: no public model has such a name, or there is no such mirror.
-            ModelError: a file cannot be had or has the wrong sha256. Models before it are stored.
+            ModelError: a file cannot be downloaded or has the wrong sha256. Models before it are stored.
             StorageError: the folder cannot be written, or another pull keeps it locked.
         """
         names = self.names(chosen)
@@ -164,7 +164,7 @@ class ModelStore:
 
 
 def _onnx_bytes(name: str, model: PublicModel, source: Path) -> bytes:
-    """Make the ONNX file's bytes from the upstream file, whose sha256 is right."""
+    """The bytes of the ONNX file, made from the published file, whose sha256 was checked."""
     data = source.read_bytes()
     if model.member:
         with zipfile.ZipFile(source) as archive:

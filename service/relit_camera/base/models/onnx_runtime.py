@@ -1,4 +1,4 @@
-"""ONNX Runtime in our terms: its options, the shapes and types of a model, its exceptions."""
+"""Helpers for ONNX Runtime: options, shapes and types of a model, placement of its nodes, exceptions."""
 
 from __future__ import annotations
 

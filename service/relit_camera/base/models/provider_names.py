@@ -12,7 +12,7 @@ AUTO = "auto"
 CPU = "cpu"
 
 _PREFERRED = ("cuda",)
-"""What `auto` takes where this ONNX Runtime was built with it; for networks this small others seldom beat the CPU."""
+"""Providers that `auto` prefers to the CPU if ONNX Runtime was built with them; others are seldom faster here."""
 
 
 def short_name(provider: str) -> str:
@@ -55,15 +55,6 @@ def choose_provider(requested: str) -> str:
     return requested
 
 
-def provider_cure(provider: str) -> str:
-    """Say what a person can do to get `provider`, or to live without it."""
-    if provider == "cuda":
-        install = "install the NVIDIA driver, replace the package onnxruntime by onnxruntime-gpu[cuda,cudnn]"
-    else:
-        install = f"install a build of ONNX Runtime with {full_name(provider)}"
-    return f"{install}, or set the provider to {CPU}"
-
-
 @cache
 def preload(provider: str) -> str:
     """Load the libraries of `provider` out of their Python packages; returns what could not be loaded, or ""."""
@@ -71,8 +62,8 @@ def preload(provider: str) -> str:
         return ""
     import onnxruntime
 
-    # It prints its findings; a missing library is no failure yet, since the placement is proven afterwards.
-    with contextlib.redirect_stdout(io.StringIO()) as said:
+    # It prints what it finds; a missing library is no failure yet, since the placement is checked afterwards.
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
         onnxruntime.preload_dlls()
-    lines = said.getvalue().strip().splitlines()
+    lines = printed.getvalue().strip().splitlines()
     return lines[0] if lines else ""

@@ -1,7 +1,8 @@
-"""The one place that opens ONNX Runtime sessions.
+"""Opens networks in ONNX Runtime, on a proven provider or else on the CPU.
 
-Threads are explicit and never spin: several networks, OpenCV and BLAS share few cores. A provider counts only when it
-is proven: most of the graph's nodes were placed on it and a warm-up ran there. Otherwise the session says why not.
+A provider is proven when at least half of the graph's nodes were placed on it and a warm-up run succeeded. Otherwise,
+or if it fails later, the CPU is used and the session's report says why. The number of threads is explicit, and threads
+never spin, since several networks, OpenCV and BLAS share few cores.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _LOG_FATAL = 4
-"""The severity to log from. What ONNX Runtime would print below it reaches us as an exception or in the placement."""
+"""Least severity that ONNX Runtime prints: anything less arrives as an exception or shows in the placement."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class SessionOptions:
 
 @dataclass(frozen=True)
 class SessionReport:
-    """What a person wants to know of an open session.
+    """Facts about an open session, for the status and the doctor.
 
     Attributes:
         name: of the model.
@@ -81,8 +82,8 @@ class SessionReport:
 class Session:
     """An open model, with its inputs and outputs by name. `run` may be called from several threads.
 
-    Where an accelerator fails on the way (its driver is reset, its memory is gone) the model goes on on the CPU from
-    then on, and the report says why.
+    If an accelerator fails later (its driver is reset, its memory is full), the model runs on the CPU from then on, and
+    the report says why.
     """
 
     report: SessionReport
@@ -133,7 +134,7 @@ class Session:
         return dict(zip(self.outputs, values, strict=True))
 
     def _run_on_cpu(self, feeds: Mapping[str, NDArray], why: str) -> dict[str, NDArray]:
-        """Run on the CPU, and if that succeeds, stay there: then it was the accelerator that failed, not the feeds."""
+        """Run on the CPU, and stay there if that succeeds: then the accelerator was at fault and not the inputs."""
         with self._change:
             if self._on_cpu is not None:
                 other = self._on_cpu(why)
@@ -141,7 +142,7 @@ class Session:
                 log.warning("model %s goes on on the CPU: %s failed: %s", self.name, self.provider, why)
                 self.report, self._runtime, self._on_cpu = other.report, other._runtime, None
                 return result
-        return self._run(feeds)  # it is on the CPU by now, or always was
+        return self._run(feeds)  # it runs on the CPU already
 
 
 _open_sessions: weakref.WeakSet[Session] = weakref.WeakSet()
@@ -182,7 +183,7 @@ def open_session(model: Path | bytes, name: str, options: SessionOptions | None 
                 "restart the camera to try it again",
             )
     except _ProviderRejectedError as error:
-        cure = provider_names.provider_cure(wanted)
+        cure = f"`relit doctor` says how to install it; or set the provider to {provider_names.CPU}"
         if options.strict:
             raise DeviceError(f"model {name} cannot run on {wanted}: {error}", cure) from error
         session = _open_on_provider(model, name, provider_names.CPU, options, why=f"{wanted}: {error}", cure=cure)
@@ -229,7 +230,7 @@ def _open_on_provider(
             providers=list(
                 dict.fromkeys([provider_names.full_name(provider), provider_names.full_name(provider_names.CPU)])
             ),
-            enable_fallback=0,  # falling back is our decision, and never a silent one
+            enable_fallback=0,  # falling back is decided here, and reported
         )
         runtime._model_bytes = (
             None  # it would keep the bytes beside its own copy: hundreds of MB for a relighting graph

@@ -1,1 +1,1 @@
-"""Video files: reading (as uint8 sRGB for people, as linear light for measuring) and writing, through FFmpeg (PyAV)."""
+"""Video files through FFmpeg (PyAV): reading as uint8 sRGB or as linear light, and writing H.264."""

@@ -1,4 +1,4 @@
-"""What the readers ask of FFmpeg's libraries: opening, refusing, turning upright, converting colours, scaling."""
+"""Decoding with FFmpeg's libraries (PyAV): opening and checking files, orientation, color conversion, scaling."""
 
 from __future__ import annotations
 
@@ -61,14 +61,14 @@ def open_stream(path: Path) -> tuple[Any, Any]:
 
 
 def frame_rate(stream: Any) -> float:
-    """Average frames a second of a stream; 30 where it gives no credible rate."""
+    """Average frames a second of a stream; 30 where the file states no credible rate."""
     rates: list[Fraction | None] = [stream.average_rate, stream.guessed_rate]
     return float(next((rate for rate in rates if rate and 0 < rate <= MAX_FPS), 30))
 
 
 @dataclass(frozen=True)
 class Orientation:
-    """The quarter turns and mirrorings of a display matrix: sides change places first, then come the mirrorings."""
+    """Quarter turns and mirrorings of a display matrix: first the axes are exchanged, then the picture is flipped."""
 
     transposed: bool = False
     flip_x: bool = False
@@ -79,15 +79,15 @@ class Orientation:
         return (height, width) if self.transposed else (width, height)
 
     def upright(self, image: NDArray) -> NDArray:
-        """A view of a stored picture (height, width, …) as it is meant to be seen."""
+        """A view of a stored picture (height, width, …) in upright orientation."""
         turned = image.swapaxes(0, 1) if self.transposed else image
         return turned[:: -1 if self.flip_y else 1, :: -1 if self.flip_x else 1]
 
 
 def orientation_of(picture: Any) -> Orientation:
-    """The turn that a decoded picture asks for (ISO/IEC 14496-12, 6.2.2): quarter turns and mirrorings, no others.
+    """The orientation in a decoded picture's display matrix (ISO/IEC 14496-12, 6.2.2), to quarter turns and mirrorings.
 
-    Ask once a file: PyAV's answer and the picture hold one another until Python's garbage collector comes by.
+    Call it once a file: PyAV's answer and the picture refer to each other until the next garbage collection.
     """
     display_matrix = picture.side_data.get("DISPLAYMATRIX")
     if display_matrix is None:
@@ -106,9 +106,9 @@ class PixelConverter:
 
         Args:
             accurate: convert to within half a code value; otherwise faster, about one code value too dark.
-            pixels: FFmpeg's name of the layout to give: rgb24, rgb48le (uint16, which keeps what 10 bits tell), gray
-                or gray16le (luma alone).
-            longer_side: scale down (by area, in code values) so that the longer side has so many pixels.
+            pixels: FFmpeg's name of the pixel format to return: rgb24, rgb48le (uint16, which keeps the precision of
+                10 bits), gray or gray16le (luma alone).
+            longer_side: scale down (by area, in code values) so that the longer side has this many pixels.
         """
         self._reformatter = VideoReformatter()
         self._interpolation = ACCURATE_INTERPOLATION if accurate else None
@@ -116,7 +116,7 @@ class PixelConverter:
         self._longer_side = longer_side
 
     def __call__(self, picture: Any) -> NDArray:
-        """The picture's pixels in an array of its own."""
+        """Convert the picture; returns a new array."""
         width, height = picture.width, picture.height
         interpolation = self._interpolation
         if self._longer_side is not None and self._longer_side < max(width, height):
@@ -136,10 +136,15 @@ class PixelConverter:
 
 
 def white_code_value(picture: Any, deep: bool) -> int:
-    """The RGB code that `PixelConverter` gives for the white of a decoded picture."""
+    """The RGB code that `PixelConverter` returns for white.
+
+    Args:
+        picture: a decoded picture.
+        deep: whether it is converted to uint16.
+    """
     if not deep:
         return 255
-    # FFmpeg's scaler makes 16 bits of luma and chroma by appending eight to the 8-bit code.
+    # FFmpeg's scaler makes 16 bits of luma and chroma by appending eight bits to the 8-bit code.
     return 65535 if picture.format.is_rgb else 255 << 8
 
 
@@ -158,7 +163,7 @@ def _video_stream(container: Any, path: Path) -> Any:
     curve = HDR_TRANSFER_FUNCTIONS.get(stream.codec_context.color_trc)
     if curve:
         cure = "record with HDR video switched off, or convert it to SDR (BT.709)"
-        raise VideoError(f"{path} is an HDR video ({curve}); its colours cannot be measured", cure)
+        raise VideoError(f"{path} is an HDR video ({curve}); its colors cannot be measured", cure)
     return stream
 
 
@@ -168,15 +173,15 @@ def _require_all_frames(container: Any, stream: Any, path: Path) -> None:
         container.seek(0)
     except av.FFmpegError as error:
         raise VideoError(f"{path} is cut off", "record or copy it again") from error
-    announced = stream.frames if container.format.name.startswith("mov") else 0  # elsewhere it is no promise
+    announced = stream.frames if container.format.name.startswith("mov") else 0  # other containers only estimate it
     if announced and whole >= announced:
-        return  # only sound is missing
+        return  # only sound is truncated
     total = f" of {announced}" if announced else ""
     raise VideoError(f"{path} is cut off: {whole}{total} frames can be read", "record or copy it again")
 
 
 def _source_color_encoding(picture: Any) -> dict[str, Any]:
-    """Tell the reformatter the picture's matrix and range."""
+    """Arguments for the reformatter: the picture's color matrix and range."""
     if picture.format.is_rgb or picture.format.name in ("pal8", "gray"):
         return {}
     hd = max(picture.width / 16, picture.height / 9) * 9 > 576

@@ -1,10 +1,6 @@
-"""The decoded pictures of a video file, with their times: what every reader of video files iterates over.
+"""Readers of video files: sRGB frames for people and networks, linear light for measuring, and luma alone.
 
-Reading video files for people and networks: uint8 sRGB frames.
-
-Reading video files for measuring: linear light, as exactly as the file tells it.
-
-Reading the luma of video files: all that following a face needs, at a fraction of the time of colour.
+Luma is enough to track a face, and takes a fraction of the time of color.
 """
 
 from __future__ import annotations
@@ -37,14 +33,14 @@ FrameT = TypeVar("FrameT")
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What a video file says of itself.
+    """Facts in the header of a video file.
 
     Attributes:
         width, height: of the upright pictures, in stored pixels (a pixel aspect ratio is not applied).
-        fps: average frames a second; 30 if the file gives no credible rate.
-        frames: number announced, or reckoned from the duration; None if the file tells neither. How many there are,
-            only reading shows.
-        duration_s: 0 if the file does not tell.
+        fps: average frames a second; 30 if the file states no credible rate.
+        frames: number stated, or computed from the duration; None if the file states neither. The true number is known
+            only after reading.
+        duration_s: 0 if the file does not state it.
     """
 
     width: int
@@ -55,10 +51,12 @@ class VideoInfo:
 
 
 class FrameReader(Generic[FrameT]):
-    """What is made of a video file's pictures, in order of presentation, one in memory at a time. Iterate once.
+    """Iterates over what a subclass makes of a video file's pictures, in order of presentation, once.
+
+    One picture is in memory at a time.
 
     Attributes:
-        info: what the header says.
+        info: facts in the header.
     """
 
     def __init__(self, path: Path, threads: int, only: Collection[int] | None = None) -> None:
@@ -67,7 +65,7 @@ class FrameReader(Generic[FrameT]):
         Args:
             path: the file (MP4, MOV, MKV, WebM, GIF, AVI …).
             threads: of the decoder.
-            only: indices of the pictures to make something of; all if None. The others cost their decoding alone.
+            only: indices of the pictures to return; all if None. The others are only decoded.
 
         Raises:
             VideoError: the file is missing, empty, cut off, no video, HDR, or of an absurd size.
@@ -88,14 +86,14 @@ class FrameReader(Generic[FrameT]):
             raise
 
     def _make(self, picture: Any, index: int, time_s: float) -> FrameT:
-        """What is given for a decoded picture, the index-th, at `time_s` from the first."""
+        """Convert a decoded picture, the index-th, at `time_s` seconds from the first."""
         raise NotImplementedError
 
     def __iter__(self) -> Iterator[FrameT]:
         """All frames, once.
 
         Raises:
-            VideoError: the size changes; or, after all frames that can be read, there were damaged ones.
+            VideoError: the size changes; or, after all frames that can be read, some were damaged.
         """
         first, self._first = self._first, None
         if first is not None:
@@ -141,7 +139,7 @@ class FrameReader(Generic[FrameT]):
             )
 
     def _pictures(self) -> Iterator[Any]:
-        """Decode pictures. Damage before the first is no damage: a recorded stream may begin between key frames."""
+        """Decode pictures. Damage before the first does not count: a recorded stream may begin between key frames."""
         begun = False
         try:
             for packet in self._container.demux(self._stream):
@@ -193,7 +191,7 @@ class VideoReader(FrameReader[Frame]):
     """The frames of a video file (MP4, MOV, MKV, WebM, GIF, AVI …) in order of presentation, upright. Iterate once.
 
     Frames are uint8 sRGB RGB, not writable; `time_s` is the presentation time from the first frame and grows strictly,
-    also where the rate varies. A rotation or mirroring flag is applied. Colours are converted by the matrix and range
+    also where the rate varies. A rotation or mirroring flag is applied. Colors are converted by the matrix and range
     that the file names; where it names no matrix, BT.709 is taken for HD and BT.601 for less, as players do.
 
     Raises:
@@ -206,7 +204,7 @@ class VideoReader(FrameReader[Frame]):
 
         Args:
             path: the file.
-            accurate: convert colours to within half a code value; otherwise faster, about one code value too dark.
+            accurate: convert colors to within half a code value; otherwise faster, about one code value too dark.
             threads: of the decoder.
         """
         self._convert = PixelConverter(accurate=accurate)
@@ -234,9 +232,9 @@ class LinearVideoFrame:
 
 
 class LinearVideoReader(FrameReader[LinearVideoFrame]):
-    """The frames of a video file as linear light, upright, in order of presentation. Iterate once; open again at will.
+    """The frames of a video file as linear light, upright, in order of presentation. Iterate once.
 
-    A file of 10 or 12 bits is converted in 16, so that nothing of it is lost.
+    A file of 10 or 12 bits is converted with 16 bits, so that no precision is lost.
 
     Raises:
         VideoError: as `VideoReader`.
@@ -256,9 +254,9 @@ class LinearVideoReader(FrameReader[LinearVideoFrame]):
         Args:
             path: the file.
             gamma: curve of its code values.
-            longer_side: scale down so that the longer side has so many pixels, while colours are converted: cheap.
-                Code values are averaged, not light.
-            only: indices of the frames to give; all if None.
+            longer_side: scale down so that the longer side has this many pixels. It is cheap, since it is done with
+                the color conversion, but averages code values, not light.
+            only: indices of the frames to return; all if None.
             threads: of the decoder.
         """
         self._gamma, self._longer_side = gamma, longer_side
@@ -304,7 +302,7 @@ class LumaVideoReader(FrameReader[LumaVideoFrame]):
 
         Args:
             path: the file.
-            only: indices of the frames to give; all if None.
+            only: indices of the frames to return; all if None.
             threads: of the decoder.
         """
         self._convert: PixelConverter | None = None
@@ -313,7 +311,7 @@ class LumaVideoReader(FrameReader[LumaVideoFrame]):
     def _make(self, picture: Any, index: int, time_s: float) -> LumaVideoFrame:
         if self._convert is None:
             deep = any(component.bits > 8 for component in picture.format.components)
-            # Nothing of colour is to be converted: the fast way is as good.
+            # Without color to convert the fast conversion is as exact.
             self._convert = PixelConverter(accurate=False, pixels="gray16le" if deep else "gray")
         codes = self._orientation.upright(self._convert(picture))
         white = 65535 if codes.dtype == np.uint16 else 255

@@ -1,4 +1,4 @@
-"""Whether a video file ends before it should, told from its container's own sizes without decoding anything.
+"""Finds truncated video files by the sizes stated in their container, without decoding anything.
 
 Demuxers stop at a missing end without a word where the format allows streaming; the sizes that the file itself
 announces do not lie. Formats: ISO base media (ISO/IEC 14496-12), Matroska and WebM (RFC 8794, RFC 9559), RIFF, GIF89a.
@@ -15,7 +15,7 @@ ISO_FIRST_BOXES = frozenset({b"ftyp", b"moov", b"mdat", b"free", b"wide", b"skip
 
 
 def is_truncated(path: Path) -> bool:
-    """Whether `path` is shorter than its container says. False for formats that do not say."""
+    """Whether `path` is shorter than its container states. False for formats that state no sizes."""
     length = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(12)

@@ -1,4 +1,4 @@
-"""Writing video files through FFmpeg's libraries (PyAV)."""
+"""Writes video files with FFmpeg's libraries (PyAV), whole or not at all."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from relit_camera.base.video.video_decoding import ACCURATE_INTERPOLATION, BT709
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov"})
 
 TICKS_PER_S = 10_000
-"""Least resolution of written time stamps."""
+"""Time stamps are written in steps of this or finer."""
 
 
 class VideoWriter:
@@ -139,7 +139,7 @@ class VideoWriter:
             for packet in self._stream.encode(picture):
                 self._container.mux(packet)
         except OSError as error:
-            with suppress(OSError):  # what failed at first is what is told
+            with suppress(OSError):  # the first failure is the one to report
                 self._give_up(error)
             raise storage_error(self.path, error) from error
         except BaseException as error:
@@ -147,7 +147,7 @@ class VideoWriter:
             raise
 
     def _give_up(self, error: BaseException) -> None:
-        """Delete what was written; a full disk and its like are raised as StorageError."""
+        """Delete what was written; a full disk and similar errors are raised as StorageError."""
         self._open = False
         self._files.__exit__(type(error), error, error.__traceback__)
 

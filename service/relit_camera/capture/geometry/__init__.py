@@ -1,1 +1,1 @@
-"""One-light pictures → the shape that they show: normals, albedo, depth, and which light reaches which pixel."""
+"""Shape from OLAT pictures: normals, albedo, depth, and which light reaches which pixel."""

@@ -1,1 +1,1 @@
-"""Samples → reflectance field: triangulation and interpolation over directions; one file a method."""
+"""Reflectance methods: from samples to a reflectance field, by interpolation or by models of appearance."""

@@ -1,20 +1,24 @@
-"""The seam between samples and field, and how a method is found by name."""
+"""Reflectance methods: what one is (samples → reflectance field), and how one is opened by name.
+
+A plug-in is an entry point of the group `relit_camera.methods`: called without arguments, it gives a
+`ReflectanceMethod`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from importlib.metadata import entry_points
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.errors import NotFoundError
+from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.subject.reflectance_field import FactoredField, ReflectanceField
 
 DEFAULT_METHOD = "blend"
-ENTRY_POINT_GROUP = "relit_camera.methods"
 
 
 class ReflectanceMethod(Protocol):
@@ -54,9 +58,12 @@ def factored_field(method: LinearMethod, samples: Samples) -> FactoredField:
     return FactoredField(samples.pictures, samples.directions, partial(method.weights, samples.directions))
 
 
+METHODS: PluginGroup[Callable[[], ReflectanceMethod]] = PluginGroup("relit_camera.methods", "reflectance method")
+
+
 def method_names() -> list[str]:
-    """Names of all installed methods."""
-    return sorted(point.name for point in entry_points(group=ENTRY_POINT_GROUP))
+    """List the names of all installed methods, sorted."""
+    return METHODS.names()
 
 
 def open_method(name: str) -> ReflectanceMethod:
@@ -64,9 +71,12 @@ def open_method(name: str) -> ReflectanceMethod:
 
     Raises:
         NotFoundError: none of that name is installed.
+        ConfigError: the plug-in cannot be loaded.
+        InputError: the name has an argument (`NAME:ARGUMENT`).
     """
-    wanted = DEFAULT_METHOD if name == "default" else name
-    for point in entry_points(group=ENTRY_POINT_GROUP, name=wanted):
-        method: ReflectanceMethod = point.load()()
-        return method
-    raise NotFoundError(f"no reflectance method '{name}'", f"there are: {', '.join(['default', *method_names()])}")
+    if name != "default" and not METHODS.has(name):
+        there_are = ", ".join(["default", *method_names()])
+        raise NotFoundError(f"no reflectance method is called '{name}'", f"there are: {there_are}")
+    factory, argument = METHODS.load(DEFAULT_METHOD if name == "default" else name)
+    require_no_argument("reflectance method", name.partition(":")[0], argument)
+    return factory()

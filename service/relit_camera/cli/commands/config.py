@@ -1,4 +1,4 @@
-"""`relit config`: check the configuration, show it, and say what can be in it."""
+"""`relit config`: checks the configuration, shows it, and prints its schema."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ def demo(
         server={"host": host, "port": port},
     )
     _, look = tour_at(0.0)
-    # In place of the user's own look, not over it: their colour is no part of another kind of background.
+    # Replaces the user's own look, without merging: a color of theirs is no part of another kind of background.
     settings = settings.model_copy(update={"look": look})
 
     @contextmanager
@@ -91,7 +91,10 @@ def demo(
 
 
 def opens_in_browser(url: str) -> bool:
-    """Whether a window opens. A browser of the terminal's own would show no picture, and keep Ctrl-C to itself."""
+    """Open the page in a graphical browser, if there is one. Returns whether it was opened.
+
+    A text browser would show no picture, and take Ctrl-C.
+    """
     import os
     import sys
     import webbrowser

@@ -1,4 +1,4 @@
-"""`relit doctor`: what keeps the camera from working, and the cure."""
+"""`relit doctor`: finds what prevents the camera from working, and says what to do."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def relight(
         float, typer.Option(help="Brighter or darker than a white ball at 0.8.", min=-10, max=10)
     ] = 0.0,
 ) -> None:
-    """Relight a subject's still by an environment, or by one distant light of unit irradiance."""
+    """Relight a subject by an environment, or by one distant light of unit irradiance."""
     import numpy as np
 
     from relit_camera.base.images.image_files import write_display, write_linear
@@ -50,7 +50,7 @@ def relight(
         picture = relight_from_direction(opened, head.inv().apply(direction_from_degrees(azimuth, elevation)))
         if not picture.any():
             typer.echo(f"warning: no captured light is near {light}: the picture is black", err=True)
-        # One light has no surroundings to be exposed for: unit irradiance shows as itself.
+        # A single light has no auto exposure: unit irradiance is shown as it is.
         scale = 1.0
     else:
         room = EnvironmentStore(storage.environments).resolve(environment or "").light_map

@@ -10,7 +10,7 @@ import typer
 app = typer.Typer()
 
 SHEET_FRAMES = 12
-"""A contact sheet has about so many frames, and fewer than twice as many."""
+"""A contact sheet has at least this many frames of a longer video, and fewer than twice as many."""
 
 
 @app.command()
@@ -55,7 +55,7 @@ def replay(
     chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
     info = probe_video(video)
     scene_controller = SceneController(settings.storage)
-    scene_controller.set_subject(subject)
+    scene_controller.load_configured_subject(subject)
     lighting = parse_lighting(scene_controller.register_temporary_environment(environment), rotate, exposure_ev)
     scene_controller.set_look(Look(lighting=lighting, background=chosen_background, mode=chosen_mode))
     track = make_tracker(settings)
@@ -68,7 +68,7 @@ def replay(
     every = max((info.frames or 0) // SHEET_FRAMES, 1)
     kept: list[tuple[int, DisplayImage, DisplayImage]] = []
     with ExitStack() as results, progress_bar() as progress:
-        # Opened before the work, so that what cannot be written is said at once and leaves no video behind.
+        # Opened before the work: a file that cannot be written is reported at once, and leaves no video behind.
         report_file = results.enter_context(atomic_path(report)) if report else None
         sheet_file = results.enter_context(atomic_path(contact_sheet)) if contact_sheet else None
         task = progress.add_task("Relighting", total=info.frames or None)
@@ -78,7 +78,7 @@ def replay(
             progress.update(task, completed=index + 1)
             if sheet_file and index % every == 0:
                 kept.append((index, before, after))
-                if len(kept) == 2 * SHEET_FRAMES:  # a file that does not tell its length: keep every other one
+                if len(kept) == 2 * SHEET_FRAMES:  # the file did not state its length: keep every second one
                     del kept[1::2]
                     every *= 2
 

@@ -1,4 +1,4 @@
-"""`relit run`: the camera."""
+"""`relit run`: runs the camera with its API and panel."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def run(
     }
     settings = load_command_settings(context, **given)
     path = config_path((context.find_root().obj or {}).get("config"))
-    # The same file each time: where it is gone, another one must not be taken in its place.
+    # Always the same file: if it is deleted, another one must not be read instead.
     load = partial(load_settings, overrides={"log_level": settings.log_level, **given})
     reload = (path.absolute(), load) if path else None
     run_camera(settings, environment, reload=reload)

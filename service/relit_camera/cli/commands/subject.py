@@ -11,7 +11,7 @@ import typer
 app = typer.Typer(no_args_is_help=True)
 
 GEOMETRY = ("normals", "albedo", "depth", "horizons")
-"""Parts of a subject that tell the person's shape."""
+"""Parts of a subject that describe the shape of the head."""
 
 
 @app.callback()

@@ -1,4 +1,4 @@
-"""`relit track`: what the tracker sees in a video."""
+"""`relit track`: tracks the face in a video and writes the result."""
 
 from __future__ import annotations
 

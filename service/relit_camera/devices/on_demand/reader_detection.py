@@ -10,35 +10,22 @@ from __future__ import annotations
 import errno
 import logging
 import os
-import struct
 import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
 
 from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.errors import UnsupportedByDriverError
 from relit_camera.devices.device_users import PROC, find_device_users
+from relit_camera.devices.v4l2 import query_has_readers
 
 log = logging.getLogger(__name__)
 
 DRIVER_POLL_S, PROC_SCAN_S = 0.25, 1.0
 """Seconds between two queries of the driver, and between two scans of /proc."""
-
-# linux/videodev2.h, and v4l2loopback's own event
-VIDIOC_DQEVENT, VIDIOC_SUBSCRIBE_EVENT = 0x80885659, 0x4020565A
-EVENT_BYTES, PAYLOAD_OFFSET = 136, 8
-CLIENT_USAGE = 0x08000000 + 0x08E00000 + 1
-EVENT_SUB_FL_SEND_INITIAL = 1
-
-UNSUPPORTED_ERRNOS = (errno.EINVAL, errno.ENOTTY)
-"""What the driver answers when it has no such event."""
 DEVICE_GONE_ERRNOS = (errno.ENOENT, errno.ENODEV, errno.ENXIO)
 """What opening a node gives that no longer exists: nobody can read it."""
-
-
-class ClientUsageUnsupported(Exception):  # noqa: N818 - a finding, no fault
-    """The driver does not report its readers: it is too old, or no v4l2loopback."""
-
 
 ReaderQuery = Callable[[str], bool]
 """Called with a device node; returns whether anybody reads pictures from it."""
@@ -51,28 +38,16 @@ def driver_reports_readers(node: str) -> bool:
     for long.
 
     Raises:
-        ClientUsageUnsupported: the driver has no such event.
+        UnsupportedByDriverError: the driver has no such event.
         OSError: the node is gone, or no more programs may open it now; ask again later.
     """
     if not sys.platform.startswith("linux"):
-        raise ClientUsageUnsupported
-    import fcntl
-
+        raise UnsupportedByDriverError("only Linux has v4l2loopback")
     device = os.open(node, os.O_RDONLY | os.O_NONBLOCK)
     try:
-        fcntl.ioctl(
-            device, VIDIOC_SUBSCRIBE_EVENT, struct.pack("=8I", CLIENT_USAGE, 0, EVENT_SUB_FL_SEND_INITIAL, *[0] * 5)
-        )
-        event = bytearray(EVENT_BYTES)
-        fcntl.ioctl(device, VIDIOC_DQEVENT, event)
-    except OSError as error:
-        if error.errno in UNSUPPORTED_ERRNOS:
-            raise ClientUsageUnsupported from error
-        raise
+        return query_has_readers(device)
     finally:
         os.close(device)
-    (count,) = struct.unpack_from("=I", event, PAYLOAD_OFFSET)
-    return bool(count)
 
 
 def is_open_elsewhere(node: str, proc: Path = PROC) -> bool:
@@ -124,7 +99,7 @@ class ReaderMonitor:
         try:
             if self._driver_answers:
                 return self._ask(node)
-        except ClientUsageUnsupported:
+        except UnsupportedByDriverError:
             self._driver_answers = False
             log.warning(
                 "%s: this v4l2loopback does not tell who reads it (0.13 and newer do); only programs of the same user "

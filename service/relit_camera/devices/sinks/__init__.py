@@ -1,1 +1,1 @@
-"""Where finished pictures go: virtual camera, video file, nowhere, behind one protocol."""
+"""Sinks, where finished pictures go: virtual camera, video file, nothing."""

@@ -1,7 +1,4 @@
-"""What every sink is.
-
-A sink that shows nothing: for measuring, and for running with the preview alone.
-"""
+"""The protocol of sinks, and the null sink."""
 
 from __future__ import annotations
 
@@ -13,12 +10,12 @@ from relit_camera.base.images.image_types import DisplayImage
 
 @dataclass(frozen=True)
 class SinkInfo:
-    """What a sink is.
+    """Facts about a sink.
 
     Attributes:
         kind: camera, file or null.
         id: device node, path, or empty.
-        size: width and height in pixels that it takes, fixed for its life.
+        size: width and height in pixels of the pictures that it takes, fixed for its life.
     """
 
     kind: str
@@ -27,10 +24,10 @@ class SinkInfo:
 
 
 class Sink(Protocol):
-    """Takes pictures from one thread, all of one size.
+    """Takes pictures of one size, from one thread.
 
-    After a failure it may be written to again: a camera tries anew. A file that failed is lost, and the sink says so at
-    each call, to the end.
+    After a failure it may be written to again: a camera is then opened again. A file that failed is lost, and every
+    further call raises the error again.
     """
 
     def write(self, image: DisplayImage) -> None:
@@ -44,11 +41,11 @@ class Sink(Protocol):
         ...
 
     def describe(self) -> SinkInfo:
-        """Say what the sink is."""
+        """Facts about the sink."""
         ...
 
     def close(self) -> None:
-        """Finish. Harmless when repeated.
+        """Finish the output and free the device or file. Harmless when repeated.
 
         Raises:
             StorageError: the end of the file cannot be written, or the file was lost before.
@@ -57,7 +54,7 @@ class Sink(Protocol):
 
 
 class NullSink:
-    """Counts pictures and keeps the last.
+    """A sink without output, for measuring and for running with the preview alone. Counts pictures, keeps the last.
 
     Attributes:
         count: pictures written.
@@ -75,7 +72,7 @@ class NullSink:
         self.count += 1
 
     def describe(self) -> SinkInfo:
-        """Say what the sink is."""
+        """Facts about the sink."""
         return self._info
 
     def close(self) -> None:

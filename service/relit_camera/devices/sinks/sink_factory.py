@@ -1,12 +1,18 @@
-"""From what a person writes after `--sink` to a sink."""
+"""Sinks by name: which sink the text of `--sink` or of the setting `output.sink` opens.
+
+A plug-in is an entry point of the group `relit_camera.sinks`: called with `SinkOptions`, it gives a `Sink`.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from relit_camera.base.config.settings import OutputSettings
 from relit_camera.base.errors import InputError
+from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
 from relit_camera.base.video.video_writer import VIDEO_SUFFIXES
 from relit_camera.devices.sinks.sink import NullSink, Sink
 from relit_camera.devices.sinks.video_file_sink import VideoFileSink
@@ -14,26 +20,72 @@ from relit_camera.devices.sinks.virtual_camera_sink import VirtualCameraSink
 from relit_camera.devices.video_devices import SYSTEM_TREE, DeviceTree, list_virtual_cameras
 
 
+@dataclass(frozen=True)
+class SinkOptions:
+    """What every sink is opened with.
+
+    Attributes:
+        argument: what follows the colon in `NAME:ARGUMENT`.
+        size: (width, height) of all pictures that it will get.
+        fps: pictures a second that it will get.
+        label: name under which call apps shall show it.
+        tree: where virtual cameras are looked for.
+    """
+
+    argument: str
+    size: tuple[int, int]
+    fps: float
+    label: str
+    tree: DeviceTree = SYSTEM_TREE
+
+
+SINKS: PluginGroup[Callable[[SinkOptions], Sink]] = PluginGroup("relit_camera.sinks", "sink")
+
+
 def open_sink(settings: OutputSettings, tree: DeviceTree = SYSTEM_TREE) -> Sink:
-    """Open the sink that `settings.sink` names: `camera`, `null`, a node such as /dev/video10, or a video file.
+    """Open the sink that `settings.sink` names.
+
+    In this order: a plug-in (`NAME` or `NAME:ARGUMENT`; `camera` and `null` are of them), the node of a virtual camera
+    such as /dev/video10, a video file.
 
     Raises:
-        InputError: none of these.
+        InputError: none of these, or the plug-in takes no such argument.
+        ConfigError: the plug-in cannot be loaded.
         DeviceError: the virtual camera is missing or in use.
         StorageError: the file cannot be written.
     """
     text, size, fps = settings.sink, (settings.width, settings.height), settings.fps
-    if text == "null":
-        return NullSink(size)
-    if text == "camera":
-        return VirtualCameraSink(size, fps, settings.label, tree=tree)
+    if SINKS.has(text):
+        factory, argument = SINKS.load(text)
+        return factory(SinkOptions(argument, size, fps, settings.label, tree))
     if node := _node(text, tree):
         return VirtualCameraSink(size, fps, settings.label, device=node, tree=tree)
     path = Path(text).expanduser()
     if path.suffix.lower() in VIDEO_SUFFIXES:
         return VideoFileSink(path, size, fps)
-    endings = ", ".join(sorted(VIDEO_SUFFIXES))
-    raise InputError(f"unknown sink '{text}'", f"use camera, null, /dev/videoN, or a file ending in {endings}")
+    names, endings = ", ".join(SINKS.names()), ", ".join(sorted(VIDEO_SUFFIXES))
+    raise InputError(f"unknown sink '{text}'", f"use {names}, /dev/videoN, or a file ending in {endings}")
+
+
+def open_virtual_camera(options: SinkOptions) -> Sink:
+    """Open the virtual camera of the label.
+
+    Raises:
+        InputError: there is an argument.
+        DeviceError: it is missing or in use.
+    """
+    require_no_argument("sink", "camera", options.argument)
+    return VirtualCameraSink(options.size, options.fps, options.label, tree=options.tree)
+
+
+def open_null(options: SinkOptions) -> Sink:
+    """Open the sink that shows nothing.
+
+    Raises:
+        InputError: there is an argument.
+    """
+    require_no_argument("sink", "null", options.argument)
+    return NullSink(options.size)
 
 
 def published_label(settings: OutputSettings, tree: DeviceTree = SYSTEM_TREE) -> str:

@@ -12,11 +12,11 @@ from relit_camera.devices.sinks.sink import SinkInfo
 
 
 class VideoFileSink:
-    """Writes what is published, each picture at the time when it was. The file takes its name when it is closed.
+    """Writes the published pictures to a video file with the times of publication. `close` completes the file.
 
-    Where writing fails (a full disk) nothing is left of the file, and it is not begun anew: a recording whose beginning
-    is missing would look whole. The failure is told again by every `write` and by `close`, so that the command that
-    recorded cannot end as if all were well.
+    If writing fails (the disk is full) the file is deleted and not started again: a recording without its beginning
+    would look complete. Every further `write` and `close` raises the failure again, so that the command that records
+    cannot end with success.
     """
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
@@ -29,13 +29,13 @@ class VideoFileSink:
         self._video = VideoWriter(path, size, fps)
         self._info = SinkInfo("file", str(path), size)
         self._started_at: float | None = None
-        self._lost: tuple[str, str] | None = None  # what and cure; the error itself would keep a picture in memory
+        self._lost: tuple[str, str] | None = None  # what and cure: the error object would keep a picture in memory
 
     def write(self, image: DisplayImage) -> None:
-        """Add a picture at the present moment.
+        """Add a picture at the present time.
 
         Raises:
-            StorageError: the file cannot be written, or could not before; it is gone then.
+            StorageError: the file cannot be written, now or before; it was deleted.
             ImageError: the picture has another size.
         """
         self._check()
@@ -49,7 +49,7 @@ class VideoFileSink:
             raise
 
     def describe(self) -> SinkInfo:
-        """Say what the sink is."""
+        """Facts about the sink."""
         return self._info
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The virtual camera as sink: on Linux a v4l2loopback device, elsewhere the one that pyvirtualcam finds."""
+"""The virtual camera as sink: on Linux a v4l2loopback device, on other systems the one that pyvirtualcam finds."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ import numpy as np
 from relit_camera.base.errors import DeviceError, InputError
 from relit_camera.base.images.image_types import DisplayImage, check_image
 from relit_camera.base.images.resize import crop_to_fill
+from relit_camera.devices.device_lock import DeviceLock
 from relit_camera.devices.sinks.sink import SinkInfo
-from relit_camera.devices.v4l2loopback import DeviceLock, LoopbackDevice, reset_stuck_device
+from relit_camera.devices.v4l2loopback import LoopbackDevice, reset_stuck_device
 from relit_camera.devices.video_devices import (
     SYSTEM_TREE,
     VIRTUAL_CAMERA_LABEL,
@@ -25,7 +26,7 @@ from relit_camera.devices.video_devices import (
 
 
 class VirtualCameraOutput(Protocol):
-    """What pictures are shown through.
+    """An open virtual camera.
 
     Attributes:
         node: the device file, or the system's name for it.
@@ -40,7 +41,7 @@ class VirtualCameraOutput(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of the device."""
+        """Close the device."""
         ...
 
 
@@ -49,11 +50,11 @@ OpenOutput = Callable[[tuple[int, int], float, str], VirtualCameraOutput]
 
 
 class VirtualCameraSink:
-    """Shows pictures as the virtual camera of one label, at one fixed size.
+    """Publishes pictures as the virtual camera of one label, at one fixed size.
 
-    A device that a reader still holds keeps its old size whatever is asked for; then pictures are cropped and scaled to
-    it. The device is claimed, so that no second Relit Camera can write to it. After a failed write the next one opens
-    the device again.
+    A device that another program still reads keeps its size, whatever is asked for; then pictures are scaled and
+    cropped to it. The device is locked (`DeviceLock`), so that no second Relit Camera can write to it. After a failed
+    write the next one opens the device again.
     """
 
     def __init__(
@@ -69,16 +70,16 @@ class VirtualCameraSink:
         """Open the device.
 
         Args:
-            size: width and height of the pictures that will come, both even.
-            fps: frames a second, a hint for some systems' virtual cameras.
+            size: width and height of the pictures, both even.
+            fps: frames a second, a hint for the virtual cameras of some systems.
             label: name of the device (Linux).
             device: node such as /dev/video10, instead of the label.
-            tree: where devices are looked for.
-            open_output: `LoopbackDevice` on Linux and pyvirtualcam elsewhere, if not given.
+            tree: the folders in which devices are found.
+            open_output: opens the device; `LoopbackDevice` on Linux and pyvirtualcam elsewhere, if not given.
 
         Raises:
-            InputError: an odd size: readers of the camera would get no picture.
-            DeviceError: there is no such device, or it is in use; the cure says what to run.
+            InputError: the size is odd: readers of the camera would get no picture.
+            DeviceError: there is no such device, or it is in use; the cure is the command to run.
         """
         if size[0] % 2 or size[1] % 2:
             raise InputError(f"a virtual camera cannot be {size[0]}x{size[1]}", "use an even width and height")
@@ -108,11 +109,11 @@ class VirtualCameraSink:
             raise DeviceError(f"the virtual camera {output.node} takes no pictures: {error}") from error
 
     def describe(self) -> SinkInfo:
-        """Say what the sink is."""
+        """Facts about the sink."""
         return self._info
 
     def close(self) -> None:
-        """Let go of the device. Harmless when repeated."""
+        """Close the device. Harmless when repeated."""
         output, self._output = self._output, None
         lock, self._lock = self._lock, None
         try:
@@ -142,7 +143,7 @@ class VirtualCameraSink:
 
     def _explained(self, error: Exception, node: str) -> Exception:
         if isinstance(error, ImportError):
-            return DeviceError(f"pyvirtualcam cannot be used: {error}", "run: pip install pyvirtualcam")
+            return DeviceError(f"pyvirtualcam cannot be used: {error}", "`relit doctor` says how to install it")
         if isinstance(error, OSError) and error.errno == errno.EBUSY:
             what = f"{node} is in use: {error.strerror}"
             reload = f"sudo modprobe -r v4l2loopback && {modprobe_command(self._label)}"
@@ -150,17 +151,16 @@ class VirtualCameraSink:
         if isinstance(error, OSError):
             return DeviceError(f"{node} cannot be opened: {error.strerror}", f"run: {modprobe_command(self._label)}")
         if isinstance(error, RuntimeError):
-            cure = "install OBS Studio and start its virtual camera once"
-            return DeviceError(f"there is no virtual camera: {error}", cure)
+            return DeviceError(f"there is no virtual camera: {error}", "`relit doctor` says how to get one here")
         return error
 
 
 def _open_loopback(size: tuple[int, int], fps: float, node: str) -> VirtualCameraOutput:
-    return LoopbackDevice(size, node)  # the driver announces 30 frames a second whatever is written
+    return LoopbackDevice(size, node)  # the driver states 30 frames a second, whatever is written
 
 
 class _PyVirtualCam:
-    """The virtual camera of other systems."""
+    """The virtual camera of systems other than Linux."""
 
     def __init__(self, size: tuple[int, int], fps: float, node: str) -> None:
         import pyvirtualcam

@@ -1,1 +1,1 @@
-"""Where live pictures come from: webcam, video file, picture, test pattern, behind one protocol."""
+"""Sources, where frames come from: webcam, video file, picture, test pattern."""

@@ -1,8 +1,9 @@
-"""A moving test pattern whose every picture carries its number, readable from the pixels after any codec."""
+"""A moving test pattern. Every picture carries its number, which can be read from the pixels after any codec."""
 
 from __future__ import annotations
 
 import itertools
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,51 +23,27 @@ COLOR_BARS = np.array(
     [[191, 191, 191], [191, 191, 0], [0, 191, 191], [0, 191, 0], [191, 0, 191], [191, 0, 0], [0, 0, 191], [16, 16, 16]],
     dtype=np.uint8,
 )
-"""The colours of a television test picture at 75 %."""
+"""The colors of a television test picture at 75 %."""
 
 
 def pattern_source(size: tuple[int, int], fps: float) -> Source:
-    """Draw the test pattern `fps` times a second, for ever.
+    """A source that draws the test pattern `fps` times a second, for ever.
 
     Raises:
         InputError: narrower than 128 or lower than 96 pixels: the number could not be read back.
     """
     if size[0] < 128 or size[1] < 96:
         raise InputError(f"the test pattern cannot be {size[0]}x{size[1]}", "use at least 128x96")
-    colours = _draw_bars(size)
-    pictures = ((_draw(colours, number), number / fps) for number in itertools.count())
+    pictures = ((draw_pattern(size, number), number / fps) for number in itertools.count())
     return PlaybackSource(SourceInfo("pattern", "pattern", size, fps), pictures)
 
 
 def draw_pattern(size: tuple[int, int], number: int) -> DisplayImage:
     """Picture `number` of the pattern, uint8 sRGB (height, width, 3): bars that move left, over a grey ramp."""
-    return _draw(_draw_bars(size), number)
-
-
-def read_number(image: DisplayImage) -> int | None:
-    """Read the number in a picture of the pattern of any size; None if the check bits do not fit."""
-    height, width = image.shape[:2]
-    centres = (np.arange(NUMBER_CELLS) + 0.5) * width / NUMBER_CELLS
-    half = max(1, width // (NUMBER_CELLS * 4))
-    rows = image[height // (STRIP_FRACTION * 4) : max(1, 3 * height // (STRIP_FRACTION * 4))]
-    means = [rows[:, int(c) - half : int(c) + half].mean() for c in centres]
-    word = int("".join("1" if mean > 127 else "0" for mean in means), 2)
-    number, check = word >> (NUMBER_CELLS - NUMBER_BITS), word & 0xFF
-    return number if check == _check_bits(number) else None
-
-
-def _draw_bars(size: tuple[int, int]) -> DisplayImage:
-    width, height = size
-    bars = np.repeat(COLOR_BARS[np.arange(width) * len(COLOR_BARS) // width][None], height, axis=0)
-    ramp = np.linspace(0, 255, width).astype(np.uint8)
-    bars[height * 5 // 6 :] = ramp[None, :, None]
-    return bars
-
-
-def _draw(colours: DisplayImage, number: int) -> DisplayImage:
-    height, width = colours.shape[:2]
+    bars = _draw_bars(size)
+    height, width = bars.shape[:2]
     shift = number * max(1, width // 320) % width
-    image = np.concatenate([colours[:, shift:], colours[:, :shift]], axis=1)
+    image = np.concatenate([bars[:, shift:], bars[:, :shift]], axis=1)
     number %= 1 << NUMBER_BITS
     word = number << (NUMBER_CELLS - NUMBER_BITS) | _check_bits(number)
     bits = [word >> (NUMBER_CELLS - 1 - cell) & 1 for cell in range(NUMBER_CELLS)]
@@ -75,6 +52,30 @@ def _draw(colours: DisplayImage, number: int) -> DisplayImage:
     return image
 
 
+def read_number(image: DisplayImage) -> int | None:
+    """Read the number in a picture of the pattern, of any size; None if the check bits do not fit.
+
+    For whoever measures what arrives at the reading end of a virtual camera or in a recording (tests/vm).
+    """
+    height, width = image.shape[:2]
+    centers = (np.arange(NUMBER_CELLS) + 0.5) * width / NUMBER_CELLS
+    half = max(1, width // (NUMBER_CELLS * 4))
+    rows = image[height // (STRIP_FRACTION * 4) : max(1, 3 * height // (STRIP_FRACTION * 4))]
+    means = [rows[:, int(center) - half : int(center) + half].mean() for center in centers]
+    word = int("".join("1" if mean > 127 else "0" for mean in means), 2)
+    number, check = word >> (NUMBER_CELLS - NUMBER_BITS), word & 0xFF
+    return number if check == _check_bits(number) else None
+
+
+@lru_cache(maxsize=1)
+def _draw_bars(size: tuple[int, int]) -> DisplayImage:
+    width, height = size
+    bars = np.repeat(COLOR_BARS[np.arange(width) * len(COLOR_BARS) // width][None], height, axis=0)
+    ramp = np.linspace(0, 255, width).astype(np.uint8)
+    bars[height * 5 // 6 :] = ramp[None, :, None]
+    return bars
+
+
 def _check_bits(number: int) -> int:
-    # 0xA5: neither a black nor a white strip is a number.
+    # 0xA5: so neither a black nor a white strip is a number.
     return (number ^ number >> 8 ^ number >> 16) & 0xFF ^ 0xA5

@@ -1,9 +1,4 @@
-"""A source whose pictures and times are known: a file, a still, a pattern.
-
-A picture file as source: the same picture again and again.
-
-A video file as source.
-"""
+"""Sources that play pictures at given times: video files, picture files and (`pattern_source`) the test pattern."""
 
 from __future__ import annotations
 
@@ -22,17 +17,19 @@ TimedImage = tuple[DisplayImage, float]
 """A picture and its time in seconds from the first one."""
 
 MAX_LATENESS_S = 0.5
+"""A source that is later than this (the machine was suspended, or decoding is too slow) continues from now on, instead
+of playing faster to catch up."""
 
 
 class PlaybackSource(ThreadedSource):
-    """Gives each picture when it is due, counted from the first `read`; drops those that nobody came for."""
+    """Plays pictures, each at its time after the first `read`; pictures that were not read in time are dropped."""
 
     def __init__(self, info: SourceInfo, pictures: Iterator[TimedImage]) -> None:
-        """Set up; no picture is asked for before the first `read`.
+        """Set up; no picture is taken before the first `read`.
 
         Args:
-            info: what `describe` answers.
-            pictures: their times grow. The source ends after the last.
+            info: facts about the source, for `describe`.
+            pictures: pictures with growing times. The source ends after the last.
         """
         super().__init__(info)
         self._pictures = enumerate(pictures)
@@ -41,9 +38,7 @@ class PlaybackSource(ThreadedSource):
         start = time.monotonic()
         for index, (image, time_s) in self._pictures:
             late_s = time.monotonic() - (start + time_s)
-            if (
-                late_s > MAX_LATENESS_S
-            ):  # suspended, or decoding is too slow: go on from here instead of rushing through
+            if late_s > MAX_LATENESS_S:
                 start += late_s
             elif self._stopping.wait(max(0.0, -late_s)):
                 return
@@ -53,7 +48,7 @@ class PlaybackSource(ThreadedSource):
 
 
 def image_source(path: Path, fps: float) -> Source:
-    """Show a picture file `fps` times a second, for ever.
+    """A source that gives the picture of a file `fps` times a second, for ever.
 
     Raises:
         ImageError: the file is missing or is no picture.
@@ -65,10 +60,10 @@ def image_source(path: Path, fps: float) -> Source:
 
 
 def file_source(path: Path) -> Source:
-    """Play a video file in its own time, for ever.
+    """A source that plays a video file at its own speed, again and again.
 
     Raises:
-        VideoError: as `VideoReader`; what shows only later, `read` raises.
+        VideoError: as `VideoReader`; damage that is found later is raised by `read`.
     """
     info = probe_video(path)
     described = SourceInfo("file", str(path), (info.width, info.height), info.fps)
@@ -76,12 +71,12 @@ def file_source(path: Path) -> Source:
 
 
 def _loop_frames(path: Path, fps: float) -> Iterator[TimedImage]:
-    """The pictures of one round after another, their times growing throughout."""
+    """The pictures of the file, again and again, with times that grow throughout."""
     start = 0.0
     while True:
         with VideoReader(path, accurate=False) as video:
             for frame in video:
                 end = start + frame.time_s
                 yield frame.image, end
-        gc.collect()  # the reader's first picture is in a reference cycle of PyAV's, and a short clip ends often
+        gc.collect()  # PyAV keeps the reader's first picture in a reference cycle, and short clips end often
         start = end + 1 / fps

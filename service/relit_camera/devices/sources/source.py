@@ -1,7 +1,4 @@
-"""What every source is: a state machine that hands out frames.
-
-The live source: a reader thread that fills a slot.
-"""
+"""The protocol of sources and their states, and the base class of sources that read in a thread of their own."""
 
 from __future__ import annotations
 
@@ -12,26 +9,27 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from relit_camera.base.errors import IllegalTransitionError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.newest_slot import NewestSlot
 
 
 class SourceState(StrEnum):
-    """What a source is doing."""
+    """The state of a source."""
 
     IDLE = "idle"
-    """Made, but not read yet."""
+    """Created, but not read yet."""
     OPENING = "opening"
     """Opened, no frame yet."""
     RUNNING = "running"
     STALLED = "stalled"
-    """Open, but no frame came for longer than its patience."""
+    """Open, but no frame came within its timeout."""
     RECONNECTING = "reconnecting"
-    """Gone; it is looked for again and again."""
+    """The device is away, and is searched for again and again."""
     RELEASED = "released"
-    """On demand, and nobody looks: closed until somebody does (`devices.on_demand`). No single source is ever so."""
+    """Closed while nobody reads the output: only the wrapper `devices.on_demand` is ever in this state."""
     FAILED = "failed"
-    """It cannot go on: `read` raises why."""
+    """It cannot continue: `read` raises the reason."""
     ENDED = "ended"
     """It gave its last frame, or was closed."""
 
@@ -46,11 +44,7 @@ TRANSITIONS: dict[SourceState, frozenset[SourceState]] = {
     _S.FAILED: frozenset({_S.ENDED}),
     _S.ENDED: frozenset(),
 }
-"""The legal moves. Staying where one is is always legal. No source goes to RELEASED: what wraps it says so."""
-
-
-class IllegalTransitionError(RuntimeError):
-    """A source tried a move that is not in the table: a fault of ours."""
+"""The legal transitions. Staying in a state is always legal. No source goes to RELEASED itself."""
 
 
 class SourceStateMachine:
@@ -69,7 +63,7 @@ class SourceStateMachine:
         """Go to another state; with `only_from`, do nothing unless that is the present one.
 
         Raises:
-            IllegalTransitionError: the table has no such move.
+            IllegalTransitionError: the transition is not in `TRANSITIONS`.
         """
         with self._lock:
             if self._state is to or (only_from is not None and self._state is not only_from):
@@ -81,12 +75,12 @@ class SourceStateMachine:
 
 @dataclass(frozen=True)
 class SourceInfo:
-    """What a source is.
+    """Facts about a source.
 
     Attributes:
         kind: webcam, file, still or pattern.
-        id: what to give as `--source` to get it again.
-        size: width and height in pixels: real once a frame came, what was asked for until then.
+        id: the value of `--source` that opens it again.
+        size: width and height in pixels: those asked for until the first frame, then the real ones.
         fps: frames a second, likewise.
     """
 
@@ -97,32 +91,31 @@ class SourceInfo:
 
 
 class Source(Protocol):
-    """Gives frames to one reading thread. Nothing is opened before the first `read`.
+    """Gives live frames to one reading thread. Nothing is opened before the first `read`.
 
-    The newest frame is given, older ones are dropped. Indices count from 0 and grow; they have gaps where frames were
-    dropped.
+    `read` returns the newest frame; older ones are dropped. Indices count from 0, with gaps where frames were dropped.
     """
 
     def read(self, timeout_s: float) -> Frame | None:
         """Get the next frame, waiting up to `timeout_s` seconds; None if none came in time or none will come any more.
 
         Raises:
-            RelitError: the source has failed for good; again at each call. Never for a camera that is away.
+            RelitError: the source has failed for good; raised again at each call. Not for a camera that is away.
         """
         ...
 
     @property
     def state(self) -> SourceState:
-        """What the source is doing."""
+        """The state of the source."""
         ...
 
     @property
     def reason(self) -> str:
-        """One line saying why no frames come, for people; empty while they do."""
+        """One line for people saying why no frames come; empty while they do."""
         ...
 
     def describe(self) -> SourceInfo:
-        """Say what the source is."""
+        """Facts about the source."""
         ...
 
     def close(self) -> None:
@@ -136,9 +129,9 @@ JOIN_TIMEOUT_S = 2.0
 
 
 class ThreadedSource(ABC):
-    """A `Source` whose frames are made in a thread of its own, started by the first `read`.
+    """Base class of sources whose frames are produced in a thread of their own, started by the first `read`.
 
-    Subclasses write `_produce`, which calls `_publish` for every frame and returns soon after `_stopping` is set.
+    Subclasses implement `_produce`, which calls `_publish` for every frame and returns soon after `_stopping` is set.
     """
 
     def __init__(self, info: SourceInfo) -> None:
@@ -159,7 +152,7 @@ class ThreadedSource(ABC):
         """
         if self._thread is None and not self._stopping.is_set():
             self._machine.transition(SourceState.OPENING)
-            # A daemon thread: a driver that never answers must not keep the program from ending.
+            # A daemon thread: a driver that hangs must not keep the program from ending.
             self._thread = threading.Thread(target=self._run, name=f"source-{self._info.kind}", daemon=True)
             self._thread.start()
         frame = self._reader.get(timeout_s)
@@ -169,7 +162,7 @@ class ThreadedSource(ABC):
 
     @property
     def state(self) -> SourceState:
-        """What the source is doing."""
+        """The state of the source."""
         return self._machine.state
 
     @property
@@ -178,16 +171,16 @@ class ThreadedSource(ABC):
         return self._reason
 
     def describe(self) -> SourceInfo:
-        """Say what the source is."""
+        """Facts about the source."""
         return self._info
 
     def close(self) -> None:
-        """End the thread and free what it holds, within 2 s."""
+        """End the thread and free the device or file, within 2 s."""
         self._stopping.set()
         if self._thread is not None:
             self._thread.join(JOIN_TIMEOUT_S)
             if self._thread.is_alive():
-                log.warning("%s did not let go of its device within %.0f s", self._thread.name, JOIN_TIMEOUT_S)
+                log.warning("%s did not close its device within %.0f s", self._thread.name, JOIN_TIMEOUT_S)
         self._slot.close()
         self._machine.transition(SourceState.ENDED)
 
@@ -207,8 +200,8 @@ class ThreadedSource(ABC):
             return
         self._reason = ""
         self._machine.transition(SourceState.RUNNING)
-        self._slot.put(frame)  # last, so that whoever gets it finds the source running
+        self._slot.put(frame)  # last: the state is RUNNING when the frame arrives
 
     @abstractmethod
     def _produce(self) -> None:
-        """Make frames until there are no more or `_stopping` is set."""
+        """Produce frames until there are no more or `_stopping` is set."""

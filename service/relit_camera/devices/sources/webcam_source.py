@@ -1,4 +1,4 @@
-"""A webcam as source: found again by its stable id, reopened by itself after it was away."""
+"""A webcam as source: it is found by its stable id, and opened again after it was away."""
 
 from __future__ import annotations
 
@@ -17,21 +17,20 @@ from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.devices.sources.source import SourceInfo, SourceState, ThreadedSource
 from relit_camera.devices.video_devices import SYSTEM_TREE, VIRTUAL_CAMERA_LABEL, DeviceTree, find_webcam
 
-STALL_TIMEOUT_S = 2.0
-"""No frame for this long, or for four frame times, is a stall."""
+MIN_STALL_TIMEOUT_S = 2.0
 
 FIRST_FRAME_TIMEOUT_S = 5.0
 """A camera may take this long to give its first frame."""
 
 BACKOFF_S = (0.25, 0.5, 1.0, 2.0, 4.0)
-"""Pauses between attempts to open; the last one is repeated for ever."""
+"""Pauses between attempts to open the camera; the last one repeats for ever."""
 
 
 LOG_LEVEL_ERROR = 2
 
 
 class OpenCvCapture(Protocol):
-    """What is used of `cv2.VideoCapture`."""
+    """The part of `cv2.VideoCapture` that is used."""
 
     def isOpened(self) -> bool: ...  # noqa: N802, D102
     def read(self) -> tuple[bool, np.ndarray | None]: ...  # noqa: D102
@@ -39,9 +38,9 @@ class OpenCvCapture(Protocol):
 
 
 class WebcamSource(ThreadedSource):
-    """Gives the newest frame of a webcam. All of OpenCV's calls are made in the reader thread.
+    """Gives the newest frame of a webcam. OpenCV is only called in the reader thread.
 
-    A camera that goes away (unplugged, suspended, taken by another program) is looked for until it is back.
+    A camera that is away (unplugged, suspended, used by another program) is searched for until it is back.
     """
 
     def __init__(
@@ -59,12 +58,12 @@ class WebcamSource(ThreadedSource):
 
         Args:
             text: `webcam`, or an id, name or node of `find_webcam`.
-            size: width and height to ask for; the camera may give another.
+            size: width and height to ask for; the camera may choose others.
             fps: frames a second to ask for.
-            tree: where devices are looked for.
-            own_label: the virtual camera never to open.
+            tree: the folders in which devices are found.
+            own_label: label of the virtual camera that is published to, which is never opened.
             open_capture: opens (node, size, fps); OpenCV if not given.
-            stall_timeout_s: seconds without a frame that make a stall.
+            stall_timeout_s: seconds without a frame after which the source has stalled.
 
         Raises:
             DeviceError: there is no such camera now.
@@ -73,13 +72,13 @@ class WebcamSource(ThreadedSource):
         super().__init__(SourceInfo("webcam", self._webcam.id, size, fps))
         self._tree, self._own_label = tree, own_label
         self._open_capture = open_capture or open_with_opencv
-        self._stall_timeout_s = max(STALL_TIMEOUT_S, 4 / fps) if stall_timeout_s is None else stall_timeout_s
+        self._stall_timeout_s = stall_timeout(fps) if stall_timeout_s is None else stall_timeout_s
         self._last_frame_at = 0.0
         self._index = 0
 
     @property
     def state(self) -> SourceState:
-        """What the source is doing; found to be stalled when asked."""
+        """The state of the source; whether it has stalled is checked here."""
         silent_s = time.monotonic() - self._last_frame_at
         if silent_s > self._stall_timeout_s:
             self._machine.transition(SourceState.STALLED, only_from=SourceState.RUNNING)
@@ -109,14 +108,14 @@ class WebcamSource(ThreadedSource):
             return False
         try:
             return self._pump(capture, start)
-        except (RelitError, cv2.error) as error:  # what a driver gives may be no picture at all; the next may be one
+        except (RelitError, cv2.error) as error:  # the driver gave no valid picture; the next may be one
             self._reason = f"{self._webcam.name} gives what is no picture: {error}"
             return False
         finally:
             capture.release()
 
     def _open(self) -> OpenCvCapture | None:
-        """Open the camera, or give None with the reason noted. It may come back under another node."""
+        """Open the camera, which may have another node than before; None, with `reason` set, if it cannot be opened."""
         try:
             self._webcam = find_webcam(self._info.id, self._tree, self._own_label)
         except DeviceError:
@@ -160,11 +159,16 @@ class WebcamSource(ThreadedSource):
         super()._publish(frame)
 
 
+def stall_timeout(fps: float) -> float:
+    """Seconds without a frame after which a source of that rate has stalled: four intervals, but at least two."""
+    return max(MIN_STALL_TIMEOUT_S, 4 / fps)
+
+
 def open_with_opencv(node: str, size: tuple[int, int], fps: float) -> OpenCvCapture:
     """Open a device by OpenCV and ask for Motion-JPEG, this size and rate, and a queue of one."""
-    # How long V4L2 lets `read` wait, which must not hold up closing; OpenCV looks at it when it first waits.
+    # Longest wait of `read` in seconds, which must not delay closing; OpenCV reads the variable at its first wait.
     os.environ.setdefault("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1")
-    # Errors only: that a camera is busy or away we say ourselves. OpenCV 5 moved the function.
+    # Errors only: a camera that is busy or away is reported by the source itself. OpenCV 5 moved the function.
     set_log_level = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLevel
     set_log_level(LOG_LEVEL_ERROR)
     if node.isdigit():

@@ -1,0 +1,1 @@
+"""Landmark schemes, the canonical face, and measurements on landmarks."""

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.images.affine import opencv_affine
 from relit_camera.base.images.image_types import DisplayImage, Points
 
 
@@ -36,9 +37,7 @@ class Crop:
 
     def cut(self, image: DisplayImage, columns: int, rows: int) -> DisplayImage:
         """Sample the crop to (rows, columns, 3), bilinear; black beyond the picture."""
-        affine = self.picture_from_pixels(columns, rows)
-        # OpenCV counts pixel centres at integers.
-        affine[:, 2] += affine[:, :2] @ [0.5, 0.5] - 0.5
+        affine = opencv_affine(self.picture_from_pixels(columns, rows))
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         return np.asarray(cv2.warpAffine(image, affine, (columns, rows), flags=flags))
 

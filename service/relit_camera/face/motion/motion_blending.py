@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from relit_camera.base.easing import smoothstep
+
 
 @dataclass(frozen=True, eq=False)
 class RelativeMotion:
@@ -55,11 +57,6 @@ def zero_motion(count: int) -> RelativeMotion:
     return RelativeMotion(Rotation.identity(), np.zeros(3), np.zeros((count, 3)))
 
 
-def smoothstep(share: float) -> float:
-    """Ease 0..1 to 0..1 with no speed at either end."""
-    return share * share * (3 - 2 * share)
-
-
 class MotionTransition(ABC):
     """Gives its target, except for `duration_s` after the target was exchanged for another (another `key`)."""
 
@@ -77,7 +74,7 @@ class MotionTransition(ABC):
         self._key = key
         passed = (time_s - self._changed_s) / self._duration_s
         if self._kept is not None and 0 <= passed < 1:
-            target = self._blend(self._kept, target, smoothstep(passed))
+            target = self._blend(self._kept, target, float(smoothstep(passed)))
         self._output = target
         return target
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from relit_camera.base.rotations import angles_from_rotation
-from relit_camera.face.face_state import FaceState, FaceStatus, HeadPose
+from relit_camera.face.face_state import FaceState, FaceStatus
+from relit_camera.face.head_pose import HeadPose
 
 _MIN_FRAMES = 10
 _WINDOW_S = 1.0

@@ -1,0 +1,1 @@
+"""Face trackers, their networks, and recorded tracks."""

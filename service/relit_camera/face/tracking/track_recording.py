@@ -18,8 +18,8 @@ from relit_camera.base.errors import NotFoundError, TrackError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.rotations import angles_from_rotation, rotation_from_angles
 from relit_camera.base.storage import write_atomic
-from relit_camera.face.face_state import LOST, FaceState, FaceStatus, HeadPose, Tracker
-from relit_camera.face.head_pose import guess_focal
+from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
+from relit_camera.face.head_pose import HeadPose, guess_focal
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.tracking.trackers import TrackerOptions
 

@@ -1,9 +1,7 @@
-"""Trackers by name.
+"""Trackers by name, and tracking a still picture with a tracker that is made for video.
 
 A plug-in is an entry point of the group `relit_camera.trackers`: called with `TrackerOptions`, it gives a
 `face.face_state.Tracker`.
-
-Looking at a still picture with a tracker that is made for video.
 """
 
 from __future__ import annotations
@@ -11,15 +9,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from importlib.metadata import entry_points
-from typing import cast
 
-from relit_camera.base.errors import InputError, NotFoundError
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
 from relit_camera.face.face_state import FaceState, Tracker
-
-TRACKER_ENTRY_POINTS = "relit_camera.trackers"
 
 
 @dataclass(frozen=True)
@@ -46,13 +40,10 @@ class TrackerOptions:
         Raises:
             InputError: there is an argument.
         """
-        if self.argument:
-            raise InputError(f"tracker {tracker} takes no argument, and got '{self.argument}'", f"name it '{tracker}'")
+        require_no_argument("tracker", tracker, self.argument)
 
 
-def tracker_names() -> list[str]:
-    """List the names of all installed trackers, sorted."""
-    return sorted(entry_points(group=TRACKER_ENTRY_POINTS).names)
+TRACKERS: PluginGroup[Callable[[TrackerOptions], Tracker]] = PluginGroup("relit_camera.trackers", "tracker")
 
 
 def open_tracker(name: str, options: TrackerOptions | None = None) -> Tracker:
@@ -60,24 +51,21 @@ def open_tracker(name: str, options: TrackerOptions | None = None) -> Tracker:
 
     Raises:
         NotFoundError: no tracker of that name is installed.
+        ConfigError: the plug-in cannot be loaded.
         ModelError: its models are not there; `relit models pull` gets them.
         TrackError: `recorded:PATH` names no usable track file.
     """
-    plain, _, argument = name.partition(":")
-    points = entry_points(group=TRACKER_ENTRY_POINTS, name=plain)
-    if not points:
-        raise NotFoundError(f"no tracker is called '{plain}'", f"use one of {', '.join(tracker_names())}")
-    factory = cast(Callable[[TrackerOptions], Tracker], next(iter(points)).load())
+    factory, argument = TRACKERS.load(name)
     return factory(replace(options or TrackerOptions(), argument=argument))
 
 
 STILL_REPEATS = 4
-"""A tracker sees the still this many times: it settles as it would on a person sitting still."""
+"""A tracker gets a picture this many times: it settles as it would on a person who sits still."""
 
 
-def track_still(still: DisplayImage, tracker: Tracker) -> FaceState:
-    """What `tracker` says of a still picture. It forgets what it followed before, and the still afterwards."""
+def track_still(picture: DisplayImage, tracker: Tracker) -> FaceState:
+    """Track the face in a still picture (height, width, 3) uint8. The tracker is reset before and afterwards."""
     tracker.reset()
-    states = [tracker.track(Frame(still, index, time.monotonic(), index / 30)) for index in range(STILL_REPEATS)]
+    states = [tracker.track(Frame(picture, index, time.monotonic(), index / 30)) for index in range(STILL_REPEATS)]
     tracker.reset()
     return states[-1]

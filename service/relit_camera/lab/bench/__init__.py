@@ -1,1 +1,1 @@
-"""How fast this machine is: relighting (thesis, Tables 6.1 and 6.2) and each stage of the live chain."""
+"""Benchmarks: relighting (thesis, Tables 6.1 and 6.2) and each stage of the live pipeline."""

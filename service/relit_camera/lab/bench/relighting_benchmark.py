@@ -1,9 +1,4 @@
-"""Timing one function.
-
-Relighting one picture by every implementation, in one run (thesis, Table 6.1), and their agreement.
-
-What it costs to carry the data to the GPU each time (thesis, Table 6.2).
-"""
+"""Benchmarks of relighting: every implementation in one run (thesis, Table 6.1), and GPU transfers (Table 6.2)."""
 
 from __future__ import annotations
 
@@ -18,10 +13,11 @@ from threadpoolctl import threadpool_limits
 
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.relighting.dense_relighter import DenseRelighter
 from relit_camera.subject.relighting.onnx_relighter import OnnxBasisRelighter
-from relit_camera.subject.relighting.relighter import DenseRelighter, weighted_light
+from relit_camera.subject.relighting.relighter import RelighterOptions, weighted_light
 from relit_camera.subject.subject import Subject
 
 
@@ -40,7 +36,7 @@ def median_ms(call: Callable[[], object], repeats: int = 30, at_most_s: float = 
 
 
 NAIVE_LOOP_PIXELS = 600
-"""The naive loop is timed on so many pixels and scaled up."""
+"""Number of pixels that the naive loop is timed on; the time is scaled up to the picture."""
 
 
 def benchmark_relighting(subject: Subject, maps: Mapping[str, LightMap], options: SessionOptions) -> dict[str, object]:
@@ -78,7 +74,7 @@ def _benchmark_relighting(subject: Subject, maps: Mapping[str, LightMap], option
     }
     result["numpy_ms"] = median_ms(lambda: dense.relight(light_map), 20)
     result["basis_ms"] = median_ms(lambda: basis.relight(light_map), 200)
-    onnx = OnnxBasisRelighter(subject, options)
+    onnx = OnnxBasisRelighter(subject, RelighterOptions(options))
     result["onnx_ms"] = median_ms(lambda: onnx.relight(light_map), 200)
     result["onnx_provider"] = onnx.session.provider
     result["dense_mb"] = round(matrix.nbytes / 1e6, 1)

@@ -1,6 +1,6 @@
-"""What a capture found in a video against the truth of a rendered one: frames, ball, light directions, head motion.
+"""Accuracy of a capture of a rendered video: frames, ball, light directions and head motion against the truth.
 
-A capture's errors as a report for people, as text and as JSON.
+Reports are written as HTML, text and JSON.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from relit_camera.base.errors import InputError
-from relit_camera.lab.evaluate.html_report import chart, line_chart, page, paragraph, table
 from relit_camera.lab.evaluate.json_records import Record, read_json_record
+from relit_camera.lab.evaluate.rendered_truth import CaptureTruth, Vector3, read_truth
+from relit_camera.lab.evaluate.report.html_page import Block, Paragraph, render_page, table
+from relit_camera.lab.evaluate.report.plots import line_plot
 
-Vector3 = tuple[float, float, float]
 FrameClassLabel = Literal["bright", "dark", "partial", "rejected"]
 
 
@@ -42,46 +43,6 @@ class _Report(Record):
     ball: _Ball | None = None
     focal_px: float | None = None
     frames: Annotated[list[_ReportFrame], Field(min_length=1)]
-
-
-class _TrueBall(Record):
-    x_px: float
-    y_px: float
-    radius_px: float
-
-
-class _Light(Record):
-    direction: Vector3
-    at_ball: Vector3
-    at_second_ball: Vector3 | None = None
-    distance_cm: Annotated[float, Field(gt=0)]
-
-
-class _Flash(Record):
-    state: Literal["bright", "dark", "partial"]
-
-
-class _ToRest(Record):
-    rotation_deg: float
-    translation_px: tuple[float, float]
-
-
-class _Head(Record):
-    to_rest: _ToRest
-
-
-class _TrueFrame(Record):
-    index: int
-    light: _Light
-    flash: _Flash
-    head: _Head
-
-
-class _Truth(Record):
-    ball: _TrueBall
-    second_ball: _TrueBall | None = None
-    focal_px: float
-    frames: Annotated[list[_TrueFrame], Field(min_length=1)]
 
 
 @dataclass(frozen=True)
@@ -129,7 +90,7 @@ def compare_capture(report: Path, truth: Path) -> CaptureErrors:
         InputError: one is missing or in another form, or the report tells of frames that the video has not.
     """
     found = read_json_record(report, _Report, "give a report of `relit capture`")
-    known = read_json_record(truth, _Truth, "give the truth.json of a rendered capture")
+    known = read_truth(truth, CaptureTruth)
     by_index = {frame.index: frame for frame in known.frames}
     strangers = [frame.index for frame in found.frames if frame.index not in by_index]
     if strangers:
@@ -161,7 +122,7 @@ def compare_capture(report: Path, truth: Path) -> CaptureErrors:
     )
 
 
-def _is_second(found: _Report, known: _Truth) -> bool:
+def _is_second(found: _Report, known: CaptureTruth) -> bool:
     """Whether the report's ball is the truth's second one."""
     if found.ball is None or known.second_ball is None:
         return False
@@ -216,14 +177,14 @@ def capture_text(errors: CaptureErrors) -> str:
 
 def capture_page(errors: CaptureErrors, title: str) -> str:
     """The HTML document."""
-    return page(title, _capture_blocks(errors))
+    return render_page(title, _capture_blocks(errors))
 
 
-def _capture_blocks(errors: CaptureErrors) -> Iterator[str]:
-    yield paragraph(
+def _capture_blocks(errors: CaptureErrors) -> Iterator[Block]:
+    yield Paragraph(
         "A video of a person, a mirror ball and a blinking hand-held light was rendered, so that the truth of every "
-        f"frame is known. Of {errors.true_bright} frames that the flash lit wholly, {errors.used} were used "
-        f"({errors.used_share:.0%}); {errors.wrongly_bright} others were taken for bright wrongly."
+        f"frame is known. Of {errors.true_bright} frames that the flash lit completely, {errors.used} were used "
+        f"({errors.used_share:.0%}); {errors.wrongly_bright} other frames were classified as bright by mistake."
     )
     rows = []
     for name, values, unit in _error_rows(errors):
@@ -233,15 +194,19 @@ def _capture_blocks(errors: CaptureErrors) -> Iterator[str]:
     yield table(
         ["error", "mean", "RMS", "95 % below", "largest"],
         rows,
-        "Light: angle between the found and the true direction toward it. Head: what remains of its motion in the "
-        "picture after the found transform, a constant taken out. Smaller is better everywhere.",
+        "Light: angle between the found and the true direction toward it. Head: motion in the picture that remains "
+        "after the found transform, without its mean. Smaller is better everywhere.",
     )
     if np.isfinite(errors.direction_deg).any() or np.isfinite(errors.at_ball_deg).any():
         lines = {"from the head": errors.direction_deg, "from the ball": errors.at_ball_deg}
-        yield chart(
-            line_chart(errors.index, lines, "frame", "degrees"),
+        yield line_plot(
+            errors.index,
+            lines,
+            "frame",
+            "degrees",
             "Error of the light's direction in each bright frame. A constant error points to the ball or the focal "
-            "length, a slow wave to the parallax between ball and head, single peaks to frames lit in part.",
+            "length, a slow wave to the parallax between ball and head, single peaks to partly lit frames.",
+            from_zero=True,
         )
 
 

@@ -1,7 +1,4 @@
-"""Leaving captured lights out and predicting them from the others: a truth that every capture has.
-
-The leave-out protocol as a report for people, as text and as JSON.
-"""
+"""Hold-out evaluation: some captured lights are left out and predicted from the others; reports as HTML, text, JSON."""
 
 from __future__ import annotations
 
@@ -20,14 +17,18 @@ from relit_camera.capture.reflectance.sampled_region import boundary_lights
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.candidates import method_candidates
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, select_lights
-from relit_camera.lab.evaluate.field.map_pictures import heat_map_picture, labeled_grid
+from relit_camera.lab.evaluate.field.map_pictures import labeled_grid
 from relit_camera.lab.evaluate.field.relighting_metrics import Colors, compare_relit, finite_psnr
-from relit_camera.lab.evaluate.html_report import heading, page, paragraph, picture, table
+from relit_camera.lab.evaluate.report.html_page import Block, Heading, Paragraph, picture, render_page, table
+from relit_camera.lab.evaluate.report.plots import heat_maps
+
+_LARGEST_SHOWN_ERROR = 0.3
+"""End of the color scale of the error maps, as a share of white."""
 
 
 @dataclass(frozen=True)
 class HoldOutScores:
-    """How well a method predicts the lights left out: means over them.
+    """Scores of a method: means over the lights left out.
 
     Attributes:
         method: its name.
@@ -47,16 +48,16 @@ class HoldOutScores:
 
 @dataclass(frozen=True)
 class HoldOutResult:
-    """One list of lights with every so many-th interior light left out.
+    """Result for one list of lights with every N-th interior light left out.
 
     Attributes:
         name: of the list.
         every: 4 leaves out every fourth.
         lights: how many were used to begin with.
-        rejected: index and reason of pictures that no light could make; they are neither used nor asked for.
+        rejected: index and reason of unusable pictures; they are neither used nor predicted.
         left_out: (some,) indices of those left out.
         scores: best first.
-        hardest: index into `left_out` of the picture that was predicted worst, on average over the methods.
+        worst_index: index into `left_out` of the picture that was predicted worst, on average over the methods.
         truth: (height, width, 3) that picture, aligned.
         predicted: method → prediction of that picture.
     """
@@ -67,7 +68,7 @@ class HoldOutResult:
     rejected: Mapping[int, str]
     left_out: NDArray[np.intp]
     scores: Sequence[HoldOutScores]
-    hardest: int
+    worst_index: int
     truth: Colors
     predicted: dict[str, Colors]
 
@@ -85,7 +86,7 @@ def parse_hold_out(text: str) -> int:
 
 
 def interior_lights(directions: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Indices (some,) of the lights that are not on the edge of the sampled region: others surround them.
+    """Indices (some,) of the lights inside the sampled region, not on its boundary.
 
     Raises:
         LightsError: the directions (lights, 3) span no region.
@@ -100,7 +101,7 @@ def evaluate_hold_out(
     methods: Sequence[str] = (),
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> HoldOutResult:
-    """Leave out every so many-th interior light, in the list's order, and predict its picture from the rest.
+    """Leave out every N-th interior light, in the list's order, and predict its picture from the rest.
 
     The pictures that are kept are aligned with each other. Those left out are then aligned, for scoring only, as the
     kept ones were: with what a model of appearance fitted to the kept ones alone says of them; one motion and one gain
@@ -138,7 +139,9 @@ def evaluate_hold_out(
         as_it_is = _peak_255_db(as_captured.pictures_at(asked), known.colors[left_out])
         scores.append(_scores(known, candidate.name, predicted[candidate.name], truth, as_it_is))
         progress(done + 1, len(names))
-    hardest = int(np.mean([((each - truth) ** 2).mean(axis=(1, 2)) for each in predicted.values()], axis=0).argmax())
+    worst_index = int(
+        np.mean([((each - truth) ** 2).mean(axis=(1, 2)) for each in predicted.values()], axis=0).argmax()
+    )
     return HoldOutResult(
         name=name,
         every=every,
@@ -146,14 +149,14 @@ def evaluate_hold_out(
         rejected=rejected,
         left_out=left_out,
         scores=sorted(scores, key=lambda each: -each.peak_255_db),
-        hardest=hardest,
-        truth=known.picture(truth[hardest]),
-        predicted={method: known.picture(colors[hardest]) for method, colors in predicted.items()},
+        worst_index=worst_index,
+        truth=known.picture(truth[worst_index]),
+        predicted={method: known.picture(colors[worst_index]) for method, colors in predicted.items()},
     )
 
 
 def aligned_truth(kept: Samples, pictures: Colors, directions: NDArray[np.float64]) -> Colors:
-    """Pictures (some, height, width, 3) that were left out, moved and multiplied to fit the appearance of those kept.
+    """Left-out pictures (some, height, width, 3), aligned to the appearance model of the kept ones by motion and gain.
 
     A method's own prediction, or a mean of them, would favour methods that are wrong in the same way: interpolation is
     too dark between its lights, and a gain fitted to it is too small.
@@ -169,7 +172,7 @@ def aligned_truth(kept: Samples, pictures: Colors, directions: NDArray[np.float6
 
 
 def _scores(known: GroundTruth, method: str, predicted: Colors, truth: Colors, raw_peak_255_db: float) -> HoldOutScores:
-    """Of colours (some, pixels, 3) against the true ones."""
+    """Scores of predicted colors (some, pixels, 3) against the true ones."""
     relit = [compare_relit(known, seen, expected) for seen, expected in zip(predicted, truth, strict=True)]
     return HoldOutScores(
         method=method,
@@ -197,7 +200,7 @@ def holdout_json(results: Sequence[HoldOutResult]) -> dict[str, object]:
 
 
 def holdout_text(results: Sequence[HoldOutResult]) -> str:
-    """A table for each list and share left out: a row a method."""
+    """Plain-text table for each result, a row per method."""
     width = max(len(score.method) for each in results for score in each.scores)
     lines = ["PSNR in linear light, peak 255, dB: aligned (as captured)"]
     for each in results:
@@ -212,11 +215,11 @@ def holdout_text(results: Sequence[HoldOutResult]) -> str:
 
 def holdout_page(results: Sequence[HoldOutResult]) -> str:
     """The HTML document."""
-    return page("Lights left out", _blocks(results))
+    return render_page("Lights left out", _blocks(results))
 
 
-def _blocks(results: Sequence[HoldOutResult]) -> Iterator[str]:
-    yield paragraph(
+def _blocks(results: Sequence[HoldOutResult]) -> Iterator[Block]:
+    yield Paragraph(
         "Some of the captured lights are left out, and each method predicts their pictures from the others. Only "
         "lights that others surround are left out, so that nothing is asked beyond the sampled region."
     )
@@ -231,7 +234,7 @@ def _blocks(results: Sequence[HoldOutResult]) -> Iterator[str]:
         "same for all methods.",
     )
     for each in results:
-        yield heading(f"{each.name}: every {each.every} left out")
+        yield Heading(f"{each.name}: every {each.every} left out")
         yield table(
             ["method", "PSNR, dB", "as captured", "bright parts as peak", "SSIM"],
             [[s.method, s.peak_255_db, s.raw_peak_255_db, s.psnr_db, f"{s.ssim:.4f}"] for s in each.scores],
@@ -239,22 +242,27 @@ def _blocks(results: Sequence[HoldOutResult]) -> Iterator[str]:
             "of aligned pictures and of pictures as they are; PSNR with the peak at the truth's 99.5th percentile; "
             "SSIM of luma.",
         )
-        yield _hardest(each)
+        yield from _worst_prediction(each)
 
 
-def _hardest(result: HoldOutResult) -> str:
+def _worst_prediction(result: HoldOutResult) -> Iterator[Block]:
     names = [score.method for score in result.scores]
     peak = np.float32(np.percentile(result.truth, 99.5) or 1.0)
     shown = [uint8_from_linear(each / peak) for each in (result.truth, *(result.predicted[name] for name in names))]
-    errors = [np.abs(result.predicted[name] - result.truth).mean(axis=2) / peak for name in names]
-    heats = [np.zeros_like(shown[0]), *(heat_map_picture(each, 0.3) for each in errors)]
-    pairs = [np.concatenate(pair) for pair in zip(shown, heats, strict=True)]
-    return picture(
-        labeled_grid(pairs, ["truth", *names], 4, 240),
-        f"The left-out light that is predicted worst (number {result.left_out[result.hardest]} of the list, from 0), "
-        "by each method; below it the error, pale yellow where it is 30 % of white. It is largest along the edges of "
-        "shadows, which stand elsewhere in the pictures of the lights around.",
-        exact=False,
+    yield picture(
+        labeled_grid(shown, ["truth", *names], 5, 210),
+        f"The left-out light with the largest mean error (number {result.left_out[result.worst_index]} of the list, "
+        "from 0), predicted by each method.",
+        lossless=False,
+    )
+    yield heat_maps(
+        [np.abs(result.predicted[name] - result.truth).mean(axis=2) / peak for name in names],
+        names,
+        _LARGEST_SHOWN_ERROR,
+        "Error of these predictions as a share of white. It is largest along the edges of shadows, which lie elsewhere "
+        "in the pictures of the neighboring lights.",
+        columns=5,
+        color_label="error, share of white",
     )
 
 

@@ -1,5 +1,1 @@
-"""Six environments of our own, computed: nothing to download, no licence to mind.
-
-Each module paints one with `paint() -> radiance` in viewer axes (see `canvas`); `catalogue` names them and gives
-panoramas.
-"""
+"""The six built-in environments, each painted by a module's `paint() -> radiance` in viewer axes."""

@@ -1,7 +1,6 @@
 """The canvas that the built-in environments are painted on, and the strokes they share.
 
-Viewer axes: a latitude-longitude picture as somebody sees it who looks along −Z, where the background of the virtual
-camera lies. Its middle is −Z, right of it lies +X, row 0 is up. `bearing` is the angle from the middle to the right, in
+A canvas has viewer axes (`light.panorama_axes`), row 0 up. `bearing` is the angle from its middle to the right, in
 degrees; what lights the face from the front is at bearings beyond ±90.
 """
 
@@ -14,7 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.color import srgb_decode
+from relit_camera.base.easing import smoothstep
+from relit_camera.base.images.color import rgb_from_hex, srgb_decode
 from relit_camera.light.directions import direction_from_degrees
 
 HEIGHT, WIDTH = 512, 1024
@@ -38,21 +38,9 @@ def directions() -> Canvas:
     return direction_from_degrees(180 - bearing, elevation).astype(np.float32)
 
 
-def to_map_axes(canvas: Canvas) -> Canvas:
-    """A canvas as a map: mirrored, with the camera's side in the middle."""
-    return np.ascontiguousarray(np.roll(canvas[:, ::-1], WIDTH // 2, axis=1))
-
-
 def color(code: str, strength: float = 1.0) -> NDArray[np.float32]:
     """Linear RGB (3,) of a web colour such as "#ff8800", times `strength`."""
-    encoded = np.array([int(code[k : k + 2], 16) for k in (1, 3, 5)], np.float32) / 255
-    return srgb_decode(encoded) * np.float32(strength)
-
-
-def smoothstep(low: float, high: float, value: NDArray) -> Canvas:
-    """0 below `low`, 1 above `high` (or the other way round where low > high), smooth between (Hermite)."""
-    t = np.clip((value - low) / (high - low), 0, 1)
-    return np.asarray(t * t * (3 - 2 * t), np.float32)
+    return srgb_decode(np.array(rgb_from_hex(code), np.float32) / 255) * np.float32(strength)
 
 
 def color_ramp(value: NDArray, stops: Sequence[float], colours: list[NDArray[np.float32]]) -> Canvas:
@@ -87,7 +75,7 @@ def panel_mask(
     u, v, depth = np.moveaxis(directions() @ axes.T, -1, 0)
     inside = [
         smoothstep(
-            size / 2 + soft_deg, size / 2 - soft_deg, np.abs(np.degrees(np.arctan2(offset, np.maximum(depth, 1e-6))))
+            np.abs(np.degrees(np.arctan2(offset, np.maximum(depth, 1e-6)))), size / 2 + soft_deg, size / 2 - soft_deg
         )
         for offset, size in ((u, width_deg), (v, height_deg))
     ]

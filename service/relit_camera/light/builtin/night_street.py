@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.light.builtin.canvas import (
     Canvas,
     add_bokeh_disc,
@@ -17,7 +18,6 @@ from relit_camera.light.builtin.canvas import (
     fractal_noise,
     gaussian_glow,
     panel_mask,
-    smoothstep,
 )
 
 LAMP, SHOP, NEON_PINK, NEON_TEAL = "#ffb066", "#ffcf94", "#ff2f7d", "#22e0d0"
@@ -38,7 +38,7 @@ def paint() -> Canvas:
     depth = 1.6 / np.maximum(-y, 0.01)
     puddles = 0.32 + 0.2 * fractal_noise(0.35 * x * depth, 0.35 * z * depth, 51, 5) * np.exp(-depth / 40)
     mirror = np.clip(puddles, 0.06, 0.6) * (0.25 + 0.75 * (1 - np.abs(y)) ** 3)
-    return blend_over(canvas, smoothstep(0.2, -0.4, elevation), color("#0b0b10") + wet * mirror[..., None])
+    return blend_over(canvas, smoothstep(elevation, 0.2, -0.4), color("#0b0b10") + wet * mirror[..., None])
 
 
 def _houses(canvas: Canvas, bearing: Canvas, elevation: Canvas) -> Canvas:
@@ -96,4 +96,4 @@ def _shops(canvas: Canvas) -> Canvas:
         NEON_TEAL, 0.2
     )
     halo += gaussian_glow(141, 10, 9)[..., None] * color(NEON_PINK, 0.2)
-    return blend_over(canvas + halo, smoothstep(4.5, 3.0, angle_from(20, 52)), color(LAMP, 60.0))
+    return blend_over(canvas + halo, smoothstep(angle_from(20, 52), 4.5, 3.0), color(LAMP, 60.0))

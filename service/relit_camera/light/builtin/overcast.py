@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.light.builtin.canvas import (
     Canvas,
     bearings,
@@ -13,7 +14,6 @@ from relit_camera.light.builtin.canvas import (
     color_ramp,
     directions,
     fractal_noise,
-    smoothstep,
 )
 
 
@@ -23,14 +23,14 @@ def paint() -> Canvas:
     canvas = _sky(elevation)
     far = 2.6 + 1.3 * fractal_noise(bearing / 24, np.full_like(bearing, 3.0), 21, 3)
     near = 0.8 + 1.1 * fractal_noise(bearing / 13, np.full_like(bearing, 9.0), 22, 5)
-    canvas = blend_over(canvas, smoothstep(0.35, -0.35, elevation - far), color("#8fa0ab", 1.5))
-    canvas = blend_over(canvas, smoothstep(0.3, -0.3, elevation - near), color("#5f7470", 1.2))
+    canvas = blend_over(canvas, smoothstep(elevation - far, 0.35, -0.35), color("#8fa0ab", 1.5))
+    canvas = blend_over(canvas, smoothstep(elevation - near, 0.3, -0.3), color("#5f7470", 1.2))
     canvas = blend_over(
         canvas,
         _trees(bearing, elevation),
         color("#2e3d2c", 1.1) * (1 + 0.3 * fractal_noise(bearing, elevation, 24)[..., None]),
     )
-    return blend_over(canvas, smoothstep(0.1, -0.5, elevation), _meadow(elevation))
+    return blend_over(canvas, smoothstep(elevation, 0.1, -0.5), _meadow(elevation))
 
 
 def _sky(elevation: Canvas) -> Canvas:
@@ -40,7 +40,7 @@ def _sky(elevation: Canvas) -> Canvas:
     x, y, z = np.moveaxis(directions(), -1, 0)
     height = np.maximum(y, 0.02) + 0.06
     cloud = fractal_noise(0.8 * x / height, 0.8 * z / height, 20, 6)
-    shade = 1 + 0.2 * cloud * smoothstep(0, 9, elevation) * (1 - 0.3 * up)
+    shade = 1 + 0.2 * cloud * smoothstep(elevation, 0, 9) * (1 - 0.3 * up)
     return np.asarray((1.1 * (1 + 0.9 * up) * shade)[..., None] * tint, np.float32)
 
 
@@ -49,7 +49,7 @@ def _trees(bearing: Canvas, elevation: Canvas) -> Canvas:
     group = np.clip(0.5 + fractal_noise(bearing / 16, np.full_like(bearing, 1.0), 25, 2), 0, 1.4)
     crown = group * (1.6 + 1.2 * fractal_noise(bearing / 2.6, np.full_like(bearing, 5.0), 26, 4)) - 0.2
     ragged = 0.35 * fractal_noise(bearing * 1.3, elevation * 1.3, 27, 3)
-    return smoothstep(0.15, -0.15, elevation - crown - ragged)
+    return smoothstep(elevation - crown - ragged, 0.15, -0.15)
 
 
 def _meadow(elevation: Canvas) -> Canvas:

@@ -1,9 +1,10 @@
-"""A photographer's studio: a large key from the front left, a weak fill, two strips behind, a lit grey backdrop."""
+"""A photographer's studio: a large key light from the front left, a weak fill, two strips behind, lit grey paper."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.light.builtin.canvas import (
     Canvas,
     angle_from,
@@ -13,21 +14,20 @@ from relit_camera.light.builtin.canvas import (
     color_ramp,
     gaussian_glow,
     panel_mask,
-    smoothstep,
 )
 
 
 def paint() -> Canvas:
     """Radiance (512, 1024, 3) in viewer axes."""
     bearing, elevation = bearings()
-    backdrop = color_ramp(elevation, [-90, -30, -14, 10, 90], [
+    paper_roll = color_ramp(elevation, [-90, -30, -14, 10, 90], [
         color("#1a1b20"), color("#34373e"), color("#4b4f58"), color("#3a3e47"), color("#101115"),
     ])  # fmt: skip
     spot = np.exp(-0.5 * ((bearing / 17) ** 2 + ((elevation - 2) / 11) ** 2))[..., None]
-    canvas = backdrop * (0.35 + 0.65 * smoothstep(150, 40, np.abs(bearing)))[..., None] + spot * color("#a9b4c6", 1.5)
-    canvas = canvas.astype(np.float32)
+    falloff = 0.35 + 0.65 * smoothstep(np.abs(bearing), 150, 40)[..., None]
+    canvas = np.asarray(paper_roll * falloff + spot * color("#a9b4c6", 1.5), np.float32)
     # The paper sweeps from wall to floor: a soft, brighter band where it bends, a pool of light on the floor.
-    canvas += (smoothstep(-34, -20, elevation) * smoothstep(-8, -18, elevation) * smoothstep(100, 30, np.abs(bearing)))[
+    canvas += (smoothstep(elevation, -34, -20) * smoothstep(elevation, -8, -18) * smoothstep(np.abs(bearing), 100, 30))[
         ..., None
     ] * color("#5a606b", 0.2)
     canvas += gaussian_glow(0, -90, 35)[..., None] * color("#4a4d55", 0.5)

@@ -4,16 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_camera.light.builtin.canvas import (
-    Canvas,
-    blend_over,
-    blur,
-    color,
-    color_ramp,
-    directions,
-    fractal_noise,
-    smoothstep,
-)
+from relit_camera.base.easing import smoothstep
+from relit_camera.light.builtin.canvas import Canvas, blend_over, blur, color, color_ramp, directions, fractal_noise
 
 LEFT, RIGHT, BACK, FRONT, FLOOR, CEILING = -2.3, 2.9, -4.6, 3.4, -1.25, 1.75
 """Walls of the room in metres from the head, in the project's axes."""
@@ -72,7 +64,7 @@ def _surfaces(point: Canvas, wall: np.ndarray, back: np.ndarray) -> Canvas:
     x, y, z = np.moveaxis(point, -1, 0)
     paint = np.where(back[..., None], color("#c3cbc9"), color("#d9cfc1"))
     paint = paint * (1 + 0.02 * fractal_noise(3 * (x + z), 3 * y, 60, 3))[..., None]
-    paint = blend_over(paint, smoothstep(FLOOR + 0.13, FLOOR + 0.11, y), color("#e8e4dc"))
+    paint = blend_over(paint, smoothstep(y, FLOOR + 0.13, FLOOR + 0.11), color("#e8e4dc"))
     paint = _picture(paint, back, x, y)
     flat = wall == 1
     paint = np.where((flat & (y > 0))[..., None], color("#ece8e0"), paint)
@@ -80,11 +72,11 @@ def _surfaces(point: Canvas, wall: np.ndarray, back: np.ndarray) -> Canvas:
     shade = np.random.default_rng(62).uniform(-0.5, 0.5, 64)[plank % 64] + 0.35 * fractal_noise(
         14 * x, 1.2 * z + 5 * plank, 61, 4
     )
-    seam = 1 - 0.5 * smoothstep(0.44, 0.5, np.abs(x / 0.16 - plank - 0.5))
+    seam = 1 - 0.5 * smoothstep(np.abs(x / 0.16 - plank - 0.5), 0.44, 0.5).astype(np.float32)
     wood = color_ramp(shade, [-1, 0, 1], [color("#6e4a2e"), color("#94683f"), color("#b98a58")]) * seam[..., None]
     from_middle = np.hypot(x - 0.3, z + 2.4)
     rug = color("#8f4b3a") * (1 + 0.15 * np.tanh(4 * np.sin(from_middle * 14)))[..., None]
-    wood = blend_over(wood, smoothstep(1.32, 1.28, from_middle), rug)
+    wood = blend_over(wood, smoothstep(from_middle, 1.32, 1.28), rug)
     return np.where((flat & (y < 0))[..., None], wood, paint).astype(np.float32)
 
 
@@ -96,7 +88,7 @@ def _picture(paint: Canvas, back: np.ndarray, x: Canvas, y: Canvas) -> Canvas:
     ])  # fmt: skip
     for size, layer in ((1.12, color("#2b2320")), (1.04, color("#f1ede4")), (0.84, hills)):
         edge = np.maximum(np.abs(x - 1.35) - 0.55 * size, np.abs(y - 0.5) - 0.42 * size)
-        paint = blend_over(paint, back * smoothstep(_SOFT, -_SOFT, edge), layer)
+        paint = blend_over(paint, back * smoothstep(edge, _SOFT, -_SOFT), layer)
     return paint
 
 
@@ -114,10 +106,10 @@ def _window(canvas: Canvas, wall: np.ndarray, along: Canvas, up: Canvas, span: t
         color("#dcebff", 1.1),
     ])  # fmt: skip
     view = blend_over(
-        outside * np.float32(DAYLIGHT), smoothstep(0.025 + _SOFT, 0.025 - _SOFT, to_bar), color("#e9e6df", 0.45)
+        outside * np.float32(DAYLIGHT), smoothstep(to_bar, 0.025 + _SOFT, 0.025 - _SOFT), color("#e9e6df", 0.45)
     )
-    canvas = blend_over(canvas, wall * smoothstep(0.09 + _SOFT, 0.09 - _SOFT, edge), color("#f4f1ea", 0.7))
-    return blend_over(canvas, wall * smoothstep(_SOFT, -_SOFT, edge), view)
+    canvas = blend_over(canvas, wall * smoothstep(edge, 0.09 + _SOFT, 0.09 - _SOFT), color("#f4f1ea", 0.7))
+    return blend_over(canvas, wall * smoothstep(edge, _SOFT, -_SOFT), view)
 
 
 def _lamp_light(point: Canvas, wall: np.ndarray) -> Canvas:
@@ -133,11 +125,11 @@ def _lamp(canvas: Canvas) -> Canvas:
     depth = LAMP[2] / np.minimum(direction[..., 2], -1e-3)
     across, up = direction[..., 0] * depth - LAMP[0], direction[..., 1] * depth - LAMP[1]
     ahead = direction[..., 2] < -0.1
-    pole = ahead * smoothstep(0.02 + _SOFT, 0.02 - _SOFT, np.abs(across)) * (up < 0) * (up > FLOOR - LAMP[1])
+    pole = ahead * smoothstep(np.abs(across), 0.02 + _SOFT, 0.02 - _SOFT) * (up < 0) * (up > FLOOR - LAMP[1])
     canvas = blend_over(canvas, pole.astype(np.float32), color("#1e1a18"))
     half = 0.24 - 0.25 * up
     edge = np.maximum(np.abs(across) - half, np.abs(up) - 0.18)
     inner = 1.0 + 0.8 * np.exp(-((up / 0.1) ** 2) - (across / 0.15) ** 2)
     return blend_over(
-        canvas, ahead * smoothstep(_SOFT, -_SOFT, edge), (inner[..., None] * color("#ffc98a", 2.2)).astype(np.float32)
+        canvas, ahead * smoothstep(edge, _SOFT, -_SOFT), (inner[..., None] * color("#ffc98a", 2.2)).astype(np.float32)
     )

@@ -1,6 +1,4 @@
-"""The live room behind the person, out of focus.
-
-What stands behind the person.
+"""The background behind the person: a color, a picture, the environment, or the live room, blurred or as it is.
 
 Where the webcam's picture stays private (mode reenact), there is no live room: `none` is then a dark neutral, and
 `blur` blurs the environment that lights the face. Without an environment both, and `environment`, are the neutral.
@@ -24,7 +22,7 @@ from relit_camera.base.config.look import (
     NoBackground,
 )
 from relit_camera.base.easing import ease_out_cubic
-from relit_camera.base.images.color import linear_from_uint8, srgb_encode, uint8_from_linear
+from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, srgb_encode, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, Mask
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.base.images.tone_mapping import inverse_tone_curve, tone_curve
@@ -57,7 +55,7 @@ class MattedFrame:
 
 
 def blur_background(room: MattedFrame, strength: float) -> DisplayImage:
-    """The room without the person, blurred in linear light with a sigma of `strength` tenths of the height; uint8 sRGB.
+    """Blur the live room without the person in linear light, sigma `strength` tenths of the height: uint8 sRGB.
 
     Normalised convolution: the person's pixels have no weight, so nothing of them bleeds into the room around them, and
     behind them the room is continued (Knutsson and Westin 1993).
@@ -123,7 +121,7 @@ def needs_matte(background: Background, lighting: Lighting) -> bool:
 
 
 class BackgroundRenderer:
-    """Makes backgrounds of one size. A still one is made once and kept; a change is faded in. Not thread-safe."""
+    """Makes backgrounds of one size. One without live pixels is kept till it changes, and faded in. Not thread-safe."""
 
     def __init__(self, size: tuple[int, int]) -> None:
         """`size` is (width, height)."""
@@ -133,10 +131,10 @@ class BackgroundRenderer:
         self._changed_at = self._last = 0.0
         self._view: tuple[Panorama, float, float, EnvironmentView] | None = None
 
-    def still(self, request: BackgroundRequest, now: float) -> DisplayImage:
-        """The background at `now` seconds, without any live picture; uint8 sRGB of the backdrop's size.
+    def static_background(self, request: BackgroundRequest, now: float) -> DisplayImage:
+        """The background at `now` seconds, without any live pixel; uint8 sRGB of the renderer's size.
 
-        It is eased over the lighting's `transition_s` from the one before, and must not be written to.
+        It is eased over the lighting's `transition_s` from the previous one, and must not be written to.
 
         Raises:
             ValueError: `request` has an `image` background and no image.
@@ -151,10 +149,10 @@ class BackgroundRenderer:
         self._shown = crossfade(self._previous, self._goal, share)
         return self._shown
 
-    def live(self, request: BackgroundRequest, room: MattedFrame, now: float) -> DisplayImage:
-        """The background of a live picture of the backdrop's size: its room for `none` and `blur`, else as `still`.
+    def live_background(self, request: BackgroundRequest, room: MattedFrame, now: float) -> DisplayImage:
+        """The background of a live picture of the renderer's size: its room for `none` and `blur`, else a static one.
 
-        Between room and still there is a cut: no trace of the room stays where it shall not be seen.
+        Between the room and a static background there is a cut: no trace of the room stays where it shall not be seen.
         """
         match request.background:
             case NoBackground():
@@ -162,7 +160,7 @@ class BackgroundRenderer:
             case BlurBackground() as blur:
                 image = blur_background(room, blur.strength)
             case _:
-                return self.still(request, now)
+                return self.static_background(request, now)
         self._request = None
         return apply_exposure(image, request.lighting.background_gain_ev)
 
@@ -211,7 +209,7 @@ def neutral_background(size: tuple[int, int]) -> DisplayImage:
 
 def solid_color(color: str, size: tuple[int, int]) -> DisplayImage:
     """One colour, `#rrggbb` in sRGB, over `size` (width, height)."""
-    return np.full((size[1], size[0], 3), list(bytes.fromhex(color[1:])), dtype=np.uint8)
+    return np.full((size[1], size[0], 3), rgb_from_hex(color), dtype=np.uint8)
 
 
 def apply_exposure(image: DisplayImage, gain_ev: float) -> DisplayImage:
@@ -224,9 +222,9 @@ def apply_exposure(image: DisplayImage, gain_ev: float) -> DisplayImage:
     return result
 
 
-def crossfade(before: DisplayImage, after: DisplayImage, share: float) -> DisplayImage:
-    """Between two pictures: `share` of `after`."""
-    if share >= 1 or before is after:
-        return after
-    mixed: DisplayImage = cv2.addWeighted(before, 1 - share, after, share, 0)
+def crossfade(first: DisplayImage, second: DisplayImage, share: float) -> DisplayImage:
+    """Mix two uint8 pictures of one size: a `share` of the second, the rest of the first."""
+    if share >= 1 or first is second:
+        return second
+    mixed: DisplayImage = cv2.addWeighted(first, 1 - share, second, share, 0)
     return mixed

@@ -1,4 +1,4 @@
-"""The last stop before the sink: the moved picture before its background, as the display shows it."""
+"""Putting the person before the background: the finished picture, as the display shows it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from relit_camera.live.status.stage_timing import StageTimer
 
 
 class Compositor:
-    """Composes pictures of one size. Not thread-safe."""
+    """Composes pictures of one size. `composite_*` are for one thread."""
 
     def __init__(self, size: tuple[int, int], open_matte: Callable[[], Matting], timer: StageTimer) -> None:
         """`size` is (width, height); `open_matte` is called when a live person must first be parted from the room."""
@@ -31,14 +31,14 @@ class Compositor:
         self._open_matte = open_matte
         self._timer = timer
 
-    def still(self, layer: WarpedLayer, scene: Scene, now: float) -> DisplayImage:
-        """The reenacted still before its background: uint8 sRGB of the output's size. No live pixel is in it.
+    def composite_source(self, layer: WarpedLayer, scene: Scene, now: float) -> DisplayImage:
+        """The warped source image before its background: uint8 sRGB of the output's size. No live pixel is in it.
 
         `now` is the frame's time in seconds, for fading from one background to the next.
         """
         return composite_source_image(self._background_renderer, layer, scene, now)
 
-    def live(self, picture: LinearImage, frame: Frame, scene: Scene) -> DisplayImage:
+    def composite_live(self, picture: LinearImage, frame: Frame, scene: Scene) -> DisplayImage:
         """The relit live picture (output size, linear, display exposure) before its background, uint8 sRGB.
 
         Raises:
@@ -51,15 +51,19 @@ class Compositor:
             if self._matte is None:
                 self._matte = self._open_matte()
             alpha = self._matte.matte(frame)
-        background = self._background_renderer.live(_background_request(scene), MattedFrame(shown, alpha), frame.time_s)
+        background = self._background_renderer.live_background(
+            _background_request(scene), MattedFrame(shown, alpha), frame.time_s
+        )
         return over(estimate_foreground_colors(shown, alpha), alpha, np.ascontiguousarray(background))
 
 
-def composite_source_image(backdrop: BackgroundRenderer, layer: WarpedLayer, scene: Scene, now: float) -> DisplayImage:
-    """A moved still before the scene's background at `now` seconds: uint8 sRGB of the backdrop's size."""
-    background = backdrop.still(_background_request(scene), now)
+def composite_source_image(
+    background_renderer: BackgroundRenderer, layer: WarpedLayer, scene: Scene, now: float
+) -> DisplayImage:
+    """A warped source image before the scene's background at `now` seconds: uint8 sRGB of the renderer's size."""
+    background = background_renderer.static_background(_background_request(scene), now)
     return over(display_from_linear(unpremultiply(layer.picture, layer.alpha)), layer.alpha, background, layer.at)
 
 
 def _background_request(scene: Scene) -> BackgroundRequest:
-    return BackgroundRequest(scene.look.background, scene.look.lighting, scene.environment, scene.backdrop)
+    return BackgroundRequest(scene.look.background, scene.look.lighting, scene.environment, scene.background_image)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_files import read_display
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.images.resize import letterbox
 
 TITLE = "Relit Camera"
 BACKGROUND_COLOR = np.array([0.010, 0.012, 0.015], np.float32)
@@ -36,21 +37,10 @@ def placeholder(size: tuple[int, int], reason: str = "", picture: Path | None = 
     Raises:
         ImageError: the picture file cannot be read.
     """
-    return _draw(size, reason) if picture is None else _letterbox(read_display(picture), size)
-
-
-def _letterbox(image: DisplayImage, size: tuple[int, int]) -> DisplayImage:
-    width, height = size
-    scale = min(width / image.shape[1], height / image.shape[0])
-    inner_width, inner_height = max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale))
-    filter_ = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    canvas = np.empty((height, width, 3), np.uint8)
-    canvas[:] = uint8_from_linear(BACKGROUND_COLOR)
-    x, y = (width - inner_width) // 2, (height - inner_height) // 2
-    canvas[y : y + inner_height, x : x + inner_width] = cv2.resize(
-        image, (inner_width, inner_height), interpolation=filter_
-    )
-    return canvas
+    if picture is None:
+        return _draw(size, reason)
+    red, green, blue = uint8_from_linear(BACKGROUND_COLOR).tolist()
+    return letterbox(read_display(picture), size, (red, green, blue), cv2.INTER_CUBIC)
 
 
 def _draw(size: tuple[int, int], reason: str) -> DisplayImage:

@@ -1,1 +1,1 @@
-"""Face motion → moved picture: reenactors behind one interface."""
+"""Reenactors: moving the source image as the live face moves."""

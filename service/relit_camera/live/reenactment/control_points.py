@@ -1,4 +1,4 @@
-"""The points that carry the motion: chosen landmarks, and anchors for what has none (skull, hair, neck, shoulders)."""
+"""Control points, which carry the motion: chosen landmarks, and anchors on skull, hair, neck and shoulders."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import Indices, LandmarkScheme
 from relit_camera.live.reenactment.dense_motion import Influence, Region, region_around
 from relit_camera.live.reenactment.source_image import SourceFace
@@ -33,7 +32,8 @@ SHOULDER_ANCHORS_CM = np.array([(x, y) for y in (-7.5, -12.0) for x in (-16.0, -
 """Points of neck and shoulders (cm from the pivot, picture plane) that stay where they are while the head turns."""
 CROWN_OFFSET_CM = 6.0
 SLIT_OFFSET = 3.0
-"""Radii by which the influence of closed lids and lips is centred off their slit: they hand over within r / 3."""
+"""Distance from the slit, in radii, at which the influence of closed lids and lips is centred: one side's influence
+gives way to the other's within a third of the radius."""
 FEATURE_REACH = 0.6
 """Radius of landmarks inside the outline by the distance of their neighbours: with 1 the nose, nearer to the camera
 than all round it, falls 15 % short when the head turns. Of outline and anchors it is 1, or the hairline tears."""
@@ -44,15 +44,15 @@ FINE_GRID = (30, 38)
 
 @dataclass(frozen=True)
 class ControlPoints:
-    """Where the control points lie in the still, and how far each one reaches.
+    """Where the control points lie in the source image, and how far each one reaches.
 
     Attributes:
         chosen: indices of the landmarks among them, (landmarks,) int.
-        source: (count, 2) float64 still pixels: chosen landmarks, then anchors.
-        radius: (count,) float64 still pixels.
+        source: (count, 2) float64 source pixels: chosen landmarks, then anchors.
+        radius: (count,) float64 source pixels.
         pairs: (count, 2) int control points of upper and lower lids and inner lips that lie over each other.
         irises: control points of each iris, with its eye's pairs as rows of `pairs`.
-        unit: the eye distance in still pixels.
+        unit: the eye distance in source pixels.
     """
 
     chosen: NDArray[np.intp]
@@ -88,7 +88,7 @@ class ControlPoints:
 
 
 def control_points(face: SourceFace, anchors: NDArray[np.float64]) -> ControlPoints:
-    """The control points of a still: chosen landmarks and `anchors` (count, 2), for what has no landmarks."""
+    """The control points of a source image: chosen landmarks and `anchors` (count, 2), for what has no landmarks."""
     scheme = face.scheme
     chosen = select_landmarks(scheme, face.landmarks.astype(np.float64))
     source = np.vstack([face.landmarks[chosen], anchors]).astype(np.float64)
@@ -116,8 +116,8 @@ def fine_regions(face: SourceFace, target: NDArray[np.float64]) -> list[Region]:
     """Where the flow needs a fine grid: round both eyes and the mouth.
 
     Args:
-        face: the still's face.
-        target: (count, 2) moved landmarks in still pixels.
+        face: the source image's face.
+        target: (count, 2) moved landmarks in source pixels.
     """
     scheme, span = face.scheme, face.scheme.eye_span(face.landmarks)
     return [region_around(target[list(group)], 0.12 * span, *FINE_GRID) for group in feature_landmarks(scheme)]
@@ -157,7 +157,7 @@ def skull_outline(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
     The outline of a round head does not turn with it: it follows the skull's centre, its size and its roll only.
     """
     centre, above = project(np.stack([SKULL_CENTER, SKULL_CENTER + [0, CROWN_OFFSET_CM, 0]]), pose, size)
-    depth = -(pose.rotation.apply(SKULL_CENTER) + pose.translation)[2]
+    depth = pose.depth_of(SKULL_CENTER)
     up = (above - centre) / max(float(np.linalg.norm(above - centre)), 1e-6)
     right = np.array([-up[1], up[0]])
     # From one temple over the crown to the other: below are face and neck.
@@ -169,5 +169,5 @@ def skull_outline(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
 def shoulder_anchors(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
     """Points (count, 2) of neck and shoulders in the picture, below the neck's pivot."""
     pivot = project(NECK_PIVOT[None], pose, size)[0]
-    depth = -(pose.rotation.apply(NECK_PIVOT) + pose.translation)[2]
+    depth = pose.depth_of(NECK_PIVOT)
     return np.asarray(pivot + SHOULDER_ANCHORS_CM * [1, -1] * (pose.focal_px / max(depth, 1.0)))

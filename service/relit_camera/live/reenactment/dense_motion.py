@@ -1,4 +1,4 @@
-"""Control points before and after → dense flow, through the first-order motion graph (models/first_order_motion)."""
+"""Dense flow from the motion of control points, by the first-order motion graph (models/first_order_motion)."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from relit_camera.live.reenactment.warp import FlowPatch
 
 @dataclass(frozen=True)
 class Influence:
-    """How control points act.
+    """Where control points go, and how far around them they move the picture.
 
     Attributes:
-        target: (count, 2) float64 still pixels, where each must lie.
-        centre: (count, 2) float64 still pixels, the middle of its Gaussian.
+        target: (count, 2) float64 source pixels, where each must lie.
+        centre: (count, 2) float64 source pixels, the middle of its Gaussian.
         strength: (count,) float64, its weight there; 0 is no influence.
     """
 
@@ -30,10 +30,10 @@ class Influence:
 
 @dataclass(frozen=True)
 class Region:
-    """Part of the still where flow is wanted.
+    """Part of the source image where flow is wanted.
 
     Attributes:
-        box: (4,) float64 left, top, right, bottom in still pixels.
+        box: (4,) float64 left, top, right, bottom in source pixels.
         rows, columns: of its grid.
     """
 
@@ -43,7 +43,7 @@ class Region:
 
     @property
     def grid(self) -> NDArray[np.float64]:
-        """Grid positions (rows · columns, 2) in still pixels, the corners at the box's."""
+        """Grid positions (rows · columns, 2) in source pixels, the corners at the box's."""
         x = np.linspace(self.box[0], self.box[2], self.columns)
         y = np.linspace(self.box[1], self.box[3], self.rows)
         return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
@@ -55,7 +55,7 @@ def region_around(points: NDArray[np.float64], margin: float, rows: int, columns
 
 
 class DenseMotion:
-    """Runs the packaged graph."""
+    """Runs the first-order motion graph that the package contains."""
 
     def __init__(self, options: SessionOptions) -> None:
         graph = files("relit_camera.live.reenactment").joinpath("first_order_motion.onnx").read_bytes()
@@ -72,10 +72,10 @@ class DenseMotion:
         """The flow that brings `source` to the influence's target, on the grid of each region.
 
         Args:
-            source: (count, 2) still pixels.
+            source: (count, 2) source pixels.
             influence: where they must go, and how they act there.
-            radius: (count,) reach of each point in still pixels.
-            unit: still pixels that the graph counts as 1; the eye distance.
+            radius: (count,) reach of each point in source pixels.
+            unit: source pixels that the graph counts as 1; the eye distance.
             regions: where flow is wanted.
         """
         middle = influence.target.mean(axis=0)

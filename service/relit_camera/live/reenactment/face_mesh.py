@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from relit_camera.face.face_state import HeadPose
+from relit_camera.base.easing import smoothstep
+from relit_camera.face.head_pose import HeadPose
 from relit_camera.live.reenactment.dense_motion import Region, region_around
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.warp import FlowPatch
@@ -22,23 +23,23 @@ GRID_SHAPE = (160, 160)
 MARGIN = 0.1
 """Eye distances round the face that the grid takes in."""
 OUTLINE_BLEND = 0.2
-"""Eye distances inside the face's outline in the still, over which the mesh hands over to the flow round it."""
+"""Eye distances inside the face's outline, over which the mesh's flow gives way to the flow around the face."""
 FEATURE_REACH = 0.1
-"""Eye distances round lids and lips: what lies farther off by that and as much again is not theirs."""
+"""Eye distances round lids and lips: their own flow fades out between this and twice this distance."""
 EXTRAPOLATION_LIMIT = 0.25
-"""Share of a triangle by which points outside may look beyond its own part of the still."""
+"""Share of a triangle by which points outside may look beyond its own part of the source image."""
 SUBPIXEL_BITS = 4
 
 
 @dataclass(frozen=True)
 class FaceMesh:
-    """The landmarks of a still, triangulated.
+    """The landmarks of a source image's face, triangulated.
 
     Attributes:
-        face: the still's.
+        face: that face.
         members: (points,) the landmarks that are corners: all but the irises, which roll behind the lids.
         triangles: (count, 3) rows of `members`.
-        clockwise: (count,) the sign of each triangle's area in the still.
+        clockwise: (count,) the sign of each triangle's area in the source image.
         trust: (points,) 0 at the outline of them all, rising to 1 inside: how far the mesh counts beside the flow
             round it.
     """
@@ -54,7 +55,7 @@ class FaceMesh:
 
         Args:
             head: the flow of the whole head.
-            landmarks: (count, 2) where all landmarks go, still pixels.
+            landmarks: (count, 2) where all landmarks go, source pixels.
             pose: of the head that goes there: it says which of two parts is nearer.
         """
         target, source = landmarks[self.members], self.face.landmarks[self.members].astype(np.float64)
@@ -79,7 +80,7 @@ class FaceMesh:
         Args:
             patch: the flow of an eye or the mouth.
             mesh: what `surface_flow` has given.
-            feature: (count, 2) its landmarks in the still.
+            feature: (count, 2) its landmarks in the source image.
         """
         rows, columns = patch.flow.shape[:2]
         grid = Region(patch.region, rows, columns).grid.reshape(rows, columns, 2)
@@ -106,15 +107,14 @@ class FaceMesh:
 
 
 def triangulate_face(face: SourceFace) -> FaceMesh:
-    """The mesh of a still's face."""
+    """The mesh of a source image's face."""
     irises = {*face.scheme.right_eye.iris, *face.scheme.left_eye.iris}
     members = np.array([index for index in range(face.scheme.count) if index not in irises], dtype=np.intp)
     corners = face.landmarks[members].astype(np.float64)
     delaunay = Delaunay(corners)
     triangles = np.asarray(delaunay.simplices, dtype=np.intp)
     outline = np.array([corners[row] for row in delaunay.convex_hull])
-    share = np.clip(_distance(corners, outline) / (OUTLINE_BLEND * face.scheme.eye_span(face.landmarks)), 0, 1)
-    trust = share * share * (3 - 2 * share)
+    trust = smoothstep(_distance(corners, outline), 0, OUTLINE_BLEND * face.scheme.eye_span(face.landmarks))
     return FaceMesh(face, members, triangles, np.sign(_doubled_areas(corners[triangles])), trust)
 
 
@@ -152,7 +152,7 @@ def _barycentric(points: NDArray[np.float64], corners: NDArray[np.float64]) -> N
 
 
 def _resampled(patch: FlowPatch, points: NDArray[np.float64]) -> NDArray[np.float32]:
-    """A patch's flow at points (rows, columns, 2) in still pixels, bilinear; 0 beyond it."""
+    """A patch's flow at points (rows, columns, 2) in source pixels, bilinear; 0 beyond it."""
     rows, columns = patch.flow.shape[:2]
     spacing = (patch.region[2:] - patch.region[:2]) / [columns - 1, rows - 1]
     positions = ((points - patch.region[:2]) / spacing).astype(np.float32)

@@ -1,7 +1,7 @@
-"""First-order motion of the relit still (thesis 6.3): the default reenactor.
+"""Reenactor `first-order`, the default: first-order motion of the relit source image (thesis 6.3).
 
-The still's landmarks are moved as the driver's moved since neutral, a dense flow is mixed from local affine maps round
-them, and the relit picture is warped at full output resolution.
+The source image's landmarks are moved as the driver's moved since neutral, a dense flow is mixed from local affine maps
+round them, and the relit picture is warped at full output resolution.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import Frame, LinearImage
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.head_pose import HeadPose
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import (
     COARSE_GRID,
     ControlPoints,
@@ -36,24 +37,25 @@ from relit_camera.live.reenactment.warp import (
 )
 
 BORDER_FADE = 0.08
-"""Share of the still's shorter side over which a face that is cut off by the border comes to rest there."""
+"""Share of the source image's shorter side over which the flow of a face that is cut off by the border fades to 0."""
 
 
 class FirstOrderReenactor:
     """See `Reenactor`."""
 
-    def __init__(self, stage: ReenactorContext) -> None:
-        self._face = stage.face
-        self._size = stage.size
-        self._person = Cutout(stage.subject)
+    def __init__(self, context: ReenactorContext) -> None:
+        context.require_no_argument("first-order")
+        self._face = context.face
+        self._size = context.size
+        self._person = Cutout(context.subject)
         anchors = (
-            head_and_shoulder_anchors(stage.face.pose, stage.face.size) if self._person.whole else np.zeros((0, 2))
+            head_and_shoulder_anchors(context.face.pose, context.face.size) if self._person.whole else np.zeros((0, 2))
         )
-        self._points = control_points(stage.face, anchors)
-        self._mesh = triangulate_face(stage.face)
-        self._motion = DenseMotion(stage.options)
-        self._mouth = MouthInterior(stage.face, stage.subject.neutral)
-        self._placed = source_from_output(stage.subject.size, stage.size)
+        self._points = control_points(context.face, anchors)
+        self._mesh = triangulate_face(context.face)
+        self._motion = DenseMotion(context.session)
+        self._mouth = MouthInterior(context.face, context.subject.neutral)
+        self._placed = source_from_output(context.subject.size, context.size)
 
     def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
         """See `Reenactor.plan_warp`."""
@@ -87,14 +89,14 @@ def face_and_head_flow(
     pose: HeadPose,
     fine: bool = True,
 ) -> tuple[FlowPatch, ...]:
-    """The flow that brings the still's control points to `target`: over the head, the face, then eyes and mouth.
+    """The flow that brings the source image's control points to `target`: over the head, the face, then eyes and mouth.
 
     Args:
         motion: the graph.
-        mesh: of the still's face.
+        mesh: of the source image's face.
         points: its control points.
-        target: (count, 2) where they must go, still pixels.
-        landmarks: (count, 2) where all landmarks go, still pixels.
+        target: (count, 2) where they must go, source pixels.
+        landmarks: (count, 2) where all landmarks go, source pixels.
         pose: of the head that goes there.
         fine: eyes and mouth too: they open and close, as the mesh's seams cannot.
     """
@@ -107,18 +109,18 @@ def face_and_head_flow(
     whole, *features = motion.flow(points.source, influence, points.radius, points.unit, regions)
     surface_flow = mesh.surface_flow(whole, landmarks, pose)
     groups = feature_landmarks(face.scheme) if fine else ()
-    still = face.landmarks.astype(np.float64)
+    source = face.landmarks.astype(np.float64)
     return (
         whole,
         surface_flow,
-        *(mesh.occlude_feature(p, surface_flow, still[list(g)]) for p, g in zip(features, groups, strict=True)),
+        *(mesh.occlude_feature(p, surface_flow, source[list(g)]) for p, g in zip(features, groups, strict=True)),
     )
 
 
 def fade_flow_at_border(patch: FlowPatch, size: tuple[int, int]) -> FlowPatch:
-    """The flow, faded to 0 toward the border of a still of `size` (width, height), which must not move into view."""
+    """The flow, faded to 0 at the border of a source image of `size` (width, height), which must not come into view."""
     rows, columns = patch.flow.shape[:2]
     x, y = (np.linspace(patch.region[i], patch.region[i + 2], n) for i, n in ((0, columns), (1, rows)))
     inward = np.minimum.outer(np.minimum(y, size[1] - y), np.minimum(x, size[0] - x))
-    share = np.clip(inward / (BORDER_FADE * min(size)), 0, 1)
-    return FlowPatch(patch.flow * (share * share * (3 - 2 * share)).astype(np.float32)[..., None], patch.region)
+    fade = smoothstep(inward, 0, BORDER_FADE * min(size)).astype(np.float32)
+    return FlowPatch(patch.flow * fade[..., None], patch.region)

@@ -1,4 +1,4 @@
-"""Driving motion → the still's own head: which pose and expression, and where its points then lie (relative motion)."""
+"""Motion transfer: the pose, expression and points that the driver's motion gives to the source image's head."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import project
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.head_pose import HeadPose, project
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import NECK_PIVOT, ControlPoints, rigid_head_anchors, shoulder_anchors
 from relit_camera.live.reenactment.source_image import SourceFace
 
@@ -25,15 +24,15 @@ SCALE_RANGE = (0.85, 1.3)
 
 @dataclass(frozen=True)
 class TransferredPose:
-    """Where the still's points must go.
+    """Where the source image's points must go.
 
     Attributes:
-        points: (control points, 2) float64 still pixels, the head turned on a neck that stays.
-        landmarks: (count, 2) float64 still pixels: every landmark, likewise.
+        points: (control points, 2) float64 source pixels, the head turned on a neck that stays.
+        landmarks: (count, 2) float64 source pixels: every landmark, likewise.
         pose: of that head.
-        shift: (2,) float64 still pixels by which the whole person then moves.
+        shift: (2,) float64 source pixels by which the whole person then moves.
         scale: by which the whole person grows about the neck.
-        pivot: (2,) float64 still pixels: the neck.
+        pivot: (2,) float64 source pixels: the neck.
     """
 
     points: NDArray[np.float64]
@@ -64,14 +63,14 @@ def split_body_motion(face: SourceFace, motion: FaceMotion) -> BodyMotion:
     still = face.pose
     turned = rotate_about(NECK_PIVOT, still, soft_limit_rotation(motion.rotation, MAX_ROTATION_DEG))
     body = still.translation + motion.translation - turned.translation
-    depth = -(still.rotation.apply(NECK_PIVOT) + still.translation)[2]
+    depth = still.depth_of(NECK_PIVOT)
     scale = float(np.clip(depth / max(depth - body[2], 1.0), *SCALE_RANGE))
     shift = np.clip(body[:2], -MAX_SHIFT_CM, MAX_SHIFT_CM) * [1, -1] * still.focal_px / depth
     return BodyMotion(turned, shift, scale, project(NECK_PIVOT[None], still, face.size)[0])
 
 
 def transfer_motion(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> TransferredPose:
-    """Move the head of a still that shows the person whole, as the driver's head moved since neutral.
+    """Move the head of a source image that shows the person whole, as the driver's head moved since neutral.
 
     The rotation and the expression (head-space displacements in cm of the same canonical face) are taken over as they
     are; see `split_body_motion` for the head's displacement.
@@ -84,7 +83,7 @@ def transfer_motion(face: SourceFace, points: ControlPoints, motion: FaceMotion)
 
 
 def transfer_motion_in_place(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> TransferredPose:
-    """Move the face of a still that is cut off by its picture's border: it turns in its place, and less far.
+    """Move the face of a source image that is cut off by its picture's border: it turns in its place, and less far.
 
     Nothing beyond the border was captured, so turns are bent softly to what fits inside.
     """
@@ -94,7 +93,7 @@ def transfer_motion_in_place(face: SourceFace, points: ControlPoints, motion: Fa
 
 
 def soft_limit_rotation(turn: Rotation, limit_deg: float) -> Rotation:
-    """The turn, bent softly so that it never exceeds the limit: beyond it the still has nothing to show."""
+    """The turn, bent softly so that it never exceeds the limit: beyond it the source image shows nothing."""
     vector, limit = turn.as_rotvec(), np.radians(limit_deg)
     angle = float(np.linalg.norm(vector))
     return Rotation.from_rotvec(vector * (limit * np.tanh(angle / limit) / angle if angle > 0 else 1.0))

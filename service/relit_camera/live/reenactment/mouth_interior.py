@@ -1,7 +1,7 @@
-"""The inside of a mouth that the still has closed: a dark cavity and the upper teeth, lit as the lips are.
+"""Drawing the inside of a mouth that the source image has closed: a dark cavity and the upper teeth.
 
-A warp can only stretch the line between closed lips. What lies behind it was never captured, so it is drawn: plainly,
-in the relit colours, and only as far as the lips part more than in the still.
+A warp can only stretch the line between closed lips. What lies behind it was never captured, so it is drawn, lit as the
+lips are, and only as far as the lips part more than in the source image.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
-from relit_camera.face.face_state import HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.live.reenactment.source_image import SourceFace
 
 CAVITY = np.array([0.035, 0.014, 0.012], dtype=np.float32)
-"""The cavity, in the exposure of the still: dark, and red rather than black."""
+"""The cavity, in the exposure of the source image: dark, and red rather than black."""
 TEETH = np.array([0.52, 0.48, 0.41], dtype=np.float32)
 """Teeth lie in the lips' shade, so they read well below white."""
 TOOTH_EDGES_CM = np.array([0.0, 0.85, 1.5, 2.25, 2.95])
@@ -34,10 +33,10 @@ SUBPIXEL_BITS = 4
 
 
 class MouthInterior:
-    """Draws the inside of one still's mouth."""
+    """Draws the inside of the mouth of one source image."""
 
     def __init__(self, face: SourceFace, neutral: DisplayImage) -> None:
-        """`neutral` is the still, uint8 sRGB, softly lit from the front: what the lips look like in white light."""
+        """`neutral` is the source image, uint8 sRGB, softly lit from the front: the lips' look in white light."""
         scheme = face.scheme
         self._face = face
         self._upper, self._lower = list(scheme.upper_lip_inner), list(scheme.lower_lip_inner)
@@ -60,10 +59,10 @@ class MouthInterior:
         Args:
             picture: (height, width, 3) premultiplied output picture.
             alpha: (height, width) its alpha.
-            relit: the relit still, for the light at the lips.
-            landmarks: (count, 2) moved landmarks in still pixels.
-            pose: the moved head's pose in the still's camera.
-            to_output: (2, 3) still pixels → pixels of `picture`.
+            relit: the relit source image, for the light at the lips.
+            landmarks: (count, 2) moved landmarks in source pixels.
+            pose: the moved head's pose in the source image's camera.
+            to_output: (2, 3) source pixels → pixels of `picture`.
         """
         shown = float(np.clip((self._gap(landmarks) - self._source_gap) / FULL_OPENING, 0, 1))
         if shown == 0:

@@ -1,21 +1,21 @@
-"""The seam between a relit still and a living picture."""
+"""Reenactors: what one is (face motion → warped source image), and how one is opened by name.
+
+A plug-in is an entry point of the group `relit_camera.reenactors`: called with a `ReenactorContext`, it gives a
+`Reenactor`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from importlib.metadata import entry_points
+from dataclasses import dataclass, replace
 from typing import Protocol
 
-from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.source_image import SourceFace
-from relit_camera.subject.relighting.relighter import Relighter
 from relit_camera.subject.subject import Subject
-
-ENTRY_POINT_GROUP = "relit_camera.reenactors"
 
 
 @dataclass(frozen=True)
@@ -24,22 +24,30 @@ class ReenactorContext:
 
     Attributes:
         subject: the person.
-        relighter: of the same subject; a reenactor may relight under other lights than the scene's.
-        face: the face in the subject's still, in the tracker's landmark scheme.
+        face: the face in the subject's source image, in the tracker's landmark scheme.
         size: (width, height) of the pictures to make.
-        options: how ONNX Runtime runs.
+        session: how to run networks.
+        argument: what follows the colon in `NAME:ARGUMENT`.
     """
 
     subject: Subject
-    relighter: Relighter
     face: SourceFace
     size: tuple[int, int]
-    options: SessionOptions
+    session: SessionOptions
+    argument: str = ""
+
+    def require_no_argument(self, reenactor: str) -> None:
+        """For reenactors that take none.
+
+        Raises:
+            InputError: there is an argument.
+        """
+        require_no_argument("reenactor", reenactor, self.argument)
 
 
 @dataclass(frozen=True)
 class WarpedLayer:
-    """A moved picture: the part of the output that it covers.
+    """A warped picture, as large as the part of the output that it covers.
 
     Attributes:
         picture: (height, width, 3) float32 linear, premultiplied with `alpha`, in display exposure.
@@ -53,30 +61,36 @@ class WarpedLayer:
 
 
 WarpTask = Callable[[LinearImage], WarpedLayer]
-"""Moves a relit picture (subject's size, linear, display exposure). Called at most once, maybe in another thread while
-the next frame is followed: it shares nothing with that which changes."""
+"""Warps a relit picture (the subject's size, linear, display exposure), which it must not write to. Called at most
+once, maybe in another thread while the next frame's warp is planned: it shares nothing with `plan_warp` that changes.
+"""
 
 
 class Reenactor(Protocol):
-    """Moves a relit still as the live face moves. Keeps state between frames; not thread-safe."""
+    """Moves the relit source image as the live face moves. Keeps state between frames; not thread-safe."""
 
     def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
-        """Find out how the still must move as `motion` says.
+        """Find out how the source image must be warped to move as `motion` says.
 
-        All that can be done without the relit picture belongs here: it runs while that is being made. `frame` is the
-        live picture, for reenactors that build on it.
+        What needs no relit picture is done here, what needs one in the task.
+
+        Args:
+            motion: of the live face since its neutral pose and expression.
+            frame: the live frame, for networks that look at it.
         """
         ...
 
 
-def open_reenactor(name: str, stage: ReenactorContext) -> Reenactor:
-    """A reenactor of that name.
+REENACTORS: PluginGroup[Callable[[ReenactorContext], Reenactor]] = PluginGroup("relit_camera.reenactors", "reenactor")
+
+
+def open_reenactor(name: str, context: ReenactorContext) -> Reenactor:
+    """Open the reenactor `NAME` or `NAME:ARGUMENT`.
 
     Raises:
         NotFoundError: none of that name is installed.
+        ConfigError: the plug-in cannot be loaded.
+        ModelError: `onnx:FILE` names no network that keeps the contract (docs/reenactors.md).
     """
-    for point in entry_points(group=ENTRY_POINT_GROUP, name=name):
-        reenactor: Reenactor = point.load()(stage)
-        return reenactor
-    known = ", ".join(sorted(point.name for point in entry_points(group=ENTRY_POINT_GROUP)))
-    raise NotFoundError(f"no reenactor '{name}'", f"there are: {known}")
+    factory, argument = REENACTORS.load(name)
+    return factory(replace(context, argument=argument))

@@ -1,6 +1,7 @@
-"""The face in the subject's still: where its landmarks are and how the head stands.
+"""The source image, the subject's captured picture: the face in it, and the person cut out of it.
 
-The person in the still, cut out: the matte, its edges, and warping picture and matte together.
+Of the face the landmarks and the head's pose are found; of the person the matte, whose edges are feathered and which is
+warped together with the picture.
 """
 
 from __future__ import annotations
@@ -11,29 +12,31 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import LinearImage, Mask, Points
-from relit_camera.face.face_state import HeadPose, Tracker
-from relit_camera.face.head_pose import fit_pose, unproject
+from relit_camera.face.face_state import Tracker
+from relit_camera.face.head_pose import HeadPose, fit_pose, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
+from relit_camera.face.tracking.track_recording import RecordedTracker
 from relit_camera.face.tracking.trackers import open_tracker, track_still
 from relit_camera.live.reenactment.warp import Box, Warp, sample_bilinear
 from relit_camera.subject.subject import Subject
 
 SCHEME_TRACKERS = {"mesh478": "mesh", "openseeface66": "openseeface"}
-"""Who finds the landmarks of a scheme in a picture."""
+"""Name of the tracker that finds the landmarks of a scheme in a picture."""
 
 
 @dataclass(frozen=True)
 class SourceFace:
-    """The still's face.
+    """The face in the source image.
 
     Attributes:
         scheme: the landmark scheme.
-        landmarks: (count, 2) float32 pixels of the still.
-        pose: of the head in the still, relative to the camera.
+        landmarks: (count, 2) float32 pixels of the source image.
+        pose: of the head in the source image, relative to the camera.
         head_points: (count, 3) float64 centimetres: the landmarks in head axes.
-        size: (width, height) of the still.
+        size: (width, height) of the source image.
     """
 
     scheme: LandmarkScheme
@@ -44,26 +47,26 @@ class SourceFace:
 
 
 def find_source_face(subject: Subject, tracker: Tracker) -> SourceFace:
-    """Find the face in the subject's still: as `tracker` sees it, where it is to be compared with what it sees live.
+    """Find the face in the subject's source image, with the tracker that also finds the live face.
 
-    Where it is a recording, or finds none, the landmarks stored with the subject count: models and people who mark
-    faces do not mean quite the same points.
+    Models, and people who mark faces, do not mean quite the same points, so both should come from one. Where `tracker`
+    is a recording, or finds no face, the landmarks stored with the subject are taken.
 
     Raises:
         SubjectError: the subject keeps no landmarks of the tracker's scheme and the tracker finds no face in it.
         ModelError: a recorded track is played back, the subject keeps no landmarks, and the models are missing.
     """
     scheme = landmark_scheme(tracker.scheme)
-    recorded = tracker.name == "recorded"
+    recorded = isinstance(tracker, RecordedTracker)
     landmarks = None if recorded else _tracked_landmarks(subject, tracker)
     if landmarks is None:
         landmarks = subject.landmarks.get(scheme.name)
     if landmarks is None and recorded:
-        # A recording has not seen the still; the tracker that gives such landmarks finds them.
+        # A recording has not seen the source image; the tracker that gives such landmarks finds them.
         landmarks = _tracked_landmarks(subject, open_tracker(SCHEME_TRACKERS[scheme.name]))
     if landmarks is None:
         raise SubjectError(
-            f"tracker '{tracker.name}' finds no face in the subject's still",
+            f"tracker '{tracker.name}' finds no face in the subject's source image",
             "choose a subject whose face looks into the camera, or another tracker",
         )
     if len(landmarks) != scheme.count:
@@ -83,17 +86,17 @@ def _tracked_landmarks(subject: Subject, tracker: Tracker) -> Points | None:
 
 
 UPSAMPLING = 2
-"""The still is enlarged by bicubic interpolation before the bilinear warp: as sharp as a bicubic one, and quicker."""
+"""Factor of a bicubic enlargement before the bilinear warp: as sharp as a bicubic warp, and quicker."""
 FEATHER_WIDTH = 0.06
-"""Share of the still's width over which a person who is cut off by its side fades out."""
+"""Share of the source image's width over which a person who is cut off by its side fades out."""
 
 
 class Cutout:
-    """One subject's person.
+    """The person of one subject, cut out of the source image.
 
     Attributes:
-        alpha: (height, width) float32 straight alpha of the still, faded out at the sides and the top.
-        whole: whether there is background beside the head; else the picture's border cuts the face off.
+        alpha: (height, width) float32 straight alpha of the source image, faded out at the sides and the top.
+        whole: see `shows_whole_head`.
     """
 
     def __init__(self, subject: Subject) -> None:
@@ -109,7 +112,7 @@ class Cutout:
         return warp.map(box, UPSAMPLING)
 
     def sampled(self, relit: LinearImage, positions: NDArray[np.float32]) -> tuple[LinearImage, Mask]:
-        """The relit still (height, width, 3) at `positions`: premultiplied, and alpha."""
+        """The relit source image (height, width, 3) at `positions`: premultiplied, and alpha."""
         # Colours and alpha go apart through the same positions: taking four channels apart afterwards costs more.
         # The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing.
         picture = sample_bilinear(_upsample(relit * self._share), positions, cv2.BORDER_REPLICATE)
@@ -129,10 +132,10 @@ def feather_edges(matte: Mask) -> Mask:
     across = np.clip((np.minimum(np.arange(width), np.arange(width)[::-1]) + 0.5) / reach, 0, 1)
     down = np.clip((np.arange(height) + 0.5) / reach, 0, 1)
     smooth = np.minimum.outer(down, across)
-    return np.asarray(matte * (smooth * smooth * (3 - 2 * smooth)), dtype=np.float32)
+    return np.asarray(matte * smoothstep(smooth), dtype=np.float32)
 
 
 def _upsample(source: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The still (height, width[, channels]) at ENLARGE times its size, without bicubic's overshoot below 0."""
+    """Enlarge a picture (height, width[, channels]) by `UPSAMPLING`, without bicubic's overshoot below 0."""
     large = cv2.resize(source, None, fx=UPSAMPLING, fy=UPSAMPLING, interpolation=cv2.INTER_CUBIC)
     return np.asarray(np.maximum(large, 0, out=large), dtype=np.float32)

@@ -1,7 +1,4 @@
-"""Where the subject's picture sits in the output.
-
-A dense warp: an affine view of the still with a smooth flow inside it.
-"""
+"""Warping the source image into the output: an affine placement of the whole, with a smooth flow inside it."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ Box = tuple[int, int, int, int]
 
 
 def source_from_output(source: tuple[int, int], output: tuple[int, int]) -> NDArray[np.float64]:
-    """The affine map (2, 3) from output pixels to still pixels: the still fitted in whole, centred, on the bottom edge.
+    """The affine map (2, 3) from output to source pixels that fits the whole source image in, centred, at the bottom.
 
     Args:
         source: (width, height).
@@ -32,9 +29,9 @@ def source_from_output(source: tuple[int, int], output: tuple[int, int]) -> NDAr
 def move_body(
     placed: NDArray[np.float64], pivot: NDArray[np.float64], shift: NDArray[np.float64], scale: float, bottom: float
 ) -> NDArray[np.float64]:
-    """`placed`, with the person moved by `shift` and grown by `scale` about `pivot`, all in still pixels.
+    """`placed`, with the person moved by `shift` and grown by `scale` about `pivot`, all in source pixels.
 
-    The still's lower edge, at y = `bottom`, never rises into view: nobody hovers.
+    The source image's lower edge, at y = `bottom`, never rises into view: a person would seem to hover.
     """
     lift = shift[1] + (scale - 1) * (bottom - pivot[1])
     shift = shift - [0.0, min(lift, 0.0)]
@@ -44,7 +41,7 @@ def move_body(
 
 
 def visible_box(placed: NDArray[np.float64], source: tuple[int, int], output: tuple[int, int]) -> Box:
-    """The output pixels (left, top, right, bottom) in which the still is seen under an affine map without rotation."""
+    """The output pixels (left, top, right, bottom) that show the source image under an affine map without rotation."""
     inverse = inverse_affine(placed)
     corners = np.array([[0, 0], source]) @ inverse[:, :2].T + inverse[:, 2]
     left, top = np.clip(np.floor(corners.min(axis=0)), 0, output).astype(int)
@@ -68,8 +65,8 @@ class FlowPatch:
     """Flow on a grid.
 
     Attributes:
-        flow: (rows, columns, 2) float32 backward flow in still pixels; the grid's corners are the region's.
-        region: (4,) float64 left, top, right, bottom in still pixels.
+        flow: (rows, columns, 2) float32 backward flow in source pixels; the grid's corners are the region's.
+        region: (4,) float64 left, top, right, bottom in source pixels.
     """
 
     flow: Flow
@@ -77,7 +74,7 @@ class FlowPatch:
 
     @property
     def positions(self) -> NDArray[np.float32]:
-        """Where each grid point looks: its own place plus the flow, (rows, columns, 2) still pixels."""
+        """Where each grid point looks: its own place plus the flow, (rows, columns, 2) source pixels."""
         rows, columns = self.flow.shape[:2]
         x = np.linspace(self.region[0], self.region[2], columns, dtype=np.float32)
         y = np.linspace(self.region[1], self.region[3], rows, dtype=np.float32)
@@ -86,10 +83,10 @@ class FlowPatch:
 
 @dataclass(frozen=True)
 class Warp:
-    """Where each output pixel looks in the still: u = affine(x), then u + flow(u).
+    """Where each output pixel looks in the source image: u = affine(x), then u + flow(u).
 
     Attributes:
-        affine: (2, 3) float64, output pixels → still pixels (centres at integers + ½ in both).
+        affine: (2, 3) float64, output pixels → source pixels (centres at integers + ½ in both).
         patches: the first covers the head and fades to 0 outside; later ones refine it where motion is fine.
     """
 
@@ -99,7 +96,7 @@ class Warp:
     def map(self, box: Box, enlarged: int = 1) -> NDArray[np.float32]:
         """Positions (height, width, 2) for cv2.remap, for the output pixels of `box` (left, top, right, bottom).
 
-        `enlarged`: by how much the still to be sampled is larger than the one that the warp was made for.
+        `enlarged`: by how much the source image to be sampled is larger than the one that the warp was made for.
         """
         width, height = box[2] - box[0], box[3] - box[1]
         # Few positions, interpolated. One beyond each side, so that none is extrapolated.
@@ -131,18 +128,18 @@ class Warp:
         return int(np.clip(spacing.min() / source_per_output, 1, MAX_STEP))
 
     def _source_from_pixel(self, left: float, top: float, step: float) -> NDArray[np.float64]:
-        """The affine map (2, 3) from array indices to still pixels, index 0 at output position (left, top)."""
+        """The affine map (2, 3) from array indices to source pixels, index 0 at output position (left, top)."""
         return np.asarray(self.affine @ np.array([[step, 0, left], [0, step, top], [0, 0, 1]]))
 
     def apply(self, source: NDArray[np.float32], box: Box, enlarged: int = 1) -> NDArray[np.float32]:
-        """The still (height, width[, channels ≤ 4]) as seen at the output pixels of `box`; 0 beyond its edges."""
+        """Warp the source image (height, width[, channels ≤ 4]) to the output pixels of `box`; 0 beyond its edges."""
         return sample_bilinear(source, self.map(box, enlarged))
 
 
 def sample_bilinear(
     source: NDArray[np.float32], positions: NDArray[np.float32], beyond: int = cv2.BORDER_CONSTANT
 ) -> NDArray[np.float32]:
-    """The still at `positions` (height, width, 2) from `Warp.map`, bilinear; beyond its edges 0, or as cv2 names it."""
+    """Sample a picture at `positions` (height, width, 2) from `Warp.map`, bilinear; `beyond`: OpenCV's border mode."""
     view = cv2.remap(source, positions, None, cv2.INTER_LINEAR, borderMode=beyond, borderValue=0)
     return np.asarray(view, dtype=np.float32)
 
@@ -153,7 +150,7 @@ def _blend_grid(
     region: NDArray[np.float64],
     source_from_index: NDArray[np.float64],
 ) -> None:
-    """Blend a grid of values (rows, columns, 2) over a region of the still into an array of positions, in place."""
+    """Blend a grid of values (rows, columns, 2) over a source region into an array of positions, in place."""
     rows, columns = values.shape[:2]
     spacing = (region[2:] - region[:2]) / [columns - 1, rows - 1]
     grid_from_source = np.array([[1 / spacing[0], 0, 0], [0, 1 / spacing[1], 0], [0, 0, 1]])

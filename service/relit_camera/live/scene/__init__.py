@@ -1,0 +1,1 @@
+"""The scene: subject, environment, lamps, background and transitions between them."""

@@ -1,4 +1,4 @@
-"""The light as it is shown: what the scene asks for, in display exposure, eased from what was."""
+"""The light of the scene in display exposure, and its smooth transition when the scene changes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from relit_camera.base.config.look import Lighting
 from relit_camera.base.easing import ease_out_cubic
 from relit_camera.light.environment_panorama import Environment
 from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.light.scene_light import scene_light_map
 from relit_camera.live.scene.scene import Scene
 
 
 def display_light(environment: Environment | None, lighting: Lighting) -> LightMap:
-    """The room's light (32, 64, 3) in display exposure, face gain included.
+    """The light map (32, 64, 3), float32, of environment and lamps in display exposure, with the face gain.
 
-    The environment, turned as asked, is scaled so that a white ball facing the camera reads 0.8. Lamps are not: their
-    intensity already is what such a ball reads, so that a lamp is as bright in a night street as in a studio.
+    The environment, rotated as the lighting says, is scaled so that a white ball facing the camera reads 0.8. Lamps are
+    not scaled: their intensity is what such a ball reads, so a lamp is as bright in a night street as in a studio.
     """
     surround = scene_light_map(environment, lighting.model_copy(update={"lamps": ()}))
     lamps = scene_light_map(None, lighting)
@@ -26,7 +26,7 @@ def display_light(environment: Environment | None, lighting: Lighting) -> LightM
 
 
 class LightTransition:
-    """Follows the scenes' light over each lighting's `transition_s`: fast at first: a change is seen at once."""
+    """Blends from the present light to that of the next scene over its `transition_s`, fast at first."""
 
     def __init__(self) -> None:
         self._key: tuple[Environment | None, Lighting] | None = None
@@ -35,12 +35,12 @@ class LightTransition:
         self._since = self._last = 0.0
 
     def update(self, scene: Scene, now: float) -> LightMap:
-        """The room's light at `now` seconds; the first scene's is there at once."""
+        """The light map to show at `now` seconds; that of the first scene is shown without a transition."""
         key = (scene.environment, scene.look.lighting)
         if self._key is None or key[0] is not self._key[0] or key[1] != self._key[1]:
             self._from = None if self._target is None else self._shown(self._last)
             self._target = display_light(*key)
-            # The change began after the last frame: this one shows its first step already.
+            # The transition began at the last frame, so that this frame shows its first step.
             self._key, self._since = key, min(self._last, now)
         self._last = now
         return self._shown(now)

@@ -1,4 +1,4 @@
-"""The one value through which control reaches the picture path."""
+"""The scene: everything that the pipeline has to show, as one immutable value."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from relit_camera.subject.subject import Subject
 
 @dataclass(frozen=True)
 class Scene:
-    """What to show, with every name resolved: the worker reads one a frame and waits for nothing.
+    """What to show, with every name replaced by what it names. The pipeline reads one scene a frame, without a lock.
 
     Attributes:
-        look: the settings as the user gave them.
-        environment: what lights the face, or None for lamps only.
-        backdrop: the picture of an `image` background, else None.
-        subject_name: for status and panel.
-        subject: who is shown, or None: then the live picture passes through unlit.
-        frozen: the published picture stands still.
-        revision: counts changes.
+        look: lighting, background and mode as the user set them.
+        environment: the environment that lights the face; None for lamps only.
+        background_image: the picture of an `image` background, uint8 sRGB RGB (height, width, 3); None for other kinds.
+        subject_name: name of the subject, for status and panel.
+        subject: the person shown; None shows the live picture without relighting.
+        frozen: whether the published picture is held.
+        revision: number of changes so far.
     """
 
     look: Look
     environment: Environment | None = None
-    backdrop: DisplayImage | None = None
+    background_image: DisplayImage | None = None
     subject_name: str | None = None
     subject: Subject | None = None
     frozen: bool = False

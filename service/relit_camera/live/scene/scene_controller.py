@@ -1,4 +1,4 @@
-"""Turns what users ask for into the next scene: resolves names, checks that parts fit, replaces the scene whole."""
+"""Makes the next scene from what users change: looks up names, checks that the parts fit, and replaces the scene."""
 
 from __future__ import annotations
 
@@ -13,26 +13,31 @@ import numpy as np
 from relit_camera.base.config.look import Background, ColorBackground, EnvironmentBackground, ImageBackground, Look
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import InputError, NotFoundError
-from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
+from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.light.background_light import panorama_from_background
 from relit_camera.light.environment_panorama import Environment
 from relit_camera.light.environment_store import EnvironmentStore
 from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map_rotation import resample_to_light_map
+from relit_camera.light.light_map import resample_to_light_map
+from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 from relit_camera.live.scene.background_store import BackgroundStore
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_store import SubjectStore
 
 BACKGROUND_ENVIRONMENT = "background"
-"""The environment's reserved name for: lit by the virtual background."""
+"""The reserved environment name that means the light of the virtual background."""
 
 
 class SceneController:
-    """Holds the scene. Reading is one attribute access; changes are made one at a time, from any thread.
+    """Holds the scene, and the stores of what it can show. Thread-safe: changes are made one at a time.
 
-    A change that cannot be resolved raises and leaves the scene as it was.
+    A change that names something unknown raises an error and leaves the scene as it was.
+
+    Attributes:
+        scene: the present scene; reading it takes no lock.
+        environments, subjects, backgrounds: the stores.
     """
 
     def __init__(self, storage: StorageSettings) -> None:
@@ -53,32 +58,50 @@ class SceneController:
         return self.update_look(lambda _: look)
 
     def update_look(self, change: Callable[[Look], Look]) -> Scene:
-        """Show what `change` makes of the present look; no other change comes between reading and replacing it.
+        """Show what `change` makes of the present look. Other changes wait until it is replaced.
 
         Raises:
             NotFoundError, InputError: as `set_look`.
         """
         with self._change:
             look = change(self.scene.look)
-            # A slider sends dozens of changes a second: what it leaves alone is not read again.
-            backdrop = self.scene.backdrop if look.background == self.scene.look.background else None
-            if backdrop is None:
-                backdrop = self._backdrop(look.background)
-            environment = self._unchanged_environment(look) or self._environment(look, backdrop)
-            return self._replace(look=look, environment=environment, backdrop=backdrop)
+            # A slider sends dozens of changes a second, so what did not change is not read again.
+            image = self.scene.background_image if look.background == self.scene.look.background else None
+            if image is None:
+                image = self._background_image(look.background)
+            environment = self._unchanged_environment(look) or self._environment(look, image)
+            return self._replace(look=look, environment=environment, background_image=image)
 
-    def set_subject(self, name_or_path: str | None) -> Scene:
-        """Show another subject, or none.
+    def choose_stored_subject(self, name: str | None) -> Scene:
+        """Show a subject of the store, or none. For names from the API: never a file elsewhere.
 
         Raises:
-            NotFoundError: no such subject or file.
+            NotFoundError: no stored subject has that name.
             SubjectError: its file is damaged.
         """
         with self._change:
-            if name_or_path is None:
-                return self._replace(subject=None, subject_name=None)
-            name, subject = self.subjects.resolve(name_or_path)
+            subject = None if name is None else self.subjects.load(name)
             return self._replace(subject=subject, subject_name=name)
+
+    def load_subject_file(self, path: Path) -> Scene:
+        """Show the subject of a file, under the name of the file. For the command line and the configuration.
+
+        Raises:
+            NotFoundError: there is no such file.
+            SubjectError: it is damaged.
+        """
+        return self.show_subject(*self.subjects.load_file(path))
+
+    def load_configured_subject(self, name_or_path: str | None) -> Scene:
+        """Show the subject that the command line or the configuration names: a stored one, else a file; or none.
+
+        Raises:
+            NotFoundError: neither a stored name nor a file.
+            SubjectError: the file is damaged.
+        """
+        if name_or_path is not None and self.subjects.names_file(name_or_path):
+            return self.load_subject_file(Path(name_or_path))
+        return self.choose_stored_subject(name_or_path)
 
     def show_subject(self, name: str, subject: Subject) -> Scene:
         """Show a subject that is not stored, under `name`."""
@@ -86,12 +109,15 @@ class SceneController:
             return self._replace(subject=subject, subject_name=name)
 
     def set_frozen(self, frozen: bool) -> Scene:
-        """Hold the published picture, or let it go on."""
+        """Hold the published picture, or continue."""
         with self._change:
             return self._replace(frozen=frozen)
 
     def register_temporary_environment(self, name_or_path: str) -> str:
-        """The name under which an environment can be chosen: a stored one's own, or a file's, for this run only.
+        """Make the environment of a file available under a name, for this run only; a stored one keeps its own name.
+
+        Returns:
+            The name by which a look can choose it.
 
         Raises:
             NotFoundError: neither a stored name nor a file.
@@ -108,11 +134,11 @@ class SceneController:
         return name
 
     def temporary_environments(self) -> dict[str, Environment]:
-        """Environments that `register_temporary_environment` took from files, for this run only."""
+        """The environments registered from files for this run, by name."""
         return dict(self._temporary_environments)
 
     def background_names(self) -> list[str]:
-        """Names that an `image` background may have: stored pictures and environments."""
+        """The names that an `image` background may use: stored pictures and environments."""
         return sorted({*self.backgrounds.names(), *self.environments.names()})
 
     def _replace(self, **changes: object) -> Scene:
@@ -126,12 +152,12 @@ class SceneController:
         stays = look.lighting.environment != BACKGROUND_ENVIRONMENT or look.background == before.background
         return self.scene.environment if stays else None
 
-    def _environment(self, look: Look, backdrop: DisplayImage | None) -> Environment | None:
+    def _environment(self, look: Look, background_image: DisplayImage | None) -> Environment | None:
         name = look.lighting.environment
         if name is None:
             return None
         if name != BACKGROUND_ENVIRONMENT:
-            # Never `resolve`: a name that came over the API must not reach a file beside the program.
+            # Not `resolve`: a name from the API must not reach files outside the store.
             return (
                 self._temporary_environments[name]
                 if name in self._temporary_environments
@@ -141,28 +167,25 @@ class SceneController:
         if isinstance(background, ImageBackground) and background.image in self.environments.names():
             return self.environments.load(background.image)
         if isinstance(background, ColorBackground):
-            code = int(background.color[1:], 16)
-            backdrop = np.full((90, 160, 3), [code >> 16, code >> 8 & 255, code & 255], dtype=np.uint8)
-        if backdrop is None:
+            background_image = np.full((90, 160, 3), rgb_from_hex(background.color), dtype=np.uint8)
+        if background_image is None:
             kind = "an environment needs a name" if isinstance(background, EnvironmentBackground) else "has no picture"
             raise InputError(
                 f"the face cannot be lit by a background of kind '{background.kind}': it {kind}",
                 "choose an image or color background first",
             )
-        panorama = panorama_from_background(linear_from_uint8(backdrop))
+        panorama = panorama_from_background(linear_from_uint8(background_image))
         return Environment(BACKGROUND_ENVIRONMENT, panorama, resample_to_light_map(panorama.radiance), panorama.notes)
 
-    def _backdrop(self, background: Background) -> DisplayImage | None:
+    def _background_image(self, background: Background) -> DisplayImage | None:
         if not isinstance(background, ImageBackground):
             return None
         if background.image in self.backgrounds.names():
             return self.backgrounds.load(background.image)
         if background.image in self.environments.names():
             environment = self.environments.load(background.image)
-            # A white wall under irradiance 1 reads 1 and has radiance 1/π: so seen, background and face fit together.
-            # Seen from inside, looking where the camera looks: the map's edge in the middle, its right half mirrored.
-            seen = np.roll(environment.panorama.radiance[:, ::-1], environment.panorama.radiance.shape[1] // 2, axis=1)
-            shown = seen * np.float32(np.pi * auto_exposure_scale(environment.light_map))
-            return uint8_from_linear(shown)
+            seen = between_map_and_viewer_axes(environment.panorama.radiance)
+            # A white wall of irradiance 1 reads 1 and has radiance 1/π: with the factor π, background and face match.
+            return uint8_from_linear(seen * np.float32(np.pi * auto_exposure_scale(environment.light_map)))
         known = ", ".join(self.background_names()) or "none"
         raise NotFoundError(f"no background picture '{background.image}'", f"stored are: {known}")

@@ -1,0 +1,1 @@
+"""The status of the running service: events, rates and the time each stage takes."""

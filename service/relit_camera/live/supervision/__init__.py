@@ -1,0 +1,1 @@
+"""Supervision of the pipeline: its worker thread, its recovery, and what is shown meanwhile."""

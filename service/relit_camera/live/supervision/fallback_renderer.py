@@ -9,7 +9,7 @@ import numpy as np
 from relit_camera.base.config.settings import Fallback
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.images.resize import crop_to_fill
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.live.compositing.background_renderer import BackgroundRenderer
 from relit_camera.live.compositing.compositor import composite_source_image
 from relit_camera.live.reenactment.reenactor import WarpedLayer

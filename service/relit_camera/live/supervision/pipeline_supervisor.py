@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from relit_camera.base.clock import SYSTEM_CLOCK, Clock
-from relit_camera.base.errors import RelitError
+from relit_camera.base.errors import PipelineHangError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.live.pipeline import Pipeline, RenderedFrame
 from relit_camera.live.scene.scene import Scene
@@ -32,10 +32,6 @@ from relit_camera.live.supervision.pipeline_health import (
 from relit_camera.live.supervision.pipeline_worker import PipelineWorker
 
 DEFAULT_LIMITS = HealthLimits()
-
-
-class PipelineHangError(RelitError):
-    """The pipeline has rendered nothing for longer than `HealthLimits.hang_timeout_s`."""
 
 
 class Worker(Protocol):

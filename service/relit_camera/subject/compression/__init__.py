@@ -1,0 +1,1 @@
+"""Compression of a reflectance field to a basis and coefficients."""

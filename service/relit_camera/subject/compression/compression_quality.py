@@ -1,11 +1,7 @@
-"""How well a compressed field does, against what it was made from.
-
-What is asked of a compressed field.
-"""
+"""How accurate a compressed field is: PSNR of its worst light, texel and light map against the field it was made of."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,31 +10,29 @@ from numpy.typing import NDArray
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import Mask
 from relit_camera.base.threads import worker_pool
-from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.subject.compression.accuracy_target import DARK_LIGHT_FRACTION
 from relit_camera.subject.compression.local_basis import LocalBasis
 from relit_camera.subject.reflectance_field import TEXELS
 
 Values = NDArray[np.float32]
 
-DARK_LIGHT_FRACTION = 0.01
-"""A light whose picture is darker than this share of the brightest light's is judged by that."""
 MAX_PSNR_DB = 200.0
-"""Of pictures that are equal."""
+"""PSNR given for equal pictures."""
 PEAK_PIXEL_STRIDE = 4
+"""A texel's peak is taken from every fourth pixel."""
 LIGHTS_PER_BATCH = 32
-"""Lights restored at once: bounds the memory."""
+"""Lights restored at a time, which bounds the memory."""
 
 
 @dataclass(frozen=True)
 class CompressionQuality:
-    """Figures in dB (see `base.images.image_quality.psnr`), and bytes.
+    """Worst PSNRs in dB (see `base.images.image_quality.psnr`), and the size of a compressed field.
 
     Attributes:
-        light_db: of the captured light that comes back worst.
-        texel_db: of the texel, alone, that comes back worst.
-        map_db: of the light map, of those it was tried on, that comes back worst; None where it was tried on none.
-        bytes_share: bytes kept, by those of the dense float32 matrix of all pixels.
+        light_db: of the least accurate captured light.
+        texel_db: of the least accurate single texel.
+        map_db: of the least accurate light map of the target; None where it has none.
+        bytes_share: bytes of the compressed field over those of the dense float32 matrix.
     """
 
     light_db: float
@@ -48,17 +42,17 @@ class CompressionQuality:
 
 
 def dense_bytes(matte: Mask) -> int:
-    """Bytes of the matrix (pixels, 3, 2048) in float32."""
+    """Bytes of the uncompressed matrix (pixels, 3, 2048) in float32."""
     return matte.size * 3 * TEXELS * 4
 
 
 def worst_texel_db(basis: LocalBasis, coefficients: Values, errors: Values, matte: Mask) -> float:
-    """PSNR in dB of the texel, alone, that comes back worst, inside the matte.
+    """Lowest PSNR in dB of the picture under a single texel, inside the matte.
 
     Its peak, the 99.5th percentile, is taken from the compressed field, at every fourth pixel.
 
     Args:
-        basis: the rows of the field.
+        basis: the basis of the compressed field.
         coefficients: (components, 2048).
         errors: (2048,) mean square errors.
         matte: (height, width).
@@ -69,17 +63,17 @@ def worst_texel_db(basis: LocalBasis, coefficients: Values, errors: Values, matt
         part = slice(start, start + LIGHTS_PER_BATCH)
         pictures = basis.at(coefficients[:, part], inside)
         peaks[part] = np.percentile(pictures.reshape(len(pictures), -1), 99.5, axis=1)
-    judged = np.maximum(peaks, DARK_LIGHT_FRACTION * peaks.max())
-    return float(min(-10 * np.log10((errors / judged**2).max() + 1e-20), MAX_PSNR_DB))
+    reference = np.maximum(peaks, DARK_LIGHT_FRACTION * peaks.max())
+    return float(min(-10 * np.log10((errors / reference**2).max() + 1e-20), MAX_PSNR_DB))
 
 
 def worst_light_db(basis: LocalBasis, light_coefficients: Values, captured: Values, matte: Mask) -> float:
-    """PSNR in dB of the captured light (lights, height, width, 3) that comes back worst, inside the matte.
+    """Lowest PSNR in dB of the captured lights' pictures, inside the matte.
 
     Args:
-        basis: the rows of the field.
+        basis: the basis of the compressed field.
         light_coefficients: (components, lights).
-        captured: the truth.
+        captured: (lights, height, width, 3) the captured pictures.
         matte: (height, width).
     """
     inside = np.flatnonzero(matte.ravel() > 0.5)
@@ -98,10 +92,10 @@ def worst_light_db(basis: LocalBasis, light_coefficients: Values, captured: Valu
 
 
 def worst_map_db(basis: LocalBasis, coefficients: Values, light: Values, truth: Values, matte: Mask) -> float | None:
-    """PSNR in dB of the light map that comes back worst, inside the matte; None of no map.
+    """Lowest PSNR in dB of the pictures under the light maps, inside the matte; None without a map.
 
     Args:
-        basis: the rows of the field.
+        basis: the basis of the compressed field.
         coefficients: (components, 2048).
         light: (maps, 2048, 3) radiance times solid angle.
         truth: (maps, height · width, 3), the dense field's pictures.
@@ -114,31 +108,3 @@ def worst_map_db(basis: LocalBasis, coefficients: Values, light: Values, truth: 
         seen = np.stack([by_channel[channel, :, channel] for channel in range(3)], axis=1)
         found.append(min(psnr(seen[None], expected[None, inside]), MAX_PSNR_DB))
     return min(found, default=None)
-
-
-@dataclass(frozen=True)
-class CompressionTarget:
-    """How well pictures must come back inside the matte, in dB (see `base.images.image_quality.psnr`).
-
-    Attributes:
-        texel_db: of any texel alone, by its own peak: light maps, which mix them, are then no worse.
-        light_db: of any captured light.
-        maps: light maps (32, 64, 3) that the result is tried on.
-    """
-
-    texel_db: float = 43.0
-    light_db: float = 46.0
-    maps: Sequence[LightMap] = ()
-
-    def allowed(self, peaks: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Root mean square error (columns,) allowed, by the peak of each column: texels, then captured lights."""
-        decibels = np.full(len(peaks), self.light_db)
-        decibels[:TEXELS] = self.texel_db
-        judged = np.maximum(peaks, max(DARK_LIGHT_FRACTION * float(peaks.max()), 1e-6))
-        return np.asarray(judged * 10 ** (-decibels / 20), np.float32)
-
-    @property
-    def light(self) -> NDArray[np.float32]:
-        """The maps' radiance times solid angle, (maps, 2048, 3)."""
-        weighted = [each * texel_solid_angles()[..., None] for each in self.maps]
-        return np.asarray(weighted, np.float32).reshape(-1, TEXELS, 3)

@@ -1,1 +1,1 @@
-"""Field × light → picture (thesis 6.1, 6.2): dense reference, basis, ONNX graph."""
+"""Relighting: reflectance field × light map → picture (thesis 6.1, 6.2), dense, in bases, or as an ONNX graph."""

@@ -1,6 +1,6 @@
-"""Clusters with equally many components, side by side: what arithmetic on arrays wants.
+"""Relighting in the subject's bases with NumPy: three small matrix products instead of one large one.
 
-Relighting in the subject's bases: three small products instead of one large one.
+Clusters of equal rank lie side by side in one array, so that one product serves all of them.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import LinearImage
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.subject.compression.local_basis import LocalBasis
-from relit_camera.subject.relighting.relighter import weighted_light
+from relit_camera.subject.relighting.relighter import RelighterOptions, weighted_light
 from relit_camera.subject.subject import Subject
 
 RANK_STEP = 4
@@ -59,13 +59,17 @@ third of the time that BLAS has for a tall matrix times three columns."""
 
 
 class BasisRelighter:
-    """coefficients × light, local components × that, and in each cluster its pixels × its components: the default.
+    """coefficients × light, local components × that, and in each cluster its pixels × its components.
 
     Clusters of equal rank are multiplied together. Their values are kept as float32 (clusters, 3, components, places):
     the last product streams through memory once. Pixels of no cluster come back black.
     """
 
-    def __init__(self, subject: Subject) -> None:
+    name, provider = "basis", "numpy"
+
+    def __init__(self, subject: Subject, options: RelighterOptions | None = None) -> None:
+        """`options` are those of every relighter; it takes no argument."""
+        (options or RelighterOptions()).require_no_argument(self.name)
         self._shape = (subject.metadata.height, subject.metadata.width)
         self._coefficients = subject.coefficients
         groups = group_by_rank(subject.basis)
@@ -80,7 +84,7 @@ class BasisRelighter:
 
     @property
     def nbytes(self) -> int:
-        """What it holds for its arithmetic."""
+        """Bytes of the arrays that it keeps in memory."""
         return sum(each.nbytes for each in (*self._values, self._mixes, self._coefficients))
 
     def relight(self, light_map: LightMap) -> LinearImage:

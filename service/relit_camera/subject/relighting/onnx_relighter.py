@@ -1,6 +1,6 @@
-"""Relighting as an ONNX graph whose initializers hold the subject.
+"""Relighting in the subject's bases with ONNX Runtime: the graph's initializers hold the subject.
 
-On a GPU provider they stay in GPU memory and only the light map and the picture travel: the thesis's finding in 6.2.
+On a GPU they stay in its memory, and only the light map and the picture are copied: what counts, by the thesis's 6.2.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import LinearImage
-from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.base.models.session_with_fallback import open_session
+from relit_camera.light.light_map import LightMap
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.relighting.basis_relighter import group_by_rank
-from relit_camera.subject.relighting.relighter import dense_matrix, weighted_light
+from relit_camera.subject.relighting.relighter import RelighterOptions, weighted_light
 from relit_camera.subject.subject import Subject
 
 if TYPE_CHECKING:
@@ -23,14 +23,6 @@ if TYPE_CHECKING:
 
 OPSET = 17
 IR_VERSION = 9
-
-
-def dense_graph(matrix: NDArray[np.float32]) -> bytes:
-    """A serialised ONNX model: a matrix (3, pixels, 2048) times `light` (3, 2048, 1) → `picture` (3, pixels, 1)."""
-    from onnx import helper
-
-    node = helper.make_node("MatMul", ["matrix", "light"], ["picture"], name="multiply")
-    return _serialised([node], {"matrix": matrix}, matrix.shape[1])
 
 
 def basis_graph(subject: Subject) -> bytes:
@@ -87,35 +79,33 @@ def _serialised(nodes: list[NodeProto], constants: dict[str, NDArray], pixels: i
     return serialised
 
 
-class _OnnxRelighter:
-    def __init__(self, subject: Subject, name: str, graph: bytes, options: SessionOptions | None) -> None:
-        self.session = open_session(graph, name, options or SessionOptions())
+class OnnxBasisRelighter:
+    """Relights one subject with ONNX Runtime: in each group of clusters of equal rank one product.
+
+    Attributes:
+        session: the open graph.
+    """
+
+    name = "onnx-basis"
+
+    def __init__(self, subject: Subject, options: RelighterOptions | None = None) -> None:
+        """Make the subject's graph and open it as `options.session` says; it takes no argument.
+
+        Raises:
+            DeviceError: a strict provider cannot run it.
+        """
+        options = options or RelighterOptions()
+        options.require_no_argument(self.name)
+        self.session = open_session(basis_graph(subject), "relight-basis", options.session)
         self._shape = (subject.metadata.height, subject.metadata.width)
+
+    @property
+    def provider(self) -> str:
+        """The execution provider that is proven to run the graph."""
+        return self.session.provider
 
     def relight(self, light_map: LightMap) -> LinearImage:
         """See `Relighter.relight`."""
         light = np.ascontiguousarray(weighted_light(light_map).T)[..., None]
         picture = self.session.run({"light": light})["picture"]
         return np.ascontiguousarray(picture[..., 0].T).reshape(*self._shape, 3)
-
-
-class OnnxBasisRelighter(_OnnxRelighter):
-    """The bases as a graph: in each group of clusters of equal rank one product.
-
-    Raises:
-        DeviceError: a strict provider is not to be had.
-    """
-
-    def __init__(self, subject: Subject, options: SessionOptions | None = None) -> None:
-        super().__init__(subject, "relight-basis", basis_graph(subject), options)
-
-
-class OnnxDenseRelighter(_OnnxRelighter):
-    """The dense matrix as a graph of one product; too large for a graph of one file over 2 GB.
-
-    Raises:
-        DeviceError: a strict provider is not to be had.
-    """
-
-    def __init__(self, subject: Subject, options: SessionOptions | None = None) -> None:
-        super().__init__(subject, "relight-dense", dense_graph(dense_matrix(subject)), options)

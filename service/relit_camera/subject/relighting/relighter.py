@@ -1,28 +1,45 @@
-"""The seam between light and picture: O[p] = Σ_l R[p, l] · E[l] · ω_l, per colour channel (thesis 6.1).
+"""Relighters: what one is (subject, light → picture), and how one is opened by name.
 
-Relighting with the whole reflectance matrix (thesis 6.2): the reference of tests and bench.
+The picture is O[p] = Σ_l R[p, l] · E[l] · ω_l, per colour channel (thesis 6.1): R the reflectance of pixel p for light
+from texel l, E the radiance of that texel of the light map, ω its solid angle.
+
+A plug-in is an entry point of the group `relit_camera.relighters`: called with a `Subject` and `RelighterOptions`, it
+gives a `Relighter`.
 """
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import LinearImage
+from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
 from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.light_map_rotation import LightMap
+from relit_camera.light.light_map import LightMap
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.subject import Subject
 
-RELIGHTER_ENTRY_POINTS = "relit_camera.relighters"
+log = logging.getLogger(__name__)
 
 
 class Relighter(Protocol):
     """Relights one subject. Holds its data in the form that its arithmetic wants. Thread-safe."""
+
+    @property
+    def name(self) -> str:
+        """As settings name it, for the status."""
+        ...
+
+    @property
+    def provider(self) -> str:
+        """What runs it, for the status: `numpy`, or the execution provider that is proven to, such as `cuda`."""
+        ...
 
     def relight(self, light_map: LightMap) -> LinearImage:
         """The subject under a light map (32, 64, 3): float32 linear (height, width, 3), unscaled and unclipped.
@@ -32,52 +49,50 @@ class Relighter(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class RelighterOptions:
+    """What every relighter is opened with, beside the subject.
+
+    Attributes:
+        session: how to run its networks.
+        argument: what follows the colon in `NAME:ARGUMENT`.
+    """
+
+    session: SessionOptions = field(default_factory=SessionOptions)
+    argument: str = ""
+
+    def require_no_argument(self, relighter: str) -> None:
+        """For relighters that take none.
+
+        Raises:
+            InputError: there is an argument.
+        """
+        require_no_argument("relighter", relighter, self.argument)
+
+
+RELIGHTERS: PluginGroup[Callable[[Subject, RelighterOptions], Relighter]] = PluginGroup(
+    "relit_camera.relighters", "relighter"
+)
+
+
+def open_relighter(name: str, subject: Subject, session: SessionOptions | None = None) -> Relighter:
+    """Open the relighter `NAME` or `NAME:ARGUMENT` for `subject`.
+
+    Raises:
+        NotFoundError: none of that name is installed.
+        ConfigError: the plug-in cannot be loaded.
+        DeviceError: the session's provider is strict, and cannot run it.
+    """
+    factory, argument = RELIGHTERS.load(name)
+    relighter = factory(subject, RelighterOptions(session or SessionOptions(), argument))
+    usual = relighter.provider == "numpy"
+    log.log(
+        logging.DEBUG if usual else logging.INFO, "the subject is relit by %s on %s", relighter.name, relighter.provider
+    )
+    return relighter
+
+
 def weighted_light(light_map: LightMap) -> NDArray[np.float32]:
     """E[l] · ω_l as float32 (2048, 3): the right-hand side of the relighting product."""
     omega = texel_solid_angles().astype(np.float32)
     return np.ascontiguousarray((light_map * omega[..., None]).reshape(TEXELS, 3))
-
-
-def open_relighter(name: str, subject: Subject) -> Relighter:
-    """A relighter of that name for `subject`.
-
-    Raises:
-        NotFoundError: none of that name is installed.
-    """
-    for point in entry_points(group=RELIGHTER_ENTRY_POINTS, name=name):
-        relighter: Relighter = point.load()(subject)
-        return relighter
-    known = ", ".join(sorted(point.name for point in entry_points(group=RELIGHTER_ENTRY_POINTS)))
-    raise NotFoundError(f"no relighter '{name}'", f"there are: {known}")
-
-
-PIXELS_PER_BLOCK = 4096
-"""Pixels restored at once: 100 MB."""
-
-
-class DenseRelighter:
-    """O = R · (E ω) with the matrix held in memory.
-
-    Attributes:
-        matrix: R as (3, pixels, 2048) float32: 737 MB for 150 x 200 pixels.
-    """
-
-    def __init__(self, subject: Subject) -> None:
-        self._shape = (subject.metadata.height, subject.metadata.width)
-        self.matrix = dense_matrix(subject)
-
-    def relight(self, light_map: LightMap) -> LinearImage:
-        """See `Relighter.relight`."""
-        light = weighted_light(light_map)
-        planes = [self.matrix[channel] @ light[:, channel] for channel in range(3)]
-        return np.stack(planes, axis=-1).reshape(*self._shape, 3)
-
-
-def dense_matrix(subject: Subject) -> NDArray[np.float32]:
-    """R as (3, pixels, 2048) float32, 0 where the matte is."""
-    total = subject.matte.size
-    matrix = np.empty((3, total, TEXELS), dtype=np.float32)
-    for start in range(0, total, PIXELS_PER_BLOCK):
-        pixels = np.arange(start, min(start + PIXELS_PER_BLOCK, total))
-        matrix[:, pixels] = subject.basis.at(subject.coefficients, pixels).transpose(2, 1, 0)
-    return matrix

@@ -1,1 +1,1 @@
-"""What runs inside Cycles' environment: bpy and numpy, nothing else of ours."""
+"""Worker inside Cycles' environment. It may import bpy and numpy, and no other part of this project."""

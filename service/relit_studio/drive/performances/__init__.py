@@ -1,1 +1,1 @@
-"""What people do before the webcam: one file a performance."""
+"""The performances, one file each."""

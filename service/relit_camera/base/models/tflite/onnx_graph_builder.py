@@ -62,7 +62,7 @@ class OnnxGraphBuilder:
         return self._constants[tensor]
 
     def set_constant(self, tensor: int, data: NDArray) -> None:
-        """Say that `tensor` is the constant `data`."""
+        """Register `tensor` as the constant `data`."""
         self._constants[tensor] = data
 
     def common_layout(self, tensors: Sequence[int]) -> Layout:
@@ -83,7 +83,7 @@ class OnnxGraphBuilder:
         return self._values[tensor, layout]
 
     def bind(self, tensor: int, value: str, layout: Layout) -> None:
-        """Say that `value` is `tensor` in `layout`."""
+        """Register the ONNX value `value` as `tensor` in `layout`."""
         self._values[tensor, layout] = value
 
     def node(self, operator: str, inputs: Sequence[str], **attributes: Any) -> str:

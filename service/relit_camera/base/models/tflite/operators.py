@@ -1,8 +1,6 @@
-"""Element-wise functions, and the activation that TFLite fuses into other operators.
+"""Converts each TFLite operator to ONNX nodes: element-wise functions, convolution and pooling, changes of shape.
 
-Convolution and pooling. Their pictures have channels first.
-
-Operators that reduce, resize or rearrange.
+Convolution and pooling work on pictures with the channels first, as ONNX defines them.
 """
 
 from __future__ import annotations

@@ -1,0 +1,1 @@
+"""Evaluation of reflectance fields: held-out lights, interpolation methods, maps."""

@@ -1,4 +1,4 @@
-"""The truth of a subject built from a rendered capture: the field that was filmed, as the capture cut it out."""
+"""Truth of a subject built from a rendered capture: the filmed field, cropped as the capture cropped it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import InputError
 from relit_camera.capture.alignment.rigid_transform import RigidTransform
-from relit_camera.capture.film.lamp.head_crop import HeadCrop
+from relit_camera.capture.film.olat.head_crop import HeadCrop
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.candidates import Candidate
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
 from relit_camera.lab.evaluate.json_records import Record, read_json_record
+from relit_camera.lab.evaluate.rendered_truth import HeadTruth, read_truth
 
 
 class _Square(Record):
@@ -36,25 +37,8 @@ class _Report(Record):
     motion: _Motion
 
 
-class _ToRest(Record):
-    rotation_deg: float
-    translation_px: tuple[float, float]
-
-
-class _Head(Record):
-    to_rest: _ToRest
-
-
-class _Frame(Record):
-    head: _Head
-
-
-class _Truth(Record):
-    frames: list[_Frame]
-
-
 def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
-    """A field's pictures as they would be in the capture's reference frame, cut out as the capture did.
+    """Move a field's pictures into the capture's reference frame and crop them as the capture did.
 
     Args:
         field: the pictures that were filmed (`python -m relit_studio field`), of the video's shape at any size.
@@ -65,7 +49,7 @@ def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
         InputError: a file is missing or in another form, or they are not of one film.
     """
     found = read_json_record(report, _Report, "give a report of `relit capture build`")
-    known = read_json_record(truth, _Truth, "give the truth.json of a rendered capture")
+    known = read_truth(truth, HeadTruth)
     if found.motion.reference >= len(known.frames):
         raise InputError(
             f"{report} tells of frame {found.motion.reference}, which {truth} has not", "give both of one film"
@@ -82,9 +66,9 @@ def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
 def scale_to_truth(
     candidate: Candidate, truth: GroundTruth, lights: NDArray[np.intp]
 ) -> tuple[Candidate, NDArray[np.float64]]:
-    """A candidate in the truth's unit, and the gains (3,) that do it: a film does not tell how bright white is.
+    """A candidate scaled to the truth, since a film does not tell how bright white is, and the gains (3,) used.
 
-    Least squares by channel over all pixels of the lights (some,).
+    The gains are least squares by channel over all pixels of the lights (some,).
     """
     seen, known = candidate.pictures_at(truth.directions[lights]), truth.colors[lights]
     gains = np.einsum("lpc,lpc->c", seen, known) / np.maximum(np.einsum("lpc,lpc->c", seen, seen), 1e-12)
@@ -94,4 +78,4 @@ def scale_to_truth(
 
 def _cut(picture: NDArray[np.float32], square: HeadCrop, transform: RigidTransform) -> NDArray[np.float32]:
     large = cv2.resize(picture, square.picture, interpolation=cv2.INTER_CUBIC)
-    return np.maximum(square.cut(large, transform), 0)
+    return np.maximum(square.crop(large, transform), 0)

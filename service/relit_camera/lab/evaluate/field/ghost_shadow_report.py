@@ -1,4 +1,4 @@
-"""The part of a field's report that shows ghost shadows."""
+"""Section of a field's HTML report on ghost shadows."""
 
 from __future__ import annotations
 
@@ -15,27 +15,28 @@ from relit_camera.lab.evaluate.field.field_evaluation import FieldReport
 from relit_camera.lab.evaluate.field.ghost_shadows import HISTOGRAM_EDGES, MID_TONE_RANGE, ghost_pixels
 from relit_camera.lab.evaluate.field.ground_truth import not_captured
 from relit_camera.lab.evaluate.field.map_pictures import labeled_grid, with_scan_line
-from relit_camera.lab.evaluate.html_report import chart, heading, line_chart, paragraph, picture
+from relit_camera.lab.evaluate.report.html_page import Block, Figure, Heading, Paragraph, picture
+from relit_camera.lab.evaluate.report.plots import line_plot
 
 _CELL_WIDTH = 300
 
 
-def ghost_blocks(report: FieldReport) -> Iterator[str]:
-    """Pictures, a line through them, and where the doubtful spots lie between dark and lit."""
+def ghost_blocks(report: FieldReport) -> Iterator[Block]:
+    """Section on ghost shadows: pictures, luminance along a line, and the histogram from dark to lit; or nothing."""
     if report.ghost is None:
         return
-    yield heading("Ghost shadows")
-    yield paragraph(
-        "Between two captured lights a shadow stands at a place of its own, with one edge. A mixture of the two "
-        "captured pictures shows both their shadows instead, each at half its strength: ghosts. Moving the light, they "
-        "fade into each other where the true shadow would move."
+    yield Heading("Ghost shadows")
+    yield Paragraph(
+        "Under a light between two captured ones, a shadow has one edge at a place between theirs. A mixture of the "
+        "captured pictures shows both their shadows instead, each at half strength: ghosts. As the light moves they "
+        "fade into each other, where the true shadow would move."
     )
     yield _pictures(report)
     yield _scan_line(report)
     yield _histogram(report)
 
 
-def _pictures(report: FieldReport) -> str:
+def _pictures(report: FieldReport) -> Figure:
     assert report.ghost is not None
     truth, ghost, row = report.truth, report.ghost, _row_with_most_ghosts(report)
     expected = truth.colors[ghost.light]
@@ -55,13 +56,12 @@ def _pictures(report: FieldReport) -> str:
     return picture(
         labeled_grid(cells, names, 3, _CELL_WIDTH),
         f"One light that was not captured; the nearest captured one is {angle:.0f}° away. In truth each shadow has one "
-        "edge. The barycentric methods draw the shadows of all three captured lights round it, faintly, over each "
-        "other; the nearest light has one clear edge, in the wrong place. The yellow line is the one of the next "
-        "figure.",
+        "edge. The barycentric methods show the shadows of all three captured lights around it, faintly, over each "
+        "other; the nearest light has one clear edge, in the wrong place. The next figure follows the yellow line.",
     )
 
 
-def _scan_line(report: FieldReport) -> str:
+def _scan_line(report: FieldReport) -> Figure:
     assert report.ghost is not None
     truth, row = report.truth, _row_with_most_ghosts(report)
     width = truth.samples.matte.shape[1]
@@ -76,30 +76,38 @@ def _scan_line(report: FieldReport) -> str:
     lines = {"truth": values(truth.colors[report.ghost.light])}
     lines |= {each.name: values(each.ghost) for each in report.candidate_scores}
     x = np.arange(columns.min(), columns.max() + 1)
-    return chart(
-        line_chart(x, lines, f"column of pixel row {row}", "luminance"),
+    return line_plot(
+        x,
+        lines,
+        f"column of pixel row {row}",
+        "luminance",
         "Brightness along that line. Where the truth (black) falls once from light to shadow, the interpolating "
-        "methods go down in two or three smaller steps: the double edge.",
+        "methods fall in two or three smaller steps: the double edge.",
+        from_zero=True,
     )
 
 
-def _histogram(report: FieldReport) -> str:
-    centres = (HISTOGRAM_EDGES[1:] + HISTOGRAM_EDGES[:-1]) / 2
+def _histogram(report: FieldReport) -> Figure:
+    centers = (HISTOGRAM_EDGES[1:] + HISTOGRAM_EDGES[:-1]) / 2
     lines = {"truth": report.truth_histogram * 100} | {
         each.name: each.histogram * 100 for each in report.candidate_scores
     }
     shares = ", ".join(f"{each.name} {each.mid_tone_share:.1%}" for each in report.candidate_scores)
-    seen = int((report.in_region & not_captured(report.captured, report.truth.directions)).sum())
-    return chart(
-        line_chart(centres, lines, "0: dark as under one capture round the light, 1: lit as under another", "%"),
-        f"All spots that one captured light reaches and a neighbouring one does not, over {seen} lights that were not "
+    count = int((report.in_region & not_captured(report.captured, report.truth.directions)).sum())
+    return line_plot(
+        centers,
+        lines,
+        "position on the scale from dark (0) to lit (1) of the captured pictures",
+        "share of the pixels, %",
+        f"All pixels that one captured light reaches and a neighboring one does not, over {count} lights that were not "
         "captured. In truth most are dark (0) or lit (1). Interpolation moves them to the middle. Mid-tones, between "
         f"{MID_TONE_RANGE[0]} and {MID_TONE_RANGE[1]}: truth {report.truth_mid_tones:.1%}; {shares}.",
+        from_zero=True,
     )
 
 
 def _row_with_most_ghosts(report: FieldReport) -> int:
-    """The picture's row that crosses most ghosts, of dark and of lit spots."""
+    """Row of the picture with the most ghost pixels, both truly dark and truly lit ones."""
     assert report.ghost is not None
     reference = next(
         (each for each in report.candidate_scores if each.name == BASELINE_METHOD), report.candidate_scores[0]

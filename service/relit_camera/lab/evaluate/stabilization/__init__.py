@@ -1,0 +1,1 @@
+"""Evaluation of how well a film of a face is stabilized."""

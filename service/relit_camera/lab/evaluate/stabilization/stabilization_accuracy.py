@@ -1,6 +1,6 @@
-"""How well a face is followed through a rendered capture: the ways of thesis 4.2 beside ours, against the truth.
+"""Accuracy of face stabilization in a rendered capture: baselines of thesis 4.2 and our method against the truth.
 
-What ways to follow a face leave of its motion, as a report for people, as text and as JSON.
+Reports are written as HTML, text and JSON.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from relit_camera.base.errors import InputError, ModelError
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, interpolate_transforms, transforms_to_array
@@ -23,8 +22,9 @@ from relit_camera.capture.film.flash.frame_classification import FrameClass, det
 from relit_camera.capture.film.stabilization.film_stabilization import stabilize_film
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
-from relit_camera.lab.evaluate.html_report import chart, line_chart, page, paragraph, table
-from relit_camera.lab.evaluate.json_records import Record, read_json_record
+from relit_camera.lab.evaluate.rendered_truth import HeadTruth, read_truth
+from relit_camera.lab.evaluate.report.html_page import Block, Paragraph, render_page, table
+from relit_camera.lab.evaluate.report.plots import line_plot
 from relit_camera.lab.evaluate.stabilization.baseline_stabilizers import BASELINE_STABILIZERS, register_landmarks
 from relit_camera.lab.evaluate.stabilization.face_crop_sequence import FaceCropSequence, read_face_crops
 
@@ -37,30 +37,13 @@ _LANDMARKS = "landmarks"
 _TRACKERS = ("mesh", "openseeface")
 
 
-class _ToRest(Record):
-    rotation_deg: float
-    translation_px: tuple[float, float]
-
-
-class _Head(Record):
-    to_rest: _ToRest
-
-
-class _TrueFrame(Record):
-    head: _Head
-
-
-class _Truth(Record):
-    frames: list[_TrueFrame] = Field(min_length=1)
-
-
 @dataclass(frozen=True, eq=False)
 class StabilizationErrors:
-    """What a way to follow the face leaves of the head's motion in the bright frames.
+    """Errors of one stabilizer: the head motion that its transforms leave in the bright frames.
 
     Attributes:
         method: its name.
-        seen: the frames that it looks at. Between dark ones their transforms are interpolated by time.
+        seen: the frames that it uses. Between dark ones the transforms are interpolated by time.
         rotation_deg: (bright,) found minus true, mean taken out: which frame is the reference does not matter.
         translation_px: (bright, 2) the same.
         lost: frames in which it found no face; they keep the last transform.
@@ -80,7 +63,7 @@ class StabilizationErrors:
 
 @dataclass(frozen=True, eq=False)
 class StabilizationReport:
-    """All ways on one video.
+    """Errors of all stabilizers on one video.
 
     Attributes:
         index: (bright,) of the frames that are compared.
@@ -96,7 +79,7 @@ class StabilizationReport:
 def compare_stabilization(
     video: Path, truth: Path, progress: Callable[[str, int], None] = lambda what, frames: None
 ) -> StabilizationReport:
-    """Follow the face in every way, and compare the transforms of the bright frames with the truth.
+    """Run every stabilizer, and compare the transforms of the bright frames with the truth.
 
     Args:
         video: a rendered capture.
@@ -108,7 +91,7 @@ def compare_stabilization(
         CaptureError: there is no flash in it, or no face can be followed.
         InputError: the truth is missing, in another form, or of another video.
     """
-    known = read_json_record(truth, _Truth, "give the truth.json of a rendered capture")
+    known = read_truth(truth, HeadTruth)
     seen = measure_brightness(video, progress=partial(progress, "Looking for flashes"))
     if len(seen.times_s) != len(known.frames):
         what = f"{video} has {len(seen.times_s)} frames, {truth} {len(known.frames)}"
@@ -128,7 +111,7 @@ def compare_stabilization(
             times_s = flashes.times_s[film.index[chosen]]
             every = interpolate_transforms(flashes.times_s[bright], times_s, _fill_forward(found))
             errors.append(_errors_against_truth(method, kind, every, true_rows, found.count(None)))
-    ours = stabilize_film(video, flashes, circle, progress=partial(progress, "Stabilising"))
+    ours = stabilize_film(video, flashes, circle, progress=partial(progress, "Stabilizing"))
     every = [ours.transforms[index] for index in bright]
     errors.append(_errors_against_truth(OUR_METHOD, "both", every, true_rows, len(ours.lost)))
     return StabilizationReport(bright, errors, left_out)
@@ -145,7 +128,7 @@ def _stabilize_with(
 
 
 def _fill_forward(transforms: Sequence[RigidTransform | None]) -> list[RigidTransform]:
-    """Transforms, those missing filled with the last one before; with none at the beginning."""
+    """Transforms with missing ones replaced by the last known one, or by the identity at the beginning."""
     filled: list[RigidTransform] = []
     for transform in transforms:
         filled.append(transform or (filled[-1] if filled else RigidTransform()))
@@ -161,7 +144,7 @@ def _errors_against_truth(
 
 
 def _open_landmark_tracker() -> tuple[Tracker | None, dict[str, str]]:
-    """The best tracker of landmarks that is installed; or none, and why."""
+    """The best installed landmark tracker; or None, and the reason by method name."""
     why = ""
     for name in _TRACKERS:
         try:
@@ -194,33 +177,39 @@ def stabilization_text(report: StabilizationReport) -> str:
 
 def stabilization_page(report: StabilizationReport, title: str) -> str:
     """The HTML document."""
-    return page(title, _blocks(report))
+    return render_page(title, _blocks(report))
 
 
-def _blocks(report: StabilizationReport) -> Iterator[str]:
-    yield paragraph(
-        f"A capture was rendered, so that the head's motion is known. In its {len(report.index)} bright frames, what "
-        "is left of it after the transform that each way finds. Ways that look at the bright frames see another light "
-        "in each; those that look at the dark ones see one light, and interpolate by time. The thesis's choice is "
-        "sparse flow through the dark frames."
+def _blocks(report: StabilizationReport) -> Iterator[Block]:
+    yield Paragraph(
+        f"A capture was rendered, so that the head's motion is known. The errors are the motion that the transforms of "
+        f"each method leave in its {len(report.index)} bright frames. Methods that use the bright frames see a "
+        "different light in each; those that use the dark ones see one light, and interpolate by time. The thesis "
+        "chooses sparse flow through the dark frames."
     )
     rows = [[_method_label(each), *_figures(each).values()] for each in report.errors]
     yield table(
-        ["way", "translation RMS, px", "largest", "rotation RMS, degrees", "largest", "frames lost"],
+        ["method", "translation RMS, px", "largest", "rotation RMS, degrees", "largest", "frames lost"],
         rows,
-        "Smaller is better. A constant is taken out: which frame the others are taken to does not matter.",
+        "Smaller is better. The mean is removed, so that the choice of the reference frame does not matter.",
         digits=3,
+        better="smaller",
     )
     for name, why in report.left_out.items():
-        yield paragraph(f"{name}: left out, {why}.")
+        yield Paragraph(f"{name}: left out, {why}.")
     shown = [each for each in report.errors if each.method == OUR_METHOD or each.seen == "dark"]
     for label, values in (
-        ("px", {_method_label(each): each.distance_px for each in shown}),
-        ("degrees", {_method_label(each): np.abs(each.rotation_deg) for each in shown}),
+        ("translation error, px", {_method_label(each): each.distance_px for each in shown}),
+        ("rotation error, degrees", {_method_label(each): np.abs(each.rotation_deg) for each in shown}),
     ):
-        yield chart(
-            line_chart(report.index, values, "frame", label),
-            "What is left in each bright frame. Peaks are haste, which interpolation by time misses; a slope is drift.",
+        yield line_plot(
+            report.index,
+            values,
+            "frame",
+            label,
+            "Error that is left in each bright frame. Peaks are fast motion, which interpolation by time misses; a "
+            "slope is drift.",
+            from_zero=True,
         )
 
 

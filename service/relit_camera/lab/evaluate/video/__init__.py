@@ -1,0 +1,1 @@
+"""Evaluation of live video against rendered truth."""

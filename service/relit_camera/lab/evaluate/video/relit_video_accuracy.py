@@ -1,7 +1,4 @@
-"""A relit video against the ground-truth relit video of the same motion.
-
-A relit video's evaluation as a report for people, as text and as JSON.
-"""
+"""Accuracy of a relit video against the ground-truth relit video of the same motion; reports as HTML, text, JSON."""
 
 from __future__ import annotations
 
@@ -22,22 +19,23 @@ from relit_camera.base.images.image_types import DisplayImage, LinearImage
 from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.lab.evaluate.field.relighting_metrics import finite_psnr
-from relit_camera.lab.evaluate.html_report import chart, heading, line_chart, page, paragraph, picture, table
+from relit_camera.lab.evaluate.report.html_page import Block, Heading, Paragraph, picture, render_page, table
+from relit_camera.lab.evaluate.report.plots import line_plot
 from relit_camera.lab.evaluate.video.head_motion_error import HeadMotion, PoseError, pose_error, second_difference_rms
 
 SHADING_BLUR_SIGMA = 0.04
 """Sigma of the blur, as a share of the picture's width, after which light is compared and features hardly are."""
 REPORT_FRAMES = 6
-"""Frames shown in the report, about so many."""
+"""Approximate number of frames shown in the report."""
 _NO_PERSON = (np.nan,) * 6
-"""The figures of a frame with nobody in it."""
+"""The figures of a frame without a person."""
 
 
 @dataclass(frozen=True)
 class LightConsistency:
-    """How the light in a relit video follows the truth, frame by frame; PSNR inside the matte, in linear light.
+    """Comparison of a relit video's light with the truth, by frame; PSNR inside the matte, in linear light.
 
-    Frames whose matte is empty, nobody being there, have NaN.
+    Frames with an empty matte have NaN.
 
     Attributes:
         psnr_db: (frames,) as it is.
@@ -63,7 +61,7 @@ class LightConsistency:
 
     @property
     def true_flicker(self) -> float:
-        """The same of the truth: what the motion itself brings."""
+        """RMS second difference of the truth's brightness, as a share of its mean: the part due to the motion."""
         return _flicker(self.true_brightness)
 
 
@@ -73,8 +71,8 @@ def compare_videos(
     """Compare two videos of the same frames, both shown through the project's display curve.
 
     Args:
-        relit: what was made.
-        truth: what is so.
+        relit: the video to judge.
+        truth: the ground-truth video.
         matte: a video whose pixels brighter than half are the person; without one the whole frame counts.
         progress: called with the frames done.
 
@@ -137,7 +135,7 @@ def _least_squares_gain(seen: NDArray[np.float32], known: NDArray[np.float32]) -
 
 
 def _blurred(picture: LinearImage, mask: NDArray[np.float32]) -> LinearImage:
-    """A mean over the surroundings that lie inside the mask."""
+    """Gaussian blur of a picture within a mask."""
     sigma = SHADING_BLUR_SIGMA * picture.shape[1]
     weight = cv2.GaussianBlur(mask, (0, 0), sigma)
     blurred = cv2.GaussianBlur(picture * mask[..., None], (0, 0), sigma)
@@ -149,7 +147,7 @@ ANGLES = ("yaw", "pitch", "roll")
 
 @dataclass(frozen=True)
 class VideoReport:
-    """What is known of a relit video.
+    """Result of a relit video's evaluation.
 
     Attributes:
         light: against the truth.
@@ -172,7 +170,7 @@ class VideoReport:
 
 
 def video_json(report: VideoReport) -> dict[str, object]:
-    """The figures; `null` for what was not given, and for what the frames are too few to tell."""
+    """The figures for JSON; None for what was not given, and for what too few frames cannot tell."""
     light, pose = report.light, report.pose
     return {
         "frames": len(light.psnr_db),
@@ -224,22 +222,22 @@ def video_text(report: VideoReport) -> str:
 def video_page(report: VideoReport, title: str) -> str:
     """The HTML document."""
     parts = (_light, _jitter, _pose)
-    return page(title, (block for part in parts for block in part(report)))
+    return render_page(title, (block for part in parts for block in part(report)))
 
 
-def _light(report: VideoReport) -> Iterator[str]:
+def _light(report: VideoReport) -> Iterator[Block]:
     light = report.light
-    yield paragraph(
-        "A video was relit, and the same motion was rendered under the same light: the truth. Frame by frame they are "
-        "compared, inside the person's outline."
+    yield Paragraph(
+        "The relit video is compared with the truth, the same motion rendered under the same light, frame by frame and "
+        "inside the person's matte."
     )
-    yield heading("Light")
+    yield Heading("Light")
     indices, relit, truth = zip(*light.shown, strict=True)
     yield picture(
         contact_sheet([list(relit), list(truth)], ["relit", "truth"], [f"frame {i}" for i in indices], 160),
         "Some frames, relit above and in truth below. Shadows should fall on the same side and be as deep, and follow "
         "the head as it turns.",
-        exact=False,
+        lossless=False,
     )
     rows = [
         ["as it is", np.nanmean(light.psnr_db), np.nanmin(light.psnr_db)],
@@ -250,41 +248,47 @@ def _light(report: VideoReport) -> Iterator[str]:
         ["PSNR, dB", "mean", "worst frame"],
         rows,
         f"Larger is better. Brightness aligned: one gain a frame, on average {np.nanmean(light.gain_ev):+.2f} stops. "
-        "Shading alone: both blurred, so that where features stand hardly counts.",
+        "Shading alone: both pictures blurred, so that the position of facial features hardly counts.",
     )
     frames = np.arange(len(light.psnr_db))
     lines = {"as it is": light.psnr_db, "brightness aligned": light.gain_aligned_db, "shading alone": light.shading_db}
-    yield chart(
-        line_chart(frames, lines, "frame", "PSNR, dB"),
-        "It falls where the head turns far: the captured still shows no more of the sides than the camera saw.",
+    yield line_plot(
+        frames,
+        lines,
+        "frame",
+        "PSNR, dB",
+        "It falls where the head turns far: the source image shows no more of the sides than the camera saw.",
     )
 
 
-def _jitter(report: VideoReport) -> Iterator[str]:
+def _jitter(report: VideoReport) -> Iterator[Block]:
     light = report.light
-    yield heading("Steadiness")
+    yield Heading("Temporal stability")
     lines = {"truth": light.true_brightness, "relit": light.brightness}
-    yield chart(
-        line_chart(np.arange(len(light.brightness)), lines, "frame", "mean luminance"),
-        "Brightness of the person. It should rise and fall as in truth, without a tremble of its own. Change of change "
-        f"from frame to frame (RMS): relit {light.flicker:.2%} of the mean, truth {light.true_flicker:.2%}.",
+    yield line_plot(
+        np.arange(len(light.brightness)),
+        lines,
+        "frame",
+        "mean luminance",
+        "Brightness of the person. It should rise and fall as in truth, without flicker of its own. RMS second "
+        f"difference from frame to frame: relit {light.flicker:.2%} of the mean, truth {light.true_flicker:.2%}.",
     )
     measured, known = _landmark_jitter(report.measured), _landmark_jitter(report.truth)
     if measured is not None:
         true_text = "" if known is None else f"; in truth {known:.3f} px"
-        yield paragraph(f"Landmarks tremble by {measured:.3f} px (RMS of their second difference){true_text}.")
+        yield Paragraph(f"Landmark jitter: {measured:.3f} px (RMS of the second difference){true_text}.")
 
 
-def _pose(report: VideoReport) -> Iterator[str]:
+def _pose(report: VideoReport) -> Iterator[Block]:
     pose = report.pose
     if pose is None or report.measured is None or report.truth is None:
         return
-    yield heading("Head pose")
+    yield Heading("Head pose")
     yield table(
         ["angle", "RMS error, degrees", "gain", "offset, degrees"],
         [[name, pose.rms_deg[i], pose.gain[i], pose.offset_deg[i]] for i, name in enumerate(ANGLES)],
-        f"Over {pose.frames} frames, after taking out the offset, which is a matter of what is called neutral. Gain: "
-        f"how far the measured angle moves when the true one moves by 1. The whole rotation is off by "
+        f"Over {pose.frames} frames, after removing the constant offset, since the neutral pose is a convention. Gain: "
+        "how far the measured angle moves when the true one moves by 1. Error of the whole rotation: "
         f"{pose.angle_rms_deg:.2f}° RMS.",
     )
     frames = np.arange(len(report.truth.angles_deg))
@@ -293,11 +297,11 @@ def _pose(report: VideoReport) -> Iterator[str]:
             "truth": report.truth.angles_deg[:, index],
             "measured": report.measured.angles_deg[:, index] - pose.offset_deg[index],
         }
-        yield chart(line_chart(frames, lines, "frame", f"{name}, degrees"), f"Measured {name} over the true one.")
+        yield line_plot(frames, lines, "frame", f"{name}, degrees", f"Measured {name}, its offset removed, and truth.")
 
 
 def _landmark_jitter(motion: HeadMotion | None) -> float | None:
-    """Of both coordinates together, pixels; None where there are no landmarks."""
+    """RMS second difference of landmark positions, pixels; None where there are no landmarks."""
     if motion is None or not motion.landmarks.shape[1]:
         return None
     return second_difference_rms(motion.landmarks) * float(np.sqrt(2))

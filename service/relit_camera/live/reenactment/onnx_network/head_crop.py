@@ -1,4 +1,4 @@
-"""Square pictures of a head, cut alike from the still and from live frames, as published reenactors want them."""
+"""Square crops of a head, alike from the source image and from live frames, as published reenactors want them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 
 from relit_camera.base.images.image_types import DisplayImage, Frame
-from relit_camera.face.face_state import FaceStatus, HeadPose
-from relit_camera.face.head_pose import project
+from relit_camera.face.face_state import FaceStatus
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.rotated_crop import Crop
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.face.motion.neutral_face import NeutralFace
 from relit_camera.live.reenactment.control_points import NECK_PIVOT
 
@@ -27,7 +27,7 @@ def head_crop(pose: HeadPose, size: tuple[int, int]) -> Crop:
     It goes by the pose, which the landmarks' rigid points give, not by their box: an open mouth does not move it.
     """
     x, y = project(CROP_CENTER[None], pose, size)[0]
-    depth = -(pose.rotation.apply(CROP_CENTER) + pose.translation)[2]
+    depth = pose.depth_of(CROP_CENTER)
     side = SIDE_CM * pose.focal_px / depth
     return Crop((float(x), float(y)), side, side)
 
@@ -36,8 +36,7 @@ def tracked_head_crop(neutral: HeadPose, now: HeadPose, size: tuple[int, int]) -
     """The crop of a neutral head, gone along with the neck: the head turns within it, the person stays in place."""
     crop = head_crop(neutral, size)
     was, is_ = (project(NECK_PIVOT[None], pose, size)[0] for pose in (neutral, now))
-    depths = [-(pose.rotation.apply(NECK_PIVOT) + pose.translation)[2] for pose in (neutral, now)]
-    scale = depths[0] / max(depths[1], 1.0)
+    scale = neutral.depth_of(NECK_PIVOT) / max(now.depth_of(NECK_PIVOT), 1.0)
     x, y = is_ + scale * (np.array(crop.center) - was)
     return Crop((float(x), float(y)), scale * crop.width, scale * crop.height)
 

@@ -1,6 +1,7 @@
-"""A reenactor of the user's own: a published network (FOMM, LivePortrait …) exported to ONNX (docs/reenactors.md).
+"""Reenactor `onnx:FILE`: the user's own network (FOMM, LivePortrait …), exported to ONNX (docs/reenactors.md).
 
-It sees square crops of heads. A flow warps the relit picture at full resolution; a picture is laid over the still.
+It gets square crops of heads. A flow warps the relit picture at full resolution; a picture is laid over the source
+image.
 """
 
 from __future__ import annotations
@@ -11,10 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
+from relit_camera.base.errors import InputError
+from relit_camera.base.images.affine import opencv_affine
 from relit_camera.base.images.color import srgb_decode, uint8_from_linear
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.face.landmarks.rotated_crop import Crop
-from relit_camera.face.motion.motion_smoothing import FaceMotion
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.first_order_reenactor import fade_flow_at_border
 from relit_camera.live.reenactment.motion_transfer import split_body_motion
 from relit_camera.live.reenactment.onnx_network.head_crop import DrivingCrops, crop_square, head_crop
@@ -32,32 +36,36 @@ from relit_camera.live.reenactment.warp import (
 )
 
 EDGE_FADE = 0.1
-"""Share of the crop's side over which a picture gives way to the still round it."""
+"""Share of the crop's side over which a picture gives way to the source image round it."""
 
 
 class OnnxReenactor:
-    """See `Reenactor`. While the face is lost or out of reach, the picture eases to the unmoved still."""
+    """See `Reenactor`. While the face is lost or out of reach, the picture eases to the unmoved source image."""
 
-    def __init__(self, stage: ReenactorContext, path: Path) -> None:
-        """Load and check the network at `path`.
+    def __init__(self, context: ReenactorContext) -> None:
+        """Load and check the network whose file the context's argument names.
 
         Raises:
+            InputError: no file is named.
             ModelError: it is missing, damaged, or breaks the contract.
         """
-        self._face, self._size = stage.face, stage.size
-        self._network = ReenactorNetwork(path, stage.options)
-        self._crop = head_crop(stage.face.pose, stage.face.size)
-        self._source = crop_square(stage.subject.neutral, self._crop, self._network.side)
+        if not context.argument:
+            raise InputError("reenactor onnx needs a network", "name it 'onnx:FILE.onnx'")
+        path = Path(context.argument).expanduser()
+        self._face, self._size = context.face, context.size
+        self._network = ReenactorNetwork(path, context.session)
+        self._crop = head_crop(context.face.pose, context.face.size)
+        self._source = crop_square(context.subject.neutral, self._crop, self._network.side)
         self._network.check_at_rest(self._source)
         self._driver = DrivingCrops(self._network.side)
-        self._person = Cutout(stage.subject)
-        self._placed = source_from_output(stage.subject.size, stage.size)
+        self._person = Cutout(context.subject)
+        self._placed = source_from_output(context.subject.size, context.size)
 
     def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
         """See `Reenactor.plan_warp`.
 
         Raises:
-            ModelError: the network fails on this frame, or breaks the contract; so does the move.
+            ModelError: the network fails on this frame, or breaks the contract; so does the task.
         """
         placed = self._placed
         if self._person.whole:
@@ -67,7 +75,7 @@ class OnnxReenactor:
         self._driver.update(motion, frame)
         driving, initial = self._driver.driving, self._driver.initial
         seen = None if driving is None or initial is None or motion.presence == 0 else (driving, initial)
-        # The flow is that of the still as it was captured, and known at once; a picture is made of the relit one.
+        # A flow is computed from the source image as it was captured, so at once; a picture from the relit one.
         flow = self._network.answer(self._source, *seen).flow if seen and self._network.gives_flow else None
         patches = () if flow is None else (self._patch(flow, motion.presence),)
         positions = self._person.positions(Warp(placed, patches), box)
@@ -85,7 +93,7 @@ class OnnxReenactor:
         return warp
 
     def _patch(self, flow: NDArray[np.float32], share: float) -> FlowPatch:
-        """A `share` of the network's flow, in still pixels."""
+        """A `share` of the network's flow, in source pixels."""
         # −1 and 1 are the middles of the outermost pixels of the crop.
         half = self._crop.width / 2 * (1 - 1 / self._network.side)
         displacement = (flow - identity_grid(*flow.shape[:2])) * np.float32(half * share)
@@ -98,17 +106,15 @@ def output_from_crop(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.floa
     """The affine map (2, 3) from a picture of `crop` to the output pixels of `box`, for cv2: pixel centres at integers.
 
     Args:
-        crop: in the still.
+        crop: in the source image.
         shape: (rows, columns) of its picture.
-        placed: output pixels → still pixels.
+        placed: output pixels → source pixels.
         box: left, top, right, bottom in output pixels.
     """
     box_from_source = inverse_affine(placed)
     box_from_source[:, 2] -= box[:2]
     source_from_picture = np.vstack([crop.picture_from_pixels(shape[1], shape[0]), [0, 0, 1]])
-    affine = np.asarray(box_from_source @ source_from_picture, dtype=np.float64)
-    affine[:, 2] += affine[:, :2] @ [0.5, 0.5] - 0.5
-    return affine
+    return opencv_affine(np.asarray(box_from_source @ source_from_picture, dtype=np.float64))
 
 
 def _blend_prediction(
@@ -116,7 +122,7 @@ def _blend_prediction(
 ) -> None:
     """Blend a `share` of the network's picture into the unmoved one, in place.
 
-    Without an alpha of its own it is cut out by the still's.
+    Without an alpha of its own it is cut out by the source image's.
     """
     assert answer.picture is not None
     size = (picture.shape[1], picture.shape[0])
@@ -132,5 +138,4 @@ def _blend_prediction(
 def _edge_fade_mask(shape: tuple[int, ...]) -> Mask:
     """1 in the middle of (rows, columns), smoothly 0 at its edges."""
     edges = [np.clip((np.minimum(np.arange(n), np.arange(n)[::-1]) + 0.5) / (EDGE_FADE * n), 0, 1) for n in shape]
-    share = np.minimum.outer(*edges)
-    return np.asarray(share * share * (3 - 2 * share), dtype=np.float32)
+    return smoothstep(np.minimum.outer(*edges)).astype(np.float32)

@@ -1,0 +1,98 @@
+"""The V4L2 calls (ioctl) that Relit Camera makes, on an open device; all of them are here.
+
+Names, numbers and structures are those of linux/videodev2.h, but for the event of v4l2loopback. The Python libraries
+for V4L2 are under the GPL, so the five calls are written out. They raise OSError as the kernel answers.
+"""
+
+from __future__ import annotations
+
+import errno
+import struct
+import sys
+
+from relit_camera.base.errors import UnsupportedByDriverError
+
+if sys.platform != "win32":
+    import fcntl
+
+VIDIOC_QUERYCAP = 0x80685600
+VIDIOC_G_FMT = 0xC0D05604
+VIDIOC_S_FMT = 0xC0D05605
+VIDIOC_STREAMON = 0x40045612
+VIDIOC_SUBSCRIBE_EVENT = 0x4020565A
+VIDIOC_DQEVENT = 0x80885659
+
+CAPABILITY_BYTES, DEVICE_CAPS_OFFSET = 104, 88
+CAP_VIDEO_CAPTURE, CAP_VIDEO_OUTPUT = 0x1, 0x2
+BUF_TYPE_VIDEO_OUTPUT = 2
+FIELD_NONE, COLORSPACE_SRGB = 1, 8
+YU12 = int.from_bytes(b"YU12", "little")
+"""The pixel format I420: planes Y, U, V, the last two of half width and height."""
+V4L2_FORMAT = struct.Struct("=I4x7I172x")
+"""v4l2_format: the buffers' type, then of v4l2_pix_format width, height, pixel format, field, bytes a line and a
+picture, color space; the rest is zero."""
+
+EVENT_BYTES, EVENT_DATA_OFFSET = 136, 8
+EVENT_CLIENT_USAGE = 0x08000000 + 0x08E00000 + 1
+"""V4L2_EVENT_PRI_CLIENT_USAGE of v4l2loopback 0.13 and newer (pull request 516): how many clients stream from it."""
+EVENT_SUB_FL_SEND_INITIAL = 1
+"""A subscription's first event is the present state, not the next change."""
+
+OutputFormat = tuple[tuple[int, int], int]
+"""Width and height, and the pixel format, such as `YU12`."""
+
+
+def query_capabilities(descriptor: int) -> int:
+    """The capabilities of the opened node (`device_caps`), a sum of `CAP_` bits."""
+    answer = bytearray(CAPABILITY_BYTES)
+    fcntl.ioctl(descriptor, VIDIOC_QUERYCAP, answer)
+    found: int = struct.unpack_from("=I", answer, DEVICE_CAPS_OFFSET)[0]
+    return found
+
+
+def get_output_format(descriptor: int) -> OutputFormat:
+    """The format that the device has for pictures written to it."""
+    return _exchange_format(descriptor, VIDIOC_G_FMT, (0, 0))
+
+
+def set_output_format(descriptor: int, size: tuple[int, int]) -> OutputFormat:
+    """Ask for I420 pictures of `size` (width, height), both even. Returns the format that the device took instead."""
+    return _exchange_format(descriptor, VIDIOC_S_FMT, size)
+
+
+def start_output_stream(descriptor: int) -> None:
+    """Start streaming output."""
+    fcntl.ioctl(descriptor, VIDIOC_STREAMON, struct.pack("=i", BUF_TYPE_VIDEO_OUTPUT))
+
+
+def query_has_readers(descriptor: int) -> bool:
+    """Whether any program takes pictures from the v4l2loopback device.
+
+    Each call subscribes anew, so `descriptor` must be freshly opened: the subscription's first event is the present
+    state, and a lost event cannot mislead for good.
+
+    Raises:
+        UnsupportedByDriverError: the driver has no such event: v4l2loopback 0.12, or another driver.
+        OSError: the device is gone.
+    """
+    subscription = struct.pack("=8I", EVENT_CLIENT_USAGE, 0, EVENT_SUB_FL_SEND_INITIAL, *[0] * 5)
+    event = bytearray(EVENT_BYTES)
+    try:
+        fcntl.ioctl(descriptor, VIDIOC_SUBSCRIBE_EVENT, subscription)
+        fcntl.ioctl(descriptor, VIDIOC_DQEVENT, event)
+    except OSError as error:
+        if error.errno in (errno.EINVAL, errno.ENOTTY):
+            what = "this v4l2loopback does not report its readers"
+            raise UnsupportedByDriverError(what, "use version 0.13 or newer") from error
+        raise
+    (count,) = struct.unpack_from("=I", event, EVENT_DATA_OFFSET)
+    return bool(count)
+
+
+def _exchange_format(descriptor: int, request: int, size: tuple[int, int]) -> OutputFormat:
+    width, height = size
+    asked = (BUF_TYPE_VIDEO_OUTPUT, width, height, YU12, FIELD_NONE, width, width * height * 3 // 2)
+    answer = bytearray(V4L2_FORMAT.pack(*asked, COLORSPACE_SRGB))
+    fcntl.ioctl(descriptor, request, answer)
+    _, actual_width, actual_height, pixel_format, *_ = V4L2_FORMAT.unpack(answer)
+    return (actual_width, actual_height), pixel_format

@@ -1,0 +1,99 @@
+"""The seam between the pipeline and the modes: what a mode is given, and what it gives back for a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import Protocol
+
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.compositing.compositor import Compositor
+from relit_camera.live.modes.scene_relighting import SceneRelighting
+from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.scene.scene import Scene
+from relit_camera.live.status.stage_timing import StageTimer
+from relit_camera.subject.relighting.relighter import Relighter
+from relit_camera.subject.subject import Subject
+
+
+@dataclass(frozen=True)
+class RenderedFrame:
+    """The finished picture of one live frame.
+
+    Attributes:
+        image: uint8 sRGB of the output's size.
+        motion: what the face did; None while there is no tracker or no subject.
+        scene: that it was made for.
+    """
+
+    image: DisplayImage
+    motion: FaceMotion | None
+    scene: Scene
+
+
+RenderTask = Callable[[], RenderedFrame]
+"""The second half of a frame's work. Called once, in the order of the frames, maybe in another thread while the next
+frame is begun: it shares nothing with `begin` that changes."""
+
+
+@dataclass(frozen=True)
+class FaceMismatch:
+    """A mode's result where it cannot go on because the live face is not the subject's.
+
+    Attributes:
+        why: one clause with what was measured.
+        cure: what the person can do.
+    """
+
+    why: str
+    cure: str
+
+
+@dataclass(frozen=True)
+class ModeContext:
+    """What a mode works with for as long as the subject stays.
+
+    Attributes:
+        subject: the person.
+        face: the face in the subject's source image, in the tracker's landmark scheme.
+        relighter: of that subject, for lights other than the scene's.
+        scene_relighting: relights that subject as the scene says.
+        compositor: puts the person before the background.
+        size: (width, height) of the pictures to make.
+        executor: one thread for work beside the relighting.
+        timer: counts the stages.
+    """
+
+    subject: Subject
+    face: SourceFace
+    relighter: Relighter
+    scene_relighting: SceneRelighting
+    compositor: Compositor
+    size: tuple[int, int]
+    executor: Executor
+    timer: StageTimer
+
+
+class RenderMode(Protocol):
+    """Makes pictures of one subject in one mode. Keeps state between frames; `begin` is called by one thread."""
+
+    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene) -> RenderTask | FaceMismatch:
+        """Do the first half of a frame's work, and return the second.
+
+        A mode divides its work so that both halves take about as long: two frames are then at work at once.
+
+        Args:
+            frame: the live frame, of the source's size.
+            motion: of the face in that frame.
+            scene: what to show; its subject is that of the mode's context.
+
+        Raises:
+            ModelError: a model that the scene needs is missing; so does the render task.
+        """
+        ...
+
+
+ModeFactory = Callable[[ModeContext], RenderMode]
+"""Makes the object of a mode for a subject. May open models."""

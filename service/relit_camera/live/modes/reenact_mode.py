@@ -1,0 +1,51 @@
+"""Mode reenact: the subject's source image, relit, moved as the live face moves. No live pixel is in the picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.images.image_types import Frame, LinearImage
+from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
+from relit_camera.live.reenactment.reenactor import Reenactor, WarpTask
+from relit_camera.live.scene.scene import Scene
+from relit_camera.subject.subject import Subject
+
+
+class ReenactMode:
+    """See `RenderMode`."""
+
+    def __init__(self, context: ModeContext, reenactor: Reenactor) -> None:
+        self._context = context
+        self._reenactor = reenactor
+
+    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene) -> RenderTask:
+        """See `RenderMode.begin`: plans the warp while the source image is relit; the task warps and composes."""
+        context, timer = self._context, self._context.timer
+        planned = context.executor.submit(self._plan, motion, frame)
+        relit = context.scene_relighting.relight(scene, motion.rotation, frame.time_s)
+        warp = planned.result()
+
+        def render() -> RenderedFrame:
+            with timer.stage("move"):
+                layer = warp(blend_with_source(context.subject, relit, scene.look.lighting.blend))
+            with timer.stage("compose"):
+                image = context.compositor.composite_source(layer, scene, frame.time_s)
+            return RenderedFrame(image, motion, scene)
+
+        return render
+
+    def _plan(self, motion: FaceMotion, frame: Frame) -> WarpTask:
+        with self._context.timer.stage("follow"):
+            return self._reenactor.plan_warp(motion, frame)
+
+
+def blend_with_source(subject: Subject, relit: LinearImage, share: float) -> LinearImage:
+    """A `share` of the relit source image, and for the rest the source image as it was captured, lit from the front.
+
+    The live picture, which mode ratio blends with, stays private in mode reenact.
+    """
+    if share >= 1:
+        return relit
+    return np.asarray(linear_from_uint8(subject.neutral) * (1 - share) + relit * share, dtype=np.float32)

@@ -1,0 +1,110 @@
+"""What is wrong with the settings is found before a device is opened."""
+
+from __future__ import annotations
+
+import signal
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from relit_camera.app.serve import run_camera
+from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
+from relit_camera.base.errors import DeviceError, RelitError
+from relit_camera.devices.sinks.sink import Sink
+from relit_camera.devices.sources.source import Source
+from tests.cli.relit_command import Material, write_material
+from tests.small_camera import memory_source
+
+
+@pytest.fixture(scope="module")
+def material(tmp_path_factory: pytest.TempPathFactory) -> Material:
+    return write_material(tmp_path_factory.mktemp("material"), frames=2)
+
+
+@pytest.fixture(autouse=True)
+def signal_handlers() -> Iterator[None]:
+    """`run_camera` sets handlers of the whole process."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+class Devices:
+    """Records what is opened; the sink then fails, so that no camera runs."""
+
+    def __init__(self) -> None:
+        self.opened: list[str] = []
+
+    def source(self, settings: SourceSettings, own_label: str) -> Source:
+        self.opened.append("source")
+        return memory_source()
+
+    def sink(self, settings: OutputSettings) -> Sink:
+        self.opened.append("sink")
+        raise DeviceError("the sink was reached", "this is the end of the test")
+
+
+def run(material: Material, folder: Path, devices: Devices, changes: dict[str, Any], **more: Any) -> None:
+    values: dict[str, Any] = {
+        "storage": {"data_dir": folder / "data"},
+        "server": {"port": 0},
+        "subject": str(material.subject),
+        "tracker": {"name": material.tracker},
+    }
+    settings = RelitSettings(**(values | changes))
+    run_camera(settings, source_for=devices.source, sink_for=devices.sink, **more)
+
+
+def test_sound_settings_reach_the_devices(material: Material, tmp_path: Path) -> None:
+    devices = Devices()
+    with pytest.raises(DeviceError, match="the sink was reached"):
+        run(material, tmp_path, devices, {})
+    assert devices.opened == ["source", "sink"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"output": {"placeholder": "none.png"}}, r"none\.png"),
+        ({"output": {"placeholder": __file__}}, "not a picture format"),
+        ({"matte": "recorded:none.npz"}, r"none\.npz"),
+        ({"matte": f"recorded:{__file__}"}, "holds no recorded mattes"),
+        ({"matte": "magic"}, "no matte is called 'magic'"),
+        ({"tracker": {"name": "magic"}}, "no tracker .*'magic'"),
+        ({"relight": {"name": "magic"}}, "no relighter .*'magic'"),
+        ({"reenact": {"name": "magic"}}, "no reenactor .*'magic'"),
+        ({"tracker": {"name": "recorded:none.json"}}, r"none\.json"),
+        ({"reenact": {"name": "onnx:none.onnx"}}, r"none\.onnx does not exist"),
+        ({"reenact": {"model": "none.onnx"}}, r"none\.onnx does not exist"),
+        ({"subject": "nobody"}, "no subject 'nobody'"),
+        ({"subject": __file__}, "subject"),
+        ({"look": {"lighting": {"environment": "nowhere"}}}, "no environment 'nowhere'"),
+        ({"look": {"background": {"kind": "image", "image": "nowhere"}}}, "no background picture 'nowhere'"),
+        ({"server": {"host": "0.0.0.0", "port": 0}}, "there is no token"),
+    ],
+)
+def test_faults_are_found_before_a_device_is_opened(
+    changes: dict[str, Any], words: str, material: Material, tmp_path: Path
+) -> None:
+    devices = Devices()
+    with pytest.raises(RelitError, match=words):
+        run(material, tmp_path, devices, changes)
+    assert devices.opened == []
+
+
+def test_a_panorama_file_that_is_missing_is_found_before_a_device_is_opened(material: Material, tmp_path: Path) -> None:
+    devices = Devices()
+    with pytest.raises(RelitError, match=r"no panorama at none\.hdr"):
+        run(material, tmp_path, devices, {}, environment="none.hdr")
+    assert devices.opened == []
+
+
+def test_a_port_in_use_is_found_before_a_device_is_opened(material: Material, tmp_path: Path) -> None:
+    devices = Devices()
+    with socket.create_server(("127.0.0.1", 0)) as other, pytest.raises(RelitError, match="is in use"):
+        run(material, tmp_path, devices, {"server": {"port": other.getsockname()[1]}})
+    assert devices.opened == []

@@ -1,0 +1,64 @@
+"""Headers of picture files that could state one size to the check and another to the decoder."""
+
+from __future__ import annotations
+
+import struct
+
+import cv2
+import numpy as np
+import pytest
+
+from relit_camera.base.images.image_limits import image_size_from_bytes
+from tests.bad_pictures import encoded
+
+WIDTH, HEIGHT = 517, 300
+
+
+def jpeg_with(before: bytes) -> bytes:
+    """A sound JPEG file with something between its start and its first segment."""
+    sound = encoded(".jpg", WIDTH, HEIGHT)
+    return sound[:2] + before + sound[2:]
+
+
+def comment_with_frame() -> bytes:
+    """A comment that holds frame headers of 64x64 pixels, wherever one begins to read in it."""
+    frame = b"\xff\xc0" + struct.pack(">HBHHB", 11, 8, 64, 64, 1) + bytes(3)
+    content = frame * 5000
+    return b"\xff\xfe" + struct.pack(">H", 2 + len(content)) + content
+
+
+@pytest.mark.parametrize(
+    "marker",
+    [b"", b"\xff\x01", b"\xff\xd0", b"\xff\xd7", b"\xff", b"\xff" * 7, b"\xff\xff\x01\xff\xff\xd3"],
+    ids=["none", "TEM", "RST0", "RST7", "fill byte", "fill bytes", "several"],
+)
+def test_the_frame_of_a_jpeg_is_the_one_that_is_decoded(marker: bytes) -> None:
+    data = jpeg_with(marker + comment_with_frame())
+    decoded = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    assert image_size_from_bytes(data) == (WIDTH, HEIGHT)
+    assert decoded is None or decoded.shape[:2] == (HEIGHT, WIDTH)
+
+
+@pytest.mark.parametrize("start", [b"\xff\x00", b"\xff\xd8", b"\xff\xd9", b"\xff\xfe\0\0", b"\xff\xfe\0\1", b"\0"])
+def test_what_is_no_segment_of_a_jpeg_is_refused(start: bytes) -> None:
+    with pytest.raises(ValueError, match="JPEG"):
+        image_size_from_bytes(jpeg_with(start + comment_with_frame()))
+
+
+def tiff(entries: list[tuple[int, int, int, int]]) -> bytes:
+    """A TIFF header of one directory: tag, type, count and value of each entry."""
+    return b"II*\0" + struct.pack("<IH", 8, len(entries)) + b"".join(struct.pack("<HHII", *entry) for entry in entries)
+
+
+def test_a_tiff_file_with_two_sizes_is_refused() -> None:
+    sides = [(256, 4, 1, 9000), (257, 4, 1, 9000)]
+    assert image_size_from_bytes(tiff(sides)) == (9000, 9000)
+    for repeated in (256, 257):
+        with pytest.raises(ValueError, match="size"):
+            image_size_from_bytes(tiff([*sides, (repeated, 4, 1, 64)]))
+
+
+def test_a_side_of_a_tiff_file_stands_in_its_entry() -> None:
+    """64 bits (type 16) do not fit: the entry would hold the place where the side is."""
+    with pytest.raises(ValueError, match="size"):
+        image_size_from_bytes(tiff([(256, 16, 1, 64), (257, 4, 1, 64)]))

@@ -1,0 +1,68 @@
+"""A stranger before the camera is told from the subject, after a while."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relit_camera.live.modes.identity_check import IdentityCheck, IdentityTunables, shape_distance_cm
+from relit_camera.live.modes.mode import FaceMismatch
+from tests.live.people import close_up, face_of
+from tests.live.rooms import before_the_camera
+
+NO_LIGHT_EXPLAINS = 0.3
+"""A residual of the fit of the room's light: 0.1 is usual for the subject."""
+
+
+def stranger_points() -> np.ndarray:
+    """A face of quite another shape: longer, narrower, with a chin aside."""
+    points = face_of(close_up()).head_points.copy()
+    points[:, 0] *= np.where(points[:, 1] < -2, 0.75, 1.1)
+    points[:, 1] *= 1.12
+    return points
+
+
+def test_a_stranger_is_found_out_after_a_while_and_not_before() -> None:
+    check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
+    delay_s = IdentityTunables().delay_s
+    for time_s in (0.0, 0.5 * delay_s, 0.99 * delay_s):
+        assert check.check(stranger, NO_LIGHT_EXPLAINS, time_s) is None
+    found = check.check(stranger, NO_LIGHT_EXPLAINS, 1.01 * delay_s)
+    assert isinstance(found, FaceMismatch)
+    assert "the live face is not the subject's" in found.why
+    assert "deviation 0.30" in found.why
+    assert "mode reenact" in found.cure
+
+
+def test_the_subject_is_not_taken_for_a_stranger_even_in_odd_light() -> None:
+    check, person = IdentityCheck(face_of(close_up())), before_the_camera()
+    assert all(check.check(person, NO_LIGHT_EXPLAINS, time_s) is None for time_s in np.arange(0, 10, 0.5))
+
+
+def test_one_measure_alone_decides_only_when_it_is_far_off() -> None:
+    """A beard changes the shape, a cap the light: only the product of both counts."""
+    check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
+    shape = shape_distance_cm(stranger_points(), face_of(close_up())) / IdentityTunables().shape_cm
+    limit = IdentityTunables().residual / shape
+    check.check(stranger, 0.0, 0.0)
+    assert check.check(stranger, 0.99 * limit, 5.0) is None
+    assert check.check(stranger, 1.01 * limit, 5.0) is not None
+
+
+def test_a_face_that_is_not_tracked_with_confidence_is_not_judged() -> None:
+    check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points(), presence=0.9)
+    check.check(stranger, NO_LIGHT_EXPLAINS, 0.0)
+    assert check.check(stranger, NO_LIGHT_EXPLAINS, 5.0) is None
+
+
+def test_shape_difference_is_of_shape_only() -> None:
+    face = face_of(close_up())
+    points = face.head_points
+    assert shape_distance_cm(points, face) == pytest.approx(0, abs=1e-9)
+    assert shape_distance_cm(points * 1.3 + [5, -2, 1], face) == pytest.approx(0, abs=1e-6)
+    too_near = points * np.stack([1 + 0.02 * points[:, 2], 1 + 0.02 * points[:, 2], np.ones(len(points))], axis=1)
+    assert shape_distance_cm(too_near, face) < 0.05  # as a wrong focal length has it
+    speaking = points.copy()
+    speaking[list(face.scheme.lips)] += [0, -1.5, 0]
+    assert shape_distance_cm(speaking, face) == pytest.approx(0, abs=1e-9)
+    assert shape_distance_cm(stranger_points(), face) > 0.4

@@ -1,0 +1,45 @@
+"""Tables at the end of a test run: rows noted by tests, in whichever process a test ran."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import pytest
+
+Row = tuple[str, ...]
+TABLES = {
+    "faults survived": ("fault", "longest gap between frames", "lasted"),
+    "readers of the virtual camera": ("reader", "v4l2loopback", "saw"),
+}
+"""Title and columns of every table."""
+
+
+@pytest.fixture
+def note_row(record_property: Callable[[str, object], None]) -> Callable[[str, Row], None]:
+    """A function that adds a row to the table of a title.
+
+    The row travels with the test's report, so that it arrives from the processes of pytest-xdist.
+    """
+
+    def note(title: str, row: Row) -> None:
+        assert len(row) == len(TABLES[title])
+        record_property(title, row)
+
+    return note
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print every table that has rows, as Markdown."""
+    reports = [report for group in terminalreporter.stats.values() for report in group]
+    for title, columns in TABLES.items():
+        rows = sorted(rows_of(title, reports))
+        if rows:
+            terminalreporter.section(title)
+            for row in (columns, ("---",) * len(columns), *rows):
+                terminalreporter.write_line(f"| {' | '.join(row)} |")
+
+
+def rows_of(title: str, reports: Iterable[object]) -> list[Row]:
+    """The rows of one table that the reports of finished tests carry."""
+    calls = (report for report in reports if isinstance(report, pytest.TestReport) and report.when == "call")
+    return [tuple(map(str, row)) for report in calls for name, row in report.user_properties if name == title]  # type: ignore[call-overload]

@@ -1,0 +1,119 @@
+"""The layout of `service/relit_camera`: few entries in a folder, short modules, standard names that occur once."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "service" / "relit_camera"
+MAX_ENTRIES = 12
+MAX_LINES = 400
+ONE_A_COMMAND = {"cli/commands"}
+"""Folders that hold one module for each command line command, however many there are."""
+SHARED_NAMES = {"__init__", "__main__", "main"}
+SAME_WORD = {
+    "subject": {"subject/subject.py", "cli/commands/subject.py"},
+    "head_crop": {"capture/film/lamp/head_crop.py", "live/reenactment/onnx_network/head_crop.py"},
+}
+"""Modules of the same name that are both rightly called so: of a command and what it is about, of two kinds of crop."""
+
+OLD_CLASSES = frozenset(
+    """
+    Line LineKeeper Daemon StandIn Director Composer Cast Finish Finished Claim Stage Move Moved RoomProbe Glimpse Kind
+    Reached Press Guide
+    """.split()  # noqa: SIM905
+)
+OLD_NAMES = frozenset(
+    """
+    daemon director composer stand_in line_keeper holders revive admit_environment room_probe glimpse look_at
+    leave_to_stay share_cores keep_picture_memory lamp_places wander
+    """.split()  # noqa: SIM905
+)
+"""Words of the private dialect that `docs/glossary.md` replaced by standard terms."""
+
+
+def modules() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def folders() -> list[Path]:
+    return sorted({path.parent for path in modules()})
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).as_posix()
+
+
+def entries(folder: Path) -> list[str]:
+    """Modules and folders of modules that a reader sees in a folder."""
+    return sorted(
+        path.name
+        for path in folder.iterdir()
+        if (path.suffix == ".py" and path.name != "__init__.py") or (path / "__init__.py").exists()
+    )
+
+
+def defined_names(tree: ast.AST) -> Iterator[tuple[str, bool]]:
+    """Every name that a module defines or assigns, and whether it is a class."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.ClassDef(name=name):
+                yield name, True
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.arg(arg=name):
+                yield name, False
+            case ast.Name(id=name, ctx=ast.Store()) | ast.Attribute(attr=name, ctx=ast.Store()):
+                yield name, False
+            case ast.alias(asname=str(name)):
+                yield name, False
+
+
+def old_names(text: str) -> set[str]:
+    """Names of the old dialect in a module's text."""
+    named = ((name.lstrip("_"), is_class) for name, is_class in defined_names(ast.parse(text)))
+    return {name for name, is_class in named if name in (OLD_CLASSES if is_class else OLD_NAMES)}
+
+
+def test_a_folder_has_few_entries() -> None:
+    found = {name_of(folder): entries(folder) for folder in folders()}
+    assert len(found) > 30
+    assert {name: held for name, held in found.items() if len(held) > MAX_ENTRIES and name not in ONE_A_COMMAND} == {}
+
+
+def test_a_module_is_short() -> None:
+    lengths = {name_of(path): len(path.read_text(encoding="utf-8").splitlines()) for path in modules()}
+    assert {name: length for name, length in lengths.items() if length > MAX_LINES} == {}
+
+
+def test_a_module_s_name_occurs_once() -> None:
+    by_name: dict[str, set[str]] = {}
+    for path in modules():
+        if path.stem not in SHARED_NAMES:
+            by_name.setdefault(path.stem, set()).add(name_of(path))
+    assert {name: paths for name, paths in by_name.items() if len(paths) > 1 and paths != SAME_WORD.get(name)} == {}
+
+
+@pytest.mark.parametrize("path", modules(), ids=name_of)
+def test_a_module_says_what_it_is_in_standard_words(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert ast.get_docstring(ast.parse(text)), "a module begins with what it is"
+    assert old_names(text) == set()
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("class StandIn: pass", {"StandIn"}),
+        ("class _Cast: pass", {"Cast"}),
+        ("def revive(device): pass", {"revive"}),
+        ("def run(daemon): pass", {"daemon"}),
+        ("self.director = None", {"director"}),
+        ("import camera_service as daemon", {"daemon"}),
+        ("Thread(daemon=True).start()", set()),
+        ("class Pipeline: pass", set()),
+    ],
+)
+def test_old_names_are_found(text: str, found: set[str]) -> None:
+    assert old_names(text) == found
