@@ -281,8 +281,8 @@ def test_our_placeholder_is_dark_and_of_the_size_asked_for(size: tuple[int, int]
 
 def test_the_reason_is_written_below_and_fits() -> None:
     size = (640, 360)
-    plain, told = placeholder(size), placeholder(size, "no webcam")
-    rows, columns = np.nonzero((plain != told).any(axis=2))
+    plain, with_reason = placeholder(size), placeholder(size, "no webcam")
+    rows, columns = np.nonzero((plain != with_reason).any(axis=2))
     assert rows.min() > size[1] // 2
     assert abs((columns.min() + columns.max()) / 2 - size[0] / 2) < 4
     long = placeholder(size, "a reason that goes on and on " * 5 + "é漢")

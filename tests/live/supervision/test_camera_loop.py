@@ -70,14 +70,17 @@ class FakeSource:
 
 
 class FakeSupervisor:
-    """A pipeline that needs no time; while `fails`, no picture comes."""
+    """A pipeline that needs no time. While `fails`, no picture comes; while `late`, its messages do not."""
 
     def __init__(self, camera: LoopUnderTest) -> None:
         self._camera = camera
         self._shown: list[ShownPicture] = []
-        self.fails, self.face = False, FaceStatus.FOUND
+        self.fails = self.late = False
+        self.face = FaceStatus.FOUND
 
     def handle_messages(self) -> list[ShownPicture]:
+        if self.late:
+            return []
         shown, self._shown = self._shown, []
         return shown
 
@@ -204,6 +207,17 @@ def test_a_source_without_frames_is_waited_for_and_says_why(camera: LoopUnderTes
     camera.run(1.0)
     assert camera.board.degradations() == []
     assert camera.board.state is CameraState.LIVE
+
+
+def test_a_late_picture_does_not_make_a_waiting_camera_live(camera: LoopUnderTest) -> None:
+    camera.run(1.0)
+    camera.supervisor.late = True
+    camera.run(0.2)
+    camera.source.state, camera.source.reason = SourceState.RECONNECTING, "HD Webcam is unplugged"
+    camera.run(1.0)
+    camera.supervisor.late = False
+    camera.run(1.0)
+    assert [data for kind, data in camera.events() if kind == "state"] == ["live", "waiting"]
 
 
 def test_a_source_that_has_not_begun_is_starting_until_it_says_why(camera: LoopUnderTest) -> None:

@@ -36,7 +36,7 @@ def frame(index: int) -> Frame:
 
 
 class FakePipeline:
-    """Raises or waits in either half, as it is told by frame index."""
+    """Raises or waits in either half, by frame index."""
 
     def __init__(self) -> None:
         self.begun: list[int] = []
@@ -122,6 +122,8 @@ def test_the_next_frame_is_begun_while_one_is_rendered_and_no_more(working: Work
     assert working.next_kinds(1) == {"FrameStarted"}  # begun, but not finished while 0 is rendered
     for index in (2, 3, 4):
         working.worker.submit_frame(frame(index))
+    with pytest.raises(queue.Empty):
+        working.posted.get(timeout=0.3)
     held.set()
     pictures = working.next_kinds(6)  # of 0 and 1, the end of 1, and 4 started, finished, rendered
     assert {kind for kind in pictures if kind.startswith("picture")} == {"picture 0", "picture 1", "picture 4"}
