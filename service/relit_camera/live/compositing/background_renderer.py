@@ -54,20 +54,20 @@ class MattedFrame:
     person: Mask
 
 
-def blur_background(room: MattedFrame, strength: float) -> DisplayImage:
+def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     """Blur the live room without the person in linear light, sigma `strength` tenths of the height: uint8 sRGB.
 
     Normalised convolution: the person's pixels have no weight, so nothing of them bleeds into the room around them, and
     behind them the room is continued (Knutsson and Westin 1993).
     """
-    height, width = room.person.shape
+    height, width = matted.person.shape
     sigma = BLUR_SIGMA * strength * height
     reduce = int(np.clip(sigma / _WORKING_SIGMA, *_REDUCTION_RANGE))
     size = (max(1, width // reduce), max(1, height // reduce))
     # Averaged as light: of codes, small lamps would come out too dark.
-    light = cv2.resize(linear_from_uint8(room.image), size, interpolation=cv2.INTER_AREA)
+    light = cv2.resize(linear_from_uint8(matted.image), size, interpolation=cv2.INTER_AREA)
     # So high a power that a pixel counts only when it is all but surely room.
-    weight = ((1 - cv2.resize(room.person, size, interpolation=cv2.INTER_AREA)) ** 16)[..., np.newaxis]
+    weight = ((1 - cv2.resize(matted.person, size, interpolation=cv2.INTER_AREA)) ** 16)[..., np.newaxis]
     # Averaging r pixels to one and enlarging linearly blurs too, with a variance of r²/12 + r²/6.
     working_sigma = max((sigma / reduce) ** 2 - 1 / 4, 0.01) ** 0.5
     weighted = cv2.GaussianBlur(np.dstack([light * weight, weight]), (0, 0), working_sigma)
@@ -149,16 +149,16 @@ class BackgroundRenderer:
         self._shown = crossfade(self._previous, self._goal, share)
         return self._shown
 
-    def live_background(self, request: BackgroundRequest, room: MattedFrame, now: float) -> DisplayImage:
+    def live_background(self, request: BackgroundRequest, matted: MattedFrame, now: float) -> DisplayImage:
         """The background of a live picture of the renderer's size: its room for `none` and `blur`, else a static one.
 
         Between the room and a static background there is a cut: no trace of the room stays where it shall not be seen.
         """
         match request.background:
             case NoBackground():
-                image = room.image
+                image = matted.image
             case BlurBackground() as blur:
-                image = blur_background(room, blur.strength)
+                image = blur_background(matted, blur.strength)
             case _:
                 return self.static_background(request, now)
         self._request = None
