@@ -11,6 +11,7 @@ from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
 from tests.cli.relit_command import Material, write_material
+from tests.made_once import run_folder
 
 pytest_plugins = ["tests.report_tables"]
 
@@ -22,6 +23,11 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "relit"))
 
 REAL_TIME = "real time"
 MACHINE = "virtual machine"
+
+
+def pytest_configure() -> None:
+    """Make the run's folder before the processes of pytest-xdist start, which share it."""
+    run_folder()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

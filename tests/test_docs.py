@@ -31,6 +31,7 @@ from relit_camera.face.tracking import track_recording
 from relit_camera.light.environment_panorama import MAX_PANORAMA_PIXELS
 from relit_camera.live.compositing import matting
 from relit_camera.live.scene.background_store import MAX_SIDE_PX as MAX_BACKGROUND_SIDE_PX
+from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject import subject_file
 from relit_camera.subject.subject import MAX_SIDE_PX
 from tests.doc_tables import DOCS, ROOT, imports_between_parts, layers, updated
@@ -80,7 +81,8 @@ def test_folder_tables_name_every_folder(page: str) -> None:
     heading = "## Find your way" if "CONTRIBUTING" in page else "## Folders and layers"
     named = [row[0].strip("`") for row in rows(page, heading)]
     assert named == [name for layer in layers() for name in layer]
-    assert set(named) == {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}
+    parts = {path.stem for path in PACKAGE.iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()}
+    assert set(named) == parts - {"__init__"}
 
 
 def test_the_table_of_threads_names_every_thread() -> None:
@@ -111,6 +113,11 @@ def test_the_table_of_events_names_all_that_are_published() -> None:
     documented = {name for row in rows("api.md", "## Events") for name in re.findall(r"`([a-z-]+)`", row[0])}
     source = "\n".join(path.read_text() for path in PACKAGE.rglob("*.py"))
     assert set(re.findall(r"events\.publish\(\s*\"([a-z-]+)\"", source)) <= documented
+
+
+def test_the_table_of_degradations_names_every_code() -> None:
+    documented = {row[0].strip("`") for row in rows("api.md", "### Degradations")}
+    assert documented == {str(code) for code in DegradationCode}
 
 
 LIMITS = {
@@ -189,6 +196,8 @@ def test_modules_and_files_that_a_page_names_exist(page: Path) -> None:
     paths = re.findall(r"`([\w/-]+/[\w/.-]*)`", text)
     known = (ROOT, SERVICE, PACKAGE, page.parent, ROOT / "tests/vm", SERVICE / "relit_studio")
     unknown |= {path for path in paths if _names_code(path) and not _found(path, known)}
+    names = {path.name for folder in (SERVICE, ROOT / "tests") for path in folder.rglob("*.py")}
+    unknown |= {name for name in re.findall(r"`(\w+\.py)`", text) if name not in names}
     assert unknown == set()
 
 
@@ -207,6 +216,21 @@ def test_the_options_of_the_capture_page_exist() -> None:
     documented = {name for row in rows("capture.md", "## Build") for name in re.findall(r"`(--[a-z-]+)", row[0])}
     assert documented <= _option_names(_command(["capture", "build"])[0])
     assert len(documented) > 10
+
+
+def test_the_messages_that_the_capture_page_quotes_exist() -> None:
+    written = set()
+    for path in [*(PACKAGE / "capture").rglob("*.py"), *(PACKAGE / "base/video").rglob("*.py")]:
+        constants = (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant))
+        written |= {constant.value for constant in constants if isinstance(constant.value, str)}
+    quoted = [
+        piece
+        for row in rows("capture.md", "## When it refuses")
+        for piece in re.split(r"; |…%?(?: \(.*\))?|, or ", row[0])
+    ]
+    pieces = [piece.strip(" :,") for piece in quoted if len(piece.strip()) > 8]
+    assert len(pieces) > 20
+    assert [piece for piece in pieces if not any(piece in text for text in written)] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: str(path.relative_to(ROOT)))

@@ -13,7 +13,7 @@ from relit_studio.pinhole import Pinhole
 
 @dataclass(frozen=True)
 class Camera:
-    """A picture centred `middle_cm` above the head's origin.
+    """A picture centerd `middle_cm` above the head's origin.
 
     Attributes:
         height: pixels.
@@ -41,10 +41,10 @@ class Camera:
 
     @property
     def position_cm(self) -> NDArray[np.float64]:
-        """Where the camera is, (3,) in room axes."""
+        """Position (3,) of the camera in room axes."""
         return np.array([0.0, self.middle_cm, self.distance_cm])
 
     def project(self, points: NDArray) -> Points:
-        """Pixels (count, 2) float32, centres at integers + ½, of room points (count, 3) in centimetres."""
+        """Pixels (count, 2) float32, centers at integers + ½, of room points (count, 3) in centimeters."""
         seen = Pinhole(*self.size, self.focal_px).project(np.asarray(points, np.float64) - self.position_cm)
         return seen[:, :2].astype(np.float32)

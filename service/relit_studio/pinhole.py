@@ -1,7 +1,7 @@
-"""The pinhole that every camera of the studio is.
+"""Pinhole projection, shared by all cameras of the studio.
 
-Camera axes: X right in the picture, Y up, Z toward the camera, centimetres, the camera at the origin, so that what it
-sees has z < 0.
+Camera axes in centimeters: X right in the picture, Y up, Z toward the camera. The camera is at the origin, so visible
+points have z < 0.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Pinhole:
     focal_px: float
 
     def project(self, points: NDArray) -> NDArray:
-        """Pixels (count, 2), centres at integers + ½, and 1 / depth as third column, of points (count, 3)."""
+        """Pixels (count, 2), centers at integers + ½, and 1 / depth as third column, of points (count, 3)."""
         inverse = -1 / points[:, 2]
         x = self.width / 2 + self.focal_px * points[:, 0] * inverse
         y = self.height / 2 - self.focal_px * points[:, 1] * inverse
@@ -40,7 +40,7 @@ class Pinhole:
         return np.asarray(ray / np.linalg.norm(ray, axis=-1, keepdims=True))
 
     def pixel_grid(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """X and y (height, width) of the pixel centres."""
+        """X and y (height, width) of the pixel centers."""
         x, y = np.meshgrid(np.arange(self.width) + 0.5, np.arange(self.height) + 0.5)
         return x, y
 

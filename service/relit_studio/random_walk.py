@@ -1,4 +1,4 @@
-"""Smooth random movement: of a hand, of a head, of a setting that drifts."""
+"""Smooth random signals, for the movement of hands and heads and for drifting camera settings."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ _WAVES = 7
 
 
 class RandomWalk:
-    """Numbers that move smoothly in time: sums of sines of random frequency and phase, each of RMS 1 and mean 0."""
+    """Smooth random functions of time: sums of sines of random frequency and phase, each with RMS 1 and mean 0."""
 
     def __init__(self, rng: np.random.Generator, count: int, low_hz: float, high_hz: float) -> None:
-        """Draw `count` independent movements within a band of frequencies."""
+        """Draw `count` independent functions within a band of frequencies."""
         self._frequencies = rng.uniform(low_hz, high_hz, (count, _WAVES))
         self._phases = rng.uniform(0, 2 * np.pi, (count, _WAVES))
 

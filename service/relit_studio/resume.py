@@ -1,4 +1,4 @@
-"""Folders that are filled bit by bit, and may be left and taken up again."""
+"""Output folders that an interrupted command can go on filling."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relit_camera.base.storage import make_folder, write_atomic
 
 
 def keep_settings(folder: Path, name: str, settings: Mapping[str, object]) -> None:
-    """Write down in file `name` what a folder is filled with, or check that it is the same as when it was begun.
+    """Write the settings of a folder's content to its file `name`, or check that they equal those written there.
 
     Raises:
         InputError: the folder was begun with other settings.

@@ -13,8 +13,8 @@ from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
 from relit_studio.camera import Camera
 from relit_studio.cycles.exr import read_rgba
-from relit_studio.cycles.figure import Figure
 from relit_studio.cycles.job import Picture, Quality
+from relit_studio.cycles.person_objects import Figure
 from relit_studio.cycles.runner import render
 from relit_studio.drive.room import Room
 from relit_studio.people.person import Person
@@ -72,7 +72,7 @@ def finish_stills(
 
 
 def _calmed(picture: LinearImage, alpha: Mask) -> tuple[LinearImage, Mask]:
-    """A premultiplied picture (h, w, 3) and its alpha (h, w) with soft edges: Cycles denoises colours, but no alpha."""
+    """A premultiplied picture (h, w, 3) and its alpha (h, w) with soft edges: Cycles denoises colors, but no alpha."""
     edge = cv2.dilate(np.asarray((alpha > 0.02) & (alpha < 0.98), np.uint8), np.ones((3, 3), np.uint8)) > 0
     soft = np.where(edge, cv2.GaussianBlur(alpha, (0, 0), _EDGE_PX), alpha)
     return np.where(edge[..., None], cv2.GaussianBlur(picture, (0, 0), _EDGE_PX), picture), np.asarray(soft, np.float32)

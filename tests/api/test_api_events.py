@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import httpx
@@ -15,6 +16,7 @@ from relit_camera.api.server.http_server import ApiServer
 from relit_camera.base.config.look import Lighting, Look
 from tests.api.api_client import Client, hdr, png
 from tests.api.fake_camera import FakeCamera
+from tests.small_camera import wait_until
 
 pytestmark = pytest.mark.real_time
 
@@ -142,12 +144,23 @@ def test_the_stream_ends_when_the_camera_does(listener: Listener, camera: FakeCa
     assert time.monotonic() - started < 1
 
 
-def test_a_listener_who_left_is_forgotten(server: ApiServer, camera: FakeCamera) -> None:
+def test_a_listener_who_left_is_forgotten(
+    server: ApiServer, camera: FakeCamera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listen, listening = camera.events.listen, list[object]()
+
+    @contextmanager
+    def counted() -> Iterator[object]:
+        with listen() as events:
+            listening.append(events)
+            try:
+                yield events
+            finally:
+                listening.remove(events)
+
+    monkeypatch.setattr(camera.events, "listen", counted)
     with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
         listener = Listener(body)  # held: the answer is closed with the last reference to its lines
         listener.wait_for("status")
-        assert len(camera.events._listeners) == 1
-    deadline = time.monotonic() + 3
-    while camera.events._listeners and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert not camera.events._listeners
+        assert len(listening) == 1
+    wait_until(lambda: not listening)

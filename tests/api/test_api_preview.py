@@ -261,7 +261,6 @@ def test_a_viewer_who_leaves_while_nothing_comes_is_noticed(
         chunks = body.iter_bytes()
         parts(body, chunks, 1)
         camera.publishing = False
-        time.sleep(0.1)
         assert feed.viewers == 1
     assert wait_until(lambda: feed.viewers == 0)
 

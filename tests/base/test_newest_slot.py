@@ -1,10 +1,16 @@
+"""The slot for the newest value: alone in virtual time, and between threads."""
+
+from __future__ import annotations
+
 import threading
-import time
 
 from relit_camera.base.newest_slot import NewestSlot
+from tests.virtual_clock import VirtualClock
+
+LONG_S = 60.0
 
 
-def test_newest_wins_and_the_others_are_counted_as_dropped():
+def test_newest_wins_and_the_others_are_counted_as_dropped() -> None:
     slot: NewestSlot[str] = NewestSlot()
     reader = slot.reader()
     for value in "abc":
@@ -14,17 +20,18 @@ def test_newest_wins_and_the_others_are_counted_as_dropped():
     assert slot.count == 3
 
 
-def test_a_value_is_got_once():
-    slot: NewestSlot[int] = NewestSlot()
+def test_a_value_is_got_once_and_the_next_waited_for() -> None:
+    clock = VirtualClock()
+    slot: NewestSlot[int] = NewestSlot(clock)
     reader = slot.reader()
     slot.put(1)
     assert reader.get(0) == 1
-    start = time.monotonic()
+    start = clock.now()
     assert reader.get(0.05) is None
-    assert time.monotonic() - start >= 0.045
+    assert clock.now() == start + 0.05
 
 
-def test_every_reader_gets_the_newest():
+def test_every_reader_gets_the_newest() -> None:
     slot: NewestSlot[int] = NewestSlot()
     early, other = slot.reader(), slot.reader()
     slot.put(1)
@@ -35,28 +42,27 @@ def test_every_reader_gets_the_newest():
     assert (early.dropped, other.dropped, late.dropped) == (0, 1, 0)
 
 
-def test_get_wakes_up_when_a_value_comes():
-    slot: NewestSlot[int] = NewestSlot()
-    timer = threading.Timer(0.05, slot.put, [7])
-    timer.start()
-    start = time.monotonic()
-    assert slot.reader().get(5) == 7
-    assert time.monotonic() - start < 2
-    timer.join()
-
-
-def test_put_at_is_when_it_was_put():
-    slot: NewestSlot[int] = NewestSlot()
+def test_put_at_is_when_it_was_put() -> None:
+    clock = VirtualClock()
+    slot: NewestSlot[int] = NewestSlot(clock)
     reader = slot.reader()
-    before = time.monotonic()
     slot.put(1)
-    after = time.monotonic()
-    time.sleep(0.02)
+    put_at = clock.now()
+    clock.sleep(0.5)
     reader.get(0)
-    assert before <= reader.put_at <= after
+    assert reader.put_at == put_at
 
 
-def test_newer_answers_by_number():
+def test_get_returns_as_soon_as_a_value_comes() -> None:
+    clock = VirtualClock()
+    slot: NewestSlot[int] = NewestSlot(clock)
+    start = clock.now()
+    clock.at(0.05, lambda: slot.put(7))
+    assert slot.reader().get(LONG_S) == 7
+    assert clock.now() == start + 0.05
+
+
+def test_newer_answers_by_number() -> None:
     slot: NewestSlot[str] = NewestSlot()
     slot.put("a")
     slot.put("b")
@@ -66,30 +72,50 @@ def test_newer_answers_by_number():
     assert slot.newer(2, 0) is None
 
 
-def test_close_wakes_readers_gives_the_last_value_and_takes_no_more():
-    slot: NewestSlot[int] = NewestSlot()
-    waiting = slot.reader()
-    threading.Timer(0.05, slot.close).start()
-    start = time.monotonic()
-    assert waiting.get(10) is None
-    assert time.monotonic() - start < 5
+def test_close_wakes_readers_gives_the_last_value_and_takes_no_more() -> None:
+    clock = VirtualClock()
+    slot: NewestSlot[int] = NewestSlot(clock)
+    start = clock.now()
+    clock.at(0.05, slot.close)
+    assert slot.reader().get(LONG_S) is None
+    assert clock.now() == start + 0.05
 
-    slot = NewestSlot()
+    slot = NewestSlot(clock)
     unread = slot.reader()
     slot.put(1)
     slot.close()
     slot.put(2)
     assert unread.get(0) == 1
-    assert unread.get(10) is None
+    assert unread.get(LONG_S) is None
+    assert clock.now() == start + 0.05  # at once
 
 
-def test_nothing_is_lost_or_doubled_between_threads():
+# Between threads.
+
+
+def test_a_thread_that_waits_is_woken_by_a_value_and_by_closing() -> None:
+    slot: NewestSlot[int] = NewestSlot()
+    reader, got = slot.reader(), list[int | None]()
+
+    def read() -> None:
+        got.append(reader.get(LONG_S))
+        got.append(reader.get(LONG_S))
+
+    thread = threading.Thread(target=read)
+    thread.start()
+    slot.put(7)
+    slot.close()
+    thread.join(LONG_S / 2)
+    assert got == [7, None]
+
+
+def test_nothing_is_lost_or_doubled_between_threads() -> None:
     slot: NewestSlot[int] = NewestSlot()
     readers = [slot.reader() for _ in range(3)]
     seen: list[list[int]] = [[] for _ in readers]
 
     def read(number: int) -> None:
-        while (value := readers[number].get(5)) is not None:
+        while (value := readers[number].get(LONG_S)) is not None:
             seen[number].append(value)
 
     threads = [threading.Thread(target=read, args=[number]) for number in range(len(readers))]
@@ -99,7 +125,7 @@ def test_nothing_is_lost_or_doubled_between_threads():
         slot.put(value)
     slot.close()
     for thread in threads:
-        thread.join(10)
+        thread.join(LONG_S / 2)
     for values, reader in zip(seen, readers, strict=True):
         assert values == sorted(set(values))
         assert values[-1] == 1999

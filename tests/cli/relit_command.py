@@ -69,9 +69,13 @@ def start(*arguments: object, folder: Path, full_at: int | None = None) -> subpr
     With `full_at` no file may grow beyond so many bytes: the kernel refuses to write them, as on a full disk.
     """
     limit = None if full_at is None else partial(resource.setrlimit, resource.RLIMIT_FSIZE, (full_at, full_at))
+    variables = environment(folder)
+    if limit is not None:
+        # Coverage, where it is measured, could not write its file either, and would say so.
+        variables = {name: value for name, value in variables.items() if not name.startswith("COVERAGE_")}
     return subprocess.Popen(
         [*COMMAND, *map(str, arguments)],
-        env=environment(folder),
+        env=variables,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -19,6 +19,7 @@ from relit_camera.face.tracking.track_recording import read_track
 from relit_camera.subject.subject_file import read_subject
 from tests.api.api_client import decoded_picture
 from tests.cli.relit_command import call, start
+from tests.small_camera import wait_until
 
 pytestmark = pytest.mark.real_time
 
@@ -94,8 +95,7 @@ def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[
     assert http.get("lighting").json()["environment"] == "party"
     party = snapshot(http)
     http.patch("lighting", json={"environment": "overcast"}).raise_for_status()
-    time.sleep(2)
-    assert np.abs(snapshot(http) - party).mean() > 10
+    wait_until(lambda: bool(np.abs(snapshot(http) - party).mean() > 10))
 
 
 def test_it_ends_by_itself_when_told_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

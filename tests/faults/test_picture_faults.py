@@ -21,7 +21,7 @@ from relit_camera.face.face_state import FaceState
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
-from relit_camera.live.reenactment.reenactor import WarpTask
+from relit_camera.live.reenactment.reenactor import WarpedLayer, WarpTask
 from relit_camera.live.supervision.pipeline_health import HealthLimits
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from tests.faults.watched_camera import Survived
@@ -37,7 +37,7 @@ watched_camera = partial(unhurried_camera, timings=IMPATIENT)
 
 
 class FaultyTracker(SteadyTracker):
-    """Raises or hangs when told to."""
+    """Raises while `error` is set, hangs while `release` is not."""
 
     def __init__(self) -> None:
         self.error: Exception | None = None
@@ -67,7 +67,7 @@ def test_a_tracker_that_raises(tracker: FaultyTracker, error: Exception, tmp_pat
     with watched_camera(tmp_path, tracker=tracker) as watched:
         live = watched.sink.new[-1]
         tracker.error = error
-        watched.told(str(error))
+        watched.reports(str(error))
         watched.state("standing-in")
         watched.goes_on(20)
         # The source image, at rest: the subject is where it was, lit as it was.
@@ -83,7 +83,7 @@ def test_a_tracker_that_raises(tracker: FaultyTracker, error: Exception, tmp_pat
 def test_a_tracker_that_hangs_for_a_while(tracker: FaultyTracker, tmp_path: Path, survived: Survived) -> None:
     with watched_camera(tmp_path, tracker=tracker) as watched:
         tracker.release.clear()
-        watched.told("in: track")
+        watched.reports("in: track")
         watched.goes_on(10)
         tracker.release.set()
         watched.recovers()
@@ -93,7 +93,7 @@ def test_a_tracker_that_hangs_for_a_while(tracker: FaultyTracker, tmp_path: Path
 def test_a_tracker_that_hangs_for_ever_is_replaced(tracker: FaultyTracker, tmp_path: Path, survived: Survived) -> None:
     with watched_camera(tmp_path, tracker=tracker, new_tracker=SteadyTracker) as watched:
         tracker.release.clear()
-        watched.told("in: track")
+        watched.reports("in: track")
         watched.state("standing-in")
         watched.recovers()
         assert tracker.hanging == 1  # it still does
@@ -116,7 +116,7 @@ def test_trackers_that_all_hang_leave_the_fallback(tracker: FaultyTracker, tmp_p
 def test_what_is_late_does_not_break_a_held_picture(tracker: FaultyTracker, tmp_path: Path) -> None:
     with watched_camera(tmp_path, tracker=tracker) as watched:
         tracker.release.clear()
-        watched.told("in: track")
+        watched.reports("in: track")
         watched.camera.put("freeze", frozen=True)
         watched.goes_on(5)
         held, count = watched.sink.new[-1], len(watched.sink.new)
@@ -132,7 +132,7 @@ def test_what_is_late_does_not_show_the_room(tracker: FaultyTracker, tmp_path: P
     room[..., 1] = 255
     with watched_camera(tmp_path, tracker=tracker, source=memory_source(room), look=Look(mode=Mode.RATIO)) as watched:
         tracker.release.clear()
-        watched.told("in: track")
+        watched.reports("in: track")
         watched.camera.put("mode", mode="reenact")
         count = len(watched.sink.new)
         tracker.release.set()
@@ -146,7 +146,7 @@ def test_what_is_late_does_not_show_the_room(tracker: FaultyTracker, tmp_path: P
 def test_it_stops_in_time_while_a_tracker_hangs(tracker: FaultyTracker, tmp_path: Path) -> None:
     with watched_camera(tmp_path, tracker=tracker) as watched:
         tracker.release.clear()
-        watched.told("in: track")
+        watched.reports("in: track")
         began = time.monotonic()
         watched.camera.camera_service.stop()
         assert time.monotonic() - began < 3
@@ -171,7 +171,7 @@ def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, mo
             fail()
         move = healthy(self, motion, frame)
 
-        def faulty(relit: LinearImage):  # type: ignore[no-untyped-def]
+        def faulty(relit: LinearImage) -> WarpedLayer:
             fail()
             return move(relit)
 
@@ -180,7 +180,7 @@ def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, mo
     monkeypatch.setattr(FirstOrderReenactor, "plan_warp", plan_warp)
     with watched_camera(tmp_path) as watched:
         fault.set()
-        watched.told("a bug in the warp" if how == "raises" else f"in: {half}")
+        watched.reports("a bug in the warp" if how == "raises" else f"in: {half}")
         watched.state("standing-in")
         watched.goes_on(20)
         fault.clear()
@@ -201,7 +201,7 @@ def test_not_even_the_source_image_can_be_relit(
         with monkeypatch.context() as broken:
             broken.setattr(BasisRelighter, "relight", fail)
             watched.camera.put("lighting", environment="sunset", transition_s=0)
-            watched.told("no memory for a picture")
+            watched.reports("no memory for a picture")
             shown = grey() if fallback is Fallback.LIVE else placeholder(SIZE, "the picture has failed: see the panel")
             wait_until(lambda: difference(watched.sink.new[-1], shown) == 0)
             watched.goes_on(20)
@@ -221,7 +221,7 @@ def test_a_provider_that_fails_on_the_way(tmp_path: Path, survived: Survived, mo
     monkeypatch.setattr(Session, "_run", run)
     with watched_camera(tmp_path) as watched:
         fault.set()
-        watched.told("719")
+        watched.reports("719")
         watched.goes_on(20)
         fault.clear()
         watched.recovers()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,7 @@ class Cameras:
         return self.opened[-1]
 
 
-def watched_webcam(tmp_path: Path, tree: FakeTree, cameras: Cameras):  # type: ignore[no-untyped-def]
+def watched_webcam(tmp_path: Path, tree: FakeTree, cameras: Cameras) -> AbstractContextManager[Watched]:
     source = WebcamSource("webcam", SIZE, 30, tree=tree, open_capture=cameras, stall_timeout_s=0.5)
     return watched_camera(tmp_path / "data", source=source)
 
@@ -69,7 +70,7 @@ def test_unplugged_and_back_under_another_number(tmp_path: Path, tree: FakeTree,
     with watched_webcam(tmp_path, tree, cameras) as watched:
         tree.remove(0)
         cameras.opened[-1].mode = "silent"
-        watched.told("unplugged")
+        watched.reports("unplugged")
         waiting(watched)
         tree.add_webcam(3, "HD Webcam", by_id="usb-Maker_HD_Webcam-video-index0")
         watched.recovers()
@@ -113,9 +114,9 @@ def test_it_stops_in_time_while_the_webcam_hangs(tmp_path: Path, tree: FakeTree)
 class Odd(FakeCapture):
     """Gives pictures of a list, over and over."""
 
-    def __init__(self, pictures: list[DisplayImage]) -> None:
+    def __init__(self, pictures: list[np.ndarray]) -> None:
         super().__init__(interval_s=1 / 30)
-        self.pictures = itertools.cycle(pictures)
+        self.pictures: Iterator[np.ndarray] = itertools.cycle(pictures)
 
     def read(self) -> tuple[bool, np.ndarray | None]:
         time.sleep(self.interval_s)
@@ -132,7 +133,7 @@ def _torn() -> DisplayImage:
     return picture
 
 
-ODD = {
+ODD: dict[str, list[np.ndarray]] = {
     "torn pictures": [_torn()],
     "black pictures": [np.zeros((SIZE[1], SIZE[0], 3), np.uint8)],
     "pictures of changing size": [_noise(48, 64, 3), _noise(720, 1280, 3), _noise(97, 33, 3)],

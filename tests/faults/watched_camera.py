@@ -51,12 +51,12 @@ class Watched:
         """The fault begins now."""
         self.since = time.monotonic()
 
-    def told(self, text: str) -> None:
-        """Wait until the status tells of this."""
+    def reports(self, text: str) -> None:
+        """Wait until the status reports this."""
         wait_until(lambda: text in self.camera.troubles())
 
-    def still_told_nothing(self) -> bool:
-        """Whether the status says that all is well."""
+    def reports_nothing(self) -> bool:
+        """Whether the status reports no trouble."""
         return self.camera.troubles() == ""
 
     def state(self, state: str) -> None:
@@ -75,7 +75,7 @@ class Watched:
 
 
 Survived = Callable[[str, Watched], None]
-"""Told a fault's name at its end: asserts that no frame was missing for long, and notes it for the table."""
+"""Called at a fault's end with its name: asserts that no frame was missing for long, and notes it for the table."""
 
 
 @contextmanager

@@ -87,7 +87,8 @@ def test_the_lights_distance_and_either_ball_are_compared(compare: Compare, trut
     assert errors.ball_px == (1, 0, 0)
     assert errors.at_ball_deg.max() < 1e-6
     np.testing.assert_allclose(errors.distance_ratio, 0.95)
-    assert capture_json(errors)["distance"]["mean"] == pytest.approx(0.05)
+    figures = json.loads(json.dumps(capture_json(errors), allow_nan=False))
+    assert figures["distance"]["mean"] == pytest.approx(0.05)
     assert "light's distance from the head: mean 5.00" in capture_text(errors)
 
 

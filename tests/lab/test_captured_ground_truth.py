@@ -49,7 +49,7 @@ def test_files_of_two_films_are_refused(files: tuple[Path, Path]) -> None:
 
 def test_the_unit_is_the_truths() -> None:
     truth = GroundTruth(sphere_samples(12, 16))
-    gains = np.float32([0.5, 1.0, 2.0])
+    gains = np.array([0.5, 1.0, 2.0], np.float32)
     candidate = Candidate("dim", truth.inside, lambda directions, pixels: truth.colors * gains)
     same, found = scale_to_truth(candidate, truth, np.arange(12))
     np.testing.assert_allclose(found, 1 / gains, rtol=1e-5)

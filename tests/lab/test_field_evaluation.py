@@ -19,6 +19,8 @@ from relit_camera.light.builtin.builtin_environments import builtin_environment
 from tests.lab.html_outline import Outline
 from tests.lab.lit_sphere import cap, grid, shadowed
 
+METHODS = ["barycentric", "planar", "nearest", "sh3", BLACK_RING_METHOD]
+"""Those that the findings are about, and one that smooths; test_candidates asks every installed one."""
 SPOTS = [SamplePoint("beside the shadow", 20, 20), SamplePoint("middle", 24, 24)]
 
 
@@ -26,7 +28,7 @@ SPOTS = [SamplePoint("beside the shadow", 20, 20), SamplePoint("middle", 24, 24)
 def report() -> FieldReport:
     samples, truth = shadowed(cap(40, 60)), GroundTruth(shadowed(grid(16)))
     environments = {name: builtin_environment(name).light_map for name in ("studio", "party")}
-    candidates = method_candidates(samples, truth.inside)
+    candidates = method_candidates(samples, truth.inside, METHODS)
     return evaluate_field(candidates, samples.directions, samples, truth, environments, SPOTS)
 
 
@@ -90,7 +92,7 @@ def test_perfect_prediction_has_no_error() -> None:
 def test_nothing_left_to_compare_is_an_error() -> None:
     samples = shadowed(cap(40, 60), 16)
     truth = GroundTruth(samples)
-    candidates = method_candidates(samples, truth.inside)
+    candidates = method_candidates(samples, truth.inside, ["barycentric"])
     with pytest.raises(LightsError, match="nothing is left to compare"):
         evaluate_field(candidates, samples.directions, samples, truth, {}, [])
 
@@ -105,7 +107,7 @@ def test_the_page_is_whole_in_itself_and_every_figure_has_a_caption(report: Fiel
     assert outline.figures == outline.captions >= 10
     assert len(outline.images) >= 10
     smallest = min(float(each.error_whole.mean()) * 1e3 for each in report.candidate_scores)
-    assert outline.best[0] == f"{smallest:.2f}"
+    assert f"{smallest:.2f}" in outline.best
     assert "Ball &lt;&amp;&gt;" in page
     for each in report.candidate_scores:
         assert each.name in page

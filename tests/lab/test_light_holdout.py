@@ -24,6 +24,8 @@ from relit_camera.lab.evaluate.light_holdout import (
 )
 from tests.lab.lit_sphere import cap, lambert
 
+METHODS = ["barycentric", "planar", "visibility", "rbf", "nearest"]
+
 
 def test_only_surrounded_lights_are_left_out() -> None:
     samples = lambert(cap(120, 50))
@@ -38,7 +40,7 @@ def test_only_surrounded_lights_are_left_out() -> None:
 
 def test_more_left_out_is_harder_and_the_nearest_light_is_worst() -> None:
     samples = lambert(cap(120, 60))
-    few, many = evaluate_hold_out("ball", samples, 4), evaluate_hold_out("ball", samples, 2)
+    few, many = (evaluate_hold_out("ball", samples, every, METHODS) for every in (4, 2))
     scores = {score.method: score for score in few.scores}
     assert few.scores[-1].method == "nearest"
     assert scores["barycentric"].peak_255_db > scores["nearest"].peak_255_db + 3
@@ -115,7 +117,7 @@ def test_a_wrong_hold_out_is_one_clear_error(wrong: str) -> None:
 
 
 def test_reports_hold_every_list_and_method() -> None:
-    results = [evaluate_hold_out(name, lambert(cap(60, 50)), 2) for name in ("a.lp", "b.lp")]
+    results = [evaluate_hold_out(name, lambert(cap(60, 50)), 2, METHODS) for name in ("a.lp", "b.lp")]
     page, text, figures = holdout_page(results), holdout_text(results), json.loads(json.dumps(holdout_json(results)))
     for name in ("a.lp", "b.lp", "planar", "nearest", "barycentric"):
         assert name in page

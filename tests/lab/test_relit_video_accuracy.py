@@ -35,7 +35,7 @@ def write(path: Path, frames: list[NDArray[np.float32]]) -> Path:
 
 
 def lit(side: float, brightness: float = 0.3) -> NDArray[np.float32]:
-    """A grey picture that is brighter at its left (−1) or right (1)."""
+    """A gray picture that is brighter at its left (−1) or right (1)."""
     ramp = brightness * (1 + 0.8 * side * np.linspace(-1, 1, SIZE))
     return np.repeat(np.tile(ramp, (SIZE, 1))[..., None], 3, axis=2).astype(np.float32)
 

@@ -16,7 +16,6 @@ from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_files import decode_display
 from relit_camera.lab.evaluate.report import html_page
 from relit_camera.lab.evaluate.report.html_page import (
-    Block,
     Heading,
     Paragraph,
     picture,
@@ -32,8 +31,8 @@ from tests.lab.html_outline import Outline
 
 def test_text_from_outside_is_escaped_everywhere() -> None:
     evil = "<script>alert(1)</script>"
-    blocks: list[Block] = [Heading(evil), Heading(evil), Paragraph(evil), table([evil], [[evil]], evil)]
-    page = render_page(evil, [*blocks, picture(np.zeros((2, 2, 3), np.uint8), evil)])
+    image = picture(np.zeros((2, 2, 3), np.uint8), evil)
+    page = render_page(evil, [Heading(evil), Heading(evil), Paragraph(evil), table([evil], [[evil]], evil), image])
     outline = Outline()
     outline.feed(page)
     assert outline.fetched == outline.open == []

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.face.face_state import FaceStatus
+from relit_camera.face.face_state import LOST, FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose, guess_focal, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.motion.face_follower import FaceMotion
@@ -27,10 +27,16 @@ LIVE_NEUTRAL = HeadPose(Rotation.from_euler("Y", 4, degrees=True), np.array([3.0
 NEUTRAL = NeutralFace(SCHEME.canonical.copy(), LIVE_NEUTRAL)
 
 
-class Looker:
-    """A recording: it is only asked for its scheme."""
+class Blind:
+    """A tracker that finds no face: so the landmarks stored with a subject count."""
 
-    name, scheme = "recorded", "mesh478"
+    name, scheme = "blind", "mesh478"
+
+    def track(self, frame: Frame) -> FaceState:
+        return LOST
+
+    def reset(self) -> None:
+        """Nothing is kept between frames."""
 
 
 @cache
@@ -54,7 +60,7 @@ def person() -> Subject:
 
 def face_of(subject: Subject) -> SourceFace:
     """Its face, as stored with it."""
-    return find_source_face(subject, Looker())
+    return find_source_face(subject, Blind())
 
 
 def context_of(subject: Subject, size: tuple[int, int], argument: str = "") -> ReenactorContext:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from relit_camera.base.images.color import parse_gamma
 from relit_camera.base.models.model_store import FOLDER_VARIABLE, ModelState, ModelStore
@@ -14,14 +13,12 @@ from relit_camera.capture.subject_builder import build_subject
 from relit_camera.capture.subject_landmarks import read_landmarks
 from relit_camera.subject.subject_file import SUFFIX, write_subject
 from relit_studio.mannequin.__main__ import generate
+from tests.made_once import made_once
 
 ROOT = Path(__file__).resolve().parents[2]
 MODELS = ("face_mesh", "face_detector_yunet", "openseeface", "selfie_landscape", "selfie_square")
 MANNEQUIN = "generated:mannequin"
 SHARED = "shared:"
-
-_scratch = TemporaryDirectory(prefix="relit-replay-tests.")
-"""Made once a process, gone when it ends."""
 
 
 class UnavailableError(Exception):
@@ -40,12 +37,9 @@ def shared_folder() -> Path:
     return folder
 
 
-@cache
 def mannequin() -> Path:
     """The generated person: `olat/lights.lp`, `clip.mp4` and its true track, two seconds long and small."""
-    folder = Path(_scratch.name) / "mannequin"
-    generate(folder, size=160, lights=48, frames=48, quiet=True)
-    return folder
+    return made_once("mannequin", lambda folder: generate(folder, size=160, lights=48, frames=48, quiet=True))
 
 
 @cache
@@ -62,9 +56,7 @@ def models() -> Path:
         mirror = shared_folder() / "models"
     except UnavailableError as error:
         raise UnavailableError(f"the public models are not pulled (relit models pull), and {error}") from error
-    folder = Path(_scratch.name) / "models"
-    ModelStore(folder).pull(MODELS, mirror)
-    return folder
+    return made_once("models", lambda folder: ModelStore(folder).pull(MODELS, mirror))
 
 
 def use_models() -> None:
@@ -94,7 +86,6 @@ def find(place: str, folder: Path, part: str) -> Path:
     return folder / place
 
 
-@cache
 def subject_file(lights: Path, gamma: str = "srgb") -> Path:
     """The subject file of one-light pictures, as `relit capture import` makes it; a .relit file is given as it is.
 
@@ -107,6 +98,9 @@ def subject_file(lights: Path, gamma: str = "srgb") -> Path:
         return lights
     curve = parse_gamma(gamma)
     known = read_landmarks(lights.parent / "landmarks.json", required=False)
-    path = Path(_scratch.name) / f"{lights.parent.name}-{lights.stem}-{gamma}{SUFFIX}"
-    write_subject(path, build_subject(import_samples(lights, curve), "barycentric", lights.name, curve, known or None))
-    return path
+
+    def make(path: Path) -> None:
+        samples = import_samples(lights, curve)
+        write_subject(path, build_subject(samples, "barycentric", lights.name, curve, known or None))
+
+    return made_once(f"{lights.parent.name}-{lights.stem}-{gamma}{SUFFIX}", make)

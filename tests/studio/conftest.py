@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from relit_studio.mannequin.__main__ import main
-from relit_studio.people.cast import CAST
 from relit_studio.people.face_model import read_face_model
-from relit_studio.people.hairs import Hairs
+from relit_studio.people.hair_strands import Hairs
 from relit_studio.people.identity import identity_weights
+from relit_studio.people.named_people import NAMED_PEOPLE
+from relit_studio.people.people_assets import PeopleAssets
 from relit_studio.people.person import Person
 from relit_studio.people.shirt import Shirt
-from relit_studio.people.wardrobe import Wardrobe
 
 NOTHING = np.zeros((0, 3))
+NO_FACES = np.zeros((0, 3), np.intp)
 
 
 @pytest.fixture(scope="session")
@@ -29,8 +30,8 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def person(shared: Path) -> Person:
     """Adam's face alone."""
     model = read_face_model(shared / "faces" / "ict_facekit_light.npz")
-    traits = CAST["adam"]
-    bare = Shirt(NOTHING, NOTHING, NOTHING, NOTHING, np.zeros(len(model.vertices), bool))
-    wardrobe = Wardrobe(model, np.zeros((len(model.vertices), 2)), NOTHING, NOTHING, Path())
+    traits = NAMED_PEOPLE["adam"]
+    bare = Shirt(NOTHING, NO_FACES, NOTHING, NO_FACES, np.zeros(len(model.vertices), bool))
+    people_assets = PeopleAssets(model, np.zeros((len(model.vertices), 2)), NOTHING, NO_FACES, Path())
     hair = Hairs(np.zeros((0, 2, 3)), np.zeros((0, 2)), np.zeros(0))
-    return Person(traits, wardrobe, model.neutral(identity_weights(model, traits)), hair, bare)
+    return Person(traits, people_assets, model.neutral(identity_weights(model, traits)), hair, bare)

@@ -19,13 +19,13 @@ from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.rotations import Angles
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.light.environment_store import EnvironmentStore
+from relit_studio.capture.capture_scene import Scene, Timing, dimmed
+from relit_studio.capture.captured_person import to_rest
 from relit_studio.capture.field_person import FieldPerson
 from relit_studio.capture.head_motion import REST, HeadMotion, Motion
 from relit_studio.capture.mannequin_person import MannequinPerson, phone_camera
-from relit_studio.capture.person import to_rest
 from relit_studio.capture.phone import SENSOR, Stages
 from relit_studio.capture.recording import record
-from relit_studio.capture.scene import Scene, Timing, dimmed
 from relit_studio.capture.torch import Torch
 from relit_studio.commands.capture import capture
 from relit_studio.mannequin.olat import write_olat
@@ -64,7 +64,7 @@ def states(truth: dict[str, Any], state: str) -> list[int]:
 
 def lit_rows(frame: dict[str, Any]) -> np.ndarray:
     y, share = np.array(frame["flash"]["lit_rows_px_share"]).T
-    return np.interp(np.arange(HEIGHT) + 0.5, y, share)
+    return np.asarray(np.interp(np.arange(HEIGHT) + 0.5, y, share))
 
 
 def test_a_frame_for_every_thirtieth_of_six_seconds(plain: tuple[np.ndarray, dict[str, Any]]) -> None:
@@ -122,8 +122,8 @@ def test_ball_is_where_the_truth_has_it(plain: tuple[np.ndarray, dict[str, Any]]
     ball = truth["ball"]
     corner = np.s_[: int(ball["y_px"] + 1.6 * ball["radius_px"]), int(ball["x_px"] - 1.6 * ball["radius_px"]) :]
     differs = np.abs(dark - behind).max(axis=2)[corner] > 2 / 255
-    y, x = np.nonzero(differs)
-    x, y = x + 0.5 + corner[1].start, y + 0.5
+    rows, columns = np.nonzero(differs)
+    x, y = columns + 0.5 + corner[1].start, rows + 0.5
     assert (x.mean(), y.mean()) == pytest.approx((ball["x_px"], ball["y_px"]), abs=0.5)
     assert np.sqrt(len(x) / np.pi) == pytest.approx(ball["radius_px"], abs=0.6)
 
@@ -144,7 +144,7 @@ def test_transform_to_rest_undoes_the_movement_in_the_picture() -> None:
     found = to_rest(person, person.face_points(), motion)
     assert found.rotation_deg == pytest.approx(-4, abs=0.3)
     rest, moved = (person.layers(m, None).ambient for m in (REST, motion))
-    # Counter-clockwise about the picture's centre, y down: where each pixel at rest comes from.
+    # Counter-clockwise about the picture's center, y down: where each pixel at rest comes from.
     x, y = (grid - shift for grid, shift in zip(person.camera.pixel_grid(), found.translation_px, strict=True))
     x, y, turn = x - 120, y - 160, np.radians(found.rotation_deg)
     source = (np.sin(turn) * x + np.cos(turn) * y + 159.5, np.cos(turn) * x - np.sin(turn) * y + 119.5)
@@ -218,13 +218,13 @@ def test_a_second_ball_is_filmed_and_told(brief: Scene, tmp_path: Path) -> None:
     assert second["x_px"] < brief.camera.width / 2 < truth["ball"]["x_px"]
     # Nothing but the second ball is new, and it shows the lamp where the truth says.
     index = next(frame["index"] for frame in truth["frames"] if frame["flash"]["state"] == "bright")
-    alone = brief.light(brief.moment(index)) * SENSOR.white * 255
+    alone = brief.light(brief.frame_state(index)) * SENSOR.white * 255
     new = np.abs(frames[index] - np.clip(alone, 0, 255)).max(axis=2)
     x, y = brief.camera.pixel_grid()
     away = np.hypot(x - second["x_px"], y - second["y_px"]) / second["radius_px"]
     assert new[away > 3].max() < 1
     assert np.median(new[away < 0.9]) > 2
-    added = scene.parts(scene.moment(index))[1].sum(axis=2) * (away < 1)
+    added = scene.parts(scene.frame_state(index))[1].sum(axis=2) * (away < 1)
     bright = added * (added > 0.5 * added.max())
     light = truth["frames"][index]
     np.testing.assert_allclose(
@@ -239,7 +239,7 @@ def test_frames_of_other_settings_are_not_taken_up(brief: Scene, tmp_path: Path)
         record(brief, Stages(), tmp_path, "overcast", 2, _interrupt)
     record(brief, PLAIN, tmp_path, "overcast", 2)
     frames, _ = read(tmp_path)
-    plain_light = brief.light(brief.moment(0)) * SENSOR.white * 255
+    plain_light = brief.light(brief.frame_state(0)) * SENSOR.white * 255
     np.testing.assert_allclose(frames[0], np.clip(plain_light, 0, 255), atol=0.51)
 
 
@@ -250,7 +250,7 @@ def test_frames_of_another_ambient_light_are_not_taken_up(brief: Scene, tmp_path
         record(brief, PLAIN, tmp_path, "overcast", 2, _interrupt)
     record(lighter, PLAIN, tmp_path, "overcast", 2)
     frames, _ = read(tmp_path)
-    plain_light = lighter.light(lighter.moment(0)) * SENSOR.white * 255
+    plain_light = lighter.light(lighter.frame_state(0)) * SENSOR.white * 255
     np.testing.assert_allclose(frames[0], np.clip(plain_light, 0, 255), atol=0.51)
 
 

@@ -14,10 +14,10 @@ from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.tracking.track_recording import RecordedTracker
 from relit_camera.face.tracking.trackers import TrackerOptions
-from relit_studio.mannequin.camera import Camera
-from relit_studio.mannequin.clip import render_clip, true_state
-from relit_studio.mannequin.lights import room
-from relit_studio.mannequin.performance import FRAMES, frame_times, posture_at
+from relit_studio.mannequin.distant_lights import room
+from relit_studio.mannequin.driving_clip import render_clip, true_state
+from relit_studio.mannequin.mannequin_camera import Camera
+from relit_studio.mannequin.mannequin_performance import FRAMES, frame_times, posture_at
 
 SMALL = Camera(64)
 

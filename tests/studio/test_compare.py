@@ -11,10 +11,10 @@ from relit_camera.base.errors import InputError
 from relit_camera.base.images.image_files import write_linear
 from relit_camera.light.directions import fibonacci_directions
 from relit_studio.cycles.job import Mesh
-from relit_studio.field.compare import compare_fields
-from relit_studio.field.solver import BELOW_AXIS_CM, DISTANCE_CM, SolverSettings, solver_camera
+from relit_studio.field.cycles_comparison import solver_scene_for_cycles, twin_camera
+from relit_studio.field.field_comparison import compare_fields
 from relit_studio.field.solver_scene import mannequin_surfaces
-from relit_studio.field.twin import surfaces_scene, twin_camera
+from relit_studio.field.transport_solver import BELOW_AXIS_CM, DISTANCE_CM, SolverSettings, solver_camera
 from relit_studio.mannequin.olat import lights_text
 
 LIGHTS, SIDE = 12, 16
@@ -52,7 +52,7 @@ def test_fields_of_other_lights_or_sizes_are_not_compared(tmp_path: Path, other:
 
 def test_cycles_gets_the_solvers_surfaces() -> None:
     surfaces = mannequin_surfaces(np.zeros(3))
-    (mesh,) = surfaces_scene(surfaces).objects
+    (mesh,) = solver_scene_for_cycles(surfaces).objects
     assert isinstance(mesh, Mesh)
     np.testing.assert_array_equal(mesh.faces[:, :3], surfaces.triangles)
     assert (mesh.faces[:, 3] == -1).all()
@@ -63,7 +63,7 @@ def test_both_cameras_see_alike() -> None:
     settings = SolverSettings()
     camera, solver = twin_camera(settings), solver_camera(settings)
     points = mannequin_surfaces(np.zeros(3)).vertices
-    placed = points + np.float32([0, -BELOW_AXIS_CM, -DISTANCE_CM])
+    placed = points + np.array([0, -BELOW_AXIS_CM, -DISTANCE_CM], np.float32)
     np.testing.assert_allclose(camera.project(points), solver.project(placed)[:, :2], atol=1e-3)
 
 

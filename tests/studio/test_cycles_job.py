@@ -11,7 +11,7 @@ import pytest
 
 from relit_camera.base.errors import DeviceError, InputError
 from relit_studio.camera import Camera
-from relit_studio.cycles.environment import create_environment, environment_python
+from relit_studio.cycles.cycles_environment import create_environment, environment_python
 from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene, Strands, write_job
 from relit_studio.cycles.runner import render
 from relit_studio.resume import keep_settings
@@ -123,7 +123,7 @@ def test_an_environment_that_cannot_be_made_is_said(tmp_path: Path, monkeypatch:
     python.write_text("#!/bin/sh\necho ensurepip is not available\nexit 1\n")
     python.chmod(0o755)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("relit_studio.cycles.environment._python311", lambda: str(python))
+    monkeypatch.setattr("relit_studio.cycles.cycles_environment._python311", lambda: str(python))
     with pytest.raises(DeviceError, match="cannot make an environment: ensurepip is not available"):
         create_environment()
 

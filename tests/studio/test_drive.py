@@ -16,13 +16,13 @@ from relit_camera.light.environment_store import EnvironmentStore
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map import irradiance
 from relit_studio.camera import Camera
-from relit_studio.drive.performance import FPS, Moment
+from relit_studio.drive.performance import FPS, ActorState
 from relit_studio.drive.performances.away import AWAY
 from relit_studio.drive.performances.hands import HANDS
 from relit_studio.drive.performances.talk import TALK
 from relit_studio.drive.room import Room
 from relit_studio.drive.take import Take
-from relit_studio.drive.truth import TruthTracker, blendshapes, frame_truth, head_pose, true_state
+from relit_studio.drive.true_tracker import TruthTracker, blendshapes, frame_truth, head_pose, true_state
 from relit_studio.people.expressions import NEUTRAL
 from relit_studio.people.eyes import gaze
 from relit_studio.people.face_model import CORNEA_MATERIALS
@@ -48,7 +48,7 @@ def test_the_head_moves_rigidly_and_the_shoulders_stand_still(person: Person) ->
 @pytest.mark.parametrize("scheme", ["mesh478", "openseeface66"])
 def test_landmarks_move_with_the_pose_that_is_told(person: Person, scheme: str) -> None:
     upright = landmarks(person, Posture())[scheme]
-    state = true_state(Take(person, TALK, CAMERA), Moment(TURNED), scheme)
+    state = true_state(Take(person, TALK, CAMERA), ActorState(TURNED), scheme)
     np.testing.assert_allclose(state.landmarks, CAMERA.project(turned(upright, TURNED.rotation)), atol=1e-3)
     assert state.pose is not None
     np.testing.assert_allclose(state.pose.rotation.as_matrix(), TURNED.rotation.as_matrix())
@@ -76,16 +76,16 @@ def test_both_schemes_agree_where_they_name_the_same(person: Person) -> None:
     for vertex, index in ((33, 36), (133, 39), (362, 42), (263, 45), (1, 30), (4, 30)):
         assert np.linalg.norm(mesh[vertex] - ibug[index]) < 1.0
     # Irises lie between their eye's corners, before the rest.
-    for centre, outer, inner in ((468, 33, 133), (473, 263, 362)):
+    for center, outer, inner in ((468, 33, 133), (473, 263, 362)):
         middle = (mesh[outer] + mesh[inner]) / 2
-        assert np.linalg.norm((mesh[centre] - middle)[:2]) < 0.5
+        assert np.linalg.norm((mesh[center] - middle)[:2]) < 0.5
 
 
 def test_lids_and_mouth_open_as_told(person: Person) -> None:
     take = Take(person, TALK, CAMERA)
 
     def state(**weights: float) -> tuple[float, float, float]:
-        found = true_state(take, Moment(Posture(expression={**NEUTRAL, **weights})))
+        found = true_state(take, ActorState(Posture(expression={**NEUTRAL, **weights})))
         return (*found.eyes, found.mouth)
 
     right, left, mouth = state()
@@ -121,7 +121,7 @@ def test_a_recorded_track_says_the_truth(person: Person, tmp_path: Path) -> None
         recorder.add(tracker.track(Frame(picture, index, 0.0, index / FPS)), index / FPS)
     recorder.write(tmp_path / "track.json")
     track = read_track(tmp_path / "track.json")
-    state, moment = track.state(1), TALK.moment(55 / FPS)
+    state, moment = track.state(1), TALK.state_at(55 / FPS)
     assert state.pose is not None
     truth = head_pose(person, CAMERA, moment)
     assert (state.pose.rotation * truth.rotation.inv()).magnitude() < 1e-6
@@ -131,13 +131,13 @@ def test_a_recorded_track_says_the_truth(person: Person, tmp_path: Path) -> None
 
 def test_who_moves_aside_takes_landmarks_and_pose_along(person: Person) -> None:
     take, shift = Take(person, TALK, CAMERA), (4.0, -2.0, -6.0)
-    at_rest, aside = (true_state(take, Moment(TURNED, shift_cm)) for shift_cm in ((0.0, 0.0, 0.0), shift))
+    at_rest, aside = (true_state(take, ActorState(TURNED, shift_cm)) for shift_cm in ((0.0, 0.0, 0.0), shift))
     points = landmarks(person, TURNED)["mesh478"] + shift
     np.testing.assert_allclose(aside.landmarks, CAMERA.project(points), atol=1e-3)
     assert at_rest.pose is not None
     assert aside.pose is not None
     moved = aside.pose.translation - at_rest.pose.translation
-    np.testing.assert_allclose(moved / np.linalg.norm(moved), shift / np.linalg.norm(shift), atol=1e-9)
+    np.testing.assert_allclose(moved / np.linalg.norm(moved), np.array(shift) / np.linalg.norm(shift), atol=1e-9)
 
 
 def test_nobody_is_found_while_nobody_is_there(person: Person, tmp_path: Path) -> None:

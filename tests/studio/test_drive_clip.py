@@ -14,10 +14,10 @@ from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.base.video.video_readers import VideoReader
 from relit_studio.camera import Camera
-from relit_studio.drive.clip import write_clip
+from relit_studio.drive.clip_files import write_clip
+from relit_studio.drive.painted_rooms import paint_room
 from relit_studio.drive.performances.away import AWAY
 from relit_studio.drive.room import Room
-from relit_studio.drive.rooms import paint_room
 from relit_studio.drive.take import Take
 from relit_studio.people.person import Person
 

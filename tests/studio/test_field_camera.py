@@ -9,8 +9,8 @@ import numpy as np
 from relit_camera.light.builtin.builtin_environments import builtin_environment
 from relit_studio.camera import Camera
 from relit_studio.capture.field_person import FieldPerson
-from relit_studio.field.render import FieldSettings, field_description
-from relit_studio.field.solver import DISTANCE_CM, SolverSettings, write_solver_field
+from relit_studio.field.field_renderer import FieldSettings, field_description
+from relit_studio.field.transport_solver import DISTANCE_CM, SolverSettings, write_solver_field
 from relit_studio.people.landmarks import canonical_origin, landmarks
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,10 +11,10 @@ from relit_camera.base.images.color import luminance
 from relit_camera.base.rotations import Angles, angles_from_rotation
 from relit_camera.face.head_pose import fit_pose, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_studio.mannequin.camera import Camera
+from relit_studio.mannequin.distant_lights import DistantLights
 from relit_studio.mannequin.expression import Expression
 from relit_studio.mannequin.figure import Posture, mannequin
-from relit_studio.mannequin.lights import DistantLights
+from relit_studio.mannequin.mannequin_camera import Camera
 from relit_studio.mannequin.olat import landmarks_px
 from relit_studio.mannequin.renderer import View
 
@@ -25,22 +27,22 @@ SOFT = DistantLights(
 )
 
 
-def points_of(**kinds: object) -> np.ndarray:
+def points_of(**kinds: Any) -> np.ndarray:
     return landmarks_px(CAMERA, Posture(**kinds))
 
 
-def colour_at(picture: np.ndarray, point: np.ndarray, radius: float = 1.5) -> np.ndarray:
+def color_at(picture: np.ndarray, point: np.ndarray, radius: float = 1.5) -> np.ndarray:
     y, x = np.mgrid[: picture.shape[0], : picture.shape[1]] + 0.5
-    return picture[np.hypot(x - point[0], y - point[1]) < radius].mean(axis=0)
+    return np.asarray(picture[np.hypot(x - point[0], y - point[1]) < radius].mean(axis=0))
 
 
 def rendered_iris(picture: np.ndarray, points: np.ndarray, iris: int) -> np.ndarray:
-    """Darkness-weighted centre of what is seen within the iris's surroundings."""
+    """Darkness-weighted center of what is seen within the iris's surroundings."""
     radius = np.linalg.norm(points[iris + 1] - points[iris])
     y, x = np.mgrid[: picture.shape[0], : picture.shape[1]] + 0.5
     near = np.hypot(x - points[iris, 0], y - points[iris, 1]) < 1.2 * radius
     dark = np.clip(0.12 - luminance(picture), 0, None) * near
-    return np.array([(x * dark).sum(), (y * dark).sum()]) / dark.sum()
+    return np.asarray(np.array([(x * dark).sum(), (y * dark).sum()]) / dark.sum())
 
 
 @pytest.mark.parametrize(
@@ -92,7 +94,7 @@ def test_irises_are_dark_where_their_landmarks_are(posture: Posture) -> None:
     for iris in (RIGHT_IRIS, LEFT_IRIS):
         span = np.linalg.norm(points[iris + 1] - points[iris])
         assert np.abs(rendered_iris(picture, points, iris) - points[iris])[0] < 0.35 * span
-        assert luminance(colour_at(picture, points[iris])) < 0.4 * luminance(colour_at(picture, points[117], 2))
+        assert luminance(color_at(picture, points[iris])) < 0.4 * luminance(color_at(picture, points[117], 2))
 
 
 def test_gaze_moves_the_irises_as_a_head_turns() -> None:
@@ -106,11 +108,11 @@ def test_gaze_moves_the_irises_as_a_head_turns() -> None:
 def test_lips_are_red_and_the_open_mouth_is_dark_between_them() -> None:
     picture = View(Posture(), CAMERA).under_lights(SOFT)
     points = points_of()
-    lip, cheek = colour_at(picture, points[[14, 17]].mean(axis=0)), colour_at(picture, points[205])
+    lip, cheek = color_at(picture, points[[14, 17]].mean(axis=0)), color_at(picture, points[205])
     assert lip[0] / lip[1] > 1.25 * cheek[0] / cheek[1]
     opened = Posture(expression=Expression(jaw=1))
     inside = landmarks_px(CAMERA, opened)[[13, 14]].mean(axis=0) - [0, -3]
-    assert luminance(colour_at(View(opened, CAMERA).under_lights(SOFT), inside)) < 0.4 * luminance(lip)
+    assert luminance(color_at(View(opened, CAMERA).under_lights(SOFT), inside)) < 0.4 * luminance(lip)
 
 
 def test_expressions_do_what_they_are_called() -> None:
@@ -134,9 +136,9 @@ def test_expressions_do_what_they_are_called() -> None:
 def test_a_blink_hides_the_eye_behind_skin() -> None:
     points = points_of()
     shut = View(Posture(expression=Expression(blink_right=1)), CAMERA).under_lights(SOFT)
-    lid, cheek = colour_at(shut, points[RIGHT_IRIS] - [0, 2], 1), colour_at(shut, points[117], 2)
+    lid, cheek = color_at(shut, points[RIGHT_IRIS] - [0, 2], 1), color_at(shut, points[117], 2)
     assert luminance(lid) > 0.45 * luminance(cheek)
-    assert luminance(colour_at(shut, points[LEFT_IRIS])) < 0.4 * luminance(cheek)
+    assert luminance(color_at(shut, points[LEFT_IRIS])) < 0.4 * luminance(cheek)
 
 
 def test_the_body_stands_while_the_head_turns() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_studio.capture.flash import FlashSchedule, RollingShutter, flash_state
+from relit_studio.capture.flash_timing import FlashSchedule, RollingShutter, flash_state
 
 SCHEDULE = FlashSchedule(frequency_hz=5.07, duty=0.45, phase_s=0.031)
 SHUTTER = RollingShutter(fps=30.0, exposure_s=1 / 50, readout_s=0.021, height=60)

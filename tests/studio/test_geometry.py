@@ -9,13 +9,13 @@ from relit_studio.people.geometry import (
     Similarity,
     areas,
     fit_similarity,
-    neighbour_mean,
+    neighbor_mean,
     scatter,
     smoothstep,
     triangles_of,
     vertex_normals,
 )
-from relit_studio.people.mesh478 import nearest_on_surface
+from relit_studio.people.mesh478_points import nearest_on_surface
 
 SQUARE = np.array([[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [1, 3, 0]])
 FACES = np.array([[0, 1, 2, 3], [3, 2, 4, -1]])
@@ -58,8 +58,8 @@ def test_values_go_with_points() -> None:
     np.testing.assert_allclose(points.of(SQUARE[:, 0]), points.of(SQUARE)[:, 0])
 
 
-def test_neighbours_are_averaged() -> None:
-    mean, has = neighbour_mean(np.array([[0.0], [2], [4]]), np.array([[0, 1], [0, 2]]))
+def test_neighbors_are_averaged() -> None:
+    mean, has = neighbor_mean(np.array([[0.0], [2], [4]]), np.array([[0, 1], [0, 2]]))
     assert mean[0] == 3
     assert has.tolist() == [True, False, False]
 

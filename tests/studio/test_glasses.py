@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from relit_camera.base.rotations import Angles
-from relit_studio.cycles.extras import extra_materials, extra_objects, extra_shape
+from relit_studio.cycles.accessory_objects import extra_materials, extra_objects, extra_shape
 from relit_studio.people.face_model import Part
 from relit_studio.people.geometry import vertex_normals
 from relit_studio.people.glasses import Glasses, fit_glasses
 from relit_studio.people.identity import identity_weights
-from relit_studio.people.mesh478 import nearest_on_surface
+from relit_studio.people.mesh478_points import nearest_on_surface
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture, turned
 from relit_studio.people.random_traits import random_traits

@@ -12,7 +12,7 @@ from relit_studio.people.beard import grow_beard
 from relit_studio.people.face_model import Part
 from relit_studio.people.geometry import vertex_normals
 from relit_studio.people.hair import grow_hair
-from relit_studio.people.mesh478 import nearest_on_surface
+from relit_studio.people.mesh478_points import nearest_on_surface
 from relit_studio.people.person import Person
 from relit_studio.people.traits import BeardStyle, HairStyle, Traits
 
@@ -21,12 +21,12 @@ BEARDS = [style for style in get_args(BeardStyle) if style != "none"]
 
 
 def distance_outside(person: Person, points: np.ndarray) -> np.ndarray:
-    """Centimetres (n,) of points (n, 3) before the head's nearest vertex, along its normal; less than 0 is inside."""
+    """Centimeters (n,) of points (n, 3) before the head's nearest vertex, along its normal; less than 0 is inside."""
     triangles = person.model.triangles(Part.FACE, Part.HEAD)
     skin = np.unique(triangles)
     normals = vertex_normals(person.neutral, triangles)[skin]
     _, nearest = cKDTree(person.neutral[skin]).query(points)
-    return ((points - person.neutral[skin][nearest]) * normals[nearest]).sum(axis=1)
+    return np.asarray(((points - person.neutral[skin][nearest]) * normals[nearest]).sum(axis=1))
 
 
 @pytest.mark.parametrize("style", get_args(HairStyle))

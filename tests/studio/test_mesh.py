@@ -34,7 +34,7 @@ def test_subdivision_of_a_closed_surface_stays_closed_and_outward() -> None:
 def test_subdivision_gives_loops_own_points() -> None:
     matrix, _, _ = loop_subdivision(FACES, 6)
     vertices = matrix @ OCTAHEDRON
-    # Valence 4: 1 - 4 β with β = 3 / 32, and the four neighbours of a pole cancel out.
+    # Valence 4: 1 - 4 β with β = 3 / 32, and the four neighbors of a pole cancel out.
     np.testing.assert_allclose(vertices[4], [0, 0, 1 - 4 * 3 / 32])
     # The middle of edge (1,0,0)-(0,1,0): 3/8 of each, and the poles' eighths cancel.
     assert np.abs(vertices - [3 / 8, 3 / 8, 0]).sum(axis=1).min() < 1e-12

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import minimize
 
 from relit_camera.light.directions import texel_directions
+from relit_studio.capture.ball_reflection import Room, highlight_px, room_in_ball, torch_in_ball
 from relit_studio.capture.mirror_ball import MirrorBall
-from relit_studio.capture.mirror_image import Room, highlight_px, room_in_ball, torch_in_ball
 from relit_studio.capture.torch import RADIUS_CM, Torch
 from relit_studio.pinhole import Pinhole
 
@@ -20,7 +20,7 @@ LIGHTS = [(-90.0, 20.0, -20.0), (10.0, 95.0, -30.0), (70.0, -10.0, -10.0), (-20.
 
 def torch_at(position: tuple[float, float, float]) -> Torch:
     place = np.array(position)
-    return Torch(place, (BALL.centre - place) / np.linalg.norm(BALL.centre - place))
+    return Torch(place, (BALL.center - place) / np.linalg.norm(BALL.center - place))
 
 
 def centroid(image: np.ndarray) -> tuple[float, float]:
@@ -45,14 +45,14 @@ def test_outline_is_the_region_that_rays_hit() -> None:
 def test_reflection_point_is_on_the_shortest_way(light: tuple[float, float, float]) -> None:
     def way(angles: np.ndarray) -> float:  # Fermat: of all ways over the near side the shortest is the light's
         a, b = angles
-        point = BALL.centre + 4.0 * np.array([np.sin(a) * np.cos(b), np.sin(b), np.cos(a) * np.cos(b)])
+        point = BALL.center + 4.0 * np.array([np.sin(a) * np.cos(b), np.sin(b), np.cos(a) * np.cos(b)])
         return float(np.linalg.norm(point) + np.linalg.norm(point - light))
 
-    start = np.array(light) / np.linalg.norm(np.array(light) - BALL.centre) - BALL.centre / 50
+    start = np.array(light) / np.linalg.norm(np.array(light) - BALL.center) - BALL.center / 50
     shortest = minimize(way, [np.arctan2(start[0], start[2]), 0.0], method="Nelder-Mead", options={"xatol": 1e-9})
     a, b = shortest.x
     found = BALL.reflection_point(light)
-    expected = BALL.centre + 4.0 * np.array([np.sin(a) * np.cos(b), np.sin(b), np.cos(a) * np.cos(b)])
+    expected = BALL.center + 4.0 * np.array([np.sin(a) * np.cos(b), np.sin(b), np.cos(a) * np.cos(b)])
     np.testing.assert_allclose(found, expected, atol=2e-3)
 
 
@@ -68,7 +68,7 @@ def test_the_ray_to_the_reflection_point_is_mirrored_into_the_light(light: tuple
 
 def test_a_light_inside_the_ball_is_refused() -> None:
     with pytest.raises(ValueError, match="inside"):
-        BALL.reflection_point(BALL.centre + [0.0, 1.0, 0.0])
+        BALL.reflection_point(BALL.center + [0.0, 1.0, 0.0])
 
 
 @pytest.mark.parametrize("light", LIGHTS)
@@ -104,12 +104,12 @@ def test_a_white_room_in_the_ball_reads_its_reflectance() -> None:
 def test_the_ball_shows_each_side_of_the_room_where_it_lies() -> None:
     directions = texel_directions(256, 512).astype(np.float32)
     image, coverage = room_in_ball(BALL, CAMERA, Room(np.maximum(directions, 0)))
-    # Colours tell where each pixel looks: red right, green up, blue toward the camera.
+    # Colors tell where each pixel looks: red right, green up, blue toward the camera.
     x, y = CAMERA.pixel_grid()
     inside = coverage == 1
     looks = CAMERA.rays(x, y)
     hit, points, _ = BALL.reflect(looks[inside])
-    normal = (points - BALL.centre) / 4.0
+    normal = (points - BALL.center) / 4.0
     sight = points / np.linalg.norm(points, axis=1, keepdims=True)
     expected = np.maximum(sight - 2 * (sight * normal).sum(axis=1, keepdims=True) * normal, 0) * np.pi * METAL
     assert hit.all()

@@ -11,9 +11,9 @@ import pytest
 from relit_camera.base.errors import StorageError
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.video.video_readers import VideoReader
-from relit_studio.capture.lossless import LosslessWriter
+from relit_studio.camera_simulation import Gains
+from relit_studio.capture.lossless_writer import LosslessWriter
 from relit_studio.capture.phone import SENSOR, Phone, Stages
-from relit_studio.processing import Gains
 
 OFF = Stages(gamma=False, noise=False, auto_exposure=False, white_balance=False, h264=False)
 MEAN = np.array([0.2, 0.2, 0.2], np.float32)
@@ -69,7 +69,7 @@ def test_exposure_overshoots_then_settles() -> None:
     assert course[-1] == pytest.approx(wanted, abs=0.01)
 
 
-def test_white_balance_pulls_a_tinted_picture_to_grey_within_its_limits() -> None:
+def test_white_balance_pulls_a_tinted_picture_to_gray_within_its_limits() -> None:
     phone = Phone(replace(OFF, white_balance=True), 1, MEAN)
     gains = Gains()
     for _ in range(200):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -13,10 +14,10 @@ from relit_studio.people.geometry import vertex_normals
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 from relit_studio.props.hand import gripping_hand, open_hand
-from relit_studio.props.held import Gesture, Held
+from relit_studio.props.held_objects import Gesture, HeldObjects
 from relit_studio.props.mug import HEIGHT_CM, RADIUS_CM, throw_mug
 from relit_studio.props.sleeve import sew_sleeve
-from relit_studio.props.solids import Blob, Solid, joined, revolve, surface_nets
+from relit_studio.props.solids import Blob, Solid, revolve, surface_nets, union_surface
 
 
 def volume(solid: Solid) -> float:
@@ -30,7 +31,7 @@ def directed_edges(solid: Solid) -> np.ndarray:
 
 
 @pytest.mark.parametrize("make", [lambda: throw_mug()[0], lambda: throw_mug()[1], gripping_hand, open_hand, sew_sleeve])
-def test_surfaces_are_closed_and_face_outward(make) -> None:
+def test_surfaces_are_closed_and_face_outward(make: Callable[[], Solid]) -> None:
     solid = make()
     edges = directed_edges(solid)
     # Each edge is used as often in one direction as in the other.
@@ -54,28 +55,28 @@ def test_a_round_cone_has_its_radii() -> None:
     along = np.array([0.0, 3.0, 6.0])
     on_surface = np.stack([along, 2 - along / 6, 0 * along], axis=1)
     np.testing.assert_allclose(cone.distance(on_surface), 0, atol=1e-9)
-    solid = joined([cone], 0.1, 0.25)
+    solid = union_surface([cone], 0.1, 0.25)
     np.testing.assert_allclose(cone.distance(solid.vertices), 0, atol=0.05)
 
 
 def test_a_mug_holds_a_cup_of_coffee() -> None:
     body, _ = throw_mug()
     outside = np.pi * RADIUS_CM**2 * HEIGHT_CM
-    assert 250 < outside - volume(body) < outside  # cubic centimetres, wall and all
+    assert 250 < outside - volume(body) < outside  # cubic centimeters, wall and all
 
 
 @pytest.fixture(scope="module")
-def held(person: Person) -> Held:
-    return Held(person)
+def held(person: Person) -> HeldObjects:
+    return HeldObjects(person)
 
 
-def placed(held: Held, name: str, gesture: Gesture) -> np.ndarray:
+def placed(held: HeldObjects, name: str, gesture: Gesture) -> np.ndarray:
     motion = held.motions(Posture(), gesture)[name]
     return held.solids[name].vertices @ motion[:3, :3].T + motion[:3, 3]
 
 
 def depth_in_head(person: Person, points: np.ndarray) -> float:
-    """How far, in centimetres, the deepest of the points is inside the face; negative: how far the nearest is off.
+    """How far, in centimeters, the deepest of the points is inside the face; negative: how far the nearest is off.
 
     What is far off is outside: below the neck, where the face ends, no normal tells.
     """
@@ -87,14 +88,14 @@ def depth_in_head(person: Person, points: np.ndarray) -> float:
     return float(-np.where(distance < 4, np.sign(outward) * distance, distance).min())
 
 
-def test_at_rest_all_is_below_the_picture_and_clear_of_the_head(person: Person, held: Held) -> None:
+def test_at_rest_all_is_below_the_picture_and_clear_of_the_head(person: Person, held: HeldObjects) -> None:
     for name in held.solids:
         points = placed(held, name, Gesture())
         assert points[:, 1].max() < -16
         assert depth_in_head(person, points) < -5
 
 
-def test_the_mug_meets_the_lips_and_does_not_enter_the_face(person: Person, held: Held) -> None:
+def test_the_mug_meets_the_lips_and_does_not_enter_the_face(person: Person, held: HeldObjects) -> None:
     lips = person.neutral[person.model.landmarks68[[51, 57]]]
     for tilt_deg in (0, 20, 40):
         gesture = Gesture(mug=1, tilt_deg=tilt_deg)
@@ -104,12 +105,12 @@ def test_the_mug_meets_the_lips_and_does_not_enter_the_face(person: Person, held
         assert depth_in_head(person, placed(held, "right_hand", gesture)) < 0
 
 
-def test_a_hand_that_passes_does_not_touch_the_face(person: Person, held: Held) -> None:
+def test_a_hand_that_passes_does_not_touch_the_face(person: Person, held: HeldObjects) -> None:
     for across_cm in (-8, 0, 9):
         assert depth_in_head(person, placed(held, "left_hand", Gesture(hand=1, across_cm=across_cm))) < -0.5
 
 
-def test_hand_and_mug_keep_together_and_sleeves_begin_at_wrists(held: Held) -> None:
+def test_hand_and_mug_keep_together_and_sleeves_begin_at_wrists(held: HeldObjects) -> None:
     gestures = [Gesture(mug=share, tilt_deg=30 * share, hand=share) for share in np.linspace(0, 1, 9)]
     motions = [held.motions(Posture(), gesture) for gesture in gestures]
     for each in motions:

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from relit_camera.base.errors import InputError
 from relit_studio.people.face_model import IDENTITIES, Part, read_face_model
 from relit_studio.people.geometry import Floats, Indices, Similarity, areas, scatter, vertex_normals
-from relit_studio.people.mesh478 import nearest_on_surface
-from relit_studio.people.registration import LANDMARKS, fit
+from relit_studio.people.mesh478_points import nearest_on_surface
+from relit_studio.people.scan_registration import LANDMARKS, fit
 from tests.studio.tiny_model import tiny_model
 
 

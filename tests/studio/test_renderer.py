@@ -8,9 +8,9 @@ import pytest
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.light.directions import direction_from_degrees, fibonacci_directions
-from relit_studio.mannequin.camera import Camera
+from relit_studio.mannequin.distant_lights import DistantLights, lights_from_map
 from relit_studio.mannequin.figure import Posture
-from relit_studio.mannequin.lights import DistantLights, lights_from_map
+from relit_studio.mannequin.mannequin_camera import Camera
 from relit_studio.mannequin.renderer import View
 
 SIZE = 96

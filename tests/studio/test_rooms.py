@@ -7,8 +7,8 @@ import pytest
 
 from relit_camera.light.directions import direction_from_degrees
 from relit_camera.light.light_map import irradiance
+from relit_studio.drive.painted_rooms import ROOMS, paint_room
 from relit_studio.drive.room import Room
-from relit_studio.drive.rooms import ROOMS, paint_room
 
 FRONT, LEFT, RIGHT, UP = ((0, 0), (-90, 0), (90, 0), (0, 90))
 

@@ -8,14 +8,14 @@ from relit_camera.base.errors import ImageError
 from relit_camera.light.directions import direction_from_degrees, fibonacci_directions
 from relit_camera.light.light_map import irradiance, total
 from relit_camera.light.scene_light import lamp_light_map
-from relit_studio.mannequin.lights import lights_from_map, room
+from relit_studio.mannequin.distant_lights import lights_from_map, room
 from relit_studio.mannequin.mesh import grid_triangles
 from relit_studio.mannequin.shading import ShadowMap, Surface, reflected
 
 
 def patch(normals: np.ndarray, shine: float = 0.0, exponent: float = 12.0) -> Surface:
     count = len(normals)
-    views = np.tile(np.float32([0, 0, 1]), (count, 1))
+    views = np.tile(np.array([0, 0, 1], np.float32), (count, 1))
     filled = (np.full(count, value, np.float32) for value in (shine, exponent))
     return Surface(np.zeros((count, 3), np.float32), normals.astype(np.float32), views, *filled)
 
@@ -52,7 +52,7 @@ def test_shadow_edge_lies_where_the_light_puts_it() -> None:
     shadow = ShadowMap(vertices, triangles, np.array([1, 0, 1]) / np.sqrt(2), 400)
     along = np.linspace(-8, 4, 601)
     probes = np.stack([along, np.zeros(601), np.zeros(601)], axis=1).astype(np.float32)
-    lit = shadow.lit(probes, np.tile(np.float32([0, 0, 1]), (601, 1)))
+    lit = shadow.lit(probes, np.tile(np.array([0, 0, 1], np.float32), (601, 1)))
     dark = along[lit < 0.5]
     assert dark.min() == pytest.approx(-5, abs=0.15)
     assert dark.max() == pytest.approx(-1, abs=0.15)
@@ -65,7 +65,7 @@ def test_round_body_does_not_shadow_itself() -> None:
     points = (8 * ball.reshape(-1, 3)).astype(np.float32)
     normals = points / 8
     light = direction_from_degrees(30, 20)
-    lit = ShadowMap(points, grid_triangles(60, 120, closed=True), light, 300).lit(points, normals)
+    lit = ShadowMap(points, grid_triangles(60, 120, closed=True), light, 300).lit(points, normals.astype(np.float32))
     facing = normals @ light
     assert (lit[facing > 0.15] > 0.99).all()
     assert (lit[facing < -0.3] < 0.01).all()

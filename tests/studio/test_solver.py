@@ -10,10 +10,10 @@ import pytest
 
 from relit_camera.capture.picture_import import import_samples
 from relit_camera.light.directions import direction_from_degrees, texel_directions, texel_solid_angles
-from relit_studio.field.solver import SolverSettings, solve, write_solver_field
 from relit_studio.field.solver_gloss import glossy
 from relit_studio.field.solver_scene import Surfaces
-from relit_studio.field.solver_transport import bounced, transport
+from relit_studio.field.solver_transport import bounce_light, transport
+from relit_studio.field.transport_solver import SolverSettings, solve, write_solver_field
 from relit_studio.mannequin.mesh import grid_triangles
 from relit_studio.pinhole import Pinhole
 
@@ -74,7 +74,7 @@ def test_hemispherical_bowl_sees_itself_and_the_sky_half_and_half() -> None:
     vertices, triangles = bowl()
     between = transport(vertices, triangles, directions=200, size=96)
     inner = vertices[:, 2] < -0.1
-    seen = np.asarray(between.seen.sum(axis=1)).ravel()
+    seen = np.asarray(between.form_factors.sum(axis=1)).ravel()
     assert between.sky[inner].mean() == pytest.approx(0.5, abs=0.02)
     assert seen[inner].mean() == pytest.approx(0.5, abs=0.02)
     np.testing.assert_allclose((seen + between.sky)[inner], 1, atol=0.06)
@@ -87,7 +87,7 @@ def test_bowl_in_a_white_room_reads_what_all_its_bounces_add_up_to(albedo: float
     between = transport(vertices, triangles, directions=200, size=96)
     every = np.full((len(vertices), 3), albedo, np.float32)
     sky = between.sky[:, None]
-    reading = albedo * (sky[..., None] + bounced(sky, every, between, bounces=40))[:, 0, 0]
+    reading = albedo * (sky[..., None] + bounce_light(sky, every, between, bounces=40))[:, 0, 0]
     inner = vertices[:, 2] < -0.1
     assert reading[inner].mean() == pytest.approx(albedo * 0.5 / (1 - albedo * 0.5), rel=0.02)
 
@@ -96,7 +96,7 @@ def test_one_bounce_more_adds_light_and_less_each_time() -> None:
     vertices, triangles = bowl()
     between = transport(vertices, triangles, directions=60, size=64)
     every = np.full((len(vertices), 3), 0.6, np.float32)
-    sums = [float(bounced(between.sky[:, None], every, between, count).sum()) for count in range(5)]
+    sums = [float(bounce_light(between.sky[:, None], every, between, count).sum()) for count in range(5)]
     steps = np.diff(sums)
     assert sums[0] == 0
     assert (steps > 0).all()
@@ -105,7 +105,7 @@ def test_one_bounce_more_adds_light_and_less_each_time() -> None:
 
 def test_glossy_surface_over_white_gives_back_what_it_gets_and_no_more() -> None:
     directions, weights = white_sky(32)
-    normals = np.tile(np.float32([0, 0, 1]), (3, 1))
+    normals = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
     tilt = np.radians([0, 45, 75])
     views = np.stack([np.sin(tilt), 0 * tilt, np.cos(tilt)], axis=1).astype(np.float32)
     for f0, alpha in ((0.04, 0.15), (0.04, 0.5), (0.9, 0.4)):

@@ -15,26 +15,26 @@ from relit_camera.base.rotations import Angles
 from relit_studio import still
 from relit_studio.camera import Camera
 from relit_studio.cycles.job import Quality
+from relit_studio.drive.painted_rooms import paint_room
 from relit_studio.drive.room import Room
-from relit_studio.drive.rooms import paint_room
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 
 POSTURES = [Posture(Angles(yaw, 0.0, 0.0)) for yaw in (0.0, 10.0, 20.0)]
 
 
-def grey(value: float) -> DisplayImage:
+def gray(value: float) -> DisplayImage:
     return np.full((4, 4, 3), round(value), np.uint8)
 
 
 def test_only_missing_pictures_are_rendered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     paths = [tmp_path / f"{index}.png" for index in range(3)]
-    write_display(paths[1], grey(99))
+    write_display(paths[1], gray(99))
     made: list[float] = []
 
     def rendered(person: Any, postures: Sequence[Posture], *_: Any) -> list[DisplayImage]:
         made.extend(posture.angles.yaw for posture in postures)
-        return [grey(posture.angles.yaw) for posture in postures]
+        return [gray(posture.angles.yaw) for posture in postures]
 
     monkeypatch.setattr(still, "render_stills", rendered)
     for _ in range(2):

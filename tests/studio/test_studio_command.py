@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from relit_camera.base.errors import InputError, StorageError
 from relit_camera.capture.picture_import import import_samples
 from relit_studio.__main__ import app
-from relit_studio.field.solver import SolverSettings
+from relit_studio.field.transport_solver import SolverSettings
 
 
 def refused(*arguments: str) -> str:
@@ -25,7 +25,7 @@ def test_the_solver_fills_a_folder_that_imports_and_keeps_to_its_settings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     small = partial(SolverSettings, width=32, height=24, map_rows=2, bundles=8, rays=32, supersampling=1, shadow=96)
-    monkeypatch.setattr("relit_studio.field.solver.SolverSettings", small)
+    monkeypatch.setattr("relit_studio.field.transport_solver.SolverSettings", small)
     result = CliRunner().invoke(app, ["field", "--renderer", "solver", "--out", str(tmp_path / "field")])
     assert result.exit_code == 0
     assert "mannequin.relit" in result.output

@@ -20,7 +20,7 @@ def test_lambertian_patch_obeys_cosine_inverse_square_and_beam() -> None:
     way = torch.position.astype(np.float32) - points
     distance = np.linalg.norm(way, axis=1, keepdims=True)
     filled = (np.full(len(points), value, np.float32) for value in (0.0, 12.0))
-    normals = np.tile(np.float32([0, 0, 1]), (len(points), 1))
+    normals = np.tile(np.array([0, 0, 1], np.float32), (len(points), 1))
     cosine, _ = reflected(Surface(points, normals, normals, *filled), way / distance)
     squared = (x - 10) ** 2 + (y - 5) ** 2 + 80.0**2
     off_axis = np.clip((np.sin(np.radians(20)) * (x - 10) + np.cos(np.radians(20)) * 80) / np.sqrt(squared), 0, 1)
@@ -77,7 +77,7 @@ def test_shadow_edge_of_a_light_nearby_lies_where_geometry_puts_it() -> None:
     shadow = PointShadow(vertices, triangles, [6.0, 0.0, 23.0], 500)
     along = np.linspace(-8, 8, 801)
     probes = np.stack([along, 0 * along, 0 * along], axis=1).astype(np.float32)
-    lit = shadow.lit(probes, np.tile(np.float32([0, 0, 1]), (len(along), 1)))
+    lit = shadow.lit(probes, np.tile(np.array([0, 0, 1], np.float32), (len(along), 1)))
     left, right = (6 + (edge - 6) * 23 / 20 for edge in (-2, 2))
     dark = along[lit < 0.5]
     assert (dark.min(), dark.max()) == pytest.approx((left, right), abs=0.12)

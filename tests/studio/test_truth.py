@@ -14,9 +14,9 @@ from relit_camera.light.builtin.builtin_environments import builtin_environment
 from relit_camera.light.directions import texel_directions
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_studio.mannequin.__main__ import main
-from relit_studio.mannequin.camera import Camera
-from relit_studio.mannequin.clip import CLIP_SIZE, render_clip
+from relit_studio.mannequin.driving_clip import CLIP_SIZE, render_clip
 from relit_studio.mannequin.figure import Posture
+from relit_studio.mannequin.mannequin_camera import Camera
 from relit_studio.mannequin.renderer import View
 
 
@@ -46,7 +46,7 @@ def test_the_relit_video_is_the_clip_under_that_light(made: Path) -> None:
     expected = next(render_clip(light_map, Camera(CLIP_SIZE), [0.0])) * np.float32(auto_exposure_scale(light_map))
     inside = mattes[0]
     assert 0.3 < inside.mean() < 0.8
-    # H.264 halves the resolution of colour.
+    # H.264 halves the resolution of color.
     error = linear_from_display(frames[0])[inside] - np.clip(expected[inside], 0, 2)
     assert np.sqrt(np.mean(error**2)) < 0.03
     assert frames[0][:20, :20].max() < 8

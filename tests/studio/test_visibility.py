@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relit_studio.camera import Camera
-from relit_studio.drive.visibility import visibility
+from relit_studio.drive.face_visibility import visibility
 
 CAMERA = Camera(180, 320)
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])

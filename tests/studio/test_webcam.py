@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.color import linear_from_uint8, luminance
+from relit_studio.camera_simulation import Gains
 from relit_studio.drive.webcam import SENSOR, Webcam
-from relit_studio.processing import Gains
 
 HEIGHT, WIDTH = 90, 160
 

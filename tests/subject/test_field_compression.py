@@ -18,14 +18,8 @@ from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.environment_panorama import read_panorama
 from relit_camera.light.light_map import LightMap, resample_to_light_map
 from relit_camera.subject.compression.accuracy_target import DARK_LIGHT_FRACTION, CompressionTarget
-from relit_camera.subject.compression.field_compression import (
-    CLUSTER_PIXELS,
-    TILE_HEIGHT,
-    TILE_WIDTH,
-    CompressedField,
-    compress_field,
-    tiles,
-)
+from relit_camera.subject.compression.field_compression import CompressedField, compress_field
+from relit_camera.subject.compression.field_tiles import CLUSTER_PIXELS, TILE_HEIGHT, TILE_WIDTH, tiles
 from relit_camera.subject.compression.principal_components import PixelCluster
 from relit_camera.subject.reflectance_field import TEXELS, ReflectanceField
 from tests.lab.lit_sphere import cap, shadowed
@@ -87,11 +81,11 @@ def test_every_texel_and_light_comes_back_as_asked(
     worst = -10 * np.log10((error / peaks**2).max())
     assert worst > TARGET.texel_db
     # It tells what it reached; the peaks, by which that is judged, are those of every fourth pixel.
-    assert found.reached.texel_db == pytest.approx(worst, abs=0.7)
+    assert found.quality.texel_db == pytest.approx(worst, abs=0.7)
     lights = (rows @ found.light_coefficients).transpose(2, 0, 1)
     each = [psnr(picture(a), b, samples.matte) for a, b in zip(lights, samples.pictures, strict=True)]
     assert min(each) > TARGET.light_db - 0.5
-    assert found.reached.light_db == pytest.approx(min(each), abs=0.1)
+    assert found.quality.light_db == pytest.approx(min(each), abs=0.1)
 
 
 def psnr_under(light_map: LightMap, samples: Samples, dense: NDArray[np.float32], found: CompressedField) -> float:
@@ -105,7 +99,7 @@ def psnr_under(light_map: LightMap, samples: Samples, dense: NDArray[np.float32]
 
 def test_the_worst_map_is_told(samples: Samples, dense: NDArray[np.float32], found: CompressedField) -> None:
     reached = psnr_under(MAP, samples, dense, found)
-    assert found.reached.map_db == pytest.approx(reached, abs=0.1)
+    assert found.quality.map_db == pytest.approx(reached, abs=0.1)
     assert reached > 45
 
 
@@ -122,7 +116,7 @@ def test_real_places_that_it_was_not_tried_on_come_back(
 
 def test_it_is_small_and_black_outside(samples: Samples, found: CompressedField) -> None:
     kept = found.basis.nbytes + found.coefficients.nbytes + found.light_coefficients.nbytes
-    assert found.reached.bytes_share == pytest.approx(kept / (SIZE**2 * 3 * TEXELS * 4))
+    assert found.quality.bytes_share == pytest.approx(kept / (SIZE**2 * 3 * TEXELS * 4))
     assert not rows_by_hand(found.basis, SIZE**2)[samples.matte.ravel() == 0].any()
 
 
@@ -130,9 +124,9 @@ def test_more_is_kept_where_more_is_asked(samples: Samples, found: CompressedFie
     better = compress_field(
         SharpVisibilityInterpolation().build(samples), samples.pictures, samples.matte, CompressionTarget(50, 53)
     )
-    assert better.reached.texel_db > found.reached.texel_db + 5
+    assert better.quality.texel_db > found.quality.texel_db + 5
     assert len(better.basis.values) > 1.2 * len(found.basis.values)
-    assert better.reached.map_db is None
+    assert better.quality.map_db is None
 
 
 def test_a_field_of_low_rank_needs_no_more_components_than_it_has(samples: Samples) -> None:
@@ -140,7 +134,7 @@ def test_a_field_of_low_rank_needs_no_more_components_than_it_has(samples: Sampl
     counted = Counted(SphericalBarycentric().build(samples))
     low = compress_field(counted, samples.pictures, samples.matte)
     assert low.basis.components <= len(samples.directions)
-    assert low.reached.texel_db > 43
+    assert low.quality.texel_db > 43
     # Never the whole at once.
     assert max(counted.asked) <= TILE_WIDTH
 
@@ -160,8 +154,8 @@ def test_one_cluster_is_enough() -> None:
     few = shadowed(cap(40, 60), 8)
     one = compress_field(SphericalBarycentric().build(few), few.pictures, few.matte, TARGET)
     assert len(np.concatenate(tiles(few.matte))) == 1
-    assert one.reached.light_db > TARGET.light_db
-    assert one.reached.texel_db > TARGET.texel_db
+    assert one.quality.light_db > TARGET.light_db
+    assert one.quality.texel_db > TARGET.texel_db
 
 
 def test_clusters_hold_every_pixel_inside_once_and_neighbours_together() -> None:

@@ -156,7 +156,7 @@ def test_auto_is_numpy_where_there_is_no_gpu(
 ) -> None:
     monkeypatch.setattr(onnxruntime, "get_available_providers", lambda: ["CPUExecutionProvider"])
     monkeypatch.setattr(onnxruntime, "InferenceSession", pytest.fail)  # no graph is made in vain
-    caplog.set_level("INFO")
+    caplog.set_level("DEBUG")
     chosen = open_relighter("auto", sphere)
     assert (chosen.name, chosen.provider) == ("basis", "numpy")
     assert "the subject is relit by basis on numpy" in caplog.text

@@ -1,4 +1,4 @@
-"""A recorded video relit into another: the pipeline without clocks, every frame once."""
+"""Relighting a recorded video: every frame goes through the pipeline once, as fast as it can."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from relit_camera.live.scene.scene import Scene
 
 @dataclass(frozen=True)
 class ReplayedFrame:
-    """What one frame of a replay was.
+    """The record of one frame of a replay.
 
     Attributes:
         index: from 0 in presentation order.
@@ -52,7 +52,7 @@ def replay(
     out: Path | None,
     pipeline_for: Callable[[tuple[int, int]], Pipeline],
     scene_at: Callable[[float], Scene],
-    watch: Callable[[int, DisplayImage, DisplayImage], None] = lambda index, before, after: None,
+    watch: Callable[[int, DisplayImage, DisplayImage], None] = lambda index, live, relit: None,
 ) -> list[ReplayedFrame]:
     """Relight `video` into `out`, at its own size and rate; odd sides lose their last column or row.
 
@@ -76,11 +76,11 @@ def replay(
         writer = files.enter_context(VideoWriter(out, size, reader.info.fps, threads=2)) if out else None
         pipeline = pipeline_for(size)
         for frame in reader:
-            finished = pipeline.process(frame, scene_at(frame.time_s))
-            frames.append(ReplayedFrame(frame.index, frame.time_s, finished.motion, pipeline.timer.lap_ms()))
-            watch(frame.index, frame.image, finished.image)
+            rendered = pipeline.process(frame, scene_at(frame.time_s))
+            frames.append(ReplayedFrame(frame.index, frame.time_s, rendered.motion, pipeline.timer.lap_ms()))
+            watch(frame.index, frame.image, rendered.image)
             if writer:
-                writer.write(np.ascontiguousarray(finished.image), frame.time_s)
+                writer.write(np.ascontiguousarray(rendered.image), frame.time_s)
         if not any(f.motion and f.motion.status is FaceStatus.FOUND for f in frames):
             raise VideoError(
                 f"no face was found in {video}", "the face must look toward the camera, 60 pixels high or more"

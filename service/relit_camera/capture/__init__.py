@@ -1,1 +1,1 @@
-"""Capture: from OLAT pictures (RTI .lp) or from a film to samples, to a reflectance field, to a subject."""
+"""Capture: from one-light pictures (RTI .lp) or a film to samples, and from samples to a subject."""

@@ -1,4 +1,4 @@
-"""RTI light files (.lp): first line the count, then `file x y z`, unit vectors in our axes."""
+"""RTI light files (.lp): the count in the first line, then lines `file x y z` with unit vectors toward the lights."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from relit_camera.base.errors import LightsError
 
 NORM_TOLERANCE = 0.01
+"""Largest deviation of a direction's length from 1."""
 MIN_LIGHTS = 4
 MAX_BYTES = 4 << 20
+"""Of an .lp file."""
 
 
 @dataclass(frozen=True)

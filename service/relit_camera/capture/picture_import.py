@@ -1,4 +1,4 @@
-"""One-light pictures with known directions → samples."""
+"""Importing one-light pictures with known directions (an .lp file) as samples."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ MATTE_NAME = "matte.png"
 def import_samples(
     lights: Path, gamma: Gamma = "srgb", progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Samples:
-    """Read the pictures that an .lp file names, and the matte.png beside it; without one, all of the picture counts.
+    """Read the pictures that an .lp file names, and matte.png beside it; without a matte all of the picture counts.
 
     Args:
         lights: the .lp file.
-        gamma: the pictures' curve.
+        gamma: the curve that the pictures are encoded with.
         progress: called with the count of pictures read and the total.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Samples → subject: the field, compressed, with what trackers and people need to see."""
+"""Building a subject from samples: the compressed field, neutral picture, landmarks, geometry and header."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from relit_camera.subject.compression.field_compression import CompressedField, 
 from relit_camera.subject.subject import HORIZON_STEP_RAD, Subject, SubjectMetadata
 
 MAX_SKIN_LUMINANCE = 0.45
-"""Luminance that three quarters of a face do not exceed under frontal light where a white wall reads 1."""
+"""Upper bound of the 75th percentile of a face's luminance under frontal light, where a white wall reads 1."""
 TYPICAL_SKIN_LUMINANCE = 0.36
-"""The same of light skin."""
+"""The same percentile for light skin."""
 
 
 def build_subject(
@@ -41,12 +41,11 @@ def build_subject(
     Args:
         samples: aligned one-light pictures.
         method: a name that `capture.reflectance.method_registry.open_method` knows.
-        source: file name that the header should tell.
-        gamma: the curve that the pictures were decoded with, for the header.
-        landmarks: known points of the face by scheme; where it is None, the
-            installed trackers look for them.
-        with_geometry: keep the person's shape in the subject.
-        progress: called with the count of parts of the field that are compressed, and the total.
+        source: file name of the capture, for the header.
+        gamma: curve that the pictures were decoded with, for the header.
+        landmarks: known landmarks by scheme; None finds them with the installed trackers.
+        with_geometry: whether to store the person's geometry in the subject.
+        progress: called with the number of tiles that are compressed and the total.
 
     Raises:
         NotFoundError: no such method.
@@ -56,9 +55,9 @@ def build_subject(
     field = open_method(method).build(samples)
     maps = [builtin_environment(name).light_map for name in BUILTIN_NAMES]
     compressed = compress_field(field, samples.pictures, samples.matte, CompressionTarget(maps=maps), progress)
-    reached = compressed.reached
+    quality = compressed.quality
     frontal = frontal_picture(compressed, samples.matte)
-    still = neutral_picture(frontal, samples.matte)
+    neutral = neutral_picture(frontal, samples.matte)
     lights, height, width = samples.pictures.shape[:3]
     return Subject(
         metadata=SubjectMetadata(
@@ -68,10 +67,10 @@ def build_subject(
             lights=lights,
             components=compressed.basis.components,
             source=source,
-            psnr_db=reached.light_db,
-            texel_psnr_db=reached.texel_db,
-            map_psnr_db=reached.map_db,
-            bytes_share=reached.bytes_share,
+            psnr_db=quality.light_db,
+            texel_psnr_db=quality.texel_db,
+            map_psnr_db=quality.map_db,
+            bytes_share=quality.bytes_share,
             gamma=str(gamma),
             over_black=over_black(samples),
             display_gain=display_gain(frontal, samples.matte),
@@ -83,17 +82,17 @@ def build_subject(
         light_directions=samples.directions.astype(np.float32),
         light_coefficients=compressed.light_coefficients,
         matte=samples.matte,
-        neutral=still,
-        landmarks=find_landmarks(still) if landmarks is None else landmarks,
+        neutral=neutral,
+        landmarks=find_landmarks(neutral) if landmarks is None else landmarks,
         **(quantize_geometry(samples.geometry) if with_geometry else {}),
     )
 
 
 def quantize_geometry(geometry: Geometry) -> dict[str, NDArray]:
-    """The shape as a subject keeps it: normals, albedo, depth, horizons (see `Subject`).
+    """The geometry arrays of a subject: normals, albedo, depth, horizons (see `Subject`).
 
-    Half floats tell normals to 0.03° and albedo to 0.05 %, far below what photometric stereo knows; a horizon's 0.7° is
-    less than the light's own size.
+    Half floats resolve normals to 0.03° and albedo to 0.05 %, far below the errors of photometric stereo; a horizon's
+    step of 0.7° is less than the size of a light.
     """
     horizons = np.rint((geometry.horizon.heights.astype(np.float32) + np.pi / 2) / HORIZON_STEP_RAD)
     return {
@@ -105,7 +104,7 @@ def quantize_geometry(geometry: Geometry) -> dict[str, NDArray]:
 
 
 def frontal_picture(field: CompressedField, matte: Mask) -> LinearImage:
-    """The face under soft light from the front, a cosine lobe about the camera: a white wall facing it reads 1."""
+    """The linear picture under a cosine lobe of light about the camera, in which a white wall facing it reads 1."""
     lobe = np.maximum(texel_directions()[..., 2], 0) * texel_solid_angles()
     lobe /= (lobe * np.maximum(texel_directions()[..., 2], 0)).sum()
     amounts = field.coefficients @ lobe.ravel().astype(np.float32)
@@ -113,22 +112,22 @@ def frontal_picture(field: CompressedField, matte: Mask) -> LinearImage:
 
 
 def over_black(samples: Samples) -> bool:
-    """Whether everything outside the matte is black in every frame."""
+    """Whether everything outside the matte is black (below 0.02) in every frame."""
     outside = samples.matte == 0
     return bool(outside.any() and samples.pictures[:, outside].max() < 0.02)
 
 
 def display_gain(frontal: LinearImage, matte: Mask) -> float:
-    """What the pictures are multiplied by to be shown: 1 for a calibrated capture.
+    """Factor from the pictures to displayed values: 1 for a calibrated capture.
 
-    No skin is nearly as bright as a white wall. Where the frames say so, their unit is another (a strobe of unknown
-    strength), and they are shown as bright as light skin is.
+    No skin is nearly as bright as a white wall. Where the frames are that bright, their unit is unknown (a strobe of
+    unknown strength), and the face is scaled to the luminance of light skin.
     """
     bright = float(np.percentile(luminance(frontal)[matte > 0.5], 75))
     return 1.0 if bright <= MAX_SKIN_LUMINANCE else TYPICAL_SKIN_LUMINANCE / bright
 
 
 def neutral_picture(frontal: LinearImage, matte: Mask) -> DisplayImage:
-    """The face as trackers like to see it: softly lit from the front, well exposed."""
+    """The frontal picture as uint8 sRGB, exposed so that trackers find the face: its 95th percentile becomes 0.7."""
     bright = float(np.percentile(frontal[matte > 0.5], 95))
     return uint8_from_linear(frontal * np.float32(0.7 / bright if bright > 0 else 1.0))

@@ -1,6 +1,7 @@
-"""Finding the face in a new subject's still, so that it need not be found at every start.
+"""Landmarks of a new subject: found by trackers in its neutral picture, or read from a JSON file.
 
-Known landmarks beside a set of one-light pictures: JSON {scheme: [[x, y], …]}, pixels, centres at integers + ½.
+They are stored in the subject, so that the face need not be found at every start. The file is
+{scheme: [[x, y], …]} in pixels, pixel centers at integers + ½.
 """
 
 from __future__ import annotations
@@ -20,10 +21,14 @@ from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker, tr
 log = logging.getLogger(__name__)
 
 LANDMARK_TRACKERS = ("mesh", "openseeface")
+MAX_BYTES = 16 << 20
+"""Of a landmarks file."""
+
+_Layout = TypeAdapter(dict[str, list[tuple[float, float]]])
 
 
-def find_landmarks(still: DisplayImage) -> Mapping[str, Points]:
-    """The face's landmarks (count, 2) in each scheme whose tracker is installed; empty where there is no face."""
+def find_landmarks(neutral: DisplayImage) -> Mapping[str, Points]:
+    """Landmarks (count, 2) of the face in a neutral picture, by scheme of each installed tracker."""
     found: dict[str, Points] = {}
     for name in LANDMARK_TRACKERS:
         try:
@@ -31,15 +36,10 @@ def find_landmarks(still: DisplayImage) -> Mapping[str, Points]:
         except ModelError as error:
             log.info("landmarks of tracker %s are left out: %s", name, error)
             continue
-        state = track_still(still, tracker)
+        state = track_still(neutral, tracker)
         if state.visible:
             found[state.scheme] = state.landmarks
     return found
-
-
-MAX_BYTES = 16 << 20
-
-_Layout = TypeAdapter(dict[str, list[tuple[float, float]]])
 
 
 def read_landmarks(path: Path, required: bool) -> Mapping[str, Points]:

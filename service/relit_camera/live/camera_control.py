@@ -1,4 +1,4 @@
-"""What the API may do with the running camera."""
+"""The interface through which the API controls the running camera."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from relit_camera.live.status.event_hub import EventHub
 
 
 class CameraControl(Protocol):
-    """The camera as the API sees it: `app.camera_service.CameraService`, and a fake in the API's tests."""
+    """The running camera as the API sees it. `app.camera_service.CameraService` implements it."""
 
     scene_controller: SceneController
     events: EventHub
 
     def status(self) -> CameraStatus:
-        """What is going on; cheap enough for several calls a second."""
+        """The camera's present state; cheap enough for several calls a second."""
         ...
 
     def picture(self, after: int, timeout_s: float) -> tuple[int, DisplayImage] | None:

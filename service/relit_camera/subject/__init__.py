@@ -1,1 +1,1 @@
-"""The subject: a reflectance field in compressed form, its file, its store, and relighting it."""
+"""The reflectance field of a person, its compressed form, the subject file and the store."""

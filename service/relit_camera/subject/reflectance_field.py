@@ -1,7 +1,7 @@
-"""The reflectance field: how every pixel answers light from every direction (thesis 5.1).
+"""The reflectance field: the color of every pixel under light from every direction (thesis 5.1).
 
 R[p, l] is the picture under a distant light of unit irradiance from direction l, so a captured frame is its own
-sample. Solid angles are no part of it: they belong to the operator that sums over directions.
+sample. Solid angles are not included: they belong to the operator that sums over directions.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ TEXELS = MAP_HEIGHT * MAP_WIDTH
 
 
 class ReflectanceField(Protocol):
-    """What a method builds from samples."""
+    """A reflectance field, as a method builds it from samples."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -34,7 +34,7 @@ class ReflectanceField(Protocol):
 
 @runtime_checkable
 class ExactField(ReflectanceField, Protocol):
-    """A field that answers any direction, not only texels."""
+    """A field that can be evaluated at any direction, not only at texels."""
 
     def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""

@@ -1,4 +1,4 @@
-"""The subject: one person's compressed reflectance field and what goes with it."""
+"""The subject: one person's compressed reflectance field with its matte, geometry, landmarks and header."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from relit_camera.subject.reflectance_field import TEXELS
 
 FORMAT_VERSION: Literal[2] = 2
 MIN_SIDE_PX, MAX_SIDE_PX = 8, 8192
-"""Of the picture, in pixels."""
+"""Least and largest side of a subject's picture, in pixels."""
 HORIZON_STEP_RAD = np.pi / 255
-"""A horizon's code v of 0..255 stands for the height v · this − π/2, in radians."""
+"""Step of the quantized horizons: code v of 0..255 is the height v · HORIZON_STEP_RAD − π/2, in radians."""
 
 
 class SubjectMetadata(BaseModel):
@@ -27,17 +27,17 @@ class SubjectMetadata(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     format_version: Literal[1, 2] = FORMAT_VERSION
-    """1: one set of principal pictures for all pixels, as small subjects have it; 2: local bases."""
+    """1: one set of principal pictures for all pixels, in packed subjects; 2: local bases."""
     width: Annotated[int, Field(ge=MIN_SIDE_PX, le=MAX_SIDE_PX)]
     height: Annotated[int, Field(ge=MIN_SIDE_PX, le=MAX_SIDE_PX)]
     light_map: tuple[int, int] = (64, 32)
-    """Width and height of the light maps that it answers to."""
+    """Width and height of the light maps that light it."""
     method: str
     """Name of the reflectance method that built the field."""
     lights: Annotated[int, Field(ge=1)]
     components: Annotated[int, Field(ge=1)]
     source: str
-    """File name of what it was built from; never a full path, which would tell of the person's machine."""
+    """File name of what it was built from; never a full path, which would reveal the person's folders."""
     psnr_db: float
     """Worst PSNR of the compressed field over the captured lights, each against its own frame."""
     texel_psnr_db: float | None = None
@@ -45,19 +45,19 @@ class SubjectMetadata(BaseModel):
     map_psnr_db: float | None = None
     """The same under the built-in environments."""
     bytes_share: float | None = None
-    """Bytes of the compressed field by those of its dense float32 matrix."""
+    """Bytes of the compressed field over those of its dense float32 matrix."""
     gamma: str = "srgb"
     display_gain: Annotated[float, Field(gt=0, le=100)] = 1.0
-    """What pictures are multiplied by to be shown, where the captured frames are not in units of a white wall."""
+    """Factor from pictures to displayed values, where the captured frames are not in units of a white wall."""
     over_black: bool = False
-    """Whether the captured frames hold the person over black: then their colours carry the matte as a factor."""
+    """Whether the captured frames show the person over black: their colors then have the matte as a factor."""
     created_by: str
     created_at: str
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A person who can be relit.
+    """One person's compressed field and what belongs to it.
 
     The field is R[p, c, l] = Σ_g row[p, c, g] · coefficients[g, l], with the rows of `basis`.
 
@@ -68,14 +68,13 @@ class Subject:
         light_directions: (lights, 3) float32 unit vectors, the captured directions.
         light_coefficients: (components, lights) float32: the captured frames in the same basis.
         matte: (height, width) float32 straight alpha.
-        neutral: (height, width, 3) uint8 sRGB, the face under soft light from the front: what trackers look at.
+        neutral: (height, width, 3) uint8 sRGB, the face under soft light from the front, for trackers.
         landmarks: points (count, 2) on `neutral` for each landmark scheme that is known.
         normals: (height, width, 3) float16 unit vectors, (0, 0, 1) outside of the matte; or None.
         albedo: (height, width, 3) float16 linear, 0 outside; or None.
         depth: (height, width) float32 in pixels toward the camera, mean 0, 0 outside; or None.
-        horizons: (height, width, sectors) uint8, what the rest of the surface hides (`capture.geometry.horizon_map`),
-            in steps of
-            `HORIZON_STEP_RAD`; or None.
+        horizons: (height, width, sectors) uint8, heights of the horizons (`capture.geometry.horizon_map`), in
+            steps of `HORIZON_STEP_RAD`; or None.
     """
 
     metadata: SubjectMetadata

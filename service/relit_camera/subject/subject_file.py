@@ -25,15 +25,16 @@ HEADER_KEY = "relit_subject"
 LANDMARKS_PREFIX = "landmarks."
 MAX_TENSORS = 64
 MAX_BYTES = 8 << 30
+"""Largest file that is memory-mapped."""
 MAX_IN_MEMORY_BYTES = 1 << 30
-"""Of a subject that is read into memory: the largest that is built, 1024 pixels a side, has under 700 MB."""
+"""Largest file that is read into memory; the largest subject that is built, 1024 pixels a side, has under 700 MB."""
 REQUIRED_TENSORS = ("coefficients", "light_directions", "light_coefficients", "matte", "neutral")
 OPTIONAL_TENSORS = ("normals", "albedo", "depth", "horizons")
 LOCAL_BASIS_PREFIX = "basis."
 LOCAL_BASIS_TENSORS = ("pixels", "first", "values", "scales", "mixes")
-"""The basis of version 2, each with `LOCAL_BASIS_PREFIX` before its name."""
+"""Arrays of the local basis in version 2, each stored under its name after `LOCAL_BASIS_PREFIX`."""
 GLOBAL_BASIS, GLOBAL_BASIS_WEBP = "basis", "basis_webp"
-"""In their place in version 1: the pictures themselves (3, components, height, width), or one WebP picture of them."""
+"""The basis in version 1: the pictures (3, components, height, width), or one WebP picture of them."""
 DTYPES: dict[str, tuple[type[np.generic], ...]] = {
     GLOBAL_BASIS: (np.float16,),
     GLOBAL_BASIS_WEBP: (np.uint8,),
@@ -46,7 +47,7 @@ DTYPES: dict[str, tuple[type[np.generic], ...]] = {
     LOCAL_BASIS_PREFIX + "values": (np.int8, np.float16),
     LOCAL_BASIS_PREFIX + "mixes": (np.float16,),
 }
-"""Every other tensor is float32."""
+"""Allowed types of the tensors; every tensor not named here is float32."""
 SAFETENSORS_DTYPES: dict[str, type[np.generic]] = {
     "F16": np.float16,
     "F32": np.float32,
@@ -54,7 +55,7 @@ SAFETENSORS_DTYPES: dict[str, type[np.generic]] = {
     "I8": np.int8,
     "I32": np.int32,
 }
-"""What safetensors calls the types that a subject may hold."""
+"""Types of a subject's tensors by their safetensors names."""
 
 
 def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
@@ -63,9 +64,8 @@ def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
     Args:
         path: file to write.
         subject: what it holds.
-        small: keep the principal pictures of `subject.compression.webp_packing.pack_subject` as one picture of 8 bits,
-            which is format version
-            1. Such a file is decoded when it is opened.
+        small: store the principal pictures of `subject.compression.webp_packing.pack_subject` as one picture of 8 bits
+            (format version 1). Such a file is decoded when it is opened.
 
     Raises:
         StorageError: the file cannot be written.
@@ -91,9 +91,8 @@ def read_subject(path: Path, in_memory: bool = False) -> Subject:
 
     Args:
         path: the file.
-        in_memory: read it into memory instead. What runs for long needs that: where somebody cuts a mapped file short,
-            the
-            system ends the process that looks at it. It may have `MAX_IN_MEMORY_BYTES` then, else `MAX_BYTES`.
+        in_memory: read the file into memory instead, `MAX_IN_MEMORY_BYTES` at most, else `MAX_BYTES`. Long-running
+            programs need that: the system kills a process that reads a mapped file which was truncated meanwhile.
 
     Raises:
         SubjectError: missing, too large, damaged, of another version, or with values that are not finite.
@@ -114,7 +113,7 @@ def read_subject(path: Path, in_memory: bool = False) -> Subject:
 
 
 def read_metadata(path: Path) -> SubjectMetadata:
-    """What a subject's header says. Its tensors are not looked at.
+    """The header of a subject file. Its tensors are not read.
 
     Raises:
         SubjectError: missing, too large, no subject, or of another version.
@@ -124,7 +123,7 @@ def read_metadata(path: Path) -> SubjectMetadata:
 
 
 def read_neutral(path: Path) -> DisplayImage:
-    """A copy of the neutral picture, uint8 sRGB RGB (height, width, 3). No other tensor is looked at.
+    """A copy of the neutral picture, uint8 sRGB RGB (height, width, 3). No other tensor is read.
 
     Raises:
         SubjectError: missing, too large, no subject, of another version, or without such a picture.
@@ -142,7 +141,7 @@ def read_neutral(path: Path) -> DisplayImage:
 
 @contextmanager
 def _open_safetensors(path: Path, most_bytes: int) -> Iterator[Any]:
-    """A sound file of tensors, by `safe_open`, which has no types. What fails while it is open is a SubjectError."""
+    """Open a file of tensors with `safe_open`; errors while it is open become SubjectError."""
     if not path.is_file():
         raise SubjectError(f"no subject file at {path}", "build one with 'relit capture import' or check the path")
     if path.stat().st_size > most_bytes:
@@ -185,7 +184,7 @@ def _metadata(path: Path, header: Mapping[str, str]) -> SubjectMetadata:
 
 
 def _tensor_views(path: Path, names: list[str], in_memory: bool) -> dict[str, NDArray]:
-    """The tensors of a file that `safe_open` found sound; its own `get_tensor` would copy each.
+    """Views of the tensors of a file that `safe_open` has checked; its own `get_tensor` would copy each.
 
     Layout (github.com/huggingface/safetensors): the header's length as 8 bytes, the header as JSON, the tensors.
     """

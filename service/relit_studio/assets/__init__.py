@@ -1,1 +1,1 @@
-"""Meshes and pictures of other authors: fetched on demand, verified, never committed."""
+"""Meshes and pictures by other authors: fetched on demand, verified, never committed."""

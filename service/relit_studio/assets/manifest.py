@@ -1,4 +1,4 @@
-"""The list of raw meshes and pictures: what each file is, where it comes from, and under what licence."""
+"""The list of raw meshes and pictures: what each file is, where it comes from, and under what license."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class AssetFile(BaseModel):
     Attributes:
         name: relative to the assets' folder, and to a mirror.
         sha256: of the file as it is used.
-        licence: SPDX identifier.
+        license: SPDX identifier.
         credit: key of the credit line.
         source: page a person can read of it.
         urls: that give the file itself; empty where none does.

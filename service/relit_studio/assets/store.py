@@ -1,4 +1,4 @@
-"""Where raw files lie on this machine, and how they get there: by download, or from a local folder."""
+"""Store of the raw files on this machine, filled by download or from a local folder."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def cache_folder() -> Path:
 
 
 def assets_folder() -> Path:
-    """Where the raw files lie."""
+    """Folder of the raw files."""
     return cache_folder() / "assets"
 
 
 def asset(name: str) -> Path:
-    """The path of a fetched file.
+    """Path of a fetched file.
 
     Raises:
         NotFoundError: it has not been fetched.
@@ -40,7 +40,7 @@ def asset(name: str) -> Path:
 
 
 def fetch_assets(mirror: Path | None = None) -> list[Path]:
-    """Bring every file of the manifest, verified; those that are there and sound are left.
+    """Fetch and verify every file of the manifest, except those that exist and are intact.
 
     Args:
         mirror: a folder that holds them under their names; else they are downloaded.

@@ -1,1 +1,1 @@
-"""Rendered phone captures with ground truth (thesis 4.3)."""
+"""Simulated phone capture videos with known truth (thesis 4.3)."""

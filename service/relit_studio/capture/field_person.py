@@ -1,4 +1,4 @@
-"""Somebody whose reflectance field is known before the phone: lit by interpolation, moved by their depth.
+"""A person with a known reflectance field in front of the phone: relit by interpolation, moved by their depth map.
 
 The field is a folder of one-light pictures (`lights.lp`, `matte.png`), with `truth.npz` (depth) and `field.json`
 (the camera) beside them, as `python -m relit_studio field` writes it. Every pixel is lit from its own direction and
@@ -27,8 +27,8 @@ from relit_camera.capture.reflectance.delaunay_triangulation import spherical_ba
 from relit_camera.light.directions import texel_directions, texel_solid_angles
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
+from relit_studio.capture.captured_person import FACE_REACH_CM, Layers
 from relit_studio.capture.head_motion import Motion
-from relit_studio.capture.person import FACE_REACH_CM, Layers
 from relit_studio.capture.torch import Torch
 from relit_studio.pinhole import Pinhole
 
@@ -37,9 +37,9 @@ CAMERA_NAME, TRUTH_NAME = "field.json", "truth.npz"
 _NOSE_CM = np.array([0.0, -0.6, 7.5])
 """From the head's origin to the tip of the nose."""
 _NEAR_COSINE = 0.5
-"""Triangles of lights whose corners are all farther off the torch's direction are not looked at."""
+"""Cosine of the largest angle to the torch's direction at which lights are used for interpolation."""
 _STEPS = 4
-"""Of the fixed point that inverts the movement in the picture."""
+"""Fixed-point iterations that invert the movement in the picture."""
 
 
 class FieldPerson:
@@ -68,7 +68,7 @@ class FieldPerson:
         self.camera = Pinhole(round(field_camera.width * scale), height, field_camera.focal_px * scale)
         self._field_camera = field_camera
         self._inside = self._matte > 0.5
-        # At the edge a pixel's depth may be mixed with nothing's.
+        # Depth at the person's edge may be mixed with empty background.
         nearest = distance_transform_edt(~self._inside, return_distances=False, return_indices=True)
         self._points = _unproject(field_camera, depth[tuple(nearest)] - depth_zero_cm)
         self._origin = _head_origin(self._points[self._inside])
@@ -95,13 +95,13 @@ class FieldPerson:
         return np.asarray(points[np.linalg.norm(points - self._origin, axis=1) < FACE_REACH_CM])
 
     def _ambient(self, motion: Motion) -> LinearImage:
-        """The field under the room's light as the turned head sees it."""
+        """The field under the room's light, rotated into the head's axes."""
         light = rotate_light_map(self._room, motion.rotation) * texel_solid_angles()[..., None]
         power = self._light_of_texel @ light.reshape(-1, 3).astype(np.float32)
         return np.asarray(np.einsum("lhwc,lc->hwc", self._pictures, power, optimize=True))
 
     def _flash(self, motion: Motion, torch: Torch) -> LinearImage:
-        """The field under the torch, each pixel from its own direction, in the head's own axes."""
+        """The field under the torch, whose direction differs from pixel to pixel, in the head's axes."""
         rows, columns = np.nonzero(self._matte)
         points = self._points[rows, columns] - self._origin
         moved_torch = Torch(
@@ -139,7 +139,7 @@ class FieldPerson:
         moved = motion.apply(self._points - self._origin) + self._origin
         x, y, _ = np.moveaxis(field.project(moved.reshape(-1, 3)).reshape(*self._matte.shape, 3), -1, 0)
         rest_x, rest_y = field.pixel_grid()
-        # The movement is smooth but for steps of the depth: drawn over them, the background goes along at the edge.
+        # The movement is smooth except at depth steps, where the background near the edge moves along.
         shift = np.stack([x - rest_x, y - rest_y], axis=-1).astype(np.float32)
         shift = _filled(shift, self._inside)
         wanted = np.stack(self.camera.pixel_grid(), axis=-1) * (field.height / self.camera.height)
@@ -152,7 +152,7 @@ class FieldPerson:
         return source[..., 0] - 0.5, source[..., 1] - 0.5
 
     def _moved(self, picture: NDArray[np.float32], at: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray:
-        # The lower border goes on below the picture, where the body would.
+        # Extend the lower border below the picture, where the body continues.
         return np.asarray(cv2.remap(picture, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 
@@ -182,7 +182,7 @@ def _head_origin(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _read_description(path: Path, shape: tuple[int, ...]) -> tuple[Pinhole, float, tuple[str, ...]]:
-    """The field's camera, how far before it the depth is 0, centimetres, and whom to credit."""
+    """The field's camera, how far before it the depth is 0, centimeters, and whom to credit."""
     cure = "make the field again with `python -m relit_studio field`"
     try:
         described = json.loads(path.read_text())

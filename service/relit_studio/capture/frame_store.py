@@ -1,4 +1,4 @@
-"""Frames that are done already, so that an interrupted capture goes on where it stopped."""
+"""Store of finished frames, so that an interrupted capture resumes where it stopped."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from typing import Any
 from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage import make_folder, write_atomic
-from relit_studio.processing import Gains
+from relit_studio.camera_simulation import Gains
 
 
 @dataclass(frozen=True, eq=False)
-class Done:
+class FinishedFrame:
     """A finished frame.
 
     Attributes:
         truth: of the frame.
-        next_gains: what the phone has set for the next one.
+        next_gains: the phone's settings for the next frame.
     """
 
     truth: dict[str, Any]
@@ -29,7 +29,7 @@ class Done:
 
 
 class FrameStore:
-    """A folder of finished frames of one capture; those of another are thrown away on opening."""
+    """Folder of the finished frames of one capture; frames of a capture with other settings are removed on opening."""
 
     def __init__(self, folder: Path, settings: Mapping[str, Any]) -> None:
         """Open `folder`, making it; `settings` say which capture this is.
@@ -44,8 +44,8 @@ class FrameStore:
             make_folder(folder)
             write_atomic(label, text)
 
-    def load(self, index: int) -> Done | None:
-        """Frame `index`, if it is done."""
+    def load(self, index: int) -> FinishedFrame | None:
+        """Frame `index`, or None if it is not finished."""
         note = self._note(index)
         if not (note.is_file() and self._picture(index).is_file()):
             return None
@@ -53,9 +53,9 @@ class FrameStore:
         gains = kept["next_gains"]
         for name in ("balance", "balance_speed"):
             gains[name] = tuple(gains[name])
-        return Done(kept["truth"], Gains(**gains))
+        return FinishedFrame(kept["truth"], Gains(**gains))
 
-    def save(self, index: int, image: DisplayImage, done: Done) -> None:
+    def save(self, index: int, image: DisplayImage, done: FinishedFrame) -> None:
         """Keep frame `index`.
 
         Raises:
@@ -69,7 +69,7 @@ class FrameStore:
         return read_display(self._picture(index))
 
     def remove(self) -> None:
-        """Throw the frames away."""
+        """Remove the frames."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _note(self, index: int) -> Path:

@@ -1,4 +1,4 @@
-"""The small movements of a person who tries to sit still."""
+"""Small involuntary head movements of a person who tries to keep still."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BREATH_CM, _BREATH_HZ = 0.06, 0.27
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """How far the head is from rest: turned about its pivot in the neck, then moved.
+    """Displacement of the head from rest: a rotation about its pivot in the neck, then a translation.
 
     Attributes:
         angles: degrees, see `base.rotations`.
@@ -37,7 +37,7 @@ class Motion:
         return rotation_from_angles(*self.angles)
 
     def apply(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Points (..., 3) of the head, in its own axes at rest, after the motion."""
+        """Move points (..., 3) of the head, given in its axes at rest."""
         matrix = self.rotation.as_matrix()
         return np.asarray((np.asarray(points, np.float64) - PIVOT) @ matrix.T + PIVOT + self.translation_cm)
 
@@ -51,7 +51,7 @@ REST = Motion(Angles(0.0, 0.0, 0.0), np.zeros(3))
 
 
 class HeadMotion:
-    """A head that wanders slowly and breathes; `amount` scales it, 0 holds it still."""
+    """Slow random head movement with breathing, scaled by `amount`; 0 keeps the head still."""
 
     def __init__(self, seed: int, amount: float = 1.0) -> None:
         rng = np.random.default_rng([seed, 2])

@@ -1,4 +1,4 @@
-"""The mannequin before the phone: rendered anew for every frame, under a torch nearby."""
+"""The mannequin in front of the phone, rendered for every frame under room light and a torch nearby."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.light.light_map import LightMap
+from relit_studio.capture.captured_person import FACE_REACH_CM, Layers
 from relit_studio.capture.head_motion import REST, Motion
-from relit_studio.capture.person import FACE_REACH_CM, Layers
 from relit_studio.capture.point_shadow import PointShadow
 from relit_studio.capture.torch import Torch
+from relit_studio.mannequin.distant_lights import lights_from_map
 from relit_studio.mannequin.figure import Posture, mannequin
-from relit_studio.mannequin.lights import lights_from_map
-from relit_studio.mannequin.raster import Hits, rasterise
+from relit_studio.mannequin.rasterizer import Hits, rasterize
 from relit_studio.mannequin.shading import ShadowMap, Surface, Values, reflected
 from relit_studio.pinhole import Pinhole
 
 _SEAT_CM = (0.0, -2.0, -62.0)
 """The head's origin at rest."""
 _HEIGHT_CM = 56.0
-"""What the picture's height spans at the head's origin: the bust, cut below the shoulders, fills it to the bottom."""
+"""Height of the view at the head's origin: the bust, cut below the shoulders, fills it to the bottom."""
 
 _SUPERSAMPLING = 2
 _AMBIENT_LIGHTS = 16
-"""Distant lights that stand for the room."""
+"""Number of distant lights that approximate the room."""
 _AMBIENT_SHADOW = 112
 _SHADOW_PER_ROW = 1.6
-"""Texels of the torch's shadow map a row of the picture."""
+"""Texels of the torch's shadow map per row of the picture."""
 
 
 def phone_camera(width: int, height: int) -> Pinhole:
@@ -37,7 +37,7 @@ def phone_camera(width: int, height: int) -> Pinhole:
 
 
 class MannequinPerson:
-    """The generated bust; its head turns on its neck, the shoulders sway with it (see `person.Person`)."""
+    """The mannequin as captured person: its head rotates on the neck, the shoulders move along (see `Person`)."""
 
     name = "mannequin"
     credits: tuple[str, ...] = ()
@@ -50,7 +50,7 @@ class MannequinPerson:
         self._figure = mannequin()
         vertices, _ = self._seen(REST)
         normals = self._figure.normals(vertices)
-        # The room's shadows are soft and the head moves by a degree or two: they are found once, at rest.
+        # Room shadows are soft and the head moves by a degree or two, so they are computed once, at rest.
         self._room_lit = [
             ShadowMap(vertices, self._figure.casters, direction, _AMBIENT_SHADOW).lit(vertices, normals)
             for direction in self._room.directions
@@ -66,7 +66,7 @@ class MannequinPerson:
         figure = self._figure
         vertices, hits = self._seen(motion)
         normals = figure.normals(vertices)
-        material = hits.interpolate(np.concatenate([figure.colour, figure.paint], axis=1))
+        material = hits.interpolate(np.concatenate([figure.color, figure.paint], axis=1))
         albedo = figure.albedo(material[:, :3], material[:, 3:])
         black = np.zeros((self.camera.height, self.camera.width, 3), np.float32)
         return Layers(
@@ -86,7 +86,7 @@ class MannequinPerson:
         place = (self.origin + motion.translation_cm).astype(np.float32)
         vertices = self._figure.vertices(Posture(motion.angles)) + place
         projected = self._fine.project(vertices).astype(np.float32)
-        return vertices, rasterise(projected, self._figure.triangles, self._fine.width, self._fine.height)
+        return vertices, rasterize(projected, self._figure.triangles, self._fine.width, self._fine.height)
 
     def _flash(self, vertices: Values, normals: Values, hits: Hits, albedo: Values, torch: Torch) -> Values:
         """Light (samples, 3) sent to the camera under the torch: Lambert and gloss, inverse square, cast shadows."""

@@ -1,4 +1,4 @@
-"""Geometry of the mirror ball: its outline in the picture, and where it mirrors the torch."""
+"""Geometry of the mirror ball: its outline in the picture, and the reflection point of the torch."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Vectors = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Outline:
-    """A ball's outline in the picture: an ellipse, drawn out away from the picture's middle.
+    """Outline of a ball in the picture: an ellipse, elongated away from the picture's center.
 
     Attributes:
-        x, y: its centre in pixels.
+        x, y: its center in pixels.
         radius: of the circle of the same area, pixels.
         semi_radial, semi_tangential: half axes in pixels, along the line from the picture's middle and across it.
     """
@@ -32,29 +32,29 @@ class Outline:
 
 @dataclass(frozen=True, eq=False)
 class MirrorBall:
-    """A ball of polished metal.
+    """Mirror ball of polished metal.
 
     Attributes:
-        centre: (3,) camera axes, centimetres.
+        center: (3,) camera axes, centimeters.
         radius_cm: of the ball.
         reflectance: share of the light that it mirrors, linear RGB (3,).
     """
 
-    centre: Vectors
+    center: Vectors
     radius_cm: float
     reflectance: NDArray[np.float32]
 
     def outline(self, camera: Pinhole) -> Outline:
-        """The exact outline, by the cone of rays that touch the ball."""
-        distance = float(np.linalg.norm(self.centre))
-        off_axis = np.arccos(-self.centre[2] / distance)
+        """Exact outline, from the cone of rays tangent to the ball."""
+        distance = float(np.linalg.norm(self.center))
+        off_axis = np.arccos(-self.center[2] / distance)
         half_angle = np.arcsin(self.radius_cm / distance)
         # The cone of half angle γ about an axis α off the camera's cuts the picture plane in this ellipse.
         common = np.cos(half_angle) ** 2 - np.sin(off_axis) ** 2
         semi_radial = camera.focal_px * np.sin(half_angle) * np.cos(half_angle) / common
         semi_tangential = camera.focal_px * np.sin(half_angle) / np.sqrt(common)
         away = camera.focal_px * np.sin(off_axis) * np.cos(off_axis) / common
-        direction = self.centre[:2] / max(float(np.linalg.norm(self.centre[:2])), 1e-12)
+        direction = self.center[:2] / max(float(np.linalg.norm(self.center[:2])), 1e-12)
         return Outline(
             x=float(camera.width / 2 + away * direction[0]),
             y=float(camera.height / 2 - away * direction[1]),
@@ -69,41 +69,41 @@ class MirrorBall:
         Returns:
             Which of them hit (count,); of those the points hit (hits, 3) and the unit mirrored rays (hits, 3).
         """
-        along = rays @ self.centre
-        under_root = along**2 - (self.centre @ self.centre - self.radius_cm**2)
+        along = rays @ self.center
+        under_root = along**2 - (self.center @ self.center - self.radius_cm**2)
         hit = (under_root > 0) & (along > 0)
         ray = rays[hit]
         points = ray * (along[hit] - np.sqrt(under_root[hit]))[:, None]
-        normals = (points - self.centre) / self.radius_cm
+        normals = (points - self.center) / self.radius_cm
         mirrored = ray - 2 * np.einsum("ij,ij->i", ray, normals)[:, None] * normals
         return hit, points, mirrored
 
     def reflection_point(self, light: ArrayLike) -> Vectors:
         """The point (3,) of the surface at which the camera sees a light at (3,): Alhazen's problem.
 
-        It lies in the plane of camera, centre and light, where the normal halves the angle between the ways to both.
+        It lies in the plane of camera, center and light, where the normal halves the angle between the ways to both.
 
         Raises:
             ValueError: the light is inside the ball.
         """
-        way = np.asarray(light, np.float64) - self.centre
+        way = np.asarray(light, np.float64) - self.center
         if np.linalg.norm(way) <= self.radius_cm:
             raise ValueError("the light is inside the ball")
-        to_camera = -self.centre / np.linalg.norm(self.centre)
+        to_camera = -self.center / np.linalg.norm(self.center)
         aside = way - (way @ to_camera) * to_camera
         length = np.linalg.norm(aside)
         if length < 1e-9:
-            return np.asarray(self.centre + self.radius_cm * to_camera)
+            return np.asarray(self.center + self.radius_cm * to_camera)
         aside /= length
         span = float(np.arctan2(length, way @ to_camera))
 
         def imbalance(turn: float) -> float:
             normal = np.cos(turn) * to_camera + np.sin(turn) * aside
-            point = self.centre + self.radius_cm * normal
+            point = self.center + self.radius_cm * normal
             return _angle(normal, -point) - _angle(normal, way - self.radius_cm * normal)
 
         turn = float(brentq(imbalance, 0.0, span, xtol=1e-13))
-        return np.asarray(self.centre + self.radius_cm * (np.cos(turn) * to_camera + np.sin(turn) * aside))
+        return np.asarray(self.center + self.radius_cm * (np.cos(turn) * to_camera + np.sin(turn) * aside))
 
 
 def _angle(a: Vectors, b: Vectors) -> float:

@@ -1,4 +1,4 @@
-"""What a phone does to its pictures, each stage for itself: exposure, white balance, noise, the tone curve.
+"""Image processing of a phone, in separate stages: exposure, white balance, noise, tone curve.
 
 Automatic exposure and white balance follow the picture they made last, overshoot and come back: in a flashing light
 they hunt, which is why plain ambient subtraction makes faces blue (thesis 4.3.5).
@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
-from relit_studio.processing import Automatics, Gains, Sensor
+from relit_studio.camera_simulation import AutoControls, Gains, Sensor
 
 SENSOR = Sensor(white=0.85, shot=1.5e-4, read=1.2e-3)
-_AUTOMATICS = Automatics(pull=0.10, momentum=0.72, exposure_limit_ev=0.6, balance_limit=0.25)
+_AUTO_CONTROLS = AutoControls(pull=0.10, momentum=0.72, exposure_limit_ev=0.6, balance_limit=0.25)
 
 
 @dataclass(frozen=True)
 class Stages:
-    """Which parts of the processing are on; H.264 is the file's part."""
+    """Stages of the processing that are on. H.264 is applied when the video is written."""
 
     gamma: bool = True
     noise: bool = True
@@ -31,15 +31,15 @@ class Stages:
 
 
 class Phone:
-    """A phone's processing with some stages on."""
+    """Processing of a phone, with some stages on."""
 
     def __init__(self, stages: Stages, seed: int, mean: NDArray[np.float32]) -> None:
-        """Switch a phone on.
+        """Start with default gains.
 
         Args:
             stages: which are on.
             seed: of the noise.
-            mean: linear RGB (3,) of an ordinary picture of this scene: there the automatics rest.
+            mean: linear RGB (3,) of an ordinary picture of this scene: there the auto controls rest.
         """
         self._stages, self._seed, self._mean = stages, seed, mean
 
@@ -57,8 +57,8 @@ class Phone:
         """The gains of the next frame, after one of this scene light was taken with `gains`."""
         mean = np.maximum(light.mean(axis=(0, 1)), 1e-6)
         if self._stages.auto_exposure:
-            gains = _AUTOMATICS.expose(gains, mean, self._mean)
+            gains = _AUTO_CONTROLS.expose(gains, mean, self._mean)
         if self._stages.white_balance:
-            # Toward grey: red and blue as much as green.
-            gains = _AUTOMATICS.balance(gains, mean, self._mean)
+            # Toward gray: red and blue as much as green.
+            gains = _AUTO_CONTROLS.balance(gains, mean, self._mean)
         return gains

@@ -1,4 +1,4 @@
-"""Shadows of a light nearby."""
+"""Shadow map of a point light."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from relit_studio.mannequin.mesh import Triangles
-from relit_studio.mannequin.raster import nearness_buffer
+from relit_studio.mannequin.rasterizer import nearness_buffer
 from relit_studio.mannequin.shading import LIFT, axes_along, lit_share
 
 Values = NDArray[np.float32]
 
 
 class PointShadow:
-    """What a point light sees: a depth picture in perspective from where it stands (Williams 1978)."""
+    """Shadow map of a point light: perspective depth from its position (Williams 1978)."""
 
     def __init__(self, vertices: Values, triangles: Triangles, light: ArrayLike, size: int) -> None:
         """See `vertices` (count, 3) from a light at (3,), outside of them all, at size x size texels."""

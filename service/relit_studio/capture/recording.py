@@ -1,4 +1,4 @@
-"""Recording a scene with a phone: video, truth, and a sheet to look at."""
+"""Recording of a scene with a phone: video, truth and contact sheet."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage import make_folder, write_atomic
 from relit_camera.base.video.video_writer import VideoWriter
-from relit_studio.capture.frame_store import Done, FrameStore
-from relit_studio.capture.lossless import LosslessWriter
+from relit_studio.camera_simulation import Gains
+from relit_studio.capture.capture_scene import Scene
+from relit_studio.capture.capture_truth import capture_truth, frame_truth
+from relit_studio.capture.frame_store import FinishedFrame, FrameStore
+from relit_studio.capture.lossless_writer import LosslessWriter
 from relit_studio.capture.mirror_ball import MirrorBall
 from relit_studio.capture.phone import Phone, Stages
-from relit_studio.capture.scene import Scene
-from relit_studio.capture.truth import capture_truth, frame_truth
 from relit_studio.pinhole import Pinhole
-from relit_studio.processing import Gains
 from relit_studio.progress import Progress, no_progress
 
 _CRF = 20
 _STILL_FRAMES, _BALL_FRAMES = 12, 6
 _BALL_MARGIN = 1.5
 _FACE_POINTS = 5000
-"""Of the face's surface, enough for centroids and fits."""
+"""Number of surface points of the face, enough for centroids and fits."""
 
 
 def record(
@@ -56,7 +56,7 @@ def record(
     face = face[:: max(1, len(face) // _FACE_POINTS)]
     whole = capture_truth(scene, stages, video.name, room, seed, face)
     total = scene.timing.frames
-    # With what the truth does not name and the frames depend on.
+    # Includes settings that frames depend on but the truth does not contain.
     settings = {"frames": total, "motion": scene.motion, "room_light": float(scene.room.radiance.mean())}
     store = FrameStore(folder / ".frames", whole | settings)
     gains, truths = Gains(), []
@@ -65,9 +65,9 @@ def record(
         done = store.load(index)
         if done is None:
             phone = phone or Phone(stages, seed, scene.ordinary_mean())
-            moment = scene.moment(index)
-            light = scene.light(moment)
-            done = Done(frame_truth(scene, moment, gains, face), phone.settle(gains, light))
+            state = scene.frame_state(index)
+            light = scene.light(state)
+            done = FinishedFrame(frame_truth(scene, state, gains, face), phone.settle(gains, light))
             store.save(index, phone.develop(light, gains, index), done)
         truths.append(done.truth)
         gains = done.next_gains
@@ -87,7 +87,7 @@ def _encode(store: FrameStore, total: int, video: Path, stages: Stages, scene: S
 
 
 def _sheet(store: FrameStore, total: int, scene: Scene) -> DisplayImage:
-    """Frames spread over the video, successive ones from its middle, and each ball in some frames."""
+    """Contact sheet: frames spread over the video, successive frames from its middle, and crops of each ball."""
     spread = np.linspace(0, total - 1, _STILL_FRAMES).round().astype(int)
     middle = max(0, min(total // 2, total - _BALL_FRAMES)) + np.arange(_BALL_FRAMES)
     pictures = [[store.picture(int(index)) for index in chosen] for chosen in np.split(spread, 2)]

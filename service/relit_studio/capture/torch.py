@@ -1,4 +1,4 @@
-"""The hand-held torch: where it is, where it points, and what it gives there."""
+"""The hand-held torch (a phone's light): its path, its aim and its irradiance."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ REFERENCE_CM = 100.0
 BEAM_EXPONENT = 2.3
 """Intensity falls as cosⁿ of the angle off the axis: half at 42°, as phone torches have it."""
 RADIUS_CM = 0.4
-"""Of the disc that shines."""
+"""Radius of the luminous disc."""
 
 _SWEEP_S = 3.7
-"""Time of one movement up and down."""
+"""Duration of one movement up and down."""
 _AZIMUTH_DEG = 72.0
 _LOW_DEG, _HIGH_DEG = -18.0, 68.0
 _LAPSE_EVERY_S, _LAPSE_S, _LAPSE_DEG = 5.0, 0.35, 45.0
-"""Moments at which the hand points elsewhere: how often, half their length, how far."""
+"""Aiming errors of the hand: mean interval, half their duration, and their angle."""
 
 
 @dataclass(frozen=True, eq=False)
 class Torch:
-    """A torch at one moment, camera axes.
+    """The torch at one time, in camera axes.
 
     Attributes:
-        position: (3,) centimetres.
+        position: (3,) centimeters.
         aim: (3,) unit vector along which it points.
     """
 
@@ -41,7 +41,7 @@ class Torch:
     aim: Vector
 
     def off_axis_cosine(self, points: NDArray) -> NDArray:
-        """Cosine (...), not below 0, of the angle between the aim and the way to points (..., 3)."""
+        """Cosine (...), at least 0, of the angle between the aim and the direction to points (..., 3)."""
         way = points - self.position.astype(points.dtype)
         cosine = way @ self.aim.astype(points.dtype) / np.linalg.norm(way, axis=-1)
         return np.asarray(np.maximum(cosine, 0))
@@ -52,20 +52,20 @@ class Torch:
         return np.asarray(REFERENCE_CM**2 / squared * self.off_axis_cosine(points) ** BEAM_EXPONENT)
 
     def radiance(self, cosine: NDArray) -> NDArray:
-        """Radiance (...) of the disc seen at these cosines off its axis, by the same beam."""
+        """Radiance (...) of the disc at these cosines off its axis."""
         intensity_per_area = REFERENCE_CM**2 / (np.pi * RADIUS_CM**2)
         return np.asarray(intensity_per_area * np.maximum(cosine, 0) ** (BEAM_EXPONENT - 1))
 
 
 class HandPath:
-    """Repeated movements up and down, from the picture's left to its right, as thesis 4.3.1 advises.
+    """Path of the hand: repeated movements up and down, from the picture's left to its right (thesis 4.3.1).
 
     The distance varies by about a tenth, the torch wanders a few degrees off its aim, and now and then it points far
     away for a moment.
     """
 
     def __init__(self, target: ArrayLike, seconds: float, seed: int, distance_cm: float = REFERENCE_CM) -> None:
-        """Move about `target` (3,) for so long. The seed makes the hand."""
+        """Path around `target` (3,) of the given duration, with the seed's random deviations."""
         rng = np.random.default_rng([seed, 1])
         self._target = np.asarray(target, np.float64)
         self._seconds, self._distance_cm = seconds, distance_cm

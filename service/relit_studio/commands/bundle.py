@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from relit_camera.app.demo.demo_files import FOLDER
-from relit_studio.bundle import make_bundle
 from relit_studio.commands.options import shown_progress
+from relit_studio.demo_bundle import make_bundle
 
 
 def bundle(

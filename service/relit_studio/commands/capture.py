@@ -34,12 +34,12 @@ def capture(
 ) -> None:
     """Film a person under a blinking hand-held torch, a mirror ball beside them. Run it again to go on."""
     from relit_camera.cli.arguments import parse_size
+    from relit_studio.capture.capture_scene import Scene, Timing, dimmed
+    from relit_studio.capture.captured_person import Person
     from relit_studio.capture.field_person import FieldPerson
     from relit_studio.capture.mannequin_person import MannequinPerson, phone_camera
-    from relit_studio.capture.person import Person
     from relit_studio.capture.phone import Stages
     from relit_studio.capture.recording import record
-    from relit_studio.capture.scene import Scene, Timing, dimmed
 
     width, height = parse_size(size)
     if not (64 <= width <= 4096 and 64 <= height <= 4096):

@@ -1,4 +1,4 @@
-"""`check`: whether public face models see the studio's people."""
+"""`check`: whether public face models detect the studio's people."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from relit_studio.commands.options import (
     quality_of,
     shown_progress,
 )
+from relit_studio.detectability import check_detectability, detectability_table
 from relit_studio.people.posture import Posture
-from relit_studio.recognition import recognise, recognised_table
 from relit_studio.resume import keep_settings
 from relit_studio.still import finish_stills
 
@@ -48,9 +48,9 @@ def check(
     samples: Samples = None,
     threads: Threads = 2,
 ) -> None:
-    """Render people turned this way and that, and count how many the public models see, and how far off (check.json).
+    """Render people in several poses, run the public face models on them, and write shares and errors to check.json.
 
-    Finished pictures are left. The models are those of `relit models pull`.
+    Finished pictures are kept. The models are those of `relit models pull`.
     """
     detector = FaceDetector(model_path("face_detector_yunet"))
     trackers = [open_tracker(name, TrackerOptions(blendshapes=False)) for name in _TRACKERS]
@@ -68,9 +68,9 @@ def check(
             paths = [out / f"{who}-{angles.yaw:g}-{angles.pitch:g}.png" for angles in turns]
             finish_stills(paths, person, postures, room, camera, quality)
             for path, posture in zip(paths, postures, strict=True):
-                seen.append(recognise(read_display(path), person, posture, camera, detector, trackers))
+                seen.append(check_detectability(read_display(path), person, posture, camera, detector, trackers))
             progress(done + 1, len(names))
-    rows = recognised_table(seen)
+    rows = detectability_table(seen)
     write_atomic(out / "check.json", json.dumps(rows, indent=1) + "\n")
     table = Table(*rows[0])
     for row in rows:

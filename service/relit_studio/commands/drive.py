@@ -21,8 +21,8 @@ from relit_studio.commands.options import (
     quality_of,
     shown_progress,
 )
-from relit_studio.drive.performances.catalogue import PERFORMANCES, find_performance
-from relit_studio.drive.render import DriveSettings, render_drive
+from relit_studio.drive.drive_renderer import DriveSettings, render_drive
+from relit_studio.drive.performances.performance_catalog import PERFORMANCES, find_performance
 
 _PERFORMANCES = "; ".join(f"{name} ({each.summary})" for name, each in PERFORMANCES.items())
 
@@ -34,7 +34,7 @@ def drive(
     environment: Environment = "soft",
     turn: Turn = 0.0,
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the video, pixels.")] = "960x540",
-    every: Annotated[int, typer.Option(min=1, max=24, help="Make only every so manieth frame.")] = 1,
+    every: Annotated[int, typer.Option(min=1, max=24, help="Render only every N-th frame.")] = 1,
     frames: Annotated[int | None, typer.Option(min=1, help="Of the performance, from its beginning; else all.")] = None,
     webcam: Annotated[
         bool, typer.Option("--webcam/--plain", help="As a webcam takes it: automatics, noise; or plainly exposed.")

@@ -9,15 +9,15 @@ import typer
 
 from relit_studio.assets.manifest import manifest
 from relit_studio.assets.store import assets_folder, fetch_assets
-from relit_studio.people.wardrobe import wardrobe
+from relit_studio.people.people_assets import people_assets
 
 
 def fetch(
     mirror: Annotated[Path | None, typer.Option("--from", help="Folder that holds the files.", metavar="DIR")] = None,
 ) -> None:
-    """Bring the raw files, verify them, and prepare what all people share (about a minute)."""
+    """Get the raw files, verify them, and prepare what all people share (about a minute)."""
     files = fetch_assets(mirror)
-    wardrobe()
+    people_assets()
     typer.echo(f"{len(files)} files are ready in {assets_folder()}")
     for credit in manifest().credits.values():
         typer.echo(f"  {credit}")

@@ -18,13 +18,13 @@ from relit_studio.commands.options import (
     quality_of,
     shown_progress,
 )
-from relit_studio.field.render import FieldSettings, render_field
-from relit_studio.field.solver import SolverSettings, write_solver_field
-from relit_studio.field.twin import render_twin
+from relit_studio.field.cycles_comparison import render_solver_scene
+from relit_studio.field.field_renderer import FieldSettings, render_field
+from relit_studio.field.transport_solver import SolverSettings, write_solver_field
 
 
 class Renderer(StrEnum):
-    """What renders a field."""
+    """Renderer of a field."""
 
     CYCLES = "cycles"
     SOLVER = "solver"
@@ -57,7 +57,7 @@ def field(
     elif who == "mannequin":
         _refuse_other_options(context, "--person mannequin", "renderer", "who", "samples", "threads")
         with shown_progress("lights") as progress:
-            render_twin(out, SolverSettings(), quality_of(True, samples, threads), progress)
+            render_solver_scene(out, SolverSettings(), quality_of(True, samples, threads), progress)
     else:
         settings = FieldSettings(lights, size, light_size_deg, quality_of(truth, samples, threads))
         with shown_progress("lights") as progress:
@@ -68,7 +68,11 @@ def field(
 
 
 def _refuse_other_options(context: typer.Context, choice: str, *taken: str) -> None:
-    """Say which of the options given `choice` leaves no room for; it takes the parameters `taken`."""
+    """Refuse options that do not apply to `choice`, which takes only the parameters `taken`.
+
+    Raises:
+        typer.BadParameter: another option was given.
+    """
     given = [
         parameter.opts[0]
         for parameter in context.command.params

@@ -1,4 +1,4 @@
-"""Options that several commands take, and how they show progress."""
+"""Options that several commands share, and their progress bar."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import typer
 from relit_camera.cli.progress import progress_bar
 from relit_camera.light.environment_store import EnvironmentStore
 from relit_studio.cycles.job import Quality
+from relit_studio.drive.painted_rooms import ROOMS, paint_room
 from relit_studio.drive.room import Room
-from relit_studio.drive.rooms import ROOMS, paint_room
-from relit_studio.people.cast import find_traits
+from relit_studio.people.named_people import find_traits
+from relit_studio.people.people_assets import people_assets
 from relit_studio.people.person import Person, make_person
-from relit_studio.people.wardrobe import wardrobe
 from relit_studio.progress import Progress
 
 PersonName = Annotated[str, typer.Option("--person", help="adam, bea, cem, or a number for a random person.")]
@@ -47,11 +47,11 @@ def load_person(name: str) -> Person:
     Raises:
         NotFoundError: no such person, or the raw files have not been fetched.
     """
-    return make_person(find_traits(name), wardrobe())
+    return make_person(find_traits(name), people_assets())
 
 
 def load_room(environment: str, turn_deg: float) -> Room:
-    """A room of the studio, or the environment of a name or a file, turned.
+    """One of the studio's rooms, or a stored environment or panorama file, rotated by `turn_deg`.
 
     Raises:
         NotFoundError: there is none.

@@ -51,7 +51,7 @@ def person(
     posture = Posture(Angles(yaw, pitch, roll), find_expression(expression))
     camera = Camera(size, view_cm=view_cm, middle_cm=middle_cm)
     room, quality = load_room(environment, turn), quality_of(truth, samples, threads, 48)
-    # Opened before the work, so that what cannot be written is said at once.
+    # Opened before the work, so that an output that cannot be written fails at once.
     with atomic_path(out) as file, shown_progress(who) as progress:
         (picture,) = render_stills(load_person(who), [posture], room, camera, quality, progress)
         file.write_bytes(encode_display(picture, file.suffix))

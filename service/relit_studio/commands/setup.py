@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from relit_studio.cycles.environment import BPY, create_environment
+from relit_studio.cycles.cycles_environment import BPY, create_environment
 
 
 def setup() -> None:

@@ -1,1 +1,1 @@
-"""Cycles as a renderer: its own Python environment, jobs as files, and the worker that runs them there."""
+"""Rendering with Cycles: its own Python environment, jobs as files, and the worker that runs them there."""

@@ -1,4 +1,4 @@
-"""Reading what the worker writes: alpha and all layers, which the service's reader leaves out."""
+"""Reading of the worker's EXR files, with alpha and all layers, which the service's reader ignores."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Planes = dict[str, NDArray[np.float32]]
 
 @dataclass(frozen=True, eq=False)
 class Passes:
-    """What Cycles knows of each pixel; (h, w, …) float32.
+    """Render passes of a picture; (h, w, …) float32.
 
     Attributes:
         picture: linear RGB, premultiplied over black.

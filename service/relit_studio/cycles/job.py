@@ -1,4 +1,4 @@
-"""What the worker is asked to render, as files: a JSON job, and arrays as .npz beside it."""
+"""Render jobs for the worker as files: a JSON job, and its arrays in an .npz file."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from relit_studio.camera import Camera
 JOB_FILE = "job.json"
 
 Material = Mapping[str, Any]
-"""A `kind` that the worker knows (`worker/materials.py`) and its arguments; picture files as absolute paths."""
+"""A material: its `kind` (see `worker/materials.py`) and that kind's arguments; picture files as absolute paths."""
 
 Shape = Mapping[str, NDArray]
-"""What moves, by "object.vertices", "object.points" or, for a rigid motion in our axes, "object.matrix"."""
+"""Changed geometry by "object.vertices", "object.points" or, for a rigid motion in room axes, "object.matrix"."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Mesh:
 
     Attributes:
         name: unique in the scene.
-        vertices: (count, 3) in our axes, centimetres.
+        vertices: (count, 3) in our axes, centimeters.
         faces: (faces, 4) int, counter-clockwise from outside, -1 in the last column of a triangle.
         slots: (faces,) int, which of `materials` each face has.
         materials: names in the scene.
@@ -54,8 +54,8 @@ class Strands:
 
     Attributes:
         name: unique in the scene.
-        points: (strands, points, 3) in our axes, centimetres.
-        radius: (strands, points) centimetres.
+        points: (strands, points, 3) in our axes, centimeters.
+        radius: (strands, points) centimeters.
         shade: (strands,) added, scaled, to the material's melanin; about -1 to 1.
         material: name in the scene.
     """
@@ -69,7 +69,7 @@ class Strands:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Everything before the camera."""
+    """All objects and materials to render."""
 
     objects: tuple[Mesh | Strands, ...]
     materials: Mapping[str, Material]
@@ -77,7 +77,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Quality:
-    """How well Cycles renders.
+    """Render quality of Cycles.
 
     Attributes:
         samples: a pixel.
@@ -101,13 +101,13 @@ class Quality:
         return Quality(samples, denoise=False, clamp_indirect=0.0, threads=threads)
 
     def settings(self) -> dict[str, object]:
-        """What the pictures depend on: threads change none."""
+        """Settings that the pictures depend on, so without the threads."""
         return {key: value for key, value in asdict(self).items() if key != "threads"}
 
 
 @dataclass(frozen=True)
 class DistantLight:
-    """A lamp far away: a white wall that faces it reads `irradiance`. `size_deg` is its full angle."""
+    """Distant lamp that gives a white wall facing it the value `irradiance`; `size_deg` is its full angle."""
 
     direction: tuple[float, float, float]
     irradiance: float = 1.0
@@ -117,7 +117,7 @@ class DistantLight:
 
 @dataclass(frozen=True)
 class PanoramaLight:
-    """Light all round from a panorama file in picture axes, its radiance times `strength`."""
+    """Environment light from a panorama file in picture axes, its radiance times `strength`."""
 
     picture: str
     strength: float = 1.0
@@ -131,7 +131,7 @@ class Picture:
     Attributes:
         path: an .exr file: linear RGBA, half floats, premultiplied over black.
         light: what lights it.
-        shape: what has moved since the scene was built, or None for nothing.
+        shape: geometry that differs from the scene's, or None.
         all_passes: write depth, normals and albedo too, as a file of many layers.
     """
 

@@ -1,4 +1,4 @@
-"""Running a job in Cycles' environment. What is finished stays finished: a second run renders only what is missing."""
+"""Runs a job in Cycles' environment. A repeated run renders only the pictures that are missing."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import relit_studio
 from relit_camera.base.errors import DeviceError
 from relit_camera.base.storage import make_folder
 from relit_studio.camera import Camera
-from relit_studio.cycles.environment import environment_python
+from relit_studio.cycles.cycles_environment import environment_python
 from relit_studio.cycles.job import Picture, Quality, Scene, write_job
 from relit_studio.progress import Progress, no_progress
 
@@ -29,7 +29,7 @@ def render(
     progress: Progress = no_progress,
     command: Sequence[str] | None = None,
 ) -> dict[str, float]:
-    """Render those pictures that are not there yet; returns seconds by name of what was rendered now.
+    """Render the pictures that do not exist yet; returns the seconds of each by name.
 
     Args:
         scene: as it is when no shape is given.
@@ -68,13 +68,13 @@ def _reports(command: Sequence[str], errors: Path) -> Iterator[dict[str, str]]:
     with errors.open("w+", encoding="utf-8") as stderr, _process(command, stderr.fileno()) as process:
         assert process.stdout is not None
         for line in process.stdout:
-            # Blender talks on stdout, too.
+            # Blender writes messages to stdout, too.
             if line.startswith('{"picture"'):
                 yield json.loads(line)
         try:
             failed = process.wait(_WAIT_S)
         except subprocess.TimeoutExpired:
-            return  # It has nothing more to tell; whether a picture is missing, `render` sees.
+            return  # No more output. `render` checks whether pictures are missing.
         if failed:
             stderr.seek(0)
             last = (stderr.read().strip().splitlines() or ["no message"])[-1]
@@ -83,7 +83,7 @@ def _reports(command: Sequence[str], errors: Path) -> Iterator[dict[str, str]]:
 
 @contextmanager
 def _process(command: Sequence[str], stderr: int) -> Iterator[subprocess.Popen[str]]:
-    """The worker, ended with us whatever happens."""
+    """The worker process, terminated when the context ends."""
     environment = os.environ | {"PYTHONPATH": str(Path(relit_studio.__path__[0]).parent)}
     try:
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True, env=environment)

@@ -1,1 +1,1 @@
-"""Rendered driving videos: a person who talks and turns in a given room, with the ground truth of every frame."""
+"""Driving videos: a person who talks and turns the head in a given room, with the truth of every frame."""

@@ -1,4 +1,4 @@
-"""What a performance is: what the person does at each time."""
+"""Performances: what a person does at each time of a driving video."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_studio.people.posture import Posture
-from relit_studio.props.held import Gesture
+from relit_studio.props.held_objects import Gesture
 
 FPS = 24
 
 
 @dataclass(frozen=True)
-class Moment:
-    """What is so at one time.
+class ActorState:
+    """State of the person at one time.
 
     Attributes:
         posture: of the head and the face.
         shift_cm: how far the whole person has moved from their place: right in the picture, up, toward the camera.
-        gesture: of the hands; None where they are never seen.
+        gesture: of the hands; None in performances without visible hands.
     """
 
     posture: Posture = field(default_factory=Posture)
@@ -31,24 +31,24 @@ class Moment:
 
 @dataclass(frozen=True)
 class Performance:
-    """A performance.
+    """A person's postures, gestures and place over the time of a driving video.
 
     Attributes:
         name: of the performance.
         frames: at 24 a second.
-        moment: what is so at a time in seconds.
+        state_at: state of the person at a time in seconds.
         summary: in a few words.
     """
 
     name: str
     frames: int
-    moment: Callable[[float], Moment]
+    state_at: Callable[[float], ActorState]
     summary: str
 
     @property
     def handles(self) -> bool:
-        """Whether hands are seen in it."""
-        return self.moment(0.0).gesture is not None
+        """Whether hands are visible in it."""
+        return self.state_at(0.0).gesture is not None
 
 
 def frame_times(frames: int) -> NDArray[np.float64]:

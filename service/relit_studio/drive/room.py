@@ -1,4 +1,4 @@
-"""The room of a driving video: its panorama as light for Cycles, and as what is seen behind the person."""
+"""Room of a driving video: its panorama as light for Cycles and as background behind the person."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from relit_studio.camera import Camera
 from relit_studio.cycles.job import PanoramaLight
 
 _BLUR = 0.05
-"""Of what is seen behind the person: a webcam's lens has its focus on them."""
+"""Defocus blur of the background, since the webcam focuses on the person."""
 
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """An environment about the person, turned by `yaw_deg` (positive moves a frontal light to the picture's right)."""
+    """Environment around the person, rotated by `yaw_deg` (positive moves a frontal light to the picture's right)."""
 
     environment: Environment
     yaw_deg: float = 0.0
@@ -38,11 +38,11 @@ class Room:
 
     @cached_property
     def light_map(self) -> LinearImage:
-        """The light about the person, (32, 64, 3)."""
+        """Light map (32, 64, 3) around the person."""
         return rotate_light_map(self.environment.light_map, rotation_from_angles(self.yaw_deg).inv())
 
     def light(self, folder: Path) -> PanoramaLight:
-        """The light for Cycles; the panorama, turned, is written into `folder`.
+        """Light for Cycles; writes the rotated panorama into `folder`.
 
         Raises:
             StorageError: the folder cannot be written.
@@ -56,16 +56,16 @@ class Room:
         return PanoramaLight(str(path))
 
     def backdrop(self, camera: Camera) -> DisplayImage:
-        """What is seen behind the person, as exposed, uint8 sRGB (height, width, 3)."""
+        """Background behind the person after exposure, uint8 sRGB (height, width, 3)."""
         height_deg = float(np.degrees(2 * np.arctan(camera.height / 2 / camera.focal_px)))
         view = EnvironmentView(self.environment.panorama, camera.size, height_deg, _BLUR)
         return view.picture(rotation_from_angles(self.yaw_deg), self.scale)
 
     def behind(self, camera: Camera) -> LinearImage:
-        """The same as light, in the unit of rendered pictures; lamps no brighter than twice the backdrop's white."""
+        """Background as linear light, in the unit of rendered pictures; lamps are clipped at twice white."""
         return linear_from_display(self.backdrop(camera)) / np.float32(self.scale)
 
     def shown(self, picture: LinearImage, alpha: Mask, backdrop: DisplayImage) -> DisplayImage:
-        """A rendered picture (h, w, 3), premultiplied, over the backdrop, as the webcam gives it."""
-        colours = unpremultiply(picture, alpha) * np.float32(self.scale)
-        return over(display_from_linear(colours), np.clip(alpha, 0, 1), backdrop)
+        """A rendered picture (h, w, 3), premultiplied, composited over the backdrop, uint8 sRGB."""
+        colors = unpremultiply(picture, alpha) * np.float32(self.scale)
+        return over(display_from_linear(colors), np.clip(alpha, 0, 1), backdrop)

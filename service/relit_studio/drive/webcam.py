@@ -1,4 +1,4 @@
-"""A webcam: automatics that follow the middle of the picture with some delay, white balance that drifts, and noise."""
+"""Simulated webcam: delayed automatic exposure, automatic and drifting white balance, and noise."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import luminance, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
-from relit_studio.processing import Automatics, Gains, Sensor
+from relit_studio.camera_simulation import AutoControls, Gains, Sensor
 from relit_studio.random_walk import RandomWalk
 
 SENSOR = Sensor(white=0.25, shot=3e-4, read=1.2e-3)
-"""Made for a room by day: in a dark one the gain, and with it the noise, goes up."""
-_AUTOMATICS = Automatics(pull=0.035, momentum=0.6, exposure_limit_ev=2.5, balance_limit=0.2)
+"""Sensor suited to a room by day; in a dark room gain and noise rise."""
+_AUTO_CONTROLS = AutoControls(pull=0.035, momentum=0.6, exposure_limit_ev=2.5, balance_limit=0.2)
 _WANTED = 0.25
-"""Luminance that the exposure brings the middle of the picture to."""
+"""Target luminance of the middle of the picture."""
 _MIDDLE = 0.2
-"""How wide that middle is: standard deviation as a share of either side."""
+"""Size of the metered middle: standard deviation of its weights as a share of each side."""
 _TRUST = 0.5
-"""Share of the picture's change of tint that is taken for a change of the light's."""
+"""Share of the picture's change of tint that white balance attributes to the light."""
 _DRIFT, _DRIFT_HZ = 0.04, (0.03, 0.2)
-"""Of the logarithms of the gains of red and blue (RMS), and how fast."""
+"""White balance drift: RMS of the logarithms of the red and blue gains, and the band of frequencies."""
 _WARM_FRAMES = 240
-"""It was switched on so long before."""
+"""Frames for which the webcam runs before the video begins."""
 
 
 class Webcam:
-    """A webcam that has been looking at its scene for some seconds."""
+    """Webcam whose exposure and white balance have settled on the scene."""
 
     def __init__(self, seed: int, light: LinearImage) -> None:
         """Switch it on before scene light (h, w, 3), in the unit of rendered pictures; `seed` is of noise and drift."""
@@ -40,7 +40,7 @@ class Webcam:
         self.follow(light, _WARM_FRAMES)
 
     def set_at(self, time_s: float) -> Gains:
-        """What it has set for the frame at a time: as its automatics stand, and the drift."""
+        """Gains for the frame at a time: the current auto controls, and the drift."""
         drift = _DRIFT * self._drift.at(time_s)
         red, blue = (each + float(more) for each, more in zip(self.gains.balance, drift, strict=True))
         return replace(self.gains, balance=(red, blue))
@@ -50,17 +50,17 @@ class Webcam:
         return uint8_from_linear(gains.apply(SENSOR.noisy(light * np.float32(SENSOR.white), (self._seed, 2, index))))
 
     def follow(self, light: LinearImage, frames: int = 1) -> None:
-        """Let the automatics follow this scene light for so many frames at 24 a second."""
+        """Let the auto controls follow this scene light for so many frames at 24 a second."""
         mean = self._mean(light)
         wanted = self._tint * _WANTED
-        # What looks tinted may be so: it goes part of the way.
+        # The scene itself may be tinted, so correct only part of it.
         trusted = wanted * (mean / wanted) ** (1 - _TRUST)
         for _ in range(frames):
-            self.gains = _AUTOMATICS.expose(self.gains, mean, wanted)
-            self.gains = _AUTOMATICS.balance(self.gains, mean, trusted)
+            self.gains = _AUTO_CONTROLS.expose(self.gains, mean, wanted)
+            self.gains = _AUTO_CONTROLS.balance(self.gains, mean, trusted)
 
     def _mean(self, light: LinearImage) -> NDArray[np.float32]:
-        """Sensor values (3,): the mean over the middle of the picture; what is too bright counts as white."""
+        """Mean sensor values (3,) over the middle of the picture, clipped at white."""
         height, width = light.shape[:2]
         down, across = cv2.getGaussianKernel(height, _MIDDLE * height), cv2.getGaussianKernel(width, _MIDDLE * width)
         seen = np.clip(light * np.float32(SENSOR.white), 0, 1)

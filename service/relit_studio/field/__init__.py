@@ -1,1 +1,1 @@
-"""Rendered OLAT pictures: a person under one light after another, over the whole sphere."""
+"""Reflectance fields: pictures of a person under single lights over the whole sphere."""

@@ -14,7 +14,7 @@ Values = NDArray[np.float32]
 
 
 def glossy(normals: Values, views: Values, light: ArrayLike, f0: Values, alpha: Values) -> tuple[Values, Values]:
-    """What points give under a distant light of unit irradiance, without shadows.
+    """Reflected light of points under a distant light of unit irradiance, without shadows.
 
     The gloss is GGX with Smith's height-correlated masking (Walter et al. 2007; Heitz 2014) and Schlick's Fresnel, π
     times the reflectance and the cosine, so that a white Lambert surface reads 1 in the same unit. The base is scaled
@@ -42,7 +42,7 @@ def glossy(normals: Values, views: Values, light: ArrayLike, f0: Values, alpha: 
 
 
 def gloss_albedo(f0: Values, alpha: Values, cosine: NDArray) -> Values:
-    """Share (count,) of light from all round that the gloss sends toward a camera at these cosines."""
+    """Directional albedo (count,) of the gloss: share of uniform light that it reflects to the camera."""
     scale, rise = _lobe_integrals()
     steps = scale.shape[0] - 1
     place = np.stack([np.clip(alpha, 0, 1) * steps, np.clip(cosine, 0, 1) * steps])

@@ -1,4 +1,4 @@
-"""What the transport solver works on: surfaces with their reflectance."""
+"""Input of the transport solver: surfaces with their reflectance."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Values = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """A mesh to be lit, in the camera's axes, centimetres.
+    """A mesh to be lit, in the camera's axes, centimeters.
 
     Attributes:
         vertices, normals: (count, 3) float32; unit normals.
@@ -44,7 +44,7 @@ def mannequin_surfaces(place: NDArray) -> Surfaces:
         normals=figure.normals(vertices),
         triangles=figure.triangles,
         casters=figure.casters,
-        albedo=figure.albedo(figure.colour, figure.paint),
+        albedo=figure.albedo(figure.color, figure.paint),
         f0=figure.shine,
         # The GGX lobe as wide as the mannequin's Blinn-Phong lobe (Walter et al. 2007): α² = 2 / (n + 2).
         alpha=np.sqrt(2 / (figure.exponent + 2)).astype(np.float32),

@@ -1,7 +1,7 @@
-"""Light between surfaces: which vertices of a mesh see each other, as a sparse matrix.
+"""Diffuse light transport between the vertices of a mesh, as a sparse matrix of form factors.
 
-Bundles of parallel rays (Szirmay-Kalos 1998): the whole mesh is rasterised along a direction with all layers kept, and
-neighbouring layers of a pixel that face each other exchange light. A bundle serves all surfaces at once, and what one
+Bundles of parallel rays (Szirmay-Kalos 1998): the whole mesh is rasterized along a direction with all layers kept, and
+neighboring layers of a pixel that face each other exchange light. A bundle serves all surfaces at once, and what one
 end sends the other receives, so that light is neither made nor lost.
 """
 
@@ -15,7 +15,7 @@ from scipy import sparse
 
 from relit_camera.light.directions import fibonacci_directions
 from relit_studio.mannequin.mesh import Triangles
-from relit_studio.mannequin.raster import fragments
+from relit_studio.mannequin.rasterizer import fragments
 from relit_studio.mannequin.shading import axes_along
 
 Values = NDArray[np.float32]
@@ -23,20 +23,20 @@ Values = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class Transport:
-    """How vertices light each other.
+    """Diffuse exchange of light between vertices.
 
     Attributes:
-        seen: (vertices, vertices) float32: share of vertex i's cosine-weighted hemisphere that vertex j's surface
-            fills. Rows sum to 1 - sky - (what faces its back to i).
+        form_factors: (vertices, vertices) float32: share of vertex i's cosine-weighted hemisphere that the surface at
+            vertex j fills. Rows sum to 1 - sky - (share of back faces).
         sky: (vertices,) float32, the share that is open.
     """
 
-    seen: sparse.csr_array
+    form_factors: sparse.csr_array
     sky: Values
 
-    def gathered(self, sent: Values) -> Values:
-        """What vertices receive (vertices, k) from each other when they send `sent` (vertices, k), white-wall units."""
-        return np.asarray(self.seen @ sent, np.float32)
+    def gather(self, sent: Values) -> Values:
+        """Light (vertices, k) that vertices receive when they send out `sent` (vertices, k), in white-wall units."""
+        return np.asarray(self.form_factors @ sent, np.float32)
 
 
 def transport(vertices: Values, triangles: Triangles, directions: int, size: int) -> Transport:
@@ -71,8 +71,8 @@ def transport(vertices: Values, triangles: Triangles, directions: int, size: int
     return Transport(seen_by, np.asarray(open_ends * share, np.float32))
 
 
-def bounced(light: Values, albedo: Values, between: Transport, bounces: int) -> Values:
-    """What vertices receive (vertices, lights, 3) from each other after up to `bounces` reflections.
+def bounce_light(light: Values, albedo: Values, between: Transport, bounces: int) -> Values:
+    """Light (vertices, lights, 3) that vertices receive from each other after up to `bounces` reflections.
 
     Args:
         light: (vertices, lights) direct irradiance.
@@ -85,14 +85,14 @@ def bounced(light: Values, albedo: Values, between: Transport, bounces: int) -> 
     received = np.zeros_like(first)
     for _ in range(bounces):
         sent = first + (received.reshape(count, lights, 3) * albedo[:, None]).reshape(count, -1)
-        received = between.gathered(sent)
+        received = between.gather(sent)
     return received.reshape(count, lights, 3)
 
 
 def _layers(
     seen: Values, both_sides: Triangles, fronts: int, size: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.int64]]:
-    """All surfaces under all pixels, sorted by pixel and then from below.
+    """All surfaces at all pixels, sorted by pixel and then by depth, lowest first.
 
     Returns:
         The nearest corner's vertex, whether the surface faces up along the bundle, and the pixel; each (count,).

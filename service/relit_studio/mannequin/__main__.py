@@ -31,12 +31,12 @@ from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage import make_folder, write_atomic
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
-from relit_studio.mannequin.clip import CLIP_SIZE, write_clip
-from relit_studio.mannequin.field import write_field
-from relit_studio.mannequin.lights import room
+from relit_studio.mannequin.distant_lights import room
+from relit_studio.mannequin.driving_clip import CLIP_SIZE, write_clip
+from relit_studio.mannequin.mannequin_field import write_field
+from relit_studio.mannequin.mannequin_performance import FPS, FRAMES, frame_times, posture_at
 from relit_studio.mannequin.olat import write_olat
-from relit_studio.mannequin.performance import FPS, FRAMES, frame_times, posture_at
-from relit_studio.mannequin.relit import write_relit
+from relit_studio.mannequin.relit_clip import write_relit
 
 
 def generate(
@@ -49,7 +49,7 @@ def generate(
     relit: Sequence[str] = (),
     quiet: bool = False,
 ) -> None:
-    """Write everything into folder `out`; what it held under the same names is replaced at the end.
+    """Write everything into folder `out`; files of the same names are replaced at the end.
 
     Args:
         out: made if missing.

@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from relit_studio.mannequin.mesh import Floats
-from relit_studio.mannequin.paint import SKIN_TONE
 from relit_studio.mannequin.part import CLOTH, SKIN, Part, grid_part
+from relit_studio.mannequin.texture_atlas import SKIN_TONE
 
 _PROFILE = np.array(
     [
@@ -23,7 +23,7 @@ _PROFILE = np.array(
         [-3.0, 4.8, 4.2, -4.6],
     ]
 )
-"""Height, half width, half depth and middle Z of the body's cross sections, in centimetres."""
+"""Height, half width, half depth and middle Z of the body's cross sections, in centimeters."""
 _COLLAR = np.array([[-0.6, -0.3], [0.1, -0.05], [0.42, 0.1], [0.45, 0.32], [0.2, 0.55], [-0.4, 0.66], [-1.05, 0.6]])
 """Height over the neckline and distance from the body of the rolled collar's section, from inside to outside."""
 _CLOTH_TONE = np.array([0.060, 0.105, 0.165])
@@ -49,8 +49,8 @@ def pullover() -> Part:
     vertices = _body(heights, offsets)
     rib = np.sin(_AROUND * 60)
     shade = np.concatenate([np.tile(1.25 + 0.12 * rib, (len(_COLLAR), 1)), np.ones_like(body_heights)])
-    colour = _CLOTH_TONE * shade[..., None]
-    return grid_part("pullover", vertices, colour, CLOTH, closed=True, caster_step=4)
+    color = _CLOTH_TONE * shade[..., None]
+    return grid_part("pullover", vertices, color, CLOTH, closed=True, caster_step=4)
 
 
 def base() -> Part:

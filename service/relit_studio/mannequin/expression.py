@@ -1,4 +1,4 @@
-"""What the mannequin's face can do, as movements of the head's control mesh."""
+"""Facial expressions of the mannequin, as displacements of the head's control mesh."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from relit_studio.mannequin.head import (
     LID_THICKNESS,
     SCHEME,
     control_head,
-    eye_centre,
+    eye_center,
 )
 from relit_studio.mannequin.mesh import Floats, spread
 
 JAW_HINGE = np.array([0.0, 0.0, -3.0])
 JAW_RANGE_DEG = 23.0
 _EYES_WIDENED = 0.3
-"""How much wider than the canonical face the mannequin opens its eyes, as a share of the lid gap."""
+"""Extra opening of the mannequin's eyes over the canonical face, as a share of the lid gap."""
 
 _FRIENDLY = 0.2
-"""How much of a smile the neutral face has."""
+"""Smile of the neutral face."""
 _UPPER_LIP = (0.45, 0.22, 0.08, 0.0, 0.0, 0.0)
 _LOWER_LIP = (0.45, 0.68, 0.88, 1.0, 1.0, 1.0)
-"""How far the lips follow the jaw, from the corner to the middle."""
+"""Share of the jaw's motion that the lips follow, from the corner to the middle."""
 
 
 @dataclass(frozen=True)
 class Expression:
-    """How the face looks. All zero is neutral: lips closed, eyes open and looking ahead. Right is the subject's.
+    """Facial expression. All zero is neutral: lips closed, eyes open and looking ahead. Right is the subject's.
 
     Attributes:
         jaw: 0 closed to 1 wide open.
@@ -56,7 +56,7 @@ class Expression:
 
 @dataclass(frozen=True, eq=False)
 class _Fields:
-    """Displacements (control vertices, 3) in centimetres of each movement at 1, and the jaw's weights (vertices, 1)."""
+    """Displacements (control vertices, 3) in centimeters of each movement at 1, and the jaw's weights (vertices, 1)."""
 
     rest: Floats
     blink_right: Floats
@@ -124,7 +124,7 @@ def _spread(fixed: dict[int, ArrayLike], order: int = 2) -> Floats:
 
 
 def _still(points: Floats, middle: Floats, radius: float, *but: int) -> dict[int, ArrayLike]:
-    """Handles that keep in place whatever is farther than `radius` from `middle`, except vertices `but`."""
+    """Zero displacements that fix all vertices farther than `radius` from `middle`, except vertices `but`."""
     far = np.flatnonzero(np.linalg.norm(points - middle, axis=1) > radius)
     return {int(index): np.zeros(3) for index in far if index not in but}
 
@@ -146,12 +146,12 @@ def _blink(points: Floats, eye: EyeLandmarks, upper_share: float) -> Floats:
 
 
 def _keep_outside_eyeball(vertices: Floats, eye: EyeLandmarks) -> None:
-    centre = eye_centre(eye)
-    near = np.linalg.norm(vertices[:FACE_COUNT] - centre, axis=1) < EYE_RADIUS + 0.6
+    center = eye_center(eye)
+    near = np.linalg.norm(vertices[:FACE_COUNT] - center, axis=1) < EYE_RADIUS + 0.6
     indices = np.flatnonzero(near)
-    offset = vertices[indices] - centre
+    offset = vertices[indices] - center
     distance = np.linalg.norm(offset, axis=1, keepdims=True)
-    vertices[indices] = centre + offset * np.maximum(1, (EYE_RADIUS + LID_THICKNESS) / distance)
+    vertices[indices] = center + offset * np.maximum(1, (EYE_RADIUS + LID_THICKNESS) / distance)
 
 
 def _close_lips(points: Floats) -> Floats:

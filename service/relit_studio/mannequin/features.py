@@ -7,14 +7,14 @@ import numpy as np
 from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks
 from relit_studio.mannequin.head import EYE_RADIUS
 from relit_studio.mannequin.mesh import Floats
-from relit_studio.mannequin.paint import IRIS_SHARE, SKIN_TONE, eye_paint_position
 from relit_studio.mannequin.part import EYE, SKIN, TOOTH, Part, grid_part
+from relit_studio.mannequin.texture_atlas import IRIS_SHARE, SKIN_TONE, eye_paint_position
 
 _CORNEA_BULGE = 0.06
 
 
 def eyeball(eye: EyeLandmarks, name: str) -> Part:
-    """An eyeball about its own centre, looking along +Z."""
+    """An eyeball about its own center, looking along +Z."""
     polar, around = np.radians(np.linspace(0, 100, 27)), np.linspace(0, 2 * np.pi, 36, endpoint=False)
     directions = np.stack(
         [
@@ -31,7 +31,7 @@ def eyeball(eye: EyeLandmarks, name: str) -> Part:
 
 
 def iris_points() -> Floats:
-    """Iris landmarks (5, 3) on the eyeball about its centre: middle, picture right, top, picture left, bottom."""
+    """Iris landmarks (5, 3) on the eyeball about its center: middle, picture right, top, picture left, bottom."""
     ring = np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]]) * IRIS_SHARE
     depth = np.sqrt(1 - (ring**2).sum(axis=1, keepdims=True))
     points = EYE_RADIUS * np.concatenate([ring, depth], axis=1)
@@ -48,15 +48,15 @@ def teeth(name: str, *, upper: bool) -> Part:
     height = top + (bottom - top) * rows[:, None] * np.ones_like(arch)
     edge = rows if upper else 1 - rows
     height = height + (0.07 if upper else -0.07) * (1 - gap) * edge[:, None]
-    # Teeth stand out between their gaps, and lean back towards their edge.
+    # Teeth stand out between their gaps, and lean back toward their edge.
     out = 0.10 * gap * np.sin(np.pi * np.clip(edge, 0.15, 0.85))[:, None] - 0.1 * edge[:, None]
     width, depth = 2.45 + out, 2.3 + out
     vertices = np.stack([width * np.sin(arch), height, front - 2.3 + depth * np.cos(arch)], axis=-1)
     ivory, gum = np.array([0.68, 0.63, 0.55]), np.array([0.42, 0.17, 0.15])
     share = np.clip((edge - 0.28) / 0.12, 0, 1)[:, None, None]
-    colour = (gum + (ivory - gum) * share) * (0.62 + 0.38 * gap)[None, :, None]
-    colour *= np.clip(np.cos(arch) * 1.5, 0.1, 1)[None, :, None]
-    return grid_part(name, vertices, colour, TOOTH, caster_step=4)
+    color = (gum + (ivory - gum) * share) * (0.62 + 0.38 * gap)[None, :, None]
+    color *= np.clip(np.cos(arch) * 1.5, 0.1, 1)[None, :, None]
+    return grid_part(name, vertices, color, TOOTH, caster_step=4)
 
 
 def ear(name: str, side: int) -> Part:
@@ -82,5 +82,5 @@ def ear(name: str, side: int) -> Part:
     vertices = np.array([7.95, 0.3, -3.6]) + u[..., None] * ahead + height[..., None] * outward
     vertices[..., 1] += v
     redness = np.clip(0.5 + height, 0.25, 1)[..., None]
-    colour = SKIN_TONE * (1 - (1 - redness) * [0.3, 0.45, 0.45]) * [1, 0.93, 0.93]
-    return grid_part(name, vertices * [side, 1, 1], colour, SKIN, closed=True, mirrored=side < 0, caster_step=3)
+    color = SKIN_TONE * (1 - (1 - redness) * [0.3, 0.45, 0.45]) * [1, 0.93, 0.93]
+    return grid_part(name, vertices * [side, 1, 1], color, SKIN, closed=True, mirrored=side < 0, caster_step=3)

@@ -1,4 +1,4 @@
-"""The mannequin put together: all parts in one mesh that takes postures."""
+"""The mannequin: all parts in one mesh that can be posed."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from relit_camera.base.rotations import Angles, rotation_from_angles
 from relit_studio.mannequin import features
 from relit_studio.mannequin.bust import base, neck, pullover
 from relit_studio.mannequin.expression import Expression, control_vertices, gaze_rotation, jaw_motion
-from relit_studio.mannequin.hair import hair
-from relit_studio.mannequin.head import FACE_COUNT, SCHEME, control_head, eye_centre
+from relit_studio.mannequin.head import FACE_COUNT, SCHEME, control_head, eye_center
+from relit_studio.mannequin.mannequin_hair import hair
 from relit_studio.mannequin.mesh import Floats, Triangles, normal_operator, vertex_normals
-from relit_studio.mannequin.paint import atlas, face_paint_position
 from relit_studio.mannequin.part import SKIN, Part
+from relit_studio.mannequin.texture_atlas import atlas, face_paint_position
 
 PIVOT = np.array([0.0, -7.0, -4.0])
-"""Where the head turns on the neck, in head axes, centimetres."""
+"""Center of the head's rotation in the neck, in head axes, centimeters."""
 _NECK_TURNS = (-13.0, -5.5)
-"""Below the first height the neck stands still, above the second it goes with the head."""
+"""Heights between which the neck's share of the head's rotation grows from 0 to 1."""
 
 
 @dataclass(frozen=True)
 class Posture:
-    """How the head stands relative to the room (degrees, see `base.rotations`), and its expression."""
+    """Head rotation relative to the room (degrees, see `base.rotations`), and facial expression."""
 
     angles: Angles = field(default_factory=lambda: Angles(0.0, 0.0, 0.0))
     expression: Expression = field(default_factory=Expression)
@@ -45,14 +45,14 @@ class Posture:
 class Figure:
     """The whole mannequin; arrays of its vertices are read-only.
 
-    Room axes are the head's at rest: X right in the picture, Y up, Z toward the camera, centimetres, the origin where
+    Room axes are the head's at rest: X right in the picture, Y up, Z toward the camera, centimeters, the origin where
     the canonical face has it when the head is upright.
 
     Attributes:
         parts: by name, in the order of their vertices.
         triangles, casters: of all parts; the casters are fewer and throw the shadows of moving pictures.
         part_of: (vertices,) index of each vertex's part.
-        colour: (vertices, 3) float32 linear albedo, multiplied by the paint.
+        color: (vertices, 3) float32 linear albedo, multiplied by the paint.
         paint: (vertices, 2) float32 position in the paint atlas.
         shine, exponent: (vertices,) float32, the finish.
         summing: operator of `vertex_normals`.
@@ -62,7 +62,7 @@ class Figure:
     triangles: Triangles
     casters: Triangles
     part_of: NDArray[np.int64]
-    colour: NDArray[np.float32]
+    color: NDArray[np.float32]
     paint: NDArray[np.float32]
     shine: NDArray[np.float32]
     exponent: NDArray[np.float32]
@@ -76,7 +76,7 @@ class Figure:
             if name == "skin":
                 points = control_head().skin @ control_vertices(expression)
             elif name in _EYES:
-                points = part.vertices @ gaze_rotation(expression).T + eye_centre(_EYES[name])
+                points = part.vertices @ gaze_rotation(expression).T + eye_center(_EYES[name])
             elif name == "lower teeth":
                 points = part.vertices + jaw_motion(part.vertices, expression.jaw)
             else:
@@ -100,18 +100,18 @@ class Figure:
         head = control_head()
         skin = head.skin[:FACE_COUNT] @ control_vertices(posture.expression)
         looking = features.iris_points() @ gaze_rotation(posture.expression).T
-        irises = [looking + eye_centre(eye) for eye in _EYES.values()]
+        irises = [looking + eye_center(eye) for eye in _EYES.values()]
         return _turned(np.concatenate([skin, *irises]), posture.rotation)
 
-    def albedo(self, colour: NDArray[np.float32], paint: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Linear albedo (count, 3) of points with this colour (count, 3) and this place in the atlas (count, 2)."""
+    def albedo(self, color: NDArray[np.float32], paint: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Linear albedo (count, 3) of points with this color (count, 3) and this place in the atlas (count, 2)."""
         # cv2.remap takes pictures of up to 32767 pixels a side.
         width = 1024
         rows = -(-len(paint) // width)
         position = np.zeros((rows * width, 2), np.float32)
         position[: len(paint)] = paint
         sampled = cv2.remap(atlas(), position.reshape(rows, width, 2), None, cv2.INTER_LINEAR)
-        return np.asarray(colour * sampled.reshape(-1, 3)[: len(paint)])
+        return np.asarray(color * sampled.reshape(-1, 3)[: len(paint)])
 
 
 _EYES = {"right eye": SCHEME.right_eye, "left eye": SCHEME.left_eye}
@@ -119,7 +119,7 @@ _EYES = {"right eye": SCHEME.right_eye, "left eye": SCHEME.left_eye}
 
 @lru_cache(maxsize=1)
 def mannequin() -> Figure:
-    """The figure, built once."""
+    """The mannequin, built once and cached."""
     skin = _skin()
     listed = [
         skin,
@@ -141,7 +141,7 @@ def mannequin() -> Figure:
         triangles=triangles,
         casters=np.concatenate([part.casters + start for part, start in zip(listed, starts, strict=False)]),
         part_of=np.repeat(np.arange(len(listed)), counts),
-        colour=_frozen(np.concatenate([part.colour for part in listed])),
+        color=_frozen(np.concatenate([part.color for part in listed])),
         paint=_frozen(np.concatenate([part.paint for part in listed])),
         shine=_frozen(np.repeat([part.finish.shine for part in listed], counts)),
         exponent=_frozen(np.repeat([part.finish.exponent for part in listed], counts)),
@@ -157,9 +157,9 @@ def _skin() -> Part:
     # From the lips inwards: moist red, then dark.
     for ring, tone in enumerate(((0.55, 0.4, 0.4), (0.16, 0.07, 0.07), (0.06, 0.02, 0.02), (0.03, 0.01, 0.01))):
         tint[head.mouth.start + ring * around : min(head.mouth.start + (ring + 1) * around, head.mouth.stop)] = tone
-    colour = head.skin @ tint
+    color = head.skin @ tint
     return Part(
-        "skin", vertices, head.skin_triangles, head.caster_triangles, colour, face_paint_position(vertices), SKIN
+        "skin", vertices, head.skin_triangles, head.caster_triangles, color, face_paint_position(vertices), SKIN
     )
 
 

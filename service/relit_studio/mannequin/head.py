@@ -22,17 +22,17 @@ LIP_RIM = (*SCHEME.upper_lip_inner, *SCHEME.lower_lip_inner[-2:0:-1])
 """The closed inner edge of the lips."""
 
 EYE_RADIUS = 1.45
-"""Centimetres; a little larger than life, as dolls have it: it keeps the lids round."""
+"""Centimeters. A little larger than life, which keeps the lids round."""
 LID_THICKNESS = 0.1
 
-SKULL_CENTRE = np.array([0.0, 3.2, -2.2])
+SKULL_CENTER = np.array([0.0, 3.2, -2.2])
 SKULL_RADII = np.array([7.7, 9.9, 9.4])
 _SKULL_RINGS = (0.1, 0.22, 0.36, 0.52, 0.68, 0.84)
 
 
 @dataclass(frozen=True, eq=False)
 class ControlHead:
-    """What expressions move.
+    """Control mesh of the head, which expressions deform.
 
     Attributes:
         mesh: the control mesh.
@@ -77,8 +77,8 @@ def control_head() -> ControlHead:
     )
 
 
-def eye_centre(eye: EyeLandmarks) -> Floats:
-    """Centre (3,) of the eyeball, so that its front touches the lids from behind."""
+def eye_center(eye: EyeLandmarks) -> Floats:
+    """Center (3,) of the eyeball, so that its front touches the lids from behind."""
     lids = canonical_face().vertices[list(eye.lids)]
     middle = lids.mean(axis=0)
     upper, lower = (canonical_face().vertices[list(points)].mean(axis=0) for points in eye.gap)
@@ -110,7 +110,7 @@ def _mouth(mesh: Mesh) -> Mesh:
 
 def _skull(mesh: Mesh) -> Mesh:
     """Rings from the face's outline over an ellipsoid to the back of the head."""
-    offset = mesh.vertices[list(SCHEME.oval)] - SKULL_CENTRE
+    offset = mesh.vertices[list(SCHEME.oval)] - SKULL_CENTER
     radius = np.linalg.norm(offset, axis=1, keepdims=True)
     start, end = offset / radius, np.array([0.0, -0.05, -1.0]) / np.hypot(0.05, 1.0)
     angle = np.arccos(start @ end)[:, None]
@@ -119,5 +119,5 @@ def _skull(mesh: Mesh) -> Mesh:
         direction = (np.sin((1 - t) * angle) * start + np.sin(t * angle) * end) / np.sin(angle)
         ellipsoid = 1 / np.linalg.norm(direction / SKULL_RADII, axis=1, keepdims=True)
         share = np.clip(t / 0.4, 0, 1) ** 1.5
-        rings.append(SKULL_CENTRE + direction * (radius + (ellipsoid - radius) * share))
-    return extrude(mesh, SCHEME.oval, rings, cap=SKULL_CENTRE + end * SKULL_RADII[2])
+        rings.append(SKULL_CENTER + direction * (radius + (ellipsoid - radius) * share))
+    return extrude(mesh, SCHEME.oval, rings, cap=SKULL_CENTER + end * SKULL_RADII[2])

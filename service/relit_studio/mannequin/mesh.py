@@ -17,7 +17,7 @@ Triangles = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Vertices (count, 3) float64 in centimetres, and triangles."""
+    """Vertices (count, 3) float64 in centimeters, and triangles."""
 
     vertices: Floats
     triangles: Triangles
@@ -54,9 +54,9 @@ def extrude(mesh: Mesh, rim: Sequence[int], rings: Sequence[Floats], *, cap: Arr
         triangles.append(strip if forward else strip[:, ::-1])
         inner = outer
     if cap is not None:
-        centre = np.full(count, len(mesh.vertices) + count * (len(vertices) - 1))
+        center = np.full(count, len(mesh.vertices) + count * (len(vertices) - 1))
         vertices.append(np.asarray(cap, np.float64)[None])
-        fan = np.stack([np.roll(inner, -1), inner, centre], 1)
+        fan = np.stack([np.roll(inner, -1), inner, center], 1)
         triangles.append(fan if forward else fan[:, ::-1])
     return Mesh(np.concatenate(vertices), np.concatenate(triangles))
 
@@ -128,7 +128,7 @@ def vertex_normals(vertices: NDArray, triangles: Triangles, operator: sparse.csr
 
 
 def spread(triangles: Triangles, count: int, fixed: Mapping[int, ArrayLike], order: int = 1) -> Floats:
-    """Values (count, ...) that are as given at the fixed vertices and smooth between them.
+    """Values (count, ...) interpolated smoothly from those given at the fixed vertices.
 
     Solves L^order x = 0 with the mesh's graph Laplacian: order 1 is harmonic and stays within the given values, order 2
     also joins without kinks.

@@ -14,14 +14,14 @@ from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import Mask
 from relit_camera.base.storage import atomic_path, write_atomic
 from relit_camera.light.directions import fibonacci_directions
-from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Posture, mannequin
+from relit_studio.mannequin.mannequin_camera import Camera
 from relit_studio.mannequin.renderer import View
 from relit_studio.progress import Progress, no_progress
 
 
 def landmarks_px(camera: Camera, posture: Posture) -> NDArray[np.float32]:
-    """The points of scheme mesh478 in the picture, (478, 2) float32 pixels, centres at integers + ½."""
+    """The points of scheme mesh478 in the picture, (478, 2) float32 pixels, centers at integers + ½."""
     return camera.project(mannequin().landmarks(posture))[:, :2].astype(np.float32)
 
 
@@ -30,7 +30,7 @@ def write_olat(folder: Path, size: int = 192, lights: int = 96, progress: Progre
 
     `000.png` … are size x size, 8-bit sRGB over black, under lights of unit irradiance: a white wall that faces the
     light reads 255. Beside them `lights.lp`, `matte.png` (straight alpha), `landmarks.json` (`{"mesh478": [[x, y], …]}`
-    in pixels) and `truth.npz` (normals, linear albedo, depth in centimetres toward the camera; float32).
+    in pixels) and `truth.npz` (normals, linear albedo, depth in centimeters toward the camera; float32).
 
     Raises:
         StorageError: a file cannot be written.
@@ -43,7 +43,7 @@ def write_olat(folder: Path, size: int = 192, lights: int = 96, progress: Progre
         write_display(folder / name, uint8_from_linear(view.under_light(direction)))
         progress(index + 1, lights)
     write_atomic(folder / "lights.lp", lights_text(names, directions))
-    write_display(folder / "matte.png", grey(view.matte()))
+    write_display(folder / "matte.png", gray(view.matte()))
     points = landmarks_px(camera, posture).astype(np.float64).round(3).tolist()
     write_atomic(folder / "landmarks.json", json.dumps({"mesh478": points}))
     with atomic_path(folder / "truth.npz") as temporary:
@@ -62,6 +62,6 @@ def lights_text(names: Sequence[str], directions: NDArray[np.float64]) -> str:
     return "\n".join([str(len(lines)), *lines, ""])
 
 
-def grey(matte: Mask) -> NDArray[np.uint8]:
+def gray(matte: Mask) -> NDArray[np.uint8]:
     """A matte (height, width) as a picture."""
     return np.repeat(np.round(matte * 255).astype(np.uint8)[..., None], 3, axis=2)

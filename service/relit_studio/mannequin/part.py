@@ -1,4 +1,4 @@
-"""One piece of the mannequin at rest: its shape and what its surface is like."""
+"""A part of the mannequin at rest: mesh, color and gloss."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from relit_studio.mannequin.mesh import Floats, Triangles, grid_triangles
-from relit_studio.mannequin.paint import PLAIN
+from relit_studio.mannequin.texture_atlas import PLAIN
 
 
 @dataclass(frozen=True)
 class Finish:
-    """How a surface shines: Blinn-Phong reflectance towards the viewer and its exponent."""
+    """Gloss of a surface: Blinn-Phong reflectance toward the viewer, and exponent."""
 
     shine: float
     exponent: float
@@ -32,10 +32,10 @@ class Part:
 
     Attributes:
         name: unique in the figure.
-        vertices: (count, 3) centimetres.
+        vertices: (count, 3) centimeters.
         triangles: indices into them.
         casters: fewer triangles over the same vertices, enough to cast shadows.
-        colour: (count, 3) linear albedo, multiplied by the paint.
+        color: (count, 3) linear albedo, multiplied by the paint.
         paint: (count, 2) position in the paint atlas, pixels.
         finish: how it shines.
     """
@@ -44,7 +44,7 @@ class Part:
     vertices: Floats
     triangles: Triangles
     casters: Triangles
-    colour: Floats
+    color: Floats
     paint: Floats
     finish: Finish
 
@@ -52,7 +52,7 @@ class Part:
 def grid_part(
     name: str,
     vertices: Floats,
-    colour: ArrayLike,
+    color: ArrayLike,
     finish: Finish,
     *,
     closed: bool = False,
@@ -65,7 +65,7 @@ def grid_part(
     Args:
         name: of the part.
         vertices: rows run down and columns right, seen from outside; `mirrored` left.
-        colour: one (3,), or one a vertex (rows, columns, 3).
+        color: one (3,), or one a vertex (rows, columns, 3).
         finish: how it shines.
         closed: joins the last column to the first.
         mirrored: columns run to the left.
@@ -80,7 +80,7 @@ def grid_part(
         vertices=vertices.reshape(-1, 3),
         triangles=triangles[:, ::-1] if mirrored else triangles,
         casters=casters[:, ::-1] if mirrored else casters,
-        colour=np.broadcast_to(np.asarray(colour, np.float64), vertices.shape).reshape(-1, 3),
+        color=np.broadcast_to(np.asarray(color, np.float64), vertices.shape).reshape(-1, 3),
         paint=position.reshape(-1, 2),
         finish=finish,
     )

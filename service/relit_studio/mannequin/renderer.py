@@ -1,4 +1,4 @@
-"""Pictures of the mannequin: what the camera sees once a posture, then any light on it."""
+"""Pictures of the mannequin: visibility is computed once a posture, then lit by any lights."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from relit_camera.base.images.image_types import LinearImage, Mask
-from relit_studio.mannequin.camera import Camera
+from relit_studio.mannequin.distant_lights import DistantLights
 from relit_studio.mannequin.figure import Figure, Posture, mannequin
-from relit_studio.mannequin.lights import DistantLights
-from relit_studio.mannequin.raster import rasterise
+from relit_studio.mannequin.mannequin_camera import Camera
+from relit_studio.mannequin.rasterizer import rasterize
 from relit_studio.mannequin.shading import ShadowMap, Surface, Values, reflected
 
 SUPERSAMPLING = 2
 """Samples a pixel along each side."""
 _FINE_SHADOW, _SOFT_SHADOW = 640, 112
-"""Texels along a shadow map's side: for a lamp alone, and for one of many that make a soft light."""
+"""Texels along a shadow map's side: for a single lamp, and for one of the many lamps of a soft light."""
 
 
 class View:
-    """The mannequin in one posture before one camera. Every picture is linear, premultiplied over black."""
+    """View of the mannequin in one posture from one camera. Pictures are linear, premultiplied over black."""
 
     def __init__(self, posture: Posture, camera: Camera) -> None:
-        """Pose the figure and find what each sample of the picture sees."""
+        """Pose the figure and find the visible surface of each sample."""
         self.posture, self.camera = posture, camera
         self._figure: Figure = mannequin()
         self._vertices = self._figure.vertices(posture)
         self._normals = self._figure.normals(self._vertices)
         self._samples = camera.size * SUPERSAMPLING
         projected = Camera(self._samples).project(self._vertices).astype(np.float32)
-        self._hits = rasterise(projected, self._figure.triangles, self._samples, self._samples)
-        material = self._hits.interpolate(np.concatenate([self._figure.colour, self._figure.paint], axis=1))
+        self._hits = rasterize(projected, self._figure.triangles, self._samples, self._samples)
+        material = self._hits.interpolate(np.concatenate([self._figure.color, self._figure.paint], axis=1))
         self._albedo = self._figure.albedo(material[:, :3], material[:, 3:])
         self._surface: Surface | None = None
 
@@ -49,7 +49,7 @@ class View:
         return self._picture(self._albedo * (cosine * lit)[:, None] + (gloss * lit)[:, None])
 
     def under_lights(self, lights: DistantLights) -> LinearImage:
-        """The picture under many lights that stand for a soft one: lit at the vertices, with coarser shadows."""
+        """The picture under the many lights of a soft light: lit at the vertices, with coarser shadows."""
         used = np.unique(self._hits.corners)
         seen = Surface(
             positions=self._vertices[used],
@@ -79,7 +79,7 @@ class View:
         return self._picture(self._albedo)
 
     def depth(self) -> NDArray[np.float32]:
-        """Centimetres toward the camera (size, size) from the canonical face's origin; zero where there is nothing."""
+        """Centimeters toward the camera (size, size) from the canonical face's origin; zero where there is nothing."""
         depth = self._picture(self._seen_surface().positions[:, 2:])
         return np.asarray(depth / np.maximum(self.matte(), 1e-6))
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from relit_studio.mannequin.mesh import Triangles
-from relit_studio.mannequin.raster import nearness_buffer
+from relit_studio.mannequin.rasterizer import nearness_buffer
 
 Values = NDArray[np.float32]
 
 FRESNEL = 0.35
-"""How much of Schlick's rise towards grazing light remains: cloth, skin and hair are rough."""
+"""Share of Schlick's rise toward grazing light that remains on rough cloth, skin and hair."""
 
 LIFT = 1.6
 """Texels by which points are lifted off their surface before the test: the four texels about a point lie up to √2 of
@@ -38,7 +38,7 @@ class Surface:
 
 
 class ShadowMap:
-    """What one distant light sees: a depth picture along its direction (Williams 1978)."""
+    """Shadow map of a distant light: depth along its direction (Williams 1978)."""
 
     def __init__(self, vertices: Values, triangles: Triangles, direction: ArrayLike, size: int) -> None:
         """See `vertices` (count, 3) from `direction` (3,), a unit vector toward the light, at size x size texels."""
@@ -71,7 +71,7 @@ def lit_share(buffer: Values, x: Values, y: Values, nearness: Values) -> Values:
 
     Args:
         buffer: what the light sees, as `nearness_buffer` gives it, square.
-        x: of the points (count,) in texels, centres at integers + ½.
+        x: of the points (count,) in texels, centers at integers + ½.
         y: likewise, down.
         nearness: of the points (count,), in the buffer's measure.
     """
@@ -88,11 +88,11 @@ def lit_share(buffer: Values, x: Values, y: Values, nearness: Values) -> Values:
 
 
 def reflected(surface: Surface, direction: ArrayLike) -> tuple[Values, Values]:
-    """What a light of unit irradiance gives without shadows: Lambert's cosine (count,), and gloss (count,).
+    """Light reflected from unit irradiance, without shadows: Lambert's cosine (count,) and gloss (count,).
 
     `direction` is toward it: one (3,) of a distant light, or one a point (count, 3).
 
-    A white Lambert surface that faces the light reads 1, so the gloss is the normalised Blinn-Phong reflectance
+    A white Lambert surface that faces the light reads 1, so the gloss is the normalized Blinn-Phong reflectance
     (n + 8) / 8 · (n·h)^n times the cosine, with Schlick's rise at grazing angles.
     """
     toward = np.asarray(direction, np.float32)

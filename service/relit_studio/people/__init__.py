@@ -1,1 +1,1 @@
-"""People as numbers: shape, skin, hair, eyes and clothes, with numpy only."""
+"""People as numbers: shape, skin, hair, eyes and clothes, in numpy alone."""

@@ -1,4 +1,4 @@
-"""Beards: hairs on the face's own surface, so that they follow jaw and lips."""
+"""Beards: hairs rooted on the face mesh, so that they follow jaw and lips."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from relit_studio.people.combing import kept_out
 from relit_studio.people.face_model import FaceModel, Part
 from relit_studio.people.geometry import (
     Floats,
@@ -20,17 +19,18 @@ from relit_studio.people.geometry import (
     unit,
     vertex_normals,
 )
-from relit_studio.people.hairs import Hairs
+from relit_studio.people.hair_combing import kept_out
+from relit_studio.people.hair_strands import Hairs
 from relit_studio.people.scalp import Obstacle
 from relit_studio.people.skin import lips
 from relit_studio.people.traits import BeardStyle
 
 _POINTS = 7
 _CHEEK = np.array([[0, 2.3, 3.1, 4.4, 5.6, 6.4, 7.0, 7.5], [-1.45, -1.6, -2.9, -2.9, -1.9, -0.4, 1.6, 3.4]])
-"""Height of the upper edge on the mean head over the distance from the middle, centimetres."""
+"""Upper edge of the cheek beard on the mean head: distance from the middle, and height there, centimeters."""
 _NECK_CM = -8.9
 _LOCK = 14
-"""Hairs that go together."""
+"""Hairs in a lock."""
 
 
 class _Style(NamedTuple):
@@ -51,7 +51,7 @@ _STYLES: dict[BeardStyle, _Style] = {
 
 @dataclass(frozen=True, eq=False)
 class _Roots:
-    """On the mesh, and (n,) how much of its area's fullness each has and how long it grows."""
+    """Hair roots on the mesh, with density 0..1 (n,) and hair length (n,)."""
 
     surface: SurfacePoints
     density: Floats
@@ -59,7 +59,7 @@ class _Roots:
 
 
 def grow_beard(model: FaceModel, neutral: Floats, vertices: Floats, seed: int, style: BeardStyle) -> Hairs | None:
-    """A beard rooted on the `neutral` head, as it stands on the head with `vertices` in any expression."""
+    """A beard rooted on the `neutral` head, posed on the head with `vertices` in any expression."""
     if style == "none":
         return None
     kind, rng = _STYLES[style], np.random.default_rng(seed + 400)
@@ -69,13 +69,13 @@ def grow_beard(model: FaceModel, neutral: Floats, vertices: Floats, seed: int, s
     hairs = _hairs(roots, roots.surface.of(neutral), place, unit(roots.surface.of(normals)), kind, rng)
     skin = np.unique(triangles)
     obstacle = Obstacle(vertices[skin], normals[skin], cKDTree(vertices[skin]))
-    # What hangs over the hollow below the lip would enter the chin. Roots stay.
+    # Hairs over the hollow below the lip would enter the chin. Roots stay in place.
     outside = kept_out(hairs.points[:, 1:], obstacle)
     return hairs._replace(points=np.concatenate([hairs.points[:, :1], outside], axis=1))
 
 
 def beard_area(model: FaceModel) -> tuple[Floats, Floats, Floats]:
-    """0..1 (vertices,) each: where moustache, chin beard and whiskers grow."""
+    """Density 0..1 (vertices,) of mustache, chin beard and whiskers."""
     mean = model.vertices
     x, y, z = np.abs(mean[:, 0]), mean[:, 1], mean[:, 2]
     skin = (model.vertex_part <= Part.HEAD) * (1 - lips(mean, mean[model.landmarks68[48:60], :2]))
@@ -83,7 +83,7 @@ def beard_area(model: FaceModel) -> tuple[Floats, Floats, Floats]:
     below = smoothstep(np.interp(x, *_CHEEK) - y, -0.25, 0.55)
     neck = smoothstep(y + 0.3 * (z - 7), _NECK_CM - 0.6, _NECK_CM + 0.8)
     upper = smoothstep(y, -3.8, -3.2) * smoothstep(x, 3.1, 2.4) * smoothstep(y, -1.3, -1.7) * (z > 8.5)
-    # The philtrum is barer, and so are the corners under the lower lip.
+    # Fewer hairs grow on the philtrum and at the corners under the lower lip.
     upper = upper * (1 - 0.35 * np.exp(-((x / 0.18) ** 2)))
     bare = np.exp(-(((x - 1.35) / 0.6) ** 2) - ((y + 4.95) / 0.45) ** 2)
     middle = smoothstep(x, 3.0, 2.3) * smoothstep(y, -3.4, -4.2) * (z > 6)
@@ -99,14 +99,14 @@ def _scatter_roots(
     areas_of = np.stack(beard_area(model), axis=1) * (np.array(kind[1:4]) > 0)
     thickness = areas_of.max(axis=1)
     lengths = (areas_of * kind[1:4]).sum(axis=1) / np.maximum(areas_of.sum(axis=1), 1e-6)
-    # The moustache's strip is narrow, and its hairs lie side by side.
+    # The mustache's strip is narrow, and its hairs lie side by side.
     crowded = np.maximum(thickness, 2.6 * areas_of[:, 0])
     surface = scatter(triangles, areas(neutral, triangles) * crowded[triangles].mean(axis=1), kind.hairs, rng)
     return _Roots(surface, surface.of(thickness), surface.of(lengths))
 
 
 def _hairs(roots: _Roots, rest: Floats, place: Floats, normal: Floats, kind: _Style, rng: np.random.Generator) -> Hairs:
-    """At `place` with `normal`; what depends on where a hair stands is of the face at `rest`."""
+    """Hairs with roots at `place` and skin normals `normal`; `rest` are the roots on the neutral face."""
     count = len(place)
     aside = np.sign(rest[:, 0]) * smoothstep(np.abs(rest[:, 0]), 0.05, 0.6)
     moustache = smoothstep(rest[:, 1], -4.2, -3.4) * (rest[:, 2] > 8)

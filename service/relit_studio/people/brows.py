@@ -1,4 +1,4 @@
-"""Eyebrows: hairs between the brow's landmarks, thinning out toward its edges."""
+"""Eyebrows: hairs along the brow's landmarks, thinner toward its edges."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from scipy.spatial import cKDTree
 
 from relit_studio.people.face_model import FaceModel, Part
 from relit_studio.people.geometry import Floats, SurfacePoints, areas, find_nearest, scatter, unit, vertex_normals
-from relit_studio.people.hairs import Hairs, joined
+from relit_studio.people.hair_strands import Hairs, concatenate_hairs
 from relit_studio.people.traits import BrowTraits
 
 _BROWS = ((-1, tuple(range(17, 22))), (1, tuple(range(26, 21, -1))))
-"""Which way the tail points, and the landmarks from tail to inner end."""
+"""For each brow the direction of its tail along X, and its landmarks from tail to inner end."""
 _STEPS = 60
 _POINTS = 5
 _REACH = 1.7
-"""Hairs grow up to so many widths from the middle line, ever fewer."""
+"""Largest distance of a hair from the middle line, in widths; hairs get fewer toward it."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Roots:
-    """Where hairs stand: on the mesh; 0 at the tail to 1 at the inner end; and above (1) or below (-1) the middle."""
+    """Hair roots on the mesh, with position along the brow (0 tail, 1 inner end) and across it (1 above, -1 below)."""
 
     surface: SurfacePoints
     along: Floats
@@ -30,7 +30,7 @@ class _Roots:
 
 
 def grow_brows(model: FaceModel, neutral: Floats, vertices: Floats, seed: int, traits: BrowTraits) -> Hairs:
-    """Brows rooted on the `neutral` head, as they stand on the head with `vertices` in any expression."""
+    """Brows rooted on the `neutral` head, posed on the head with `vertices` in any expression."""
     rng = np.random.default_rng(seed + 200)
     triangles = model.triangles(Part.FACE)
     normals = vertex_normals(vertices, triangles)
@@ -39,15 +39,15 @@ def grow_brows(model: FaceModel, neutral: Floats, vertices: Floats, seed: int, t
         line = _middle_line(neutral[model.landmarks68[list(landmarks)]], traits.flatness)
         roots = _scatter_roots(neutral, triangles, line, traits, rng)
         grown.append(_hairs(roots, side, vertices, normals, traits, rng))
-    return joined(grown)
+    return concatenate_hairs(grown)
 
 
 def _middle_line(landmarks: Floats, flatness: float) -> Floats:
-    """(60, 3) from tail to inner end."""
+    """Middle line (60, 3) of a brow from tail to inner end."""
     points = landmarks - [0, 0.35, 0]
     straight = np.polyval(np.polyfit(points[:, 0], points[:, 1], 1), points[:, 0])
     points[:, 1] += flatness * (straight - points[:, 1])
-    # As the landmarks have it, the face looks sad.
+    # The line through the landmarks alone gives a sad face.
     points[:, 1] += np.linspace(0.12, -0.33, 5)
     place = np.linspace(0, 1, 5)
     line = np.stack([np.interp(np.linspace(0, 1, _STEPS), place, points[:, axis]) for axis in range(3)], axis=1)
@@ -67,7 +67,7 @@ def _scatter_roots(
     distance, nearest = find_nearest(tree, place[:, :2])
     along = nearest / (_STEPS - 1)
     half_width = traits.width * np.interp(along, [0, 0.25, 0.7, 0.95, 1], [0.06, 0.2, 0.32, 0.3, 0.2])
-    # No drawn edge: a bell across, and ends that fade.
+    # Soft edges: density falls off as a bell curve across, and toward both ends.
     ends = np.interp(along, [0, 0.12, 0.75, 0.93, 1], [0.3, 1, 1, 0.55, 0.1])
     chance = ends * np.exp(-1.9 * (distance / half_width) ** 2)
     kept = np.flatnonzero((rng.random(len(along)) < chance) & (distance < _REACH * half_width))[: traits.hairs]

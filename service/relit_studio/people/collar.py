@@ -1,4 +1,4 @@
-"""The collar of a shirt that is worn below: it stands about the neck and falls over its edge in two points."""
+"""Folded shirt collar: it stands around the neck and folds down to two points."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from relit_studio.people.geometry import Floats, Indices, find_nearest, smoothstep, unit
 
 _OPENING = (0.03, 0.42)
-"""Half the angle at the front that it leaves free at the fold and at its edge, radians."""
+"""Half the opening angle at the front, at the fold and at the edge, radians."""
 _COLUMNS = 72
 _THICK_CM = 0.12
 _PROFILE = np.array(
@@ -17,15 +17,15 @@ _PROFILE = np.array(
         (1.4, -1.3),
     ]
 )  # fmt: skip
-"""Outward and upward of the neckline, from the stand inside over the fold to the edge, centimetres."""
+"""Cross section: outward and upward offsets from the neckline, from inside over the fold to the edge, centimeters."""
 _POINT_CM = 1.3
-"""How far its two points reach below its edge."""
+"""How far the two points reach below the edge."""
 
 
 def fold_collar(neckline: Floats, up: Floats, cloth: Floats) -> tuple[Floats, Indices]:
     """Vertices (n, 3) and faces (m, 4) about a neckline (k, 3) in a plane whose normal is `up`, over cloth (l, 3)."""
-    centre = neckline.mean(axis=0)
-    offset = neckline - centre
+    center = neckline.mean(axis=0)
+    offset = neckline - center
     angle = np.arctan2(offset[:, 0], offset[:, 2])
     order = np.argsort(angle)
     rows = []
@@ -36,7 +36,7 @@ def fold_collar(neckline: Floats, up: Floats, cloth: Floats) -> tuple[Floats, In
         ring = np.stack(
             [np.interp(around, angle[order], neckline[order, axis], period=2 * np.pi) for axis in range(3)], axis=1
         )
-        outward = unit((ring - centre) - ((ring - centre) @ up)[:, None] * up)
+        outward = unit((ring - center) - ((ring - center) @ up)[:, None] * up)
         pointed = np.exp(-(((np.minimum(around, 2 * np.pi - around) - opening) / 0.25) ** 2))
         # At the front it lies flatter and ends in points.
         row = ring + outward * (out + 0.4 * falls * pointed)[:, None] + up * high

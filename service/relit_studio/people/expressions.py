@@ -10,7 +10,7 @@ Expression = Mapping[str, float]
 """Weights by the face model's names."""
 
 NEUTRAL: Expression = {"mouthSmile_L": 0.3, "mouthSmile_R": 0.26, "eyeWide_L": 0.18, "eyeWide_R": 0.18}
-"""The face at rest: the model's own zero looks tired."""
+"""The face at rest. The model's own zero looks tired."""
 EXPRESSIONS: Mapping[str, Expression] = {
     "neutral": NEUTRAL,
     "smile": {

@@ -1,4 +1,4 @@
-"""Eyeballs: where they look, and the picture that is laid over them along that axis."""
+"""Eyeballs: gaze direction, and the texture projected onto them along it."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from relit_studio.people.traits import Traits
 _WAYS = ("Out", "In", "Down", "Up")
 
 LIMBUS_CM = 0.62
-"""Radius of the coloured part; ICT-FaceKit's eyeballs are 1.5 cm in radius."""
+"""Radius of the iris. ICT-FaceKit's eyeballs have a radius of 1.5 cm."""
 _PUPIL_CM = 0.21
 VIEW_CM = 3.2
-"""What the picture spans."""
+"""Width of the texture."""
 _SIDE = 1024
 _SCLERA = (0.60, 0.525, 0.48)
 GAZE_DEG = 30.0
-"""What an `eyeLook` weight of 1 turns an eye by: the model's shapes move the lids alone."""
+"""Eye rotation at an `eyeLook` weight of 1. The model's shapes move only the lids."""
 _EYES = ((Part.EYE_LEFT, CORNEA_MATERIALS[0], "L", 1), (Part.EYE_RIGHT, CORNEA_MATERIALS[1], "R", -1))
 """Part, outer shell, suffix of its expressions, and on which side of the nose it lies."""
 
 
 @dataclass(frozen=True, eq=False)
 class EyeMap:
-    """How the eye's picture lies on the mesh: texture coordinates (vertices, 2), distance from the axis (vertices,)."""
+    """Mapping of the eye texture: texture coordinates (vertices, 2), and distance from the gaze axis (vertices,)."""
 
     uv: Floats
     eccentricity: Floats
 
 
 def eye_map(model: FaceModel, neutral: Floats) -> EyeMap:
-    """Lay the picture over both eyeballs of a neutral head, as seen along each gaze axis."""
+    """Project the texture onto both eyeballs of a neutral head along each gaze axis."""
     uv, eccentricity = np.zeros((len(neutral), 2)), np.zeros(len(neutral))
     for part, material, _, _ in _EYES:
         eyeball = vertices_of(model.faces[model.face_part == part])
@@ -53,7 +53,7 @@ def eye_map(model: FaceModel, neutral: Floats) -> EyeMap:
 
 
 def gaze(shell: Floats) -> tuple[Floats, Floats]:
-    """Middle (3,) and unit axis (3,) of an eyeball's outer shell (n, 3): a sphere, and where the cornea stands out."""
+    """Center (3,) and unit gaze axis (3,) of an eyeball's outer shell (n, 3): a fitted sphere, and its cornea."""
     back = shell[shell[:, 2] < np.percentile(shell[:, 2], 60)]
     system = np.column_stack([2 * back, np.ones(len(back))])
     middle = np.linalg.lstsq(system, (back**2).sum(axis=1), rcond=None)[0][:3]
@@ -76,7 +76,7 @@ def turn_eyes(model: FaceModel, vertices: Floats, expression: Expression) -> Flo
 
 
 def lid_shade(model: FaceModel) -> Floats:
-    """0..1 (vertices,) on the shells before the eyes: how deep in the lids' shade."""
+    """Darkening 0..1 (vertices,) by the lids, on the shells in front of the eyes."""
     shade = np.zeros(len(model.vertices))
     chosen = np.isin(model.face_part, (Part.OCCLUSION_LEFT, Part.OCCLUSION_RIGHT))
     height = model.uv[model.face_uv[chosen].ravel(), 1]
@@ -85,14 +85,14 @@ def lid_shade(model: FaceModel) -> Floats:
 
 
 def eye_picture(traits: Traits) -> DisplayImage:
-    """Sclera with veins, limbal ring, iris fibres and pupil, (1024, 1024, 3) sRGB, 3.2 cm wide."""
+    """Sclera with veins, limbal ring, iris fibers and pupil, (1024, 1024, 3) sRGB, 3.2 cm wide."""
     rng = np.random.default_rng(traits.seed + 7)
     place = ((np.arange(_SIDE) + 0.5) / _SIDE * 2 - 1) * (VIEW_CM / 2)
     x, y = np.meshgrid(place, -place)
     radius, angle = np.hypot(x, y), np.arctan2(y, x)
     iris = _iris(traits, radius, angle, rng)
     veins = _veins(rng)[..., None]
-    # Beside dark skin the full white would stare.
+    # A full white looks unnatural beside dark skin.
     sclera = np.array(_SCLERA) * min(1.0, traits.skin[1] / 0.25) ** 0.2 * (1 - veins * [0.15, 0.6, 0.6])
     sclera = sclera * (1 - 0.25 * smoothstep(radius, 0.8, 1.5)[..., None] * [0.4, 0.9, 1.0])
     share = smoothstep(radius, LIMBUS_CM - 0.06, LIMBUS_CM + 0.07)[..., None]
@@ -103,15 +103,15 @@ def _iris(traits: Traits, radius: Floats, angle: Floats, rng: np.random.Generato
     around = np.linspace(-np.pi, np.pi, 4096)
     waves = [np.sin(f * around + rng.uniform(0, 6.28)) * rng.uniform(0.5, 1) for f in (9, 17, 31, 57, 93, 140)]
     noise = cv2.GaussianBlur(rng.normal(size=radius.shape), (0, 0), 5) * 9
-    fibres = (np.interp(angle + 0.03 * noise, around, np.sum(waves, axis=0)) / 3)[..., None]
-    colour = np.array(traits.iris) * (1 + 0.38 * fibres + 0.075 * noise[..., None])
+    fibers = (np.interp(angle + 0.03 * noise, around, np.sum(waves, axis=0)) / 3)[..., None]
+    color = np.array(traits.iris) * (1 + 0.38 * fibers + 0.075 * noise[..., None])
     outward = np.clip((radius - _PUPIL_CM) / (LIMBUS_CM - _PUPIL_CM), 0, 1)
     warm = max(traits.iris) * np.array([1.25, 0.75, 0.3])
     ring = 0.55 * np.exp(-(((outward - 0.16) / 0.13) ** 2))[..., None]
-    colour = colour * (1 - ring) + warm * ring * (1 + 0.3 * fibres)
+    color = color * (1 - ring) + warm * ring * (1 + 0.3 * fibers)
     limbal = 1 - 0.75 * smoothstep(outward, 0.72, 1.0)
     pupil = smoothstep(radius, _PUPIL_CM - 0.012, _PUPIL_CM + 0.02)
-    return np.asarray(colour * (limbal * pupil)[..., None])
+    return np.asarray(color * (limbal * pupil)[..., None])
 
 
 def _veins(rng: np.random.Generator) -> Floats:

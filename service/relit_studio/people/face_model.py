@@ -1,4 +1,4 @@
-"""ICT-FaceKit: one head's mesh with 100 identity and 57 expression shapes (Li et al. 2020)."""
+"""Face model ICT-FaceKit: a head mesh with 100 identity and 57 expression blend shapes (Li et al. 2020)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ CORNEA_MATERIALS = (4, 6)
 
 @dataclass(frozen=True, eq=False)
 class FaceModel:
-    """The mean head and how it varies, in our axes and centimetres; the origin lies between the ears.
+    """Mean head and its blend shapes, in room axes and centimeters; the origin lies between the ears.
 
     Attributes:
         vertices: (26719, 3) float64.
@@ -94,7 +94,7 @@ def read_face_model(path: Path) -> FaceModel:
     """Read the packed model.
 
     Raises:
-        InputError: it is not that file.
+        InputError: the file is missing or holds no face model.
     """
     try:
         with path.open("rb") as file, np.load(file) as data:

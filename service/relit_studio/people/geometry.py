@@ -1,4 +1,4 @@
-"""Triangles, normals, samples and similarities."""
+"""Mesh geometry: triangles, normals, random surface points and similarity transforms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def smoothstep(x: ArrayLike, low: float, high: float) -> Floats:
 
 
 def unit(vectors: ArrayLike) -> Floats:
-    """Vectors (..., 3) at length 1; zero stays zero."""
+    """Vectors (..., 3) scaled to length 1; zero vectors stay zero."""
     values = np.asarray(vectors, np.float64)
     return np.asarray(values / (np.linalg.norm(values, axis=-1, keepdims=True) + 1e-9))
 
@@ -31,7 +31,7 @@ def triangles_of(faces: NDArray) -> Indices:
 
 
 def vertices_of(faces: NDArray) -> Indices:
-    """The vertices (n,) that faces (m, 4) use, in order; -1 is none."""
+    """Sorted indices (n,) of the vertices that faces (m, 4) use; -1 means no vertex."""
     return np.unique(faces[faces >= 0]).astype(np.intp)
 
 
@@ -50,13 +50,13 @@ def areas(vertices: Floats, triangles: Indices) -> Floats:
 
 
 def _crosses(vertices: Floats, triangles: Indices) -> Floats:
-    """A normal (n, 3) of each triangle, as long as twice its area."""
+    """Normal (n, 3) of each triangle, with twice its area as length."""
     corners = vertices[triangles]
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 class SurfacePoints(NamedTuple):
-    """Points on a mesh that go with it: vertex indices (n, 3) and their weights (n, 3)."""
+    """Points attached to a mesh by barycentric coordinates: vertex indices (n, 3) and weights (n, 3)."""
 
     corners: Indices
     weights: Floats
@@ -76,7 +76,7 @@ def scatter(triangles: Indices, density: Floats, count: int, rng: np.random.Gene
 
 
 class Similarity(NamedTuple):
-    """x ↦ scale · rotation x + offset."""
+    """Similarity transform x ↦ scale · rotation x + offset."""
 
     scale: float
     rotation: Floats
@@ -87,7 +87,7 @@ class Similarity(NamedTuple):
         return np.asarray(self.scale * points @ self.rotation.T + self.offset)
 
     def after(self, first: Similarity) -> Similarity:
-        """`first`, then this."""
+        """Composition: `first`, then this transform."""
         return Similarity(
             self.scale * first.scale,
             self.rotation @ first.rotation,
@@ -96,7 +96,7 @@ class Similarity(NamedTuple):
 
 
 def fit_similarity(source: Floats, target: Floats) -> Similarity:
-    """The similarity that takes points (n, 3) nearest to others (n, 3) in the least squares (Umeyama 1991)."""
+    """Least-squares similarity transform from points (n, 3) to other points (n, 3) (Umeyama 1991)."""
     middle, goal = source.mean(axis=0), target.mean(axis=0)
     left, strength, right = np.linalg.svd((target - goal).T @ (source - middle))
     signs = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
@@ -106,13 +106,13 @@ def fit_similarity(source: Floats, target: Floats) -> Similarity:
 
 
 def find_nearest(tree: cKDTree, points: Floats, count: int = 1) -> tuple[Floats, Indices]:
-    """Distance and index of the tree's nearest point to each of some points (n, k): (n,), or (n, count) of several."""
+    """Distance and index of the tree's nearest point for each point (n, k): (n,), or (n, count) for several."""
     distance, index = tree.query(points, k=count)
     return np.asarray(distance), np.asarray(index)
 
 
-def neighbour_mean(values: Floats, pairs: Indices) -> tuple[Floats, NDArray[np.bool_]]:
-    """Mean (n, k) over each vertex's neighbours in `pairs` (m, 2), and (n,) which vertices have any."""
+def neighbor_mean(values: Floats, pairs: Indices) -> tuple[Floats, NDArray[np.bool_]]:
+    """Mean (n, k) over each vertex's neighbors in `pairs` (m, 2), and (n,) which vertices have any."""
     summed, count = np.zeros_like(values), np.zeros(len(values))
     np.add.at(summed, pairs[:, 0], values[pairs[:, 1]])
     np.add.at(count, pairs[:, 0], 1)

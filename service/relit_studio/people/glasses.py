@@ -1,4 +1,4 @@
-"""Glasses: two lenses in a frame that sits before the eyes, on the nose and on the ears, and is stiff."""
+"""Glasses: two lenses in a rigid frame that rests on the nose and the ears."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _CLEARANCE_CM = 0.12
 _LASH_CM = 1.0
 """Least distance of the lens from the lids."""
 _TILT, _WRAP = 0.10, 0.016
-"""How far the lower rim stands back, a centimetre of height; and the outer, a square centimetre from the middle."""
+"""Shape of the frame: depth gained per centimeter of height, and lost per squared centimeter from the middle."""
 _EAR = (-0.6, 1.6)
-"""Between these depths the temple rests on the ear."""
+"""Range of depth (z, centimeters) in which the temple rests on the ear."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ def fit_glasses(model: FaceModel, head: Floats, traits: GlassesTraits) -> Glasse
     right, left = marks[36:42].mean(axis=0), marks[42:48].mean(axis=0)
     middle = np.array([(right[0] + left[0]) / 2, (right[1] + left[1]) / 2 - 0.1, 0.0])
     half_width, half_height, exponent = _SHAPES[traits.shape]
-    # Lenses keep apart for the nose, whose bridge is about as wide in everybody.
+    # Leave room for the bridge of the nose, which is about equally wide in all people.
     aside = max((left[0] - right[0]) / 2, half_width + 0.8)
     angle = np.linspace(0, 2 * np.pi, _AROUND, endpoint=False)
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -78,7 +78,7 @@ def _sag(flat: Floats) -> Floats:
 
 
 def _depth(skin: Floats, marks: Floats, middle: Floats, aside: float, outline: Floats, rim_cm: float) -> float:
-    """How far ahead the frame must stand to clear lids, nose, brows and cheeks."""
+    """Depth at which the frame clears lids, nose, brows and cheeks."""
     lids = marks[36:48]
     wanted = [(lids[:, 2] - _sag(lids[:, :2] - middle[:2])).max() + _LASH_CM]
     front = skin[skin[:, 2] > 5]
@@ -91,7 +91,7 @@ def _depth(skin: Floats, marks: Floats, middle: Floats, aside: float, outline: F
 
 
 def _temple(skin: Floats, hinge: Floats, side: float) -> Floats:
-    """The way (40, 3) from the hinge past the temple, over the ear and down behind it, outside the head."""
+    """Path (40, 3) of a temple from its hinge over the ear and down behind it, outside the head."""
     ear = skin[(side * skin[:, 0] > 7.4) & (skin[:, 2] > -2) & (skin[:, 2] < 2.4) & (skin[:, 1] < 5)]
     top = float(np.percentile(ear[:, 1], 97)) if len(ear) else hinge[1]
     z = np.linspace(hinge[2], -3.0, 40)
@@ -101,7 +101,7 @@ def _temple(skin: Floats, hinge: Floats, side: float) -> Floats:
     for index in range(len(z)):
         close = np.hypot(skin[:, 1] - y[index], skin[:, 2] - z[index]) < 0.7
         out = float((side * skin[close, 0]).max(initial=0.0)) + 0.2
-        # Behind the ear it lies on the head: what stands out there is the ear itself.
+        # Behind the ear the temple lies on the head; the protruding points there are the ear itself.
         x[index] = max(x[index], out) if z[index] > _EAR[1] else x[index - 1]
     smooth = np.convolve(np.pad(x, 3, mode="edge"), np.full(7, 1 / 7), mode="valid")
     return np.stack([side * np.maximum(smooth, x), y, z], axis=1)

@@ -1,4 +1,4 @@
-"""Head hair: strands that are combed, tied or let grow, gathered into locks at two scales, with some that stray."""
+"""Head hair: combed, tied or coiled strands, gathered into locks at two scales, with some stray hairs."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from relit_studio.people import hair_styles
-from relit_studio.people.combing import Combing, combed, kept_out, out_of_face
 from relit_studio.people.face_model import FaceModel
 from relit_studio.people.geometry import Floats, smoothstep, unit
-from relit_studio.people.hairs import Hairs, joined
-from relit_studio.people.locks import Curl, Locks, curled, frayed, in_locks
+from relit_studio.people.hair_combing import Combing, combed, kept_out, out_of_face
+from relit_studio.people.hair_locks import Curl, Locks, curled, frayed, in_locks
+from relit_studio.people.hair_strands import Hairs, concatenate_hairs
 from relit_studio.people.scalp import Obstacle, Roots, head_and_body, place_roots
 from relit_studio.people.tied_hair import KNOTS, bun, drawn_back, tail
 from relit_studio.people.traits import HairStyle, Traits
 
 HANGING = ("long", "ponytail")
-"""Styles that lie on the shoulders, which do not turn with the head."""
+"""Styles that reach the shoulders, which do not turn with the head."""
 FLATTENS_EARS = ("long", "bob")
 _RADIUS_CM = 0.0065
 
@@ -48,7 +48,7 @@ _COMBED: dict[HairStyle, _Style] = {
 
 
 def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits, share: float = 1.0) -> Hairs:
-    """Hair on a neutral head (vertices, 3) above clothes (n, 3); `share` of it, for a quick look."""
+    """Hair on a neutral head (vertices, 3) above clothes (n, 3); a `share` below 1 grows less, for quick previews."""
     rng = np.random.default_rng(traits.seed + 100)
     if traits.hair in ("buzz", "bald"):
         count = 110_000 if traits.hair == "buzz" else 45_000
@@ -93,7 +93,7 @@ def _cropped(roots: Roots, rng: np.random.Generator) -> Hairs:
 
 
 def _coiled(roots: Roots, share: float, rng: np.random.Generator) -> Hairs:
-    """Tight coils that stand out all round and carry each other."""
+    """Tight coils that stand out in all directions."""
     count, steps = len(roots.place), 26
     radial = unit(roots.place - [0, 4.5, -1.5])
     low = smoothstep(roots.place[:, 1], 6, 0)
@@ -118,4 +118,4 @@ def _tied(roots: Roots, style: HairStyle, obstacle: Obstacle, share: float, rng:
         tail(knot, obstacle, int(share * 9_000), rng) if style == "ponytail" else bun(knot, int(share * 12_000), rng)
     )
     tied = Hairs(knotted, _thickness(knotted, rng), 0.8 * rng.normal(size=len(knotted)))
-    return joined([Hairs(points, _thickness(points, rng), shade), tied])
+    return concatenate_hairs([Hairs(points, _thickness(points, rng), shade), tied])

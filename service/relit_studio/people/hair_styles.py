@@ -1,11 +1,11 @@
-"""How hair is combed, style by style."""
+"""Combing of each hair style."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from relit_studio.people.combing import Combing
 from relit_studio.people.geometry import Floats, smoothstep, unit
+from relit_studio.people.hair_combing import Combing
 from relit_studio.people.scalp import Roots
 
 
@@ -54,7 +54,7 @@ def back(roots: Roots, rng: np.random.Generator) -> Combing:
 
 
 def crop(roots: Roots, rng: np.random.Generator) -> Combing:
-    """Cut to a few centimetres and left as it falls."""
+    """Cut to a few centimeters, without a parting."""
     return _cut(roots, rng, top=np.array([0.15, 0.1, 0.75]), top_cm=2.7, side_cm=1.0, rise=0.9, wander=0.8)
 
 
@@ -64,7 +64,7 @@ def receding(roots: Roots, rng: np.random.Generator) -> Combing:
 
 
 def curly(roots: Roots, rng: np.random.Generator) -> Combing:
-    """Falls about the head as it likes, to the ears."""
+    """Loose curls down to the ears."""
     count = len(roots.place)
     y, z = roots.place[:, 1], roots.place[:, 2]
     radial = unit(roots.place - [0, 4, -1])
@@ -98,7 +98,7 @@ def long(roots: Roots, rng: np.random.Generator) -> Combing:
 def _cut(
     roots: Roots, rng: np.random.Generator, *, top: Floats, top_cm: float, side_cm: float, rise: float, wander: float
 ) -> Combing:
-    """Long on top, where it goes along `top`, short at the sides and the nape, where it lies down."""
+    """Long on top, combed along `top`; short and flat at the sides and the nape."""
     count = len(roots.place)
     x, y, z = roots.place.T
     side = smoothstep(np.abs(x), 4.8, 7.2) * smoothstep(y, 12.0, 9.0)
@@ -109,7 +109,7 @@ def _cut(
     direction = unit(unit(top) * (1 - low) + down * low + wander * (1 - 0.6 * low) * _wander(roots, rng))
     nape = smoothstep(y, 5.0, -1) * smoothstep(z, 2, -1)
     length = top_cm * (1 - low[:, 0]) + side_cm * low[:, 0]
-    # Tapered below the ears' top, as a barber does.
+    # Tapered below the top of the ears.
     length *= (0.4 + 0.6 * roots.density) * rng.uniform(0.7, 1.1, count) * (1 - 0.75 * nape)
     length *= np.where(side > 0.5, 0.35 + 0.65 * smoothstep(y, 1, 9), 1)
     return Combing(
@@ -130,11 +130,11 @@ def _cut(
 def _hanging(
     roots: Roots, rng: np.random.Generator, *, end_cm: float, layers_cm: float, gravity: float, points: int
 ) -> Combing:
-    """Parted where chance has it, hanging to about the height `end_cm`, in layers."""
+    """Parted at a random place, hanging down to about the height `end_cm`, in layers."""
     count = len(roots.place)
     x, y, z = roots.place.T
     parting = rng.uniform(0.8, 2.8) * (1 if rng.random() < 0.5 else -1)
-    # The parting is no ruled line.
+    # A straight parting would look artificial.
     ragged = parting + 0.35 * np.sin(1.3 * z + 6.28 * rng.random()) + 0.12 * rng.normal(size=count)
     sign = np.where(x > ragged, 1.0, -1.0)
     outward = sign * (1.0 - 0.5 * smoothstep(-z, 0, 6))
@@ -159,7 +159,7 @@ def _hanging(
 
 
 def _wander(roots: Roots, rng: np.random.Generator, wave_cm: float = 5.0) -> Floats:
-    """Directions (n, 3), about unit, that change smoothly over the head: no head's hair grows all one way."""
+    """Random directions (n, 3), of about unit length, that vary smoothly over the head, as hair growth does."""
     total = np.zeros_like(roots.place)
     for _ in range(5):
         wave = 6.28 / wave_cm * unit(rng.normal(size=3)) * rng.uniform(0.5, 1.4)

@@ -1,4 +1,4 @@
-"""Which head a person has: identity weights at random, then led to the proportions that are asked for."""
+"""Head shape of a person: random identity weights, conditioned on the wanted proportions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from relit_studio.people.geometry import Floats, smoothstep
 from relit_studio.people.traits import Proportions, Traits
 
 _DECAY = 35
-"""Orders over which the shapes' strength falls to 1/e: what comes later is noise of the scans."""
+"""Number of identity shapes over which their strength falls to 1/e; late shapes are noise of the scans."""
 _X, _Y, _Z = 0, 1, 2
 _DISTANCES: dict[str, tuple[int, tuple[int, ...], tuple[int, ...]]] = {
     "jaw_width": (_X, (11, 12), (4, 5)),
@@ -24,7 +24,7 @@ _DISTANCES: dict[str, tuple[int, tuple[int, ...], tuple[int, ...]]] = {
     "brow_depth": (_Z, (19, 20, 23, 24), (37, 38, 43, 44)),
     "face_width": (_X, (14, 15), (1, 2)),
 }
-"""Of each proportion: the axis, and the iBUG points whose mean lies how far beyond the mean of which others."""
+"""Definition of each proportion: an axis, and two sets of iBUG points. It is the first mean minus the second."""
 
 _RESTING = {
     "eyes_wide": ("eyeWide_L", "eyeWide_R"),
@@ -32,7 +32,7 @@ _RESTING = {
     "brows_up": ("browInnerUp_L", "browInnerUp_R", "browOuterUp_L", "browOuterUp_R"),
     "lips_pressed": ("mouthPress_L", "mouthPress_R"),
 }
-"""The model's shapes that each part of `Resting` weighs."""
+"""Shapes of the face model that each field of `RestingExpression` controls."""
 
 
 def identity_weights(model: FaceModel, traits: Traits) -> Floats:
@@ -42,7 +42,7 @@ def identity_weights(model: FaceModel, traits: Traits) -> Floats:
     if traits.proportions is None:
         return np.asarray(drawn)
     measured, scale = proportion_shapes(model), traits.spread * fall
-    # The most probable weights that differ by what is missing (a Gaussian conditioned on linear measurements).
+    # Condition the Gaussian of the weights on the wanted proportions, which are linear in them.
     spread = measured * scale**2 @ measured.T
     wanted = np.array(list(asdict(traits.proportions).values())) * np.sqrt(np.diag(spread))
     return np.asarray(drawn + (measured * scale**2).T @ np.linalg.solve(spread, wanted - measured @ drawn))
@@ -52,7 +52,7 @@ def neutral_face(model: FaceModel, traits: Traits) -> Floats:
     """The model's vertices (count, 3) for this person, expression 0."""
     neutral = model.neutral(identity_weights(model, traits))
     if traits.proportions is not None:
-        # Below the neck everybody is the mean person, for whom the shirt is cut.
+        # Below the neck everybody has the mean shape, which the shirt fits.
         own = smoothstep(model.vertices[:, 1] + 0.25 * model.vertices[:, 2], -11.5, -6.5)[:, None]
         neutral = model.vertices + own * (neutral - model.vertices)
     for name, shapes in _RESTING.items():
@@ -62,7 +62,7 @@ def neutral_face(model: FaceModel, traits: Traits) -> Floats:
 
 
 def proportion_shapes(model: FaceModel) -> Floats:
-    """Centimetres (9, 100) that each proportion, in the order of `Proportions`, gains with each identity weight."""
+    """Change (9, 100) in centimeters of each proportion, in the order of `Proportions`, per unit of identity weight."""
     places = model.identities[:, model.landmarks68].astype(np.float64)
     rows = []
     for name in Proportions.__dataclass_fields__:

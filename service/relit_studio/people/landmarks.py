@@ -1,4 +1,4 @@
-"""Where the points of the service's landmark schemes lie on a person."""
+"""Landmarks of the service's schemes on a person's mesh."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_studio.people.eyes import LIMBUS_CM, VIEW_CM, eye_map
 from relit_studio.people.face_model import CORNEA_MATERIALS, FaceModel, Part
 from relit_studio.people.geometry import Floats, SurfacePoints, triangles_of
-from relit_studio.people.mesh478 import IBUG_66, mesh_points, nearest_on_surface
+from relit_studio.people.mesh478_points import IBUG_66, mesh_points, nearest_on_surface
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 
 _IRIS_RING = np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]])
-"""Centre, picture right, upper, picture left, lower; in radii."""
+"""Iris points in radii: center, picture right, upper, picture left, lower."""
 
 
 def landmarks(person: Person, posture: Posture) -> Mapping[str, Floats]:
@@ -33,9 +33,9 @@ def landmarks(person: Person, posture: Posture) -> Mapping[str, Floats]:
 
 
 def canonical_origin(model: FaceModel) -> tuple[Floats, float]:
-    """Where the canonical face's origin lies in the mean head's axes (3,), and its unit in the model's centimetres.
+    """Origin (3,) of the canonical face in the mean head's axes, and its unit in the model's centimeters.
 
-    The best scale and shift without a turn: an upright head has the identity as its pose.
+    They are the least-squares scale and shift. Rotation is left out, so that an upright head has the identity pose.
     """
     source = landmark_scheme("openseeface66").canonical
     target = model.vertices[model.landmarks68[IBUG_66]]
@@ -45,7 +45,7 @@ def canonical_origin(model: FaceModel) -> tuple[Floats, float]:
 
 
 def _irises(person: Person) -> tuple[SurfacePoints, SurfacePoints]:
-    """Centre and limbus of the subject's right and left eye, on the eyeballs' outer shells."""
+    """Center and limbus of the subject's right and left eye, on the eyeballs' outer shells."""
     model = person.model
     laid = eye_map(model, person.neutral)
     plane = np.column_stack([laid.uv, np.zeros(len(laid.uv))])

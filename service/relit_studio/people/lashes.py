@@ -1,4 +1,4 @@
-"""Eyelashes along the face model's own strips, so that they follow every blink."""
+"""Eyelashes along the face model's lash strips, so that they follow every blink."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from relit_studio.people.face_model import FaceModel, Part
 from relit_studio.people.geometry import Floats, Indices
-from relit_studio.people.hairs import Hairs, joined
+from relit_studio.people.hair_strands import Hairs, concatenate_hairs
 
 _ROWS, _COLUMNS = 6, 19
 """A strip is a grid from root to tip, along the lid; an eye has three on the upper lid and three on the lower."""
@@ -28,13 +28,13 @@ def grow_lashes(model: FaceModel, vertices: Floats, seed: int, amount: float = 1
             points = grid[left] * (1 - share) + grid[left + 1] * share
             length = rng.uniform(0.55, 0.95, count) * (0.9 if upper else 0.8)
             points = points[:, :1] + (points - points[:, :1]) * length[:, None, None]
-            # The strips point at the camera, where lashes would vanish: they are curled.
+            # The strips point at the camera, which would hide the lashes, so they are curled.
             points[:, :, 0] += rng.normal(size=(count, 1)) * 0.06 * along**2
             points[:, :, 1] += (0.30 if upper else -0.10) * length[:, None] * along**1.6
             points[:, :, 2] -= (0.12 if upper else 0.0) * length[:, None] * along**2
             thick = np.full((count, _ROWS), 0.0085 if upper else 0.0055) * np.linspace(1, 0.25, _ROWS)
             grown.append(Hairs(points, thick, np.zeros(count)))
-    return joined(grown)
+    return concatenate_hairs(grown)
 
 
 def _strips(model: FaceModel, part: Part) -> Indices:

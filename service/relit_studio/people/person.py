@@ -1,4 +1,4 @@
-"""A person put together: everything about them that does not move."""
+"""A person: everything about them that does not depend on the posture, and what follows from a posture."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from relit_studio.people.face_model import FaceModel, Part
 from relit_studio.people.geometry import Floats
 from relit_studio.people.glasses import Glasses, fit_glasses
 from relit_studio.people.hair import FLATTENS_EARS, grow_hair
-from relit_studio.people.hairs import Hairs
+from relit_studio.people.hair_strands import Hairs
 from relit_studio.people.identity import neutral_face
 from relit_studio.people.lashes import grow_lashes
+from relit_studio.people.people_assets import PeopleAssets
 from relit_studio.people.posture import Posture, follows_head, rigid_motion, turned
 from relit_studio.people.scalp import ears
 from relit_studio.people.shirt import Shirt, sew_shirt
 from relit_studio.people.traits import Traits
-from relit_studio.people.wardrobe import Wardrobe
 
 _SHIRT_HAIR_CM = -10.5
-"""Cloth below this keeps long hair out."""
+"""Height below which cloth is an obstacle for long hair."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class Person:
     """
 
     traits: Traits
-    wardrobe: Wardrobe
+    people_assets: PeopleAssets
     neutral: Floats
     hair: Hairs
     shirt: Shirt
@@ -50,7 +50,7 @@ class Person:
     @property
     def model(self) -> FaceModel:
         """The face model."""
-        return self.wardrobe.model
+        return self.people_assets.model
 
     def face(self, expression: Expression) -> Floats:
         """Vertices (count, 3) of the upright head in an expression."""
@@ -77,29 +77,29 @@ class Person:
         return _turned_hairs(grow_lashes(self.model, face, self.traits.seed, self.traits.lashes), posture)
 
     def head_motion(self, posture: Posture) -> Floats:
-        """A matrix (4, 4) that takes what goes with the head, hair and glasses, to where it is in this posture."""
+        """Rigid motion (4, 4) of hair and glasses with the head in this posture."""
         return rigid_motion(posture.rotation)
 
     def hair_points(self, posture: Posture) -> Floats:
-        """`hair` in room axes where it hangs down to the shoulders, which do not turn."""
+        """Points of hair that reaches the shoulders, in room axes; its lower part does not turn with the head."""
         flat = self.hair.points.reshape(-1, 3)
         moved = turned(flat, posture.rotation, follows_head(flat))
         return moved.reshape(self.hair.points.shape)
 
 
-def make_person(traits: Traits, wardrobe: Wardrobe) -> Person:
-    """Build a person; some seconds, most of them for the hair."""
-    model = wardrobe.model
+def make_person(traits: Traits, people_assets: PeopleAssets) -> Person:
+    """Build a person. It takes some seconds, most of them for the hair."""
+    model = people_assets.model
     neutral = neutral_face(model, traits)
     if traits.hair in FLATTENS_EARS:
         # Ears lie flat under long hair.
         beyond = np.clip(np.abs(neutral[:, 0]) - 7.1, 0, None)
         neutral[:, 0] -= np.sign(model.vertices[:, 0]) * ears(model) * beyond * 0.75
     skin = model.triangles(Part.FACE, Part.HEAD)
-    shirt = sew_shirt(wardrobe.body, wardrobe.body_triangles, neutral, skin, traits.neckline)
+    shirt = sew_shirt(people_assets.body, people_assets.body_triangles, neutral, skin, traits.neckline)
     hair = grow_hair(model, neutral, shirt.cloth[shirt.cloth[:, 1] < _SHIRT_HAIR_CM], traits)
     glasses = None if traits.glasses is None else fit_glasses(model, neutral, traits.glasses)
-    return Person(traits, wardrobe, neutral, hair, shirt, glasses)
+    return Person(traits, people_assets, neutral, hair, shirt, glasses)
 
 
 def _turned_hairs(hairs: Hairs, posture: Posture) -> Hairs:

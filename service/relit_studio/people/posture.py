@@ -1,4 +1,4 @@
-"""How a person holds their head and face."""
+"""Posture of a person: head rotation and facial expression."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from relit_studio.people.expressions import NEUTRAL, Expression
 from relit_studio.people.geometry import Floats, smoothstep
 
 PIVOT = np.array([0.0, -4.0, -1.0])
-"""Where the head turns on the neck, in head axes, centimetres."""
+"""Center of the head's rotation in the neck, in head axes, centimeters."""
 
 
 @dataclass(frozen=True)
 class Posture:
-    """How the head stands relative to the room, and the face's expression."""
+    """Head rotation relative to the room, and facial expression."""
 
     angles: Angles = field(default_factory=lambda: Angles(0.0, 0.0, 0.0))
     expression: Expression = field(default_factory=lambda: NEUTRAL)
@@ -29,12 +29,12 @@ class Posture:
 
 
 def follows_head(points: Floats) -> Floats:
-    """How much (n,) of the head's turn a point at rest follows: all of it on the head, less and less down the neck."""
+    """Share (n,) of the head's rotation that points at rest (n, 3) follow: 1 on the head, 0 below the neck."""
     return smoothstep(points[:, 1] + 0.25 * points[:, 2], -12.5, -6.5)
 
 
 def turned(points: Floats, rotation: Rotation, share: Floats | None = None) -> Floats:
-    """Points (n, 3) turned about the neck; `share` (n,) of the turn where they do not follow wholly."""
+    """Points (n, 3) rotated about the pivot in the neck, by the part `share` (n,) of the rotation where given."""
     offset = points - PIVOT
     if share is None:
         return np.asarray(rotation.apply(offset) + PIVOT)
@@ -42,7 +42,7 @@ def turned(points: Floats, rotation: Rotation, share: Floats | None = None) -> F
 
 
 def rigid_motion(rotation: Rotation) -> Floats:
-    """The head's turn as a matrix (4, 4)."""
+    """The head's rotation about the pivot as a matrix (4, 4)."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation.as_matrix()
     matrix[:3, 3] = PIVOT - rotation.apply(PIVOT)

@@ -1,4 +1,4 @@
-"""People drawn at random: every trait, so that a crowd of them is one."""
+"""Random people: every trait drawn from a distribution."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from relit_studio.people.geometry import smoothstep
 from relit_studio.people.traits import (
     BeardStyle,
     BrowTraits,
-    Colour,
+    Color,
     GlassesTraits,
     HairStyle,
     Proportions,
-    Resting,
+    RestingExpression,
     Traits,
 )
 
 Choice = TypeVar("Choice", bound=str)
 
-SKINS: tuple[Colour, ...] = (
+SKINS: tuple[Color, ...] = (
     (0.66, 0.44, 0.35), (0.60, 0.385, 0.295), (0.56, 0.345, 0.24), (0.48, 0.285, 0.19), (0.40, 0.225, 0.145),
     (0.31, 0.17, 0.105), (0.225, 0.118, 0.072), (0.165, 0.080, 0.046), (0.125, 0.058, 0.033), (0.098, 0.045, 0.026),
 )  # fmt: skip
 """Linear albedo from light to dark."""
-_LIGHT_IRISES: tuple[Colour, ...] = ((0.13, 0.24, 0.33), (0.17, 0.22, 0.12), (0.16, 0.20, 0.22), (0.20, 0.14, 0.06))
-_DARK_IRISES: tuple[Colour, ...] = ((0.14, 0.065, 0.025), (0.075, 0.035, 0.015), (0.045, 0.02, 0.01))
-_SHIRTS: tuple[Colour, ...] = (
+_LIGHT_IRISES: tuple[Color, ...] = ((0.13, 0.24, 0.33), (0.17, 0.22, 0.12), (0.16, 0.20, 0.22), (0.20, 0.14, 0.06))
+_DARK_IRISES: tuple[Color, ...] = ((0.14, 0.065, 0.025), (0.075, 0.035, 0.015), (0.045, 0.02, 0.01))
+_SHIRTS: tuple[Color, ...] = (
     (0.02, 0.035, 0.07), (0.30, 0.05, 0.06), (0.50, 0.48, 0.44), (0.03, 0.09, 0.06), (0.035, 0.035, 0.038),
     (0.42, 0.25, 0.05), (0.09, 0.16, 0.27), (0.20, 0.09, 0.13), (0.16, 0.17, 0.17), (0.28, 0.17, 0.10),
     (0.10, 0.20, 0.19), (0.36, 0.20, 0.17),
@@ -55,11 +55,11 @@ PIGMENTS: Mapping[str, Pigment] = {
     "blond": Pigment(0.26, 0.3),
     "red": Pigment(0.48, 0.95),
 }
-"""Hair colours by name."""
+"""Hair colors by name."""
 
 
 def random_traits(seed: int) -> Traits:
-    """A random person, the same each time; skins from light to dark are equally likely, women and men as well."""
+    """A random person, the same for the same seed; all skin tones are equally likely, and so are women and men."""
     rng = np.random.default_rng(seed + 50_000)
     tone = int(rng.integers(len(SKINS)))
     dark = tone / (len(SKINS) - 1)
@@ -122,7 +122,7 @@ def _hair_style(rng: np.random.Generator, feminine: bool, dark: float, old: floa
             "short": 0.9, "swept": 0.9, "crop": 0.9, "back": 0.6, "curly": 0.5, "buzz": 0.3 + 2.0 * coily,
             "afro": 1.4 * coily, "receding": 1.6 * old, "bald": 0.25 + 1.1 * old, "bun": 0.15, "long": 0.1,
         }  # fmt: skip
-    # Tight curls are what dark hair's combed styles would not be.
+    # Combed styles are rarer with very dark skin, where tight curls are common.
     if dark > 0.75:
         weights |= {
             style: 0.25 * weights[style] for style in ("short", "swept", "back", "long", "bob") if style in weights
@@ -147,8 +147,8 @@ def _brows(rng: np.random.Generator, feminine: bool) -> BrowTraits:
     )  # fmt: skip
 
 
-def _resting(rng: np.random.Generator) -> Resting:
-    return Resting(
+def _resting(rng: np.random.Generator) -> RestingExpression:
+    return RestingExpression(
         eyes_wide=float(rng.uniform(-0.45, 0.05)),
         smile=float(rng.uniform(-0.25, 0.3)),
         brows_up=float(rng.uniform(-0.15, 0.25)),
@@ -157,7 +157,7 @@ def _resting(rng: np.random.Generator) -> Resting:
 
 
 def _proportions(rng: np.random.Generator, feminine: bool, dark: float) -> Proportions:
-    """Of the means of women and men, and of noses and lips that are wider where skin is darker; clipped chance."""
+    """Random proportions about the means of the person's sex; noses and lips get wider with darker skin."""
     sex = -1.0 if feminine else 1.0
     broad = dark - 0.4
 
@@ -177,10 +177,10 @@ def _proportions(rng: np.random.Generator, feminine: bool, dark: float) -> Propo
     )
 
 
-def _jittered(rng: np.random.Generator, colour: Colour, amount: float) -> Colour:
+def _jittered(rng: np.random.Generator, color: Color, amount: float) -> Color:
     lighter = 1 + amount * rng.normal()
     red, green, blue = (
-        float(np.clip(value * lighter * (1 + 0.3 * amount * rng.normal()), 0.01, 0.8)) for value in colour
+        float(np.clip(value * lighter * (1 + 0.3 * amount * rng.normal()), 0.01, 0.8)) for value in color
     )
     return red, green, blue
 

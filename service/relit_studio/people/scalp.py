@@ -1,4 +1,4 @@
-"""Where hair grows, and the surface that it must not enter."""
+"""Scalp: where hair grows, and the surface that it must not enter."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ _HAIRLINE = np.array(
         [10.4, 10.7, 10.3, 8.4, 6.2, 3.4, 2.4, 3.9, 4.4, 3.9, 1.2, -1.5, -4.2, -4.6],
     ]
 )
-"""Height of the hairline on the mean head over the azimuth from the front, degrees and centimetres."""
+"""Height of the hairline on the mean head over the azimuth from the front, degrees and centimeters."""
 
 
 def scalp(model: FaceModel, style: HairStyle = "short") -> Floats:
-    """0..1 (vertices,) where hair grows."""
+    """Density 0..1 (vertices,) of hair growth."""
     mean = model.vertices
     azimuth = np.degrees(np.arctan2(np.abs(mean[:, 0]), mean[:, 2]))
     above = mean[:, 1] - np.interp(azimuth, *_HAIRLINE)
@@ -40,7 +40,7 @@ def scalp(model: FaceModel, style: HairStyle = "short") -> Floats:
 
 
 def _left(mean: Floats, style: HairStyle) -> Floats:
-    """0..1 (vertices,) of what would grow that has not fallen out."""
+    """Share 0..1 (vertices,) of the hair that has not fallen out."""
     x, y, z = np.abs(mean[:, 0]), mean[:, 1], mean[:, 2]
     if style == "receding":
         corners = np.exp(-(((x - 4.6) / 2.0) ** 2)) * smoothstep(z, 0.5, 4.0) * smoothstep(y, 8.0, 9.5)
@@ -52,7 +52,7 @@ def _left(mean: Floats, style: HairStyle) -> Floats:
 
 
 def ears(model: FaceModel) -> Floats:
-    """0..1 (vertices,) what belongs to the ears."""
+    """Membership 0..1 (vertices,) of the ears."""
     x, y, z = np.abs(model.vertices[:, 0]), model.vertices[:, 1], model.vertices[:, 2]
     height = smoothstep(y, -3.2, -1.8) * smoothstep(y, 4.3, 3.2)
     return smoothstep(x, 7.2, 7.9) * height * smoothstep(z, -2.4, -1) * smoothstep(z, 3.4, 2.2)
@@ -60,7 +60,7 @@ def ears(model: FaceModel) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Roots:
-    """Where hairs stand.
+    """Hair roots on the scalp.
 
     Attributes:
         place, normal: (n, 3).
@@ -74,7 +74,7 @@ class Roots:
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
-    """Points of a surface and their outward normals, (n, 3) each, to be kept out of."""
+    """Surface that hair must not enter, as points and their outward normals, (n, 3) each."""
 
     points: Floats
     normals: Floats
@@ -97,7 +97,7 @@ def place_roots(model: FaceModel, head: Floats, count: int, rng: np.random.Gener
 
 
 def head_and_body(model: FaceModel, head: Floats, body: Floats) -> Obstacle:
-    """The head's skin, and the clothes' points (n, 3) as a hill."""
+    """Obstacle of the head's skin and the clothes' points (n, 3), whose normals slope like a hill."""
     triangles: Indices = model.triangles(Part.FACE, Part.HEAD)
     skin = np.unique(triangles)
     slope = unit(body * [0.3, 0, 0.3] + [0, 8, 1])

@@ -1,4 +1,4 @@
-"""The scanned head whose skin everybody wears: "Infinite, 3D Head Scan by Lee Perry-Smith" (CC-BY 3.0)."""
+"""The scanned head that all skin textures come from: "Infinite, 3D Head Scan by Lee Perry-Smith" (CC-BY 3.0)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def read_scan(path: Path) -> Scan:
     """Read the first mesh of an uncompressed binary glTF file.
 
     Raises:
-        InputError: it is none.
+        InputError: the file is missing or no such file.
     """
     try:
         data = path.read_bytes()

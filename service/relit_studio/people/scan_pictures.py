@@ -1,6 +1,6 @@
-"""The scan's pictures made fit for everybody: without its brows, stubble and moles, and its pores as relief.
+"""The scan's textures prepared for all people: without brows, stubble and moles, and with pores as relief.
 
-All outlines are pixels of the 1024 x 1024 colour map, found by eye.
+All outlines are pixels of the 1024 x 1024 color map, found by eye.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ _SHAVED_SCALP = (
 )  # fmt: skip
 _EYES_AND_NOSE = ((395, 280), (630, 280), (640, 330), (560, 345), (565, 430), (465, 430), (465, 345), (385, 330))
 _FOREHEAD = (slice(100, 230), slice(400, 630))
-"""Where pores are taken from to cover what is removed."""
+"""Where pores are copied from to cover removed features."""
 _MOLE_DEPTH = 0.045
-"""How much darker than its surroundings a mole is, in sRGB code values of 0..1."""
+"""Least difference of a mole from its brighter surroundings, in sRGB code values of 0..1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class ScanPictures:
     Attributes:
         stubble: sRGB albedo (1024, 1024, 3) with shaved beard, without brows and moles.
         clean: the same without the beard.
-        pores: grey relief (2048, 2048), 128 is level.
+        pores: gray relief (2048, 2048), 128 is level.
     """
 
     stubble: DisplayImage
@@ -65,24 +65,24 @@ def outline(points: Sequence[tuple[int, int]], feather: float, side: int = SIDE)
 
 
 def lips_mask(side: int) -> Picture:
-    """The lips, (side, side)."""
+    """Mask (side, side) of the lips."""
     return outline(_LIPS, 3, side)
 
 
 def scalp_mask(side: int) -> Picture:
-    """The shaved scalp, whose grey would show at the temples, (side, side)."""
+    """Mask (side, side) of the shaved scalp, whose gray would be visible at the temples."""
     return outline(_SHAVED_SCALP, 30, side)
 
 
-def clean_pictures(colour: Path, displacement: Path) -> ScanPictures:
-    """Prepare the scan's colour map and displacement map.
+def clean_pictures(color: Path, displacement: Path) -> ScanPictures:
+    """Prepare the scan's color map and displacement map.
 
     Raises:
-        ImageError: one cannot be read, or the colour map is not 1024 pixels wide.
+        ImageError: one cannot be read, or the color map is not 1024 pixels wide.
     """
-    photo: Picture = read_display(colour).astype(np.float32) / np.float32(255)
+    photo: Picture = read_display(color).astype(np.float32) / np.float32(255)
     if photo.shape[:2] != (SIDE, SIDE):
-        raise ImageError(f"{colour} is {photo.shape[1]}x{photo.shape[0]}, not {SIDE}x{SIDE}", "fetch it again")
+        raise ImageError(f"{color} is {photo.shape[1]}x{photo.shape[0]}, not {SIDE}x{SIDE}", "fetch it again")
     photo = _without_moles(photo)
     dots = np.maximum(*(outline(each, 3) for each in _EYE_DOTS))
     brows = np.maximum(*(outline(each, 6) for each in _BROWS))
@@ -107,9 +107,9 @@ def clean_pictures(colour: Path, displacement: Path) -> ScanPictures:
 
 
 def _without_moles(photo: Picture) -> Picture:
-    """Dark spots of a few pixels, clearly darker than what surrounds them, filled from there: they were one man's."""
-    grey = cv2.GaussianBlur(photo.mean(axis=2), (0, 0), 1.5)
-    spots = (cv2.GaussianBlur(grey, (0, 0), 9) - grey) > _MOLE_DEPTH
+    """The photo with moles removed: dark spots of a few pixels are filled from their surroundings."""
+    gray = cv2.GaussianBlur(photo.mean(axis=2), (0, 0), 1.5)
+    spots = (cv2.GaussianBlur(gray, (0, 0), 9) - gray) > _MOLE_DEPTH
     features = np.maximum.reduce([outline(each, 4) for each in (*_EYE_DOTS, *_BROWS, _MOUTH, _EYES_AND_NOSE)])
     spots &= features < 0.05
     count, labels, stats, _ = cv2.connectedComponentsWithStats(spots.astype(np.uint8))
@@ -122,7 +122,7 @@ def _without_moles(photo: Picture) -> Picture:
 
 
 def _membrane(photo: Picture, mask: Picture, steps: int = 1200) -> Picture:
-    """The photo with what is masked replaced by the smoothest surface between its edges."""
+    """The photo with the masked part replaced by a smooth membrane between its edges."""
     small = cv2.resize(photo, (128, 128), interpolation=cv2.INTER_AREA)
     inside = cv2.resize(mask, (128, 128))[..., None] > 0.02
     filled = np.where(inside, small[~inside[..., 0]].mean(axis=0), small).astype(np.float32)
@@ -132,7 +132,7 @@ def _membrane(photo: Picture, mask: Picture, steps: int = 1200) -> Picture:
 
 
 def _tiled(patch: Picture) -> Picture:
-    """A patch mirrored again and again, (1024, 1024, 3)."""
+    """A patch repeated with mirroring, (1024, 1024, 3)."""
     row = np.hstack([patch, patch[:, ::-1]])
     tiled = np.tile(np.vstack([row, row[::-1]]), (5, 3, 1))
     return np.asarray(tiled[:SIDE, :SIDE], np.float32)

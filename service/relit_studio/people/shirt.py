@@ -1,4 +1,4 @@
-"""A crew-neck shirt: the scan's shoulders pushed outward, cut by a tilted plane, and a collar where it cuts."""
+"""Crew-neck shirt: the scan's shoulders moved outward and cut by a tilted plane, with a collar at the cut."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relit_studio.people.geometry import (
     Indices,
     edges_of,
     find_nearest,
-    neighbour_mean,
+    neighbor_mean,
     smoothstep,
     unit,
     vertex_normals,
@@ -25,7 +25,7 @@ _POINT = np.array([0.0, -11.3, -1.5])
 _NORMAL = unit([0.0, 1.0, 0.40])
 """The plane of the neckline."""
 _LOW_CM = -8.5
-"""What of the scan may become cloth lies below."""
+"""Height below which the scan may become cloth."""
 _GAP_CM = 0.45
 """Least distance of the cloth from the skin."""
 _COLLAR_SECTIONS, _COLLAR_POINTS = 96, 12
@@ -88,7 +88,7 @@ def _fitted(body: Floats, triangles: Indices, low: NDArray[np.bool_], skin: Floa
     tree, edges = cKDTree(skin[near]), edges_of(triangles)
     cloth = body
     for _ in range(14):
-        mean, has = neighbour_mean(cloth, edges)
+        mean, has = neighbor_mean(cloth, edges)
         cloth = cloth + 0.35 * (low & has)[:, None] * (mean - cloth)
         distance, index = find_nearest(tree, cloth)
         normal = normals[near[index]]
@@ -101,8 +101,8 @@ def _fitted(body: Floats, triangles: Indices, low: NDArray[np.bool_], skin: Floa
 def _neckline(skin: Floats, percentile: float) -> tuple[Floats, Floats]:
     """A line (96, 3) about the neck in the plane, outside so many per cent of the skin near it; and outward of it."""
     neck = skin[(skin[:, 1] < -8) & (np.abs((skin - _POINT) @ _NORMAL) < 1.4)]
-    centre = np.array([neck[:, 0].mean(), _POINT[1], (neck[:, 2].min() + neck[:, 2].max()) / 2])
-    offset = neck - centre
+    center = np.array([neck[:, 0].mean(), _POINT[1], (neck[:, 2].min() + neck[:, 2].max()) / 2])
+    offset = neck - center
     angle, radius = np.arctan2(offset[:, 0], offset[:, 2]), np.hypot(offset[:, 0], offset[:, 2])
     around = np.linspace(-np.pi, np.pi, _COLLAR_SECTIONS, endpoint=False)
     apart = np.abs((angle[None] - around[:, None] + np.pi) % (2 * np.pi) - np.pi)
@@ -110,7 +110,7 @@ def _neckline(skin: Floats, percentile: float) -> tuple[Floats, Floats]:
     for _ in range(6):
         wide = (np.roll(wide, 1) + wide + np.roll(wide, -1)) / 3
     outward = np.stack([np.sin(around), np.zeros_like(around), np.cos(around)], axis=1)
-    middle = centre + outward * (wide + 0.38)[:, None]
+    middle = center + outward * (wide + 0.38)[:, None]
     middle[:, 1] = _POINT[1] - (middle - _POINT)[:, 2] * _NORMAL[2] / _NORMAL[1]
     return middle, outward
 

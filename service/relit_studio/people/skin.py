@@ -1,4 +1,4 @@
-"""A person's skin: the photographed albedo in their colour, with moles and freckles of their own."""
+"""A person's skin: the photographed albedo in their color, with moles and freckles of their own."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
-from relit_studio.people.folds import age_spots, folds
 from relit_studio.people.geometry import Floats, smoothstep
 from relit_studio.people.scan_pictures import lips_mask, scalp_mask
+from relit_studio.people.skin_aging import age_spots, folds
 from relit_studio.people.traits import Traits
 
 SIDE = 2048
@@ -19,11 +19,11 @@ _MEAN_ALBEDO = (0.61, 0.355, 0.265)
 _FACE = slice(600, 1450)
 """Rows and columns of the map that hold the face."""
 _MELANIN_SPOT = np.array([0.35, 0.6, 0.8])
-"""What a spot takes of each channel."""
+"""Share of each channel that an age spot absorbs."""
 _FOLD_SHADE = np.array([0.16, 0.26, 0.26])
-"""What a fold takes of each channel."""
+"""Share of each channel that a fold absorbs."""
 _BLOOD = np.array([0.04, 0.22, 0.18])
-"""What blood takes of each channel."""
+"""Share of each channel that blood absorbs."""
 _FLUSHED = (((392, 400), 48, 0.9), ((638, 400), 48, 0.9), ((513, 405), 26, 0.7), ((513, 590), 40, 0.3))
 """Cheeks, nose and chin: middle and radius in pixels of 1024 x 1024, and how red they are wont to be."""
 

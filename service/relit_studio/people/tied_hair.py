@@ -8,16 +8,16 @@ from relit_studio.people.geometry import Floats, smoothstep, unit
 from relit_studio.people.scalp import Obstacle, Roots
 
 KNOTS = {"ponytail": np.array([0.0, 8.6, -9.0]), "bun": np.array([0.0, 16.0, -3.6])}
-"""Where the mean head's hair is tied."""
+"""Position of the knot on the mean head, by hair style."""
 POINTS = 30
-_CENTRE = np.array([0.0, 4.0, -0.5])
+_CENTER = np.array([0.0, 4.0, -0.5])
 _BUN_CM = 3.5
 
 
 def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Generator) -> Floats:
     """Polylines (n, 30, 3) over the head from each root to the knot."""
     count = len(roots.place)
-    offset, goal = roots.place - _CENTRE, knot - _CENTRE
+    offset, goal = roots.place - _CENTER, knot - _CENTER
     reach, goal_reach = np.linalg.norm(offset, axis=1), float(np.linalg.norm(goal))
     start, end = offset / reach[:, None], np.tile(goal / goal_reach, (count, 1))
     angle = np.arccos(np.clip((start * end).sum(axis=1), -0.999, 0.999))[:, None]
@@ -25,9 +25,9 @@ def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Ge
     slack = 0.35 * rng.normal(size=(count, 3))
     places = []
     for t in np.linspace(0, 1, POINTS):
-        # Along the great circle, which is the way a brush takes.
+        # Along the great circle, as a brush moves.
         direction = (np.sin((1 - t) * angle) * start + np.sin(t * angle) * end) / np.sin(angle)
-        place = _CENTRE + direction * ((1 - t) * reach + t * goal_reach)[:, None] + slack * np.sin(np.pi * t)
+        place = _CENTER + direction * ((1 - t) * reach + t * goal_reach)[:, None] + slack * np.sin(np.pi * t)
         surface, normal = obstacle.nearest(place)
         gap = ((place - surface) * normal).sum(axis=1)
         wanted = layer * min(1.0, 6 * t) + 0.9 * smoothstep(t, 0.75, 1.0)
@@ -50,7 +50,7 @@ def tail(knot: Floats, obstacle: Obstacle, count: int, rng: np.random.Generator)
     places = [place]
     for index in range(1, POINTS):
         t = index / (POINTS - 1)
-        # Over the shoulder, where it is seen.
+        # Over the shoulder, where it is visible.
         ahead = np.array([0.07 * side, -0.22, 0.16 * smoothstep(t, 0.2, 0.6)])
         direction = unit(direction + ahead + 0.03 * disc * (1 - 1.6 * t))
         place = place + direction * (length / (POINTS - 1))[:, None]
@@ -63,7 +63,7 @@ def tail(knot: Floats, obstacle: Obstacle, count: int, rng: np.random.Generator)
 
 def bun(knot: Floats, count: int, rng: np.random.Generator) -> Floats:
     """Polylines (count, 30, 3) wound about a ball over the knot."""
-    up = unit(knot - _CENTRE)
+    up = unit(knot - _CENTER)
     aside = unit(np.cross(up, [0, 0, 1]))
     ahead = np.cross(aside, up)
     strand = rng.integers(7, size=count)
@@ -71,7 +71,7 @@ def bun(knot: Floats, count: int, rng: np.random.Generator) -> Floats:
     start = 6.28 * (strand / 7 + 0.03 * rng.normal(size=count))
     t = np.linspace(0, 1, POINTS)[None]
     turn = start[:, None] + 6.28 * 0.8 * t
-    # A rope round a ring: strands twist about each other while they go round.
+    # A rope along a ring: strands twist around each other.
     twist = 6.28 * (tube[0][:, None] * 0.35 + strand[:, None] * 0.37 + 0.9 * t)
     thick = 0.55 * _BUN_CM * np.sqrt(tube[1])[:, None] ** 0.3
     radius = 0.52 * _BUN_CM + thick * np.cos(twist)

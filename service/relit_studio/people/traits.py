@@ -1,11 +1,11 @@
-"""Who a person is, as a few numbers and names."""
+"""Traits of a person: the numbers and names from which everything else is made."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
-Colour = tuple[float, float, float]
+Color = tuple[float, float, float]
 HairStyle = Literal[
     "short", "swept", "crop", "back", "curly", "afro", "bob", "long", "ponytail", "bun", "receding", "bald", "buzz"
 ]
@@ -16,11 +16,11 @@ Neckline = Literal["crew", "collar"]
 
 @dataclass(frozen=True)
 class Proportions:
-    """What is typical of a face, in standard deviations of the people that the face model knows; 0 is the mean.
+    """Facial proportions in standard deviations of the face model's people; 0 is the mean.
 
     Attributes:
         jaw_width, chin_height, nose_width, nose_length, mouth_width, lip_height, eye_height, brow_depth, face_width:
-            larger is wider, longer, fuller, more open, farther before the eyes.
+            larger is wider, longer, fuller, more open, farther in front of the eyes.
     """
 
     jaw_width: float = 0.0
@@ -35,8 +35,8 @@ class Proportions:
 
 
 @dataclass(frozen=True)
-class Resting:
-    """What a face at rest adds to the model's own: weights of its shapes; less than 0 is the opposite."""
+class RestingExpression:
+    """Weights of expression shapes that a face has at rest; negative weights are the opposite expression."""
 
     eyes_wide: float = 0.0
     smile: float = 0.0
@@ -46,7 +46,7 @@ class Resting:
 
 @dataclass(frozen=True)
 class BrowTraits:
-    """A side's count of hairs, their length (cm) and thickness, the brow's width, and how flat it lies (0 arched)."""
+    """One brow's number of hairs, their length (cm) and relative thickness, its width, and its flatness (0 arched)."""
 
     hairs: int = 520
     length_cm: float = 0.85
@@ -57,10 +57,10 @@ class BrowTraits:
 
 @dataclass(frozen=True)
 class GlassesTraits:
-    """The lenses' shape; the frame's linear albedo and thickness, and whether it is of metal."""
+    """Shape of the lenses; linear albedo and thickness of the frame, and whether it is metal."""
 
     shape: LensShape = "square"
-    colour: Colour = (0.01, 0.01, 0.012)
+    colour: Color = (0.01, 0.01, 0.012)
     rim_cm: float = 0.16
     metal: bool = False
 
@@ -73,7 +73,7 @@ class Traits:
         name: of the person.
         seed: of everything random about them.
         spread: of the identity weights; 0 is the mean head.
-        proportions: of the face; None leaves them to chance.
+        proportions: of the face; None leaves them as drawn with the identity weights.
         resting: of the face without expression.
         skin: mean linear albedo.
         contrast: of the photographed skin about that mean.
@@ -85,7 +85,7 @@ class Traits:
         shaved: whether the skin shows a shaved beard.
         hair: style.
         melanin, redness: of hair and brows, 0..1.
-        grey: share of hairs without colour.
+        grey: share of hairs without color.
         beard: style.
         iris: linear albedo.
         lips: factor on the photographed lips.
@@ -100,8 +100,8 @@ class Traits:
     seed: int
     spread: float = 0.8
     proportions: Proportions | None = None
-    resting: Resting = Resting()
-    skin: Colour = (0.61, 0.37, 0.28)
+    resting: RestingExpression = RestingExpression()
+    skin: Color = (0.61, 0.37, 0.28)
     contrast: float = 1.0
     relief: float = 0.9
     age: float = 0.0
@@ -114,10 +114,10 @@ class Traits:
     redness: float = 0.35
     grey: float = 0.0
     beard: BeardStyle = "none"
-    iris: Colour = (0.16, 0.25, 0.30)
-    lips: Colour = (1.0, 1.0, 1.0)
+    iris: Color = (0.16, 0.25, 0.30)
+    lips: Color = (1.0, 1.0, 1.0)
     brows: BrowTraits = BrowTraits()
     lashes: float = 1.0
     glasses: GlassesTraits | None = None
-    shirt: Colour = (0.02, 0.035, 0.07)
+    shirt: Color = (0.02, 0.035, 0.07)
     neckline: Neckline = "crew"

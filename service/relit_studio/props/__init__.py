@@ -1,1 +1,1 @@
-"""Things that people hold: a mug, and the hands and sleeves that come with it."""
+"""Objects in front of the person: a mug, hands and sleeves."""

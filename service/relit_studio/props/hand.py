@@ -1,4 +1,4 @@
-"""Hands: round cones for the bones' flesh, joined smoothly."""
+"""Hands: round cones around the bones, blended smoothly."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from numpy.typing import ArrayLike
 
 from relit_studio.people.geometry import Floats
 from relit_studio.props.mug import RADIUS_CM
-from relit_studio.props.solids import Blob, Solid, joined
+from relit_studio.props.solids import Blob, Solid, union_surface
 
 _STEP_CM = 0.26
 _FINGER_CREASE, _PALM_CREASE, _JOIN = 0.1, 0.45, 0.3
-"""How soft the creases are between fingers, in the palm, and where they meet, in centimetres."""
+"""Softness of the creases between fingers, in the palm, and where they meet, in centimeters."""
 
 GRIP_WRIST = np.array([-9.4, -1.2, -4.6])
-"""Of the hand that holds the mug, in the mug's axes; its arm goes on along `_GRIP_ARM`."""
+"""Wrist of the hand that holds the mug, in the mug's axes; its arm continues along `_GRIP_ARM`."""
 _GRIP_ARM = np.array([-0.5, -0.8, -0.33])
 _OPEN_ARM = np.array([0.0, -1.0, 0.0])
 _STUB_CM = 5.0
-"""How far a hand goes on into its sleeve."""
+"""Length of a hand inside its sleeve."""
 
 
 @cache
@@ -36,7 +36,7 @@ def gripping_hand() -> Solid:
         _metacarpal(GRIP_WRIST, knuckle, across) for knuckle, across in zip(knuckles, (2, 0.8, -0.6, -2), strict=True)
     ]
     thumb = _chain((-8.2, 2.2, -4.4, 1.3), (-6.7, 5.0, -4.0, 1.15), (-5.4, 6.9, -3.1, 0.95), (-3.6, 8.1, -3.3, 0.8))
-    return joined(
+    return union_surface(
         [Blob(tuple(fingers), _FINGER_CREASE), Blob((*palm, thumb, _stub(GRIP_WRIST, _GRIP_ARM)), _PALM_CREASE)],
         _JOIN,
         _STEP_CM,
@@ -58,7 +58,7 @@ def open_hand() -> Solid:
         for across, finger in zip((1.1, 0.4, -0.4, -1.1), fingers, strict=True)
     ]
     thumb = _chain((1.3, 1.5, -0.4, 1.35), (3.4, 4.0, -1.0, 1.2), (5.0, 6.2, -1.4, 0.95), (6.0, 8.4, -1.7, 0.78))
-    return joined(
+    return union_surface(
         [Blob(tuple(fingers), _FINGER_CREASE), Blob((*palm, thumb, _stub(np.zeros(3), _OPEN_ARM)), _PALM_CREASE)],
         _JOIN,
         _STEP_CM,

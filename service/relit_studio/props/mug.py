@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_studio.props.solids import Blob, Solid, joined, revolve
+from relit_studio.props.solids import Blob, Solid, revolve, union_surface
 
 RADIUS_CM, HEIGHT_CM = 4.0, 9.5
 RIM = np.array([0.0, HEIGHT_CM, -RADIUS_CM + 0.1])
-"""What the lips touch."""
+"""Point of the rim that the lips touch."""
 
 _PROFILE = (
     (0, 0.2), (2.9, 0.2), (3.1, 0), (3.5, 0.05), (3.78, 0.35), (3.92, 1.0), (4, 2), (4, 5), (4, 8.2), (4, 9.2),
@@ -24,5 +24,5 @@ _HANDLE = np.array(
 
 
 def throw_mug() -> tuple[Solid, Solid]:
-    """Body and handle; the handle's ends are in the wall."""
-    return revolve(_PROFILE, 64), joined([Blob((_HANDLE,), 0.2)], 0.2, 0.2)
+    """Body and handle of the mug; the ends of the handle lie inside the wall."""
+    return revolve(_PROFILE, 64), union_surface([Blob((_HANDLE,), 0.2)], 0.2, 0.2)

@@ -1,4 +1,4 @@
-"""Closed surfaces: profiles turned about an axis, and round cones joined smoothly."""
+"""Closed surfaces: solids of revolution, and smooth unions of round cones by signed distance."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from relit_studio.people.geometry import Floats, triangles_of
 
 _MARGIN_CM = 1.0
-"""Left about a shape when it is made a surface."""
+"""Margin around a shape when its surface is extracted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class Solid:
     """A closed surface.
 
     Attributes:
-        vertices: (n, 3) centimetres.
+        vertices: (n, 3) centimeters.
         faces: (m, 4) int, counter-clockwise from outside, -1 in the last column of a triangle.
     """
 
@@ -35,7 +35,7 @@ class Solid:
 
 
 def revolve(profile: ArrayLike, segments: int = 48) -> Solid:
-    """Turn a profile (points, 2) of radius and height about the Y axis; it begins and ends on the axis.
+    """Solid of revolution of a profile (points, 2) of radius and height about the Y axis, where it begins and ends.
 
     Seen with the axis at its left, the profile runs with the solid at its left: from the bottom up outside.
     """
@@ -62,10 +62,10 @@ def revolve(profile: ArrayLike, segments: int = 48) -> Solid:
 
 @dataclass(frozen=True, eq=False)
 class Blob:
-    """A shape by its distance: round cones along polylines, joined with soft creases.
+    """Implicit shape: round cones along polylines, joined with soft creases.
 
     Attributes:
-        chains: each (points, 4): centre and radius of the spheres that its cones join.
+        chains: each (points, 4): center and radius of the spheres that its cones join.
         crease_cm: how wide the creases are between chains.
     """
 
@@ -73,7 +73,7 @@ class Blob:
     crease_cm: float
 
     def distance(self, points: Floats) -> Floats:
-        """Signed distance (n,), about, of points (n, 3): negative inside."""
+        """Approximate signed distance (n,) of points (n, 3); negative inside."""
         nearest = [_distance_of_chain(points, chain) for chain in self.chains]
         return np.asarray(-self.crease_cm * logsumexp(-np.array(nearest) / self.crease_cm, axis=0))
 
@@ -85,8 +85,8 @@ class Blob:
         return (spheres[:, :3] - reach).min(axis=0), (spheres[:, :3] + reach).max(axis=0)
 
 
-def joined(blobs: Sequence[Blob], crease_cm: float, step_cm: float) -> Solid:
-    """The surface of several shapes together, in cells of `step_cm`."""
+def union_surface(blobs: Sequence[Blob], crease_cm: float, step_cm: float) -> Solid:
+    """Surface of the smooth union of several shapes, extracted on a grid with cells of `step_cm`."""
     bounds = [blob.bounds for blob in blobs]
     low, high = np.min([each[0] for each in bounds], axis=0), np.max([each[1] for each in bounds], axis=0)
     axes = [np.arange(start, end + step_cm, step_cm) for start, end in zip(low, high, strict=True)]
@@ -99,7 +99,7 @@ def joined(blobs: Sequence[Blob], crease_cm: float, step_cm: float) -> Solid:
 
 
 def surface_nets(field: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """Where a field (i, j, k) is zero: vertices (n, 3) in grid units and quads (m, 4); it is positive all round.
+    """Zero surface of a field (i, j, k) that is positive at the border: vertices (n, 3) in grid units, quads (m, 4).
 
     Naive surface nets (Gibson 1998): each cell that the surface cuts has one vertex, the mean of the cuts of its edges,
     and each edge that it cuts is crossed by the quad of the four cells about it.

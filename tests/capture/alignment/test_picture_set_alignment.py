@@ -1,9 +1,11 @@
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
 from relit_camera.base.errors import LightsError
+from relit_camera.capture.alignment import picture_set_alignment
 from relit_camera.capture.alignment.outlier_pictures import predict_pictures
 from relit_camera.capture.alignment.picture_set_alignment import align_samples, align_to_prediction, apply_alignment
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, transforms_to_array
@@ -122,7 +124,8 @@ def test_one_picture_is_aligned_to_its_prediction(strength):
 
 
 def test_large_pictures_are_measured_at_a_smaller_size(monkeypatch):
-    monkeypatch.setattr("relit_camera.capture.alignment.picture_set_alignment._LARGEST_SIDE", 140)
+    smaller = replace(picture_set_alignment.TUNABLES, largest_side_px=140)
+    monkeypatch.setattr(picture_set_alignment, "TUNABLES", smaller)
     _, _, pictures, still = scene()
     found = align_samples(pictures, DIRECTIONS, disc())
     assert off(found.pictures(pictures), still) < 0.55 * off(pictures, still)

@@ -120,7 +120,7 @@ def test_about_another_centre(centre):
     )
     picture = texture()
     whole = warp_to_reference(picture, TURNED)
-    cut = window.cut(picture, TURNED)
+    cut = window.crop(picture, TURNED)
     top, left = max(window.top, 0), max(window.left, 0)
     part = whole[top : window.top + window.side, left : window.left + window.side]
     np.testing.assert_allclose(cut[top - window.top :, left - window.left :], part, atol=0.02)

@@ -1,4 +1,4 @@
-"""Brightness of a scene under a blinking light, as a rolling shutter sees it, by summing over many short moments."""
+"""Simulated brightness of a scene under a blinking light with a rolling shutter, integrated over many moments."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _MOMENTS = 120
 
 
 LIT_ROWS, LIT_COLUMNS = slice(8, 32), slice(4, 28)
-"""Of the 32 places, those where anything is seen of the light."""
+"""Of the 32 rows or columns, those in which the light shows."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A film of a round head on shoulders, a mirror ball or two and a blinking lamp that goes about, by formulas."""
+"""A synthetic film of a round head on shoulders, one or two mirror balls, and a blinking lamp that moves around."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def head_cm() -> np.ndarray:
 
 
 def with_ball(across_px: float, up_px: float, behind_cm: float) -> MirrorScene:
-    """A camera and a ball, so far from the picture's middle where it is as far away as the head, or farther."""
+    """A camera and a ball at an offset from the picture's middle, `behind_cm` farther away than the head."""
     at = np.array([across_px / PX_PER_CM, up_px / PX_PER_CM, -DEPTH_CM])
     return MirrorScene(SIZE, FOCAL_PX, at * (1 + behind_cm / DEPTH_CM), 30 / PX_PER_CM, lamp_radius_cm=4.0)
 
@@ -45,7 +45,7 @@ class Film:
         hunting: how much exposure and balance swing (logarithm).
         distance_cm: from the lamp to the head.
         sway: frames in which the hand moves to and fro by about a radian.
-        enhanced: how much the camera evens bright and dark out by itself, from place to place.
+        enhanced: strength of a local tone mapping by the camera.
         scene: the camera, the ball, and the room that it shows.
         second: the same with another ball, if there are two.
     """
@@ -62,11 +62,11 @@ class Film:
 
     @property
     def scenes(self) -> tuple[MirrorScene, ...]:
-        """With one ball each."""
+        """The scene of each ball."""
         return (self.scene,) if self.second is None else (self.scene, self.second)
 
     def lamp_cm(self, index: int) -> np.ndarray:
-        """From the head's middle, camera axes."""
+        """Position (3,) of the lamp from the head's middle, camera axes, in a frame."""
         done = index / max(self.frames - 1, 1)
         azimuth = np.radians(np.interp(done, (0, 1), self.azimuth))
         low, high = np.radians(self.elevation)
@@ -75,16 +75,16 @@ class Film:
         return self.distance_cm * self.strength(index) ** -0.5 * np.array(toward)
 
     def strength(self, index: int) -> float:
-        """Light at the head, that at the usual distance being 1."""
+        """Light of the lamp at the head in a frame, relative to that at the usual distance."""
         return float(np.exp(0.25 * np.sin(index / self.sway)))
 
     def gain(self, index: int) -> np.ndarray:
-        """What the camera multiplies the frame by (3,)."""
+        """Gains (3,) of the camera in a frame."""
         swing = self.hunting * np.sin(index / 11)
         return np.exp([swing, 0.8 * swing, 0.5 * swing])
 
     def lit(self, index: int) -> float:
-        """Share of the frame's exposure, half of the time to the next, for which the lamp is on."""
+        """Exposure fraction of a frame, whose exposure is half of the time to the next."""
         start = (index + 0.3) % PERIOD
         return float(np.clip((PERIOD / 2 - start) / 0.5, 0, 1) + np.clip((start + 0.5 - PERIOD) / 0.5, 0, 1))
 
@@ -112,7 +112,7 @@ class Film:
         return (SKIN * (1 + 0.25 * mixed[..., None])).clip(0.05, 1) * self.surface[2][..., None]
 
     def flash(self, index: int, near: bool = True) -> np.ndarray:
-        """What the flash adds (height, width, 3); or, with the lamp far away, for unit light at the head's middle."""
+        """Light of the flash (height, width, 3); or, with a distant lamp, for unit light at the head's middle."""
         normals, points, _ = self.surface
         lamp = self.lamp_cm(index)
         if not near:
@@ -155,7 +155,7 @@ class Film:
         return cv2.GaussianBlur(cv2.resize(fine, SIZE, interpolation=cv2.INTER_AREA), (0, 0), 0.7)
 
     def shift(self, index: int) -> tuple[float, float]:
-        """Pixels by which the head is off its place."""
+        """Shift x, y of the head in pixels in a frame."""
         return 1.5 * np.sin(index / 17), 1.0 * np.sin(index / 23 + 1)
 
     def light(self, index: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""A textured face that moves as it is told, under a light that blinks and goes about."""
+"""A synthetic film of a textured face with given motion, under a blinking light that moves around."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CIRCLE = FaceCircle(112.0, 150.0, 70.0)
 
 @dataclass(frozen=True)
 class Move:
-    """How the face lies: turned counter-clockwise about the picture's centre, then shifted."""
+    """Position of the face: turned counter-clockwise about the picture's center, then shifted by pixels."""
 
     degrees: float = 0.0
     x: float = 0.0
@@ -57,8 +57,7 @@ def shading(azimuth_deg: float, elevation_deg: float) -> np.ndarray:
 def film_moving(path: Path, moves: list[Move], faces: list[np.ndarray] | None = None) -> Path:
     """Write a video: three frames lit, three not, by a light that goes from left to right and up and down.
 
-    The frames have the exposure that a camera's automatics give, off by up to a fifth, and noise. There may be another
-    face in each.
+    The frames have an automatic exposure that varies by up to a fifth, and noise. Each may show another face.
     """
     rng = np.random.default_rng(0)
     faces = faces or [texture()] * len(moves)
@@ -75,7 +74,7 @@ def film_moving(path: Path, moves: list[Move], faces: list[np.ndarray] | None = 
 
 
 def wandering(frames: int, seed: int = 1, pixels: float = 3.0, degrees: float = 0.8) -> list[Move]:
-    """Slow movements such as those of a head that tries to be still."""
+    """Slow motion like that of a head that tries to rest."""
     rng = np.random.default_rng(seed)
     time = np.arange(frames)[:, None] / 30
     rates, phases = rng.uniform(0.5, 2.5, (3, 1, 3)), rng.uniform(0, 6.3, (3, 1, 3))

@@ -43,18 +43,18 @@ def movie(path: Path, *parts: bytes) -> Path:
     ("value", "kind", "expected"),
     [(b"26", 1, 26.0), (b"50.00mm", 1, 50.0), (b"\x1a", 21, 26.0), (struct.pack(">f", 24.0), 23, 24.0)],
 )
-def test_of_the_track_or_the_file(tmp_path: Path, value: bytes, kind: int, expected: float) -> None:
+def test_the_tag_of_a_track_or_the_file(tmp_path: Path, value: bytes, kind: int, expected: float) -> None:
     header = box(b"tkhd", bytes(80))
     assert read_focal_length_tag(movie(tmp_path / "a.mov", box(b"trak", header, metadata(value, kind)))) == expected
     assert read_focal_length_tag(movie(tmp_path / "b.mp4", metadata(value, kind, full=True))) == expected
 
 
 @pytest.mark.parametrize("value", [b"", b"wide", b"0", b"-5mm", b"99999"])
-def test_a_value_that_is_none(tmp_path: Path, value: bytes) -> None:
+def test_implausible_values_are_ignored(tmp_path: Path, value: bytes) -> None:
     assert read_focal_length_tag(movie(tmp_path / "a.mov", metadata(value, 1))) is None
 
 
-def test_files_without_one(tmp_path: Path) -> None:
+def test_files_without_a_tag(tmp_path: Path) -> None:
     assert read_focal_length_tag(movie(tmp_path / "a.mov", box(b"mvhd", bytes(100)))) is None
     for name, contents in {"empty": b"", "other": b"RIFF" + bytes(500), "zeros": bytes(5000)}.items():
         (tmp_path / name).write_bytes(contents)
@@ -77,7 +77,7 @@ def test_pixels_of_an_equivalent_focal_length() -> None:
     assert "50 mm" in focal.source
 
 
-def test_a_given_one_is_surer_than_a_guess() -> None:
+def test_a_given_focal_length_is_more_accurate_than_a_guess() -> None:
     given, guess = focal_length_from_option(800), typical_focal_length((540, 960))
     assert given.error < guess.error
     assert given.source == "given"
@@ -87,6 +87,6 @@ def test_a_given_one_is_surer_than_a_guess() -> None:
 
 
 @pytest.mark.parametrize("pixels", [0.0, -3.0, float("nan"), float("inf")])
-def test_an_impossible_one(pixels: float) -> None:
+def test_an_impossible_focal_length_is_refused(pixels: float) -> None:
     with pytest.raises(InputError, match="impossible"):
         focal_length_from_option(pixels)

@@ -1,4 +1,4 @@
-"""The shape of a rendered person against its truth: self-shadowing, gloss, colour."""
+"""The shape of a rendered person against its truth: self-shadowing, gloss, color."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from relit_camera.capture.geometry.shape_estimation import Geometry, estimate_geometry
-from relit_studio.mannequin.camera import Camera
 from relit_studio.mannequin.figure import Posture
+from relit_studio.mannequin.mannequin_camera import Camera
 from relit_studio.mannequin.renderer import View
 from tests.capture.geometry.shapes import angles_deg, front_lights
 

@@ -53,7 +53,7 @@ def test_a_ball_before_a_wall_keeps_its_shape(monkeypatch: pytest.MonkeyPatch) -
     normals[~ball] = (0, 0, 1)
     errors = {}
     for rounds in (1, 50):
-        monkeypatch.setattr(module, "ROUNDS", rounds)
+        monkeypatch.setattr(module, "TUNABLES", module.IntegrationTunables(rounds=rounds))
         error = (integrate_normals(normals.astype(np.float32), np.ones(ball.shape, bool)) - truth)[ball]
         errors[rounds] = error.std()
     assert errors[50] < 0.25

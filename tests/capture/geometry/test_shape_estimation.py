@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.capture.geometry.shape_estimation import Geometry, estimate_geometry, pixels_per_cm
+from relit_camera.capture.geometry.shape_estimation import Geometry, estimate_geometry
 from tests.capture.geometry.shapes import angles_deg
 from tests.synthetic import fibonacci_directions, render_sphere, sphere_surface
 
@@ -50,9 +50,3 @@ def test_grey_pictures_and_a_matte_of_everything() -> None:
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=2), 1, atol=1e-5)
     assert np.isfinite(found.depth).all()
     assert np.isfinite(found.albedo).all()
-
-
-def test_a_scale_from_the_eyes() -> None:
-    assert pixels_per_cm(63.0, 6.3) == pytest.approx(10)
-    with pytest.raises(ValueError, match="no scale"):
-        pixels_per_cm(0.0, 6.3)

@@ -37,6 +37,14 @@ def test_each_black_sample_lies_farther_out_on_its_lights_way() -> None:
     np.testing.assert_allclose(np.degrees(np.arccos(ring[:, 2])), 70, atol=1.5)
 
 
+def test_no_black_sample_lies_beyond_the_pole_opposite_to_the_middle() -> None:
+    captured = cap(120, 50)
+    ring, rim = ring_directions(captured, 175), captured[boundary_lights(captured)]
+    moved_deg = np.degrees(np.arccos((ring * rim).sum(axis=1)))
+    # The pole is 130 degrees from the rim, which is uneven; nine tenths of the way is as far as a sample goes.
+    np.testing.assert_allclose(moved_deg, 0.9 * 130, atol=2)
+
+
 def test_the_field_fades_over_the_ring_and_stays_the_same_inside() -> None:
     samples = lambert(cap(120, 50))
     wider = with_black_ring(samples, 20)

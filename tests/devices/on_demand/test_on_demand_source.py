@@ -2,141 +2,167 @@
 
 from __future__ import annotations
 
-import time
+import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from relit_camera.base.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import ConfigError, DeviceError
 from relit_camera.base.images.image_types import Frame
-from relit_camera.devices.on_demand.on_demand_source import DemandMonitor, OnDemandController, OnDemandSource
-from relit_camera.devices.sinks.sink import SinkInfo
+from relit_camera.devices.on_demand.on_demand_source import RETRY_S, DemandMonitor, OnDemandController, OnDemandSource
+from relit_camera.devices.sinks.sink import NullSink, SinkInfo
 from relit_camera.devices.sources.source import SourceInfo, SourceState
 from relit_camera.devices.sources.webcam_source import WebcamSource
 from relit_camera.live.publishing.placeholder_image import placeholder
 from tests.devices.fake_devices import FakeCapture, FakeTree
 from tests.small_camera import SIZE, difference, grey, running_camera, wait_until
+from tests.virtual_clock import VirtualClock
 
 
 class CountingSource:
-    """Gives frames at once; remembers whether it was read and closed."""
+    """Gives a frame a hundredth of a second; remembers whether it was read and closed."""
 
-    def __init__(self):
-        self.state, self.reason, self.index, self.closed = SourceState.IDLE, "", -1, False
+    reason = ""
 
-    def read(self, timeout_s):
-        time.sleep(0.01)
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self.state, self.index, self.closed = SourceState.IDLE, -1, False
+
+    def read(self, timeout_s: float) -> Frame | None:
+        self._clock.wait(threading.Event(), 0.01)
         self.state = SourceState.RUNNING
         self.index += 1
-        return Frame(grey(), self.index, time.monotonic(), self.index / 100)
+        return Frame(grey(), self.index, self._clock.now(), self.index / 100)
 
-    def describe(self):
+    def describe(self) -> SourceInfo:
         return SourceInfo("webcam", "fake", SIZE, 100.0)
 
-    def close(self):
+    def close(self) -> None:
         self.closed = True
 
 
 class Cameras:
     """Makes sources, and keeps them all."""
 
-    def __init__(self):
+    def __init__(self, clock: Clock = SYSTEM_CLOCK) -> None:
+        self.clock = clock
         self.made: list[CountingSource] = []
+        self.calls = 0
         self.error: Exception | None = None
 
-    def __call__(self):
+    def __call__(self) -> CountingSource:
+        self.calls += 1
         if self.error is not None:
             raise self.error
-        self.made.append(CountingSource())
+        self.made.append(CountingSource(self.clock))
         return self.made[-1]
 
 
 class Switch:
     on = False
 
-    def __call__(self):
+    def __call__(self) -> bool:
         return self.on
 
 
+class OnDemand:
+    """A source on demand in virtual time.
+
+    Attributes:
+        cameras: made the sources that it wraps.
+        wanted: switches it on and off.
+    """
+
+    def __init__(self) -> None:
+        self.clock = VirtualClock()
+        self.cameras, self.wanted = Cameras(self.clock), Switch()
+        self.source = OnDemandSource(self.cameras(), self.cameras, self.wanted, self.clock)
+
+    def read(self, on: bool, timeout_s: float = 0.1) -> Frame | None:
+        self.wanted.on = on
+        return self.source.read(timeout_s)
+
+
 @pytest.fixture
-def parts():
-    cameras, wanted = Cameras(), Switch()
-    return cameras, wanted, OnDemandSource(cameras(), cameras, wanted)
+def on_demand() -> OnDemand:
+    return OnDemand()
 
 
-def test_it_begins_released_and_reads_nothing(parts):
-    cameras, _, source = parts
-    assert source.read(0.01) is None
-    assert (source.state, source.reason) == (SourceState.RELEASED, "")
-    assert cameras.made[0].state is SourceState.IDLE
-    assert source.describe().id == "fake"
+def test_it_begins_released_and_reads_nothing(on_demand: OnDemand) -> None:
+    before = on_demand.clock.now()
+    assert on_demand.read(False, 0.2) is None
+    assert on_demand.clock.now() == before + 0.2  # it waits, as a source without frames does
+    assert (on_demand.source.state, on_demand.source.reason) == (SourceState.RELEASED, "")
+    assert on_demand.cameras.made[0].state is SourceState.IDLE
+    assert on_demand.source.describe().id == "fake"
 
 
-def test_it_opens_when_wanted_closes_when_not_and_opens_anew(parts):
-    cameras, wanted, source = parts
-    wanted.on = True
-    assert source.read(0.1) is not None
-    assert source.state is SourceState.RUNNING
-    assert len(cameras.made) == 1
-    wanted.on = False
-    assert source.read(0.01) is None
-    assert cameras.made[0].closed
-    assert source.state is SourceState.RELEASED
-    wanted.on = True
-    assert source.read(0.1) is not None
-    assert len(cameras.made) == 2
-    assert not cameras.made[1].closed
+def test_it_opens_when_wanted_closes_when_not_and_opens_anew(on_demand: OnDemand) -> None:
+    made = on_demand.cameras.made
+    assert on_demand.read(True) is not None
+    assert on_demand.source.state is SourceState.RUNNING
+    assert len(made) == 1
+    assert on_demand.read(False) is None
+    assert made[0].closed
+    assert on_demand.source.state is SourceState.RELEASED
+    assert on_demand.read(True) is not None
+    assert len(made) == 2
+    assert not made[1].closed
 
 
-def test_indices_and_times_grow_through_pauses(parts):
-    _, wanted, source = parts
-    frames = []
+def test_indices_and_times_go_on_through_pauses(on_demand: OnDemand) -> None:
+    given: list[Frame] = []
     for on in (True, False, True, False, True):
-        wanted.on = on
-        frames += [source.read(0.01) for _ in range(4)]
-    given = [frame for frame in frames if frame is not None]
+        for _ in range(4):
+            frame = on_demand.read(on, timeout_s=10.0)
+            if frame is not None:
+                given.append(frame)
     assert [frame.index for frame in given] == list(range(12))
-    times = [frame.time_s for frame in given]
-    assert times == sorted(times)
+    steps = np.diff([frame.time_s for frame in given])
+    assert (steps > 0).all()
+    assert (steps > 39).sum() == 2  # four reads of ten seconds without a frame
 
 
-def test_a_camera_that_went_away_meanwhile_is_looked_for(parts, monkeypatch):
-    monkeypatch.setattr("relit_camera.devices.on_demand.on_demand_source.RETRY_S", 0.0)
-    cameras, wanted, source = parts
-    wanted.on = True
-    source.read(0.1)
-    wanted.on = False
-    source.read(0.01)
-    wanted.on, cameras.error = True, DeviceError("there is no webcam 'fake'", "plug it in")
-    assert source.read(0.01) is None
-    assert (source.state, source.reason) == (SourceState.RECONNECTING, "there is no webcam 'fake'")
-    cameras.error = None
-    assert source.read(0.1) is not None
-    assert source.reason == ""
+def test_a_camera_that_went_away_meanwhile_is_looked_for_every_second(on_demand: OnDemand) -> None:
+    on_demand.read(True)
+    on_demand.read(False)
+    on_demand.cameras.error = DeviceError("there is no webcam 'fake'", "plug it in")
+    calls = on_demand.cameras.calls
+    for _ in range(40):
+        assert on_demand.read(True, 0.2) is None
+    assert on_demand.cameras.calls - calls == pytest.approx(8.0 / RETRY_S, abs=1)
+    assert (on_demand.source.state, on_demand.source.reason) == (
+        SourceState.RECONNECTING,
+        "there is no webcam 'fake'",
+    )
+    on_demand.cameras.error = None
+    on_demand.clock.sleep(RETRY_S)
+    assert on_demand.read(True) is not None
+    assert on_demand.source.reason == ""
 
 
-def test_closing_ends_it_for_good(parts):
-    cameras, wanted, source = parts
-    wanted.on = True
-    source.read(0.1)
-    source.close()
-    source.close()
-    assert cameras.made[0].closed
-    assert source.read(0.5) is None
-    assert source.state is SourceState.ENDED
-    assert len(cameras.made) == 1
+def test_closing_ends_it_for_good(on_demand: OnDemand) -> None:
+    on_demand.read(True)
+    on_demand.source.close()
+    on_demand.source.close()
+    assert on_demand.cameras.made[0].closed
+    assert on_demand.read(True) is None
+    assert on_demand.source.state is SourceState.ENDED
+    assert len(on_demand.cameras.made) == 1
 
 
-def test_a_webcam_is_really_let_go(tmp_path: Path):
+def test_a_webcam_is_really_closed(tmp_path: Path) -> None:
     tree = FakeTree(tmp_path)
     tree.add_webcam(0, "Cam")
     captures: list[FakeCapture] = []
 
-    def open_capture(*_):
+    def open_capture(*_: object) -> FakeCapture:
         captures.append(FakeCapture())
         return captures[-1]
 
-    def webcam():
+    def webcam() -> WebcamSource:
         return WebcamSource("webcam", SIZE, 30.0, tree=tree, open_capture=open_capture)
 
     wanted = Switch()
@@ -156,31 +182,34 @@ def test_a_webcam_is_really_let_go(tmp_path: Path):
 # In a running camera.
 
 
-class Sink:
-    def __init__(self, kind, node=""):
+class NamedSink(NullSink):
+    """Says that it is a sink of some kind."""
+
+    def __init__(self, kind: str, node: str = "") -> None:
+        super().__init__(SIZE)
         self.info = SinkInfo(kind, node, SIZE)
 
-    def describe(self):
+    def describe(self) -> SinkInfo:
         return self.info
 
 
-def test_a_file_is_always_wanted_and_null_by_viewers_alone():
+def test_a_file_is_always_wanted_and_null_by_viewers_alone() -> None:
     cameras = Cameras()
-    recording = OnDemandController(cameras(), cameras, Sink("file", "out.mp4")).source
+    recording = OnDemandController(cameras(), cameras, NamedSink("file", "out.mp4")).source
     assert recording.read(0.1) is not None
-    nowhere = OnDemandController(cameras(), cameras, Sink("null"))
+    nowhere = OnDemandController(cameras(), cameras, NamedSink("null"))
     assert nowhere.source.read(0.01) is None
     nowhere.note_viewer()
     assert nowhere.source.read(0.1) is not None
 
 
-def test_another_system_says_that_it_cannot(monkeypatch):
+def test_another_system_says_that_it_cannot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "darwin")
     with pytest.raises(ConfigError, match="only Linux"):
-        OnDemandController(CountingSource(), Cameras(), Sink("camera", "OBS"))
+        OnDemandController(Cameras()(), Cameras(), NamedSink("camera", "OBS"))
 
 
-def test_the_camera_lives_on_while_its_webcam_is_released(tmp_path: Path):
+def test_the_camera_lives_on_while_its_webcam_is_released(tmp_path: Path) -> None:
     cameras, readers = Cameras(), Switch()
     demand = DemandMonitor(readers, idle_timeout_s=0.3)
     source = OnDemandSource(cameras(), cameras, demand.wanted)
@@ -216,7 +245,7 @@ def test_the_camera_lives_on_while_its_webcam_is_released(tmp_path: Path):
         wait_until(lambda: shown_or_dropped() == given)  # each once: the new source's count goes on
 
 
-def test_a_preview_or_snapshot_tells_of_a_viewer(tmp_path: Path):
+def test_a_preview_or_snapshot_counts_as_a_viewer(tmp_path: Path) -> None:
     seen: list[int] = []
     with running_camera(tmp_path, on_viewer=lambda: seen.append(1)) as camera:
         assert camera.http.get("status").status_code == 200

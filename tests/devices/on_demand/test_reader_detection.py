@@ -1,10 +1,12 @@
-"""When the webcam is wanted, and who is asked about it."""
+"""When the webcam is wanted, and how readers are detected."""
 
 from __future__ import annotations
 
 import errno
 import logging
 import struct
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -14,23 +16,17 @@ from relit_camera.devices import v4l2
 from relit_camera.devices.on_demand.on_demand_source import IDLE_TIMEOUT_S, DemandMonitor
 from relit_camera.devices.on_demand.reader_detection import ReaderMonitor, driver_reports_readers
 from tests.small_camera import wait_until
-
-
-class Clock:
-    now = 100.0
-
-    def __call__(self):
-        return self.now
+from tests.virtual_clock import VirtualClock
 
 
 class Readers:
-    """Stands for the readers of a device."""
+    """The readers of a device, as a query gives them."""
 
     there = False
     error: Exception | None = None
     calls = 0
 
-    def __call__(self, node=""):
+    def __call__(self, node: str = "") -> bool:
         self.calls += 1
         if self.error is not None:
             raise self.error
@@ -40,140 +36,155 @@ class Readers:
 # Wanted or not.
 
 
-def test_nobody_wants_it_at_the_start():
+def test_nobody_wants_it_at_the_start() -> None:
     assert not DemandMonitor(Readers()).wanted()
 
 
-def test_a_reader_wants_it_at_once_and_five_seconds_longer():
-    readers, clock = Readers(), Clock()
+def test_a_reader_wants_it_at_once_and_five_seconds_longer() -> None:
+    readers, clock = Readers(), VirtualClock()
     demand = DemandMonitor(readers, clock=clock)
     readers.there = True
     assert demand.wanted()
-    clock.now += 60
+    clock.sleep(60)
     assert demand.wanted()
     readers.there = False
-    clock.now += IDLE_TIMEOUT_S - 0.1
+    clock.sleep(IDLE_TIMEOUT_S - 0.1)
     assert demand.wanted()
-    clock.now += 0.2
+    clock.sleep(0.2)
     assert not demand.wanted()
     assert IDLE_TIMEOUT_S == 5
 
 
-def test_who_lets_go_and_takes_again_keeps_it_open():
-    readers, clock = Readers(), Clock()
+def test_a_program_that_closes_and_reopens_the_camera_keeps_it_wanted() -> None:
+    readers, clock = Readers(), VirtualClock()
     demand = DemandMonitor(readers, clock=clock)
     for there in (True, False) * 20:
         readers.there = there
         assert demand.wanted()
-        clock.now += 2.4
+        clock.sleep(2.4)
 
 
-def test_a_viewer_counts_as_a_reader():
-    clock = Clock()
+def test_a_viewer_counts_as_a_reader() -> None:
+    clock = VirtualClock()
     demand = DemandMonitor(Readers(), clock=clock)
     demand.note_viewer()
-    clock.now += IDLE_TIMEOUT_S - 0.1
+    clock.sleep(IDLE_TIMEOUT_S - 0.1)
     assert demand.wanted()
-    clock.now += 0.2
+    clock.sleep(0.2)
     assert not demand.wanted()
 
 
-# The watch.
+# The monitor, in virtual time: `run` is what its thread does.
 
 
-@pytest.fixture
-def quick(monkeypatch):
-    monkeypatch.setattr("relit_camera.devices.on_demand.reader_detection.DRIVER_POLL_S", 0.01)
-    monkeypatch.setattr("relit_camera.devices.on_demand.reader_detection.PROC_SCAN_S", 0.01)
+class Watching:
+    """A monitor in virtual time, and the times at which its answer changed."""
+
+    def __init__(self) -> None:
+        self.clock = VirtualClock()
+        self.start = self.clock.now()
+        self.ask, self.scan = Readers(), Readers()
+        self.monitor = ReaderMonitor(lambda: "/dev/video10", self.ask, self.scan, self.clock)
+        self.answers: list[tuple[float, bool]] = []
+
+    def at(self, seconds: float, readers: Readers, there: bool = False, error: Exception | None = None) -> None:
+        """Let readers come, go, or fail to answer."""
+
+        def change() -> None:
+            readers.there, readers.error = there, error
+
+        self.clock.at(seconds, change)
+
+    def run(self, seconds: float) -> list[tuple[float, bool]]:
+        """Watch for some seconds. Returns when the answer became what."""
+
+        def look() -> None:
+            found = self.monitor.has_readers()
+            if not self.answers or self.answers[-1][1] != found:
+                self.answers.append((round(self.clock.now() - self.start, 1), found))
+
+        self.clock.every(0.1, look)
+        self.clock.at(seconds, self.monitor.close)
+        self.monitor.run()
+        return self.answers
 
 
-def watch_with(ask, scan, node="/dev/video10"):
-    return ReaderMonitor(lambda: node, ask, scan)
+def test_the_driver_is_asked_four_times_a_second_and_proc_left_alone() -> None:
+    watching = Watching()
+    watching.at(2.1, watching.ask, there=True)
+    watching.at(4.1, watching.ask, there=False)
+    assert watching.run(6.0) == [(0.1, False), (2.3, True), (4.3, False)]
+    assert watching.ask.calls == 23
+    assert watching.scan.calls == 0
 
 
-def test_the_driver_is_asked_and_proc_left_alone(quick):
-    ask, scan = Readers(), Readers()
-    watch = watch_with(ask, scan)
-    try:
-        assert not watch.has_readers()
-        ask.there = True
-        wait_until(watch.has_readers)
-        ask.there = False
-        wait_until(lambda: not watch.has_readers())
-        assert scan.calls == 0
-    finally:
-        watch.close()
-
-
-def test_the_first_answer_is_no_guess():
+def test_the_first_answer_is_no_guess() -> None:
     ask = Readers()
     ask.there = True
-    watch = watch_with(ask, Readers())
-    assert watch.has_readers()
-    watch.close()
+    monitor = ReaderMonitor(lambda: "/dev/video10", ask, Readers())
+    assert monitor.has_readers()
+    monitor.close()
 
 
-def test_an_old_driver_is_asked_once_then_proc_is_searched(quick, caplog):
-    ask, scan = Readers(), Readers()
-    ask.error = UnsupportedByDriverError("it is too old")
-    watch = watch_with(ask, scan)
+def test_an_old_driver_is_asked_once_then_proc_is_scanned(caplog: pytest.LogCaptureFixture) -> None:
+    watching = Watching()
+    watching.ask.error = UnsupportedByDriverError("it is too old")
+    watching.at(3.5, watching.scan, there=True)
     with caplog.at_level(logging.WARNING):
-        assert not watch.has_readers()
-        scan.there = True
-        wait_until(watch.has_readers)
-    watch.close()
-    assert ask.calls == 1
+        assert watching.run(10.0) == [(0.1, False), (4.3, True)]
+    assert watching.ask.calls == 1
+    assert watching.scan.calls == 10  # once a second
     (said,) = [record.getMessage() for record in caplog.records]
     assert said.startswith("/dev/video10: this v4l2loopback does not tell who reads it")
     assert "only programs of the same user" in said
 
 
-def test_a_device_that_cannot_be_opened_now_leaves_the_answer_as_it_was(quick):
-    ask = Readers()
-    ask.there = True
-    watch = watch_with(ask, Readers())
-    assert watch.has_readers()
-    ask.error = OSError(errno.EBUSY, "too many openers")
-    known = ask.calls
-    wait_until(lambda: ask.calls > known + 3)
-    assert watch.has_readers()
-    ask.error, ask.there = None, False
-    wait_until(lambda: not watch.has_readers())
-    watch.close()
+def test_a_device_that_cannot_be_opened_now_leaves_the_answer_as_it_was() -> None:
+    watching = Watching()
+    watching.ask.there = True
+    watching.at(2.1, watching.ask, error=OSError(errno.EBUSY, "too many openers"))
+    watching.at(60.1, watching.ask, there=False)
+    assert watching.run(70.0) == [(0.1, False), (0.3, True), (60.3, False)]
 
 
 @pytest.mark.parametrize("number", [errno.ENOENT, errno.ENODEV, errno.ENXIO])
-def test_nobody_reads_a_device_that_is_gone(quick, number):
+def test_nobody_reads_a_device_that_is_gone(number: int) -> None:
+    watching = Watching()
+    watching.ask.there = True
+    watching.at(2.1, watching.ask, error=OSError(number, "gone"))
+    watching.at(4.1, watching.ask, there=True)
+    assert watching.run(6.0) == [(0.1, False), (0.3, True), (2.3, False), (4.3, True)]
+
+
+def test_its_thread_starts_with_the_first_question_and_ends() -> None:
     ask = Readers()
+    monitor = ReaderMonitor(lambda: "/dev/video10", ask, Readers())
+    assert not monitor.has_readers()
     ask.there = True
-    watch = watch_with(ask, Readers())
-    assert watch.has_readers()
-    ask.error = OSError(number, "gone")
-    wait_until(lambda: not watch.has_readers())
-    ask.error = None
-    wait_until(watch.has_readers)
-    watch.close()
+    wait_until(monitor.has_readers)
+    monitor.close()
+    wait_until(lambda: not [thread for thread in threading.enumerate() if thread.name == "readers"])
 
 
 # What is asked of the driver.
 
 
 @pytest.fixture
-def node(tmp_path):
+def node(tmp_path: Path) -> str:
     path = tmp_path / "video10"
     path.touch()
     return str(path)
 
 
-def open_files():
+def open_files() -> int:
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
-def driver(monkeypatch, answer):
+def driver(monkeypatch: pytest.MonkeyPatch, answer: Callable[[int, bytearray], int]) -> list[tuple[int, bytes]]:
     """Let `fcntl.ioctl` answer like a driver; returns what was asked."""
-    asked = []
+    asked: list[tuple[int, bytes]] = []
 
-    def ioctl(device, request, argument):
+    def ioctl(device: int, request: int, argument: bytearray) -> int:
         asked.append((request, bytes(argument)))
         return answer(request, argument)
 
@@ -182,8 +193,10 @@ def driver(monkeypatch, answer):
 
 
 @pytest.mark.parametrize("count", [0, 1, 3])
-def test_the_first_event_of_a_subscription_is_the_answer(monkeypatch, node, count):
-    def answer(request, argument):
+def test_the_first_event_of_a_subscription_is_the_answer(
+    monkeypatch: pytest.MonkeyPatch, node: str, count: int
+) -> None:
+    def answer(request: int, argument: bytearray) -> int:
         if request == v4l2.VIDIOC_DQEVENT:
             struct.pack_into("=I4xI", argument, 0, v4l2.EVENT_CLIENT_USAGE, count)
         return 0
@@ -201,8 +214,8 @@ def test_the_first_event_of_a_subscription_is_the_answer(monkeypatch, node, coun
 
 
 @pytest.mark.parametrize("number", [errno.EINVAL, errno.ENOTTY])
-def test_a_driver_without_the_event_cannot_answer(monkeypatch, node, number):
-    def refuse(request, argument):
+def test_a_driver_without_the_event_cannot_answer(monkeypatch: pytest.MonkeyPatch, node: str, number: int) -> None:
+    def refuse(request: int, argument: bytearray) -> int:
         raise OSError(number, "no")
 
     driver(monkeypatch, refuse)
@@ -210,7 +223,7 @@ def test_a_driver_without_the_event_cannot_answer(monkeypatch, node, number):
         driver_reports_readers(node)
 
 
-def test_a_plain_file_cannot_answer_and_a_missing_one_is_an_os_error(node, tmp_path):
+def test_a_plain_file_cannot_answer_and_a_missing_one_is_an_os_error(node: str, tmp_path: Path) -> None:
     with pytest.raises(UnsupportedByDriverError):
         driver_reports_readers(node)
     with pytest.raises(FileNotFoundError):

@@ -24,7 +24,7 @@ def test_fitted_covers_and_centres() -> None:
     same = frame(0, wide)
     assert fit_frame(same, (400, 100)) is same
     small = fit_frame(frame(0, wide), (100, 50)).image
-    expected = cv2.resize(wide[:, 100:300], (100, 50), interpolation=cv2.INTER_AREA)
+    expected = np.asarray(cv2.resize(wide[:, 100:300], (100, 50), interpolation=cv2.INTER_AREA), np.uint8)
     assert difference(small, expected) < 2
     stripes = np.zeros((90, 180, 3), np.uint8)
     stripes[:, ::3] = 255

@@ -12,7 +12,8 @@ from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImag
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.light.light_map_rotation import LightMap, rotate_light_map
+from relit_camera.light.light_map import LightMap
+from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.ratio_relighting import (
     RatioRelighting,
     extrapolate_ratio,
@@ -160,4 +161,6 @@ def test_nearly_clipped_skin_dims_as_the_light_does() -> None:
     picture = relit_live(relighting(WINDOW), still_under(WINDOW) * 0.5, before_the_camera(), live_frame(image, 0))
     height, width = image.shape[:2]
     middle = picture[int(0.4 * height) : int(0.6 * height), int(0.4 * width) : int(0.6 * width)]
-    np.testing.assert_allclose(np.median(middle), 0.5 * linear_from_uint8(np.uint8([252]))[0], rtol=0.1)
+    np.testing.assert_allclose(
+        float(np.median(middle)), 0.5 * float(linear_from_uint8(np.array([252], np.uint8))[0]), rtol=0.1
+    )

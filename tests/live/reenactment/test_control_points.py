@@ -15,6 +15,7 @@ from relit_camera.live.reenactment.control_points import (
     MAX_LANDMARKS,
     NECK_PIVOT,
     SKULL_CENTER,
+    ControlPoints,
     control_points,
     fine_regions,
     head_and_shoulder_anchors,
@@ -26,6 +27,7 @@ from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.face_mesh import triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
 from relit_camera.live.reenactment.motion_transfer import rotate_about, transfer_motion
+from relit_camera.live.reenactment.source_image import SourceFace
 from tests.live.people import SCHEME, face_of, motion, person
 
 UP = np.array([0.0, -1.0])
@@ -37,11 +39,11 @@ def face():
 
 
 @pytest.fixture(scope="module")
-def points(face):
+def points(face: SourceFace):
     return control_points(face, head_and_shoulder_anchors(face.pose, face.size))
 
 
-def lids_lowered(face, share=1.0):
+def lids_lowered(face: SourceFace, share: float = 1.0):
     """The expression, head-space cm, that brings each upper lid down by a share of the way to the lower one."""
     expression = np.zeros((SCHEME.count, 3))
     for eye in (SCHEME.right_eye, SCHEME.left_eye):
@@ -51,7 +53,7 @@ def lids_lowered(face, share=1.0):
     return expression
 
 
-def test_lips_eyes_brows_and_outline_are_all_chosen(face):
+def test_lips_eyes_brows_and_outline_are_all_chosen(face: SourceFace) -> None:
     chosen = set(select_landmarks(SCHEME, face.landmarks.astype(float)).tolist())
     assert len(chosen) == MAX_LANDMARKS
     assert chosen >= {*SCHEME.lips, *SCHEME.eyes, *SCHEME.right_brow, *SCHEME.left_brow, *SCHEME.oval}
@@ -59,19 +61,19 @@ def test_lips_eyes_brows_and_outline_are_all_chosen(face):
     assert select_landmarks(small, small.canonical[:, :2]).tolist() == list(range(66))
 
 
-def test_the_chosen_are_spread_evenly(face, points):
+def test_the_chosen_are_spread_evenly(face: SourceFace, points: ControlPoints) -> None:
     """No landmark is far from a chosen one: farthest-point sampling leaves no hole."""
     distance = np.linalg.norm(face.landmarks[:, None] - points.source[None, : len(points.chosen)], axis=2).min(axis=1)
     assert distance.max() < 0.12 * points.unit
 
 
-def test_pairs_lie_over_each_other(points):
+def test_pairs_lie_over_each_other(points: ControlPoints) -> None:
     upper, lower = points.source[points.pairs.T]
     assert (lower[:, 1] >= upper[:, 1] - 1e-6).all()
     assert np.abs(lower[:, 0] - upper[:, 0]).max() < 0.06 * points.unit
 
 
-def test_open_lids_act_where_they_are(points):
+def test_open_lids_act_where_they_are(points: ControlPoints) -> None:
     """Two landmarks a whole reach apart need no handing over."""
     apart = points.source.copy()
     upper, lower = points.pairs.T
@@ -83,7 +85,7 @@ def test_open_lids_act_where_they_are(points):
     np.testing.assert_allclose(influence.strength, (points.unit / points.radius) ** 2)
 
 
-def test_lids_that_would_cross_meet_in_the_middle(points):
+def test_lids_that_would_cross_meet_in_the_middle(points: ControlPoints) -> None:
     crossed = points.source.copy()
     upper, lower = points.pairs.T
     crossed[upper] = points.source[lower] - 2 * UP  # two pixels below the lower one
@@ -93,7 +95,7 @@ def test_lids_that_would_cross_meet_in_the_middle(points):
     np.testing.assert_allclose(target[upper], points.source[lower] - UP)
 
 
-def test_a_shut_eye_has_no_iris(face, points):
+def test_a_shut_eye_has_no_iris(face: SourceFace, points: ControlPoints) -> None:
     shut, open_ = (
         transfer_motion(face, points, motion(expression=lids_lowered(face, share))).points for share in (1.0, 0.0)
     )
@@ -103,7 +105,9 @@ def test_a_shut_eye_has_no_iris(face, points):
     assert points.influence(open_, UP).strength[irises].min() > 0
 
 
-def test_a_blink_shows_the_upper_lid_above_the_slit_and_the_lower_lid_below_it(face, points):
+def test_a_blink_shows_the_upper_lid_above_the_slit_and_the_lower_lid_below_it(
+    face: SourceFace, points: ControlPoints
+) -> None:
     """The eyeball between the still's open lids is nowhere to be seen."""
     moved = transfer_motion(face, points, motion(expression=lids_lowered(face)))
     patches = face_and_head_flow(
@@ -132,7 +136,7 @@ def test_a_blink_shows_the_upper_lid_above_the_slit_and_the_lower_lid_below_it(f
             assert looks_y[below, column].min() > still[v, 1] - 0.2 * gap
 
 
-def test_fine_regions_hold_eyes_and_mouth(face):
+def test_fine_regions_hold_eyes_and_mouth(face: SourceFace) -> None:
     regions = fine_regions(face, face.landmarks.astype(float))
     for region, group in zip(regions, (SCHEME.right_eye.lids, SCHEME.left_eye.lids, SCHEME.lips), strict=True):
         part = face.landmarks[list(group)]
@@ -140,13 +144,13 @@ def test_fine_regions_hold_eyes_and_mouth(face):
         assert (part < region.box[2:]).all()
 
 
-def test_the_skulls_outline_stays_when_the_head_turns_about_its_middle(face):
+def test_the_skulls_outline_stays_when_the_head_turns_about_its_middle(face: SourceFace) -> None:
     rest = skull_outline(face.pose, face.size)
     nodded = rotate_about(SKULL_CENTER, face.pose, Rotation.from_euler("Y", 25, degrees=True))
     np.testing.assert_allclose(skull_outline(nodded, face.size), rest, atol=1e-3)
 
 
-def test_the_skulls_outline_rolls_and_grows_with_the_head(face):
+def test_the_skulls_outline_rolls_and_grows_with_the_head(face: SourceFace) -> None:
     rest, size = skull_outline(face.pose, face.size), face.size
     # A roll about the camera's own axis turns the whole picture: positive lifts its right side.
     roll = Rotation.from_euler("Z", 20, degrees=True)
@@ -158,7 +162,7 @@ def test_the_skulls_outline_rolls_and_grows_with_the_head(face):
     assert np.ptp(skull_outline(near, size)[:, 0]) > 1.15 * np.ptp(rest[:, 0])
 
 
-def test_shoulders_stay_while_the_head_turns_on_its_neck(face):
+def test_shoulders_stay_while_the_head_turns_on_its_neck(face: SourceFace) -> None:
     turned = rotate_about(NECK_PIVOT, face.pose, Rotation.from_euler("YXZ", [25, 10, 5], degrees=True))
     np.testing.assert_allclose(shoulder_anchors(turned, face.size), shoulder_anchors(face.pose, face.size), atol=1e-3)
     assert shoulder_anchors(face.pose, face.size)[:, 1].min() > face.landmarks[list(SCHEME.lips), 1].max()

@@ -16,22 +16,29 @@ def motion():
     return DenseMotion(SessionOptions())
 
 
-def cloud(seed=1, count=60):
+def cloud(seed: int = 1, count: int = 60):
     """Points spread over a head of two eye distances, and their reach."""
     points = np.random.default_rng(seed).uniform([20, 10], [100, 110], (count, 2))
     return points, np.full(count, 0.2 * UNIT)
 
 
-def plain(target, radius):
+def plain(target: np.ndarray, radius: np.ndarray):
     return Influence(target, target, (UNIT / radius) ** 2)
 
 
-def flow_at(motion, source, target, radius, region, influence=None):
+def flow_at(
+    motion: DenseMotion,
+    source: np.ndarray,
+    target: np.ndarray,
+    radius: np.ndarray,
+    region: Region,
+    influence: Influence | None = None,
+):
     (patch,) = motion.flow(source, influence or plain(target, radius), radius, UNIT, [region])
     return patch.flow.reshape(-1, 2)
 
 
-def formula(source, influence, radius, grid):
+def formula(source: np.ndarray, influence: Influence, radius: np.ndarray, grid: np.ndarray):
     """Σ_k w_k(x) (s_k + A_k (x − t_k)) / Σ w − x, and a still background, as models/first_order_motion says."""
     s, t, c, x = (points / UNIT for points in (source, influence.target, influence.centre, grid))
     r = radius / UNIT
@@ -47,7 +54,7 @@ def formula(source, influence, radius, grid):
     return UNIT * np.einsum("gk,gka->ga", weight, local) / (weight.sum(axis=1) + 1e-3)[:, None]
 
 
-def test_the_graph_computes_its_formula(motion):
+def test_the_graph_computes_its_formula(motion: DenseMotion) -> None:
     source, radius = cloud()
     rng = np.random.default_rng(2)
     target = source + rng.normal(0, 3, source.shape)
@@ -57,13 +64,13 @@ def test_the_graph_computes_its_formula(motion):
     np.testing.assert_allclose(flow_at(motion, source, target, radius, region, influence), expected, atol=0.02)
 
 
-def test_no_motion_is_no_flow(motion):
+def test_no_motion_is_no_flow(motion: DenseMotion) -> None:
     source, radius = cloud()
     region = region_around(source, 20, 16, 16)
     np.testing.assert_allclose(flow_at(motion, source, source, radius, region), 0, atol=1e-3)
 
 
-def test_a_shift_is_reproduced_among_the_points_and_dies_away_far_from_them(motion):
+def test_a_shift_is_reproduced_among_the_points_and_dies_away_far_from_them(motion: DenseMotion) -> None:
     source, radius = cloud()
     region = Region(np.array([35.0, 25, 85, 95]), 12, 12)
     flow = flow_at(motion, source, source + [6, -3], radius, region)
@@ -81,7 +88,7 @@ def test_a_shift_is_reproduced_among_the_points_and_dies_away_far_from_them(moti
     ],
     ids=["rotation", "growth", "shear"],
 )
-def test_an_affine_motion_of_the_points_is_the_flow_between_them(motion, linear):
+def test_an_affine_motion_of_the_points_is_the_flow_between_them(motion: DenseMotion, linear: np.ndarray) -> None:
     """Points move by x → B x + b; the backward flow is then B⁻¹(x − b) − x, up to the ridge toward translation."""
     source, radius = cloud()
     middle, linear, shift = np.array([60.0, 60.0]), np.array(linear), np.array([4.0, -2.0])
@@ -94,7 +101,7 @@ def test_an_affine_motion_of_the_points_is_the_flow_between_them(motion, linear)
     assert np.abs(error).max() < 1.0
 
 
-def test_regions_come_back_in_order(motion):
+def test_regions_come_back_in_order(motion: DenseMotion) -> None:
     source, radius = cloud()
     regions = [Region(np.array([0.0, 0, 120, 120]), 7, 9), Region(np.array([40.0, 40, 60, 50]), 5, 6)]
     both = motion.flow(source, plain(source + [5, 0], radius), radius, UNIT, regions)
@@ -105,7 +112,7 @@ def test_regions_come_back_in_order(motion):
         np.testing.assert_allclose(patch.flow, alone.flow, atol=1e-4)
 
 
-def test_a_grid_has_its_corners_at_the_boxs():
+def test_a_grid_has_its_corners_at_the_boxs() -> None:
     region = region_around(np.array([[10.0, 20], [30, 60]]), 5, 4, 3)
     np.testing.assert_array_equal(region.box, [5, 15, 35, 65])
     assert region.grid.shape == (12, 2)

@@ -13,6 +13,8 @@ from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.face_mesh import triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
 from relit_camera.live.reenactment.motion_transfer import transfer_motion
+from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.reenactment.warp import FlowPatch
 from tests.live.people import SCHEME, face_of, motion, person
 
 NOSE_TIP, NOSE_LEFT_WING, NOSE_RIGHT_WING = 1, 358, 129
@@ -24,7 +26,7 @@ def face():
     return face_of(person())
 
 
-def patches_of(face, turn):
+def patches_of(face: SourceFace, turn: Rotation):
     """The target, and the flow over the head without the mesh and over the face with it."""
     points = control_points(face, head_and_shoulder_anchors(face.pose, face.size))
     target = transfer_motion(face, points, motion(turn))
@@ -35,14 +37,14 @@ def patches_of(face, turn):
     return target, head, mesh
 
 
-def looks_at(patch, points):
+def looks_at(patch: FlowPatch, points: np.ndarray):
     """Where in the still the patch looks at points (count, 2) of the moved picture."""
     rows, columns = patch.flow.shape[:2]
     x, y = (np.linspace(patch.region[i], patch.region[i + 2], n) for i, n in ((0, columns), (1, rows)))
     return points + RegularGridInterpolator((y, x), patch.flow)(points[:, ::-1])
 
 
-def firm(face):
+def firm(face: SourceFace):
     """Landmarks in the middle of the face: none of the irises, and none at the outline, where the mesh hands over."""
     middle = face.landmarks[list(SCHEME.oval)].mean(axis=0)
     reach = np.linalg.norm(face.landmarks[list(SCHEME.oval)] - middle, axis=1).min()
@@ -52,7 +54,7 @@ def firm(face):
 
 
 @pytest.mark.parametrize("yaw", [-12, 0, 12])
-def test_every_landmark_of_a_face_that_hides_nothing_is_met(face, yaw):
+def test_every_landmark_of_a_face_that_hides_nothing_is_met(face: SourceFace, yaw: float) -> None:
     target, head, mesh = patches_of(face, Rotation.from_euler("Y", yaw, degrees=True))
     rows = firm(face)
     error, before = (
@@ -66,7 +68,7 @@ def test_every_landmark_of_a_face_that_hides_nothing_is_met(face, yaw):
 @pytest.mark.parametrize(
     ("yaw", "hidden", "seen"), [(35, NOSE_LEFT_WING, NOSE_RIGHT_WING), (-35, NOSE_RIGHT_WING, NOSE_LEFT_WING)]
 )
-def test_a_turned_nose_covers_its_far_side(face, yaw, hidden, seen):
+def test_a_turned_nose_covers_its_far_side(face: SourceFace, yaw: float, hidden: np.ndarray, seen: np.ndarray) -> None:
     target, _, mesh = patches_of(face, Rotation.from_euler("Y", yaw, degrees=True))
     near, far = looks_at(mesh, target.landmarks[[seen, hidden]])
     step = np.linalg.norm(face.landmarks[NOSE_LEFT_WING] - face.landmarks[NOSE_RIGHT_WING])
@@ -77,7 +79,9 @@ def test_a_turned_nose_covers_its_far_side(face, yaw, hidden, seen):
 
 
 @pytest.mark.parametrize("angles", [(35, 25, 10), (-35, -25, 5), (0, 25, 0), (28, -10, -10)])
-def test_no_point_looks_far_from_where_its_neighbours_look(face, angles):
+def test_no_point_looks_far_from_where_its_neighbours_look(
+    face: SourceFace, angles: tuple[float, float, float]
+) -> None:
     """Thin triangles, seen from the side, throw nothing away: all look inside the face."""
     _, _, mesh = patches_of(face, Rotation.from_euler("YXZ", angles, degrees=True))
     rows, columns = mesh.flow.shape[:2]
@@ -89,7 +93,7 @@ def test_no_point_looks_far_from_where_its_neighbours_look(face, angles):
     assert (inner < high + 0.1 * (high - low)).all()
 
 
-def test_outside_the_face_the_flow_is_the_heads(face):
+def test_outside_the_face_the_flow_is_the_heads(face: SourceFace) -> None:
     _, head, mesh = patches_of(face, Rotation.from_euler("Y", 15, degrees=True))
     left, top, right, bottom = mesh.region
     corners = np.array([(left, top), (right, top), (left, bottom), (right, bottom)])

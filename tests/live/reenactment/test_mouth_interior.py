@@ -10,11 +10,12 @@ import pytest
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.live.reenactment.motion_transfer import FACE_CENTER, rotate_about
 from relit_camera.live.reenactment.mouth_interior import MouthInterior
+from relit_camera.live.reenactment.source_image import SourceFace
 from tests.live.people import SCHEME, face_of, person
 
 SCALE = 4.0
 TO_OUTPUT = np.array([[SCALE, 0, 0], [0, SCALE, 0]])
-SKIN = np.float32([0.4, 0.25, 0.2])
+SKIN = np.array([0.4, 0.25, 0.2], np.float32)
 
 
 @pytest.fixture(scope="module")
@@ -23,18 +24,18 @@ def face():
 
 
 @pytest.fixture(scope="module")
-def mouth(face):
+def mouth(face: SourceFace):
     return MouthInterior(face, person().neutral)
 
 
-def opened(face, pixels):
+def opened(face: SourceFace, pixels: float):
     """Landmarks with the lower lip down by some still pixels."""
     landmarks = face.landmarks.astype(np.float64)
     landmarks[list(SCHEME.lower_lip_inner[1:-1]), 1] += pixels
     return landmarks
 
 
-def draw(mouth, face, landmarks, light=1.0, alpha=1.0):
+def draw(mouth: MouthInterior, face: SourceFace, landmarks: np.ndarray, light: float = 1.0, alpha: float = 1.0):
     """A picture of plain skin with the mouth drawn; and the skin."""
     shape = int(face.size[1] * SCALE), int(face.size[0] * SCALE)
     mask = np.full(shape, alpha, np.float32)
@@ -46,18 +47,18 @@ def draw(mouth, face, landmarks, light=1.0, alpha=1.0):
     return picture, skin
 
 
-def changed(picture, skin):
+def changed(picture: np.ndarray, skin: np.ndarray):
     rows, columns = np.nonzero(np.abs(picture - skin).max(axis=2) > 0.01)
     return (columns + 0.5) / SCALE, (rows + 0.5) / SCALE
 
 
-def test_a_shut_mouth_is_left_alone(mouth, face):
+def test_a_shut_mouth_is_left_alone(mouth: MouthInterior, face: SourceFace) -> None:
     for pixels in (0.0, -1.0):
         picture, skin = draw(mouth, face, opened(face, pixels))
         np.testing.assert_array_equal(picture, skin)
 
 
-def test_it_is_drawn_between_the_lips_and_nowhere_else(mouth, face):
+def test_it_is_drawn_between_the_lips_and_nowhere_else(mouth: MouthInterior, face: SourceFace) -> None:
     landmarks = opened(face, 8)
     x, y = changed(*draw(mouth, face, landmarks))
     lips = landmarks[[*SCHEME.upper_lip_inner, *SCHEME.lower_lip_inner]]
@@ -68,7 +69,7 @@ def test_it_is_drawn_between_the_lips_and_nowhere_else(mouth, face):
     assert y.max() < lips[:, 1].max() + 1.5
 
 
-def test_the_middle_is_dark_and_red(mouth, face):
+def test_the_middle_is_dark_and_red(mouth: MouthInterior, face: SourceFace) -> None:
     landmarks = opened(face, 8)
     picture, skin = draw(mouth, face, landmarks)
     x, y = landmarks[[SCHEME.lip_gap[1][0]]].mean(axis=0) - [0, 2]
@@ -78,7 +79,7 @@ def test_the_middle_is_dark_and_red(mouth, face):
     assert inside[0] > inside[2] > 0
 
 
-def test_teeth_are_brighter_than_the_cavity_and_lie_at_the_upper_lip(mouth, face):
+def test_teeth_are_brighter_than_the_cavity_and_lie_at_the_upper_lip(mouth: MouthInterior, face: SourceFace) -> None:
     landmarks = opened(face, 10)
     picture, _ = draw(mouth, face, landmarks)
     x = landmarks[list(SCHEME.lips), 0].mean()
@@ -89,13 +90,13 @@ def test_teeth_are_brighter_than_the_cavity_and_lie_at_the_upper_lip(mouth, face
     assert just_below > 2 * deep
 
 
-def test_it_is_lit_as_the_lips_are(mouth, face):
+def test_it_is_lit_as_the_lips_are(mouth: MouthInterior, face: SourceFace) -> None:
     landmarks = opened(face, 8)
     once, twice = (draw(mouth, face, landmarks, light)[0] for light in (1, 2))
     np.testing.assert_allclose(twice, 2 * once, rtol=1e-4)
 
 
-def test_it_fades_in_and_never_jumps(mouth, face):
+def test_it_fades_in_and_never_jumps(mouth: MouthInterior, face: SourceFace) -> None:
     """From shut to open in small steps, no pixel changes by more than a share of the way."""
     pictures = [draw(mouth, face, opened(face, pixels))[0] for pixels in np.arange(0, 3, 0.1)]
     steps = [np.abs(b - a).max() for a, b in pairwise(pictures)]
@@ -103,12 +104,12 @@ def test_it_fades_in_and_never_jumps(mouth, face):
     assert np.abs(pictures[-1] - pictures[0]).max() > 0.2
 
 
-def test_the_picture_stays_premultiplied(mouth, face):
+def test_the_picture_stays_premultiplied(mouth: MouthInterior, face: SourceFace) -> None:
     whole, half = (draw(mouth, face, opened(face, 8), alpha=alpha)[0] for alpha in (1.0, 0.5))
     np.testing.assert_allclose(half, whole / 2, atol=1e-5)
 
 
-def test_a_mouth_beyond_the_picture_is_no_trouble(mouth, face):
+def test_a_mouth_beyond_the_picture_is_no_trouble(mouth: MouthInterior, face: SourceFace) -> None:
     for corner in ((-5000, 0), (0, 5000), (120, 0)):
         picture = np.ones((40, 40, 3), np.float32)
         moved = np.column_stack([TO_OUTPUT[:, :2], corner]).astype(float)
@@ -117,7 +118,7 @@ def test_a_mouth_beyond_the_picture_is_no_trouble(mouth, face):
         np.testing.assert_array_equal(picture, 1)
 
 
-def test_teeth_turn_with_the_head(mouth, face):
+def test_teeth_turn_with_the_head(mouth: MouthInterior, face: SourceFace) -> None:
     """They are points of the skull, projected by the pose that they are drawn under."""
     turned = rotate_about(FACE_CENTER, face.pose, rotation_from_angles(0, 0, 15))
     band, rolled = (mouth._teeth(pose, TO_OUTPUT) for pose in (face.pose, turned))
@@ -127,7 +128,7 @@ def test_teeth_turn_with_the_head(mouth, face):
     assert angle == pytest.approx(15, abs=2)
 
 
-def test_teeth_part_in_the_middle_and_darken_to_the_sides(mouth, face):
+def test_teeth_part_in_the_middle_and_darken_to_the_sides(mouth: MouthInterior, face: SourceFace) -> None:
     x = face.landmarks[list(SCHEME.lips), 0]
     columns = np.linspace(x.min(), x.max(), 401) * SCALE
     row = mouth._row(face.pose, TO_OUTPUT, columns)

@@ -6,20 +6,21 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike
 
 from relit_camera.live.reenactment.warp import inverse_affine, move_body, source_from_output, visible_box
 
 STILL, OUTPUT = (150, 200), (1280, 720)
 
 
-def seen_at(placed, point):
+def seen_at(placed: np.ndarray, point: ArrayLike) -> np.ndarray:
     """Where a still position is seen in the output."""
     inverse = inverse_affine(placed)
-    return inverse[:, :2] @ point + inverse[:, 2]
+    return inverse[:, :2] @ np.asarray(point) + inverse[:, 2]
 
 
 @pytest.mark.parametrize("output", [(1280, 720), (640, 640), (300, 800)])
-def test_the_still_is_fitted_whole_and_stands_on_the_bottom_edge(output):
+def test_the_still_is_fitted_whole_and_stands_on_the_bottom_edge(output: tuple[int, int]) -> None:
     placed = source_from_output(STILL, output)
     left, top = seen_at(placed, (0, 0))
     right, bottom = seen_at(placed, STILL)
@@ -34,12 +35,14 @@ def test_the_still_is_fitted_whole_and_stands_on_the_bottom_edge(output):
     scale=st.floats(0.5, 2),
     pivot=st.tuples(st.floats(0, 150), st.floats(50, 260)),
 )
-def test_the_body_never_rises_off_the_bottom_edge(shift, scale, pivot):
+def test_the_body_never_rises_off_the_bottom_edge(
+    shift: tuple[float, float], scale: float, pivot: tuple[float, float]
+) -> None:
     placed = move_body(source_from_output(STILL, OUTPUT), np.array(pivot), np.array(shift), scale, STILL[1])
     assert seen_at(placed, (0, STILL[1]))[1] >= OUTPUT[1] - 1e-6
 
 
-def test_a_body_moves_by_its_shift_and_grows_about_its_pivot():
+def test_a_body_moves_by_its_shift_and_grows_about_its_pivot() -> None:
     rest, pivot = source_from_output(STILL, OUTPUT), np.array([75.0, 180.0])
     per_pixel = OUTPUT[1] / STILL[1]
     moved = move_body(rest, pivot, np.array([10.0, 5.0]), 1.0, STILL[1])
@@ -50,7 +53,7 @@ def test_a_body_moves_by_its_shift_and_grows_about_its_pivot():
     np.testing.assert_allclose(spread, [0, -120 * per_pixel])
 
 
-def test_the_visible_box_holds_all_that_is_seen():
+def test_the_visible_box_holds_all_that_is_seen() -> None:
     placed = move_body(source_from_output(STILL, OUTPUT), np.array([75.0, 180.0]), np.array([90.0, 0]), 1.1, STILL[1])
     left, top, right, bottom = visible_box(placed, STILL, OUTPUT)
     corner = seen_at(placed, (0, 0))
@@ -59,7 +62,7 @@ def test_the_visible_box_holds_all_that_is_seen():
     assert (right, bottom) == (min(OUTPUT[0], int(np.ceil(seen_at(placed, STILL)[0]))), OUTPUT[1])
 
 
-def test_inverse_affine_undoes():
+def test_inverse_affine_undoes() -> None:
     affine = np.array([[2.0, 0.5, 3], [-0.3, 1.5, 7]])
     both = np.vstack([affine, [0, 0, 1]]) @ np.vstack([inverse_affine(affine), [0, 0, 1]])
     np.testing.assert_allclose(both, np.eye(3), atol=1e-12)

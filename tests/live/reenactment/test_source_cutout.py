@@ -11,18 +11,18 @@ from relit_camera.live.reenactment.warp import Warp
 from tests.live.people import close_up, person
 
 
-def with_edges(over_black):
+def with_edges(over_black: bool):
     """The small person, said to be taken over black or not."""
     subject = person()
     return dataclasses.replace(subject, metadata=subject.metadata.model_copy(update={"over_black": over_black}))
 
 
-def unmoved(cutout, relit):
+def unmoved(cutout: Cutout, relit: np.ndarray):
     """Picture and alpha of the still as it lies."""
     return cutout.sampled(relit, cutout.positions(Warp(np.eye(2, 3), ()), (0, 0, relit.shape[1], relit.shape[0])))
 
 
-def test_a_cut_out_person_is_premultiplied():
+def test_a_cut_out_person_is_premultiplied() -> None:
     subject = with_edges(over_black=False)
     relit = np.full((*subject.matte.shape, 3), 0.5, np.float32)
     picture, alpha = unmoved(Cutout(subject), relit)
@@ -31,7 +31,7 @@ def test_a_cut_out_person_is_premultiplied():
     np.testing.assert_allclose(picture, 0.5 * np.repeat(alpha[..., None], 3, axis=2), atol=0.01)
 
 
-def test_frames_taken_over_black_carry_the_matte_already():
+def test_frames_taken_over_black_carry_the_matte_already() -> None:
     """Their soft edge is the person times the matte: it is not darkened a second time."""
     subject = with_edges(over_black=True)
     captured = np.repeat(0.5 * subject.matte[..., None], 3, axis=2)
@@ -39,12 +39,12 @@ def test_frames_taken_over_black_carry_the_matte_already():
     np.testing.assert_allclose(picture, 0.5 * np.repeat(alpha[..., None], 3, axis=2), atol=0.03)
 
 
-def test_who_is_seen_whole():
+def test_who_is_seen_whole() -> None:
     assert shows_whole_head(person().matte)
     assert not shows_whole_head(close_up().matte)
 
 
-def test_feathered_fades_at_sides_and_top_and_not_at_the_bottom():
+def test_feathered_fades_at_sides_and_top_and_not_at_the_bottom() -> None:
     matte = feather_edges(np.ones((100, 200), np.float32))
     assert matte.dtype == np.float32
     assert matte[:, [0, -1]].max() < 0.02

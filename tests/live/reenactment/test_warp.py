@@ -2,38 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
-from relit_camera.live.reenactment.warp import FlowPatch, Warp
+from relit_camera.live.reenactment.warp import Box, FlowPatch, Warp
 
 SIMILARITY = np.array([[0.7 * np.cos(0.3), -0.7 * np.sin(0.3), 36.0], [0.7 * np.sin(0.3), 0.7 * np.cos(0.3), -16.0]])
 WHOLE = (0, 0, 320, 240)
 REGION = np.array([40.0, 48.0, 200.0, 176.0])
 
 
-def smooth_picture(height=280, width=360):
+def smooth_picture(height: int = 280, width: int = 360) -> np.ndarray:
     rng = np.random.default_rng(5)
     return cv2.GaussianBlur(rng.random((height, width, 4)).astype(np.float32), (0, 0), 6)
 
 
-def looked_at(affine, box):
+def looked_at(affine: np.ndarray, box: Box) -> np.ndarray:
     """Where each output pixel's centre looks in the still, in our coordinates: (height, width, 2)."""
     x, y = np.meshgrid(np.arange(box[0], box[2]) + 0.5, np.arange(box[1], box[3]) + 0.5)
     return np.stack([x, y], axis=2) @ affine[:, :2].T + affine[:, 2]
 
 
-def patch_of(flow, region=REGION, rows=65, columns=81):
-    x, y = np.meshgrid(np.linspace(region[0], region[2], columns), np.linspace(region[1], region[3], rows))
-    return FlowPatch(flow(np.stack([x, y], axis=2)).astype(np.float32), np.asarray(region, dtype=np.float64))
+def patch_of(
+    flow: Callable[[np.ndarray], np.ndarray], region: ArrayLike = REGION, rows: int = 65, columns: int = 81
+) -> FlowPatch:
+    box = np.asarray(region, dtype=np.float64)
+    x, y = np.meshgrid(np.linspace(box[0], box[2], columns), np.linspace(box[1], box[3], rows))
+    return FlowPatch(flow(np.stack([x, y], axis=2)).astype(np.float32), box)
 
 
-def well_inside(looks, region=REGION, margin=32):
-    return ((looks > region[:2] + margin) & (looks < region[2:] - margin)).all(axis=2)
+def well_inside(looks: np.ndarray, region: np.ndarray = REGION, margin: int = 32) -> np.ndarray:
+    return np.asarray(((looks > region[:2] + margin) & (looks < region[2:] - margin)).all(axis=2))
 
 
-def test_without_flow_it_is_cv2s_affine_warp():
+def test_without_flow_it_is_cv2s_affine_warp() -> None:
     picture = smooth_picture()
     ours = Warp(SIMILARITY, ()).apply(picture, WHOLE)
     for_cv2 = SIMILARITY.copy()
@@ -44,34 +50,34 @@ def test_without_flow_it_is_cv2s_affine_warp():
     assert np.ptp(ours[seen]) > 0.05
 
 
-def test_the_identity_gives_the_picture_back():
+def test_the_identity_gives_the_picture_back() -> None:
     picture = smooth_picture()
     np.testing.assert_allclose(Warp(np.eye(2, 3), ()).apply(picture, (0, 0, 360, 280)), picture, atol=1e-4)
 
 
 @pytest.mark.parametrize("box", [WHOLE, (3, 5, 74, 58), (0, 0, 1, 1), (100, 50, 103, 240)])
-def test_positions_are_the_affine_ones_less_half_a_pixel_for_cv2(box):
+def test_positions_are_the_affine_ones_less_half_a_pixel_for_cv2(box: Box) -> None:
     np.testing.assert_allclose(Warp(SIMILARITY, ()).map(box), looked_at(SIMILARITY, box) - 0.5, atol=1e-3)
 
 
-def test_beyond_the_still_there_is_nothing():
+def test_beyond_the_still_there_is_nothing() -> None:
     view = Warp(np.array([[1.0, 0, -30], [0, 1, 0]]), ()).apply(np.ones((20, 20, 4), np.float32), (0, 0, 60, 20))
     assert view[:, :29].max() == 0
     np.testing.assert_allclose(view[:, 30:50], 1, atol=1e-4)
     assert view[:, 51:].max() == 0
 
 
-def test_an_enlarged_still_is_sampled_in_the_same_places():
+def test_an_enlarged_still_is_sampled_in_the_same_places() -> None:
     """A ramp has the value of its position, whatever its size: half-pixel conventions hold on both sides."""
     x, y = np.meshgrid(np.arange(360) + 0.5, np.arange(280) + 0.5)
     ramp = np.stack([x, y], axis=2).astype(np.float32)
-    large = cv2.resize(ramp, None, fx=3, fy=3, interpolation=cv2.INTER_LINEAR)
+    large = np.asarray(cv2.resize(ramp, None, fx=3, fy=3, interpolation=cv2.INTER_LINEAR), np.float32)
     box = (80, 80, 270, 230)
     warp = Warp(SIMILARITY, (patch_of(lambda u: 0 * u + 3), patch_of(lambda u: 0 * u + 7, (90, 90, 130, 130))))
     np.testing.assert_allclose(warp.apply(large, box, 3), warp.map(box) + 0.5, atol=0.02)
 
 
-def test_a_box_is_a_part_of_the_whole():
+def test_a_box_is_a_part_of_the_whole() -> None:
     """Wherever the box begins; what is interpolated differs by a share of a pixel where the flow fades."""
     warp = Warp(SIMILARITY, (patch_of(lambda u: 0.1 * u - 10),))
     part, whole = warp.map((13, 7, 253, 161)), warp.map(WHOLE)[7:161, 13:253]
@@ -82,7 +88,7 @@ def test_a_box_is_a_part_of_the_whole():
 
 @pytest.mark.parametrize("affine", [np.array([[0.5, 0, 12.0], [0, 0.5, 20.0]]), SIMILARITY], ids=["plain", "turned"])
 @pytest.mark.parametrize("fine", [False, True], ids=["head", "fine"])
-def test_a_linear_flow_is_reproduced_inside_its_region(affine, fine):
+def test_a_linear_flow_is_reproduced_inside_its_region(affine: np.ndarray, fine: bool) -> None:
     """Bilinear interpolation of a linear flow is exact; under the middle of the patch nothing of it fades."""
     bend = np.array([[0.1, -0.05], [0.02, -0.08]])
     patch = patch_of(lambda u: u @ bend.T + [2, -1])
@@ -94,7 +100,7 @@ def test_a_linear_flow_is_reproduced_inside_its_region(affine, fine):
     np.testing.assert_allclose(warp.map(WHOLE)[inside], expected[inside], atol=0.03)
 
 
-def test_the_flow_fades_to_nothing_outside_its_region():
+def test_the_flow_fades_to_nothing_outside_its_region() -> None:
     warp, still = Warp(SIMILARITY, (patch_of(lambda u: u * 0 + 5),)), Warp(SIMILARITY, ())
     moved = warp.map(WHOLE) - still.map(WHOLE)
     looks = looked_at(SIMILARITY, WHOLE)
@@ -105,17 +111,17 @@ def test_the_flow_fades_to_nothing_outside_its_region():
     assert max(steps) < 1  # no cliff
 
 
-def test_a_later_patch_wins_where_it_is():
+def test_a_later_patch_wins_where_it_is() -> None:
     warp = Warp(np.eye(2, 3), (patch_of(lambda u: u * 0 + 5), patch_of(lambda u: u * 0 - 2, (80, 80, 144, 144))))
     moved = warp.map(WHOLE) - Warp(np.eye(2, 3), ()).map(WHOLE)
     np.testing.assert_allclose(moved[96:128, 96:128], -2, atol=1e-3)
     np.testing.assert_allclose(moved[152:156, 80:150], 5, atol=1e-3)
 
 
-def test_a_later_patch_keeps_its_detail():
+def test_a_later_patch_keeps_its_detail() -> None:
     """Lids move within a few pixels: their flow is not thinned out as the head's is."""
 
-    def wave(u):
+    def wave(u: np.ndarray):
         return 3 * np.sin(u[..., ::-1] / 2)
 
     region = np.array([80.0, 80, 144, 144])

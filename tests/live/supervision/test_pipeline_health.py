@@ -192,6 +192,17 @@ def test_each_abandoned_worker_doubles_the_patience_with_the_next() -> None:
         assert StartWorker(worker + 1) in script.arrive(at)
 
 
+def test_after_a_picture_the_patience_is_ten_seconds_again() -> None:
+    script = working()
+    script.start(10.0)
+    script.arrive(20.1)
+    script.arrive(20.2)
+    script.start(20.2, worker=1)
+    script.render(21.0, worker=1)
+    script.start(30.0, worker=1)
+    assert RetireWorker(1) in script.arrive(40.1)
+
+
 def test_with_three_abandoned_workers_none_is_started_until_one_ends() -> None:
     script = working(HealthLimits(first_frame_factor=1))
     at = 10.0

@@ -1,1 +1,1 @@
-"""Alignment of photographs of a face to each other, so that one texel shows one place of the skin."""
+"""Aligning pictures of one face under different lights: rigid transforms, templates, picture sets, outliers."""

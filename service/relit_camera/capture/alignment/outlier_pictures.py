@@ -1,12 +1,13 @@
-"""What each picture of a set would be if the law of appearance held: a robust fit, pixel by pixel, to all of them.
+"""Outlier pictures of a one-light set: black ones, torn or noisy ones, and pictures of something else.
 
-The law is the reflectance model's without its shadows: pictures that are not yet aligned do not tell a shape by which
-shadows could be foretold. What does not fit, shadows and whatever one picture alone shows, counts little.
-
-Pictures of a set that no light could make: black ones, torn or noisy ones, pictures of something else.
+Each picture is compared with a prediction of it by the appearance model, fitted robustly, pixel by pixel, to all
+pictures of the set. The model is used without horizons: from pictures that are not yet aligned no shape can be found
+that would predict shadows. Shadows, and whatever a single picture shows, have little weight in the robust fit.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +17,43 @@ from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.geometry.photometric_stereo import photometric_stereo
 from relit_camera.capture.reflectance.appearance_model import appearance_terms, fit_appearance, half_directions
 
-_OPEN = 10.0
-"""A margin over the horizon with which nothing is hidden."""
+Floats = NDArray[np.float32]
+
+_UNOCCLUDED_MARGIN = 10.0
+"""A margin above the horizon at which nothing hides the light."""
 _BLOCK = 1 << 12
 """Pixels fitted at a time."""
+
+
+@dataclass(frozen=True)
+class OutlierTunables:
+    """Thresholds for outlier pictures, chosen on the sets of `relit evaluate olat` (docs/reflectance.md).
+
+    Attributes:
+        min_light_z: z of the light from which a prediction is good enough to judge by: light from behind lights rims
+            alone.
+        black_share: share of the predicted light below which a picture is black, if it should not be dark.
+        min_expected_share: share of the median predicted light from which a picture should not be dark.
+        max_roughness_ratio: roughness over the set's median above which a picture is torn or noisy.
+        min_correlation: with the prediction; below it a picture shows something else.
+        correlation_min_z: z of the light from which the correlation counts.
+    """
+
+    min_light_z: float = -0.2
+    black_share: float = 0.1
+    min_expected_share: float = 0.3
+    max_roughness_ratio: float = 4.0
+    min_correlation: float = 0.5
+    correlation_min_z: float = 0.0
+
+
+TUNABLES = OutlierTunables()
 
 
 def predict_pictures(
     pictures: NDArray[np.float32], directions: NDArray[np.float64], matte: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Luminance (lights, height, width) that the model gives each picture; 0 outside of the matte.
+    """Luminance (lights, height, width) of each picture as the appearance model predicts it; 0 outside the matte.
 
     Args:
         pictures: (lights, height, width, 3) linear.
@@ -42,51 +70,40 @@ def predict_pictures(
     for start in range(0, len(inside), _BLOCK):
         block = inside[start : start + _BLOCK]
         cosines = normals[block] @ toward.T
-        terms = appearance_terms(cosines, normals[block] @ half.T, np.full_like(cosines, _OPEN), toward[:, 2])
+        terms = appearance_terms(
+            cosines, normals[block] @ half.T, np.full_like(cosines, _UNOCCLUDED_MARGIN), toward[:, 2]
+        )
         amounts, _ = fit_appearance(terms, np.ascontiguousarray(values[:, block].T)[:, None], bright)
         predicted[:, block] = (amounts @ terms)[:, 0].T
     return predicted.reshape(lights, height, width)
 
 
-Floats = NDArray[np.float32]
-
-_JUDGED = -0.2
-"""Z of the light from which a prediction is good enough to judge by: light from behind reaches rims alone."""
-_BLACK, _EXPECTED = 0.1, 0.3
-"""Share of the predicted light below which a picture is black, where that is this share of the median."""
-_ROUGH = 4.0
-"""Times the median roughness."""
-_LEAST_LIKENESS = 0.5
-_FROM_THE_FRONT = 0.0
-"""Z from which a picture's features must be those predicted."""
-
-
 def find_outlier_pictures(
     light: Floats, predicted: Floats, directions: NDArray[np.float64], matte: Mask
 ) -> dict[int, str]:
-    """Index of each picture that does not belong to the set, and the reason to give.
+    """Index of each picture that does not belong to the set, with the reason as a text for the user.
 
     Args:
         light: (lights, height, width) luminance as captured.
-        predicted: (lights, height, width) luminance that a model fitted to all of them has.
+        predicted: (lights, height, width) luminance predicted by `predict_pictures`.
         directions: (lights, 3) unit vectors toward the lights.
         matte: (height, width).
     """
     inside = matte > 0.5
-    seen, expected = light[:, inside].mean(axis=1), predicted[:, inside].mean(axis=1)
-    share = seen / np.maximum(expected, 1e-9)
-    black = (share < _BLACK) & (expected > _EXPECTED * np.median(expected))
-    roughness = _roughness(light) / np.maximum(seen, 1e-3 * float(light.max()) + 1e-9)
+    observed, expected = light[:, inside].mean(axis=1), predicted[:, inside].mean(axis=1)
+    share = observed / np.maximum(expected, 1e-9)
+    black = (share < TUNABLES.black_share) & (expected > TUNABLES.min_expected_share * np.median(expected))
+    roughness = _roughness(light) / np.maximum(observed, 1e-3 * float(light.max()) + 1e-9)
     times = roughness / max(float(np.median(roughness)), 1e-9)
     correlation = masked_correlation(light, predicted, matte)
-    unlike = (correlation < _LEAST_LIKENESS) & (directions[:, 2] > _FROM_THE_FRONT)
+    uncorrelated = (correlation < TUNABLES.min_correlation) & (directions[:, 2] > TUNABLES.correlation_min_z)
     reasons = {}
-    for index in np.flatnonzero(directions[:, 2] > _JUDGED).tolist():
+    for index in np.flatnonzero(directions[:, 2] > TUNABLES.min_light_z).tolist():
         if black[index]:
             reasons[index] = f"black: {share[index]:.0%} of the light expected"
-        elif times[index] > _ROUGH:
+        elif times[index] > TUNABLES.max_roughness_ratio:
             reasons[index] = f"torn or noisy: {times[index]:.0f} times as rough as the others"
-        elif unlike[index]:
+        elif uncorrelated[index]:
             reasons[index] = f"unlike the others: correlation {correlation[index]:.2f} with what they predict"
     return reasons
 
@@ -100,6 +117,6 @@ def masked_correlation(light: Floats, predicted: Floats, matte: Mask) -> NDArray
 
 
 def _roughness(light: Floats) -> NDArray[np.float64]:
-    """Mean curvature (lights,) from pixel to pixel, down or across, whichever is more: torn fields show down."""
+    """Mean second difference (lights,) along columns or rows, whichever is larger: torn fields show along columns."""
     down, across = (np.abs(np.diff(light, 2, axis=axis)).mean(axis=(1, 2)) for axis in (1, 2))
     return np.asarray(np.maximum(down, across), np.float64)

@@ -1,4 +1,4 @@
-"""Rigid transforms in the picture (thesis 4.2.2)."""
+"""Rigid transforms in the picture plane (thesis 4.2.2): fitting, applying and interpolating them."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ Size = tuple[int, int]
 
 
 _MIN_PAIRS = 4
+"""Least number of agreeing point pairs that RANSAC accepts."""
 _TREND_S = 0.2
+"""Duration over which the trend at either end is measured, to extrapolate by."""
 
 
 @dataclass(frozen=True)
 class RigidTransform:
-    """A turn about the picture's centre, then a shift: it takes points of a frame to where they are in the reference.
+    """A rotation about the picture's center, then a shift: it takes points of a frame to the reference frame.
 
     Attributes:
         rotation_deg: counter-clockwise positive.
@@ -34,29 +36,29 @@ class RigidTransform:
     y: float = 0.0
 
     def matrix(self, size: Size) -> Floats:
-        """(2, 3): it maps points (x, y, 1), pixel centres at integers + ½, of a picture of this size."""
+        """The (2, 3) matrix that maps points (x, y, 1) of a picture of this size, pixel centers at integers + ½."""
         cosine, sine = np.cos(np.radians(self.rotation_deg)), np.sin(np.radians(self.rotation_deg))
         turn = np.array([[cosine, sine], [-sine, cosine]])  # y goes down
         centre = np.array(size) / 2
         return np.concatenate([turn, (centre - turn @ centre + (self.x, self.y))[:, None]], axis=1)
 
     def apply(self, points: NDArray, size: Size) -> Floats:
-        """Points (count, 2) of the frame, in the reference."""
+        """Points (count, 2) of the frame, mapped to the reference."""
         matrix = self.matrix(size)
         return np.asarray(points @ matrix[:, :2].T + matrix[:, 2])
 
     def then(self, later: RigidTransform) -> RigidTransform:
-        """Both, `later` after this one."""
+        """The composition: this transform, then `later`."""
         turn = later.matrix((0, 0))[:, :2]
         x, y = turn @ (self.x, self.y) + (later.x, later.y)
         return RigidTransform(self.rotation_deg + later.rotation_deg, float(x), float(y))
 
     def scaled(self, factor: float) -> RigidTransform:
-        """The same in a picture so many times as large."""
+        """The same transform in a picture `factor` times as large."""
         return RigidTransform(self.rotation_deg, self.x * factor, self.y * factor)
 
     def inverse(self) -> RigidTransform:
-        """From the reference to the frame."""
+        """The inverse transform, from the reference to the frame."""
         x, y = -RigidTransform(-self.rotation_deg).matrix((0, 0))[:, :2] @ (self.x, self.y)
         return RigidTransform(-self.rotation_deg, float(x), float(y))
 
@@ -74,23 +76,23 @@ def fit_rigid_transform(points: NDArray, targets: NDArray, size: Size) -> RigidT
 def fit_rigid_transform_ransac(
     points: NDArray, targets: NDArray, size: Size, tolerance_px: float
 ) -> tuple[RigidTransform, NDArray[np.bool_]] | None:
-    """The same of those pairs that agree within a tolerance, and which they are; None if fewer than four do.
+    """The least-squares transform of the inliers that RANSAC (Fischler and Bolles 1981) finds, and their mask.
 
-    By random samples (Fischler and Bolles 1981).
+    None where fewer than four pairs of points and targets (count, 2) agree within the tolerance.
     """
     if len(points) < _MIN_PAIRS:
         return None
-    _, agreeing = cv2.estimateAffinePartial2D(
+    _, inliers = cv2.estimateAffinePartial2D(
         np.float32(points), np.float32(targets), method=cv2.RANSAC, ransacReprojThreshold=tolerance_px
     )
-    if agreeing is None or int(agreeing.sum()) < _MIN_PAIRS:
+    if inliers is None or int(inliers.sum()) < _MIN_PAIRS:
         return None
-    inside = agreeing[:, 0] > 0
+    inside = inliers[:, 0] > 0
     return fit_rigid_transform(points[inside], targets[inside], size), inside
 
 
 def warp_to_reference(picture: NDArray[np.float32], transform: RigidTransform) -> NDArray[np.float32]:
-    """The frame's picture (height, width[, channels]) as it would be in the reference; its border repeats outside."""
+    """The frame's picture (height, width[, channels]) resampled in the reference frame, its border repeated."""
     height, width = picture.shape[:2]
     return warp_affine(picture, transform.matrix((width, height)), (width, height))
 
@@ -102,9 +104,9 @@ def warp_affine(picture: NDArray[np.float32], matrix: Floats, size: Size) -> NDA
 
 
 def interpolate_transforms(times_s: Floats, known_s: Floats, known: Sequence[RigidTransform]) -> list[RigidTransform]:
-    """Transforms at times (count,) between those known at growing times (thesis 4.3.3).
+    """Transforms at times (count,), linear between those known at ascending times (thesis 4.3.3).
 
-    Before the first and after the last they go on as they went over the nearest fifth of a second.
+    Before the first and after the last they are extrapolated by the trend of the nearest fifth of a second.
     """
     rows = transforms_to_array(known)
     between = np.stack([np.interp(times_s, known_s, column) for column in rows.T], axis=1)
@@ -119,12 +121,12 @@ def interpolate_transforms(times_s: Floats, known_s: Floats, known: Sequence[Rig
 
 
 def transforms_to_array(transforms: Sequence[RigidTransform]) -> Floats:
-    """Rotation in degrees, x and y: (count, 3)."""
+    """Rows (count, 3) of rotation in degrees, x and y."""
     return np.array([[each.rotation_deg, each.x, each.y] for each in transforms]).reshape(-1, 3)
 
 
 def transforms_from_array(rows: Floats) -> list[RigidTransform]:
-    """The inverse of `transforms_to_array`."""
+    """Transforms from rows (count, 3) of rotation in degrees, x and y."""
     return [RigidTransform(*row) for row in rows.tolist()]
 
 

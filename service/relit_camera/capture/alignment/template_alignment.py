@@ -1,18 +1,18 @@
-"""Aligning a picture to another of the same light by all of its pixels.
+"""Template alignment: the rigid transform to a picture of the same light, or to a prediction for it, by all pixels.
 
-Gauss and Newton's way, the template's gradient taken once (inverse compositional; Baker and Matthews 2004), pixels that
-do not fit counting less.
+`Template` minimizes the robust squared difference by Gauss-Newton steps with the template's gradient computed once
+(inverse compositional; Baker and Matthews 2004).
 
-Aligning pictures of one face under different light: each to what the others predict for its light.
-
-Light adds up, so a picture is nearly a weighted sum of those under similar light (Belhumeur and Kriegman 1998). Which
-weights, what is coarse tells: shading, hardly touched by a shift of a pixel. What is fine, features and texture, then
-tells the shift. Directions of the light need not be known.
+`align_across_lights` aligns pictures of one face under different lights. Light is additive, so a picture is nearly a
+weighted sum of those under similar light (Belhumeur and Kriegman 1998). The weights follow from coarse shading, which a
+shift of a pixel hardly changes; fine features and texture then give the shift. Directions of the lights need not be
+known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -28,29 +28,63 @@ from relit_camera.capture.alignment.rigid_transform import (
 )
 
 Picture = NDArray[np.float32]
+Pictures = NDArray[np.float32]
+Floats = NDArray[np.float64]
 
-_ITERATIONS = 12
-_ENOUGH_PX = 0.01
-_SAMPLED = 7
-"""Every so many-th pixel tells the errors' spread."""
-_OUTLIER = 3.0
-"""In standard deviations: from here a pixel's weight falls below one half."""
+
+@dataclass(frozen=True)
+class TemplateTunables:
+    """Constants of template alignment, chosen by `relit evaluate stabilisation`.
+
+    Attributes:
+        iterations: largest number of Gauss-Newton steps.
+        converged_px: a step that moves no pixel farther ends them.
+        residual_stride: every n-th residual enters the estimate of their spread.
+        outlier_deviations: residual, in standard deviations, at which a pixel has half its weight.
+        similar_pictures: number of pictures from which one is predicted.
+        ridge: of that regression, as a share of the mean diagonal.
+        fine_blur_px: standard deviation of the blur that removes detail finer than counts.
+        broad_share: side of the squares whose mean is removed from detail, as a share of the picture's.
+        thumbnail_side_px: side of the thumbnails that show shading alone, for the prediction's weights.
+        thumbnail_blur_px: standard deviation of their blur.
+        shade: summand under the root of light, as a share of the mean light: below it differences count no more.
+        largest_side_px: larger pictures are shrunk to this.
+        border_share: border left out, over which pictures move, as a share of the longer side.
+    """
+
+    iterations: int = 12
+    converged_px: float = 0.01
+    residual_stride: int = 7
+    outlier_deviations: float = 3.0
+    similar_pictures: int = 16
+    ridge: float = 0.02
+    fine_blur_px: float = 0.7
+    broad_share: float = 0.15
+    thumbnail_side_px: int = 48
+    thumbnail_blur_px: float = 1.0
+    shade: float = 0.02
+    largest_side_px: int = 256
+    border_share: float = 0.04
+
+
+TUNABLES = TemplateTunables()
 
 
 class Template:
-    """A picture to align others to."""
+    """A picture to which others are aligned."""
 
     def __init__(self, picture: Picture, weights: Picture, *, same_light: bool = True) -> None:
         """Prepare a template.
 
-        Under the same light it is fitted too how a head that nods or turns, rounder than the picture's plane, and one
-        that comes nearer differ from it. What that has in common with a shift, over all pixels alike, is shift: else
-        the features in the middle, which go farther, would decide. Under other light, shading would pass for it.
+        Under the same light the fit includes how a head that nods, turns or comes nearer differs from the template,
+        since a head is rounder than the picture plane. The part of that which all pixels have in common counts as
+        shift; otherwise the features in the middle, which move farther, would decide. Under other light these terms
+        are left out, because shading would be mistaken for them.
 
         Args:
             picture: (height, width).
-            weights: (height, width) how much each pixel counts.
-            same_light: whether pictures show the same light, but for a factor and a summand.
+            weights: (height, width) weight of each pixel.
+            same_light: whether pictures show the same light, up to a factor and an offset.
         """
         height, width = picture.shape
         down, right = np.gradient(picture)
@@ -69,26 +103,26 @@ class Template:
         self._picture = picture
 
     def align(self, picture: Picture, start: RigidTransform) -> RigidTransform:
-        """The transform about the picture's centre, near `start`, that takes a picture to the template.
+        """The transform about the picture's center, near `start`, from a picture to the template.
 
-        It is `start` where the template shows nothing that could move.
+        It is `start` where the template has no gradient.
         """
         if not self._jacobian.any():
             return start
         transform = start
         size = (picture.shape[1], picture.shape[0])
         reach = max(size) / 2
-        for _ in range(_ITERATIONS):
+        for _ in range(TUNABLES.iterations):
             difference = warp_affine(picture, transform.matrix(size), size) - self._picture
-            error = difference[self._inside].astype(np.float64)
-            some = error[::_SAMPLED]
-            scale = _OUTLIER * 1.4826 * float(np.median(np.abs(some - np.median(some)))) + 1e-9
-            weighted = self._jacobian * (self._weights / (1 + (error / scale) ** 2))[:, None]
+            residual = difference[self._inside].astype(np.float64)
+            some = residual[:: TUNABLES.residual_stride]
+            scale = TUNABLES.outlier_deviations * 1.4826 * float(np.median(np.abs(some - np.median(some)))) + 1e-9
+            weighted = self._jacobian * (self._weights / (1 + (residual / scale) ** 2))[:, None]
             normal = self._jacobian.T @ weighted
-            step = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(len(normal)), weighted.T @ error)
+            step = np.linalg.solve(normal + 1e-9 * np.trace(normal) * np.eye(len(normal)), weighted.T @ residual)
             turn, shift = -float(np.degrees(step[0])), step[1:3] + (step[3:5] if self._same_light else 0)
             transform = transform.then(RigidTransform(turn, float(shift[0]), float(shift[1])))
-            if abs(step[0]) * reach + np.abs(shift).max() < _ENOUGH_PX:
+            if abs(step[0]) * reach + np.abs(shift).max() < TUNABLES.converged_px:
                 break
         return transform
 
@@ -105,16 +139,16 @@ class Template:
 def align_to_mean(
     pictures: Sequence[Picture], weights: Picture, start: Sequence[RigidTransform], rounds: int = 2
 ) -> tuple[list[RigidTransform], Template]:
-    """Align pictures (height, width) of the same light to their mean, which has none of their noise.
+    """Align pictures (height, width) of the same light to their mean, which is less noisy.
 
     Args:
         pictures: at least one.
         weights: (height, width).
-        start: for each the transform from which to begin.
-        rounds: how often the mean is taken anew.
+        start: initial transform of each picture.
+        rounds: how often the mean is computed anew.
 
     Returns:
-        The transforms, about the pictures' centre, and the last mean.
+        The transforms about the pictures' center, and the last mean as a template.
     """
     transforms = list(start)
     size = (weights.shape[1], weights.shape[0])
@@ -128,24 +162,8 @@ def align_to_mean(
 
 
 def gaussian_blur(picture: Picture, pixels: float) -> Picture:
-    """A picture without detail finer than so many pixels (Gaussian)."""
+    """A picture blurred by a Gaussian with a standard deviation of `pixels`."""
     return np.asarray(cv2.GaussianBlur(picture, (0, 0), pixels), np.float32)
-
-
-Floats = NDArray[np.float64]
-Pictures = NDArray[np.float32]
-
-_LIKE = 16
-"""Pictures from which one is predicted."""
-_RIDGE = 0.02
-_FINE_PX, _BROAD = 0.7, 0.15
-"""The finest detail that counts; side of the squares whose mean is no detail, as a share of the picture's."""
-_THUMBNAIL, _COARSE_PX = 48, 1.0
-"""Side of pictures that show no more than shading, and how much they are smoothed."""
-_SHADE = 0.02
-"""Of the mean light: darkness in which differences no longer count for more."""
-_LARGEST_SIDE = 256
-_BORDER = 0.04
 
 
 def align_across_lights(
@@ -156,18 +174,18 @@ def align_across_lights(
     rounds: int = 6,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[RigidTransform]:
-    """Transforms, about the pictures' centre, that take each picture to where the face is on average.
+    """Transforms about the pictures' center that take each picture to the face's mean position.
 
     Args:
         pictures: (count, height, width) linear light, three at least.
-        weights: (height, width) how much each pixel counts: 0 where the background is.
-        start: transforms to begin with; none if not given.
-        groups: (count,) pictures of one group do not predict each other: their errors are the same.
-        rounds: how often all are predicted anew.
+        weights: (height, width) weight of each pixel, 0 on the background.
+        start: initial transforms; the identity if not given.
+        groups: (count,) group of each picture; those of one group do not predict each other, as they share errors.
+        rounds: how often all pictures are predicted anew.
         progress: called with rounds done and their total.
     """
     count, height, width = pictures.shape
-    scale = min(1.0, _LARGEST_SIDE / max(height, width))
+    scale = min(1.0, TUNABLES.largest_side_px / max(height, width))
     small = np.stack([shrink(picture, scale) for picture in pictures])
     inside = without_border(shrink(weights, scale))
     transforms = [each.scaled(scale) for each in start] if start else [RigidTransform()] * count
@@ -189,39 +207,39 @@ def _one_round(
     for index, picture in enumerate(pictures):
         like, shares = _prediction(gram, index, groups)
         predicted = np.tensordot(shares, moved[like], axes=1).astype(np.float32)
-        shade = _SHADE * float(moved[index].mean()) + 1e-9
+        shade = TUNABLES.shade * float(moved[index].mean()) + 1e-9
         template = Template(visible_detail(predicted, shade), weights, same_light=False)
         aligned.append(template.align(visible_detail(picture, shade), start[index]))
         moved[index] = np.maximum(warp_to_reference(picture, aligned[index]), 0)
-    # Only how they lie to each other is told: on average they stay where they were.
+    # Only relative motion can be measured, so the mean of all transforms stays what it was.
     rows = transforms_to_array(aligned)
     return transforms_from_array(rows - rows.mean(axis=0) + transforms_to_array(start).mean(axis=0))
 
 
 def _prediction(gram: Floats, index: int, groups: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
-    """The pictures most like one, and their shares in it: ridge regression of what is coarse.
+    """Indices of the pictures most similar to one, and their weights in its prediction, by ridge regression.
 
     Args:
-        gram: (count, count) inner products of what is coarse in the pictures.
-        index: of the one.
-        groups: (count,) of all.
+        gram: (count, count) inner products of the pictures' thumbnails.
+        index: of the picture to predict.
+        groups: (count,) group of each picture.
     """
     length = np.maximum(np.sqrt(gram.diagonal()), 1e-12)
     likeness = np.where(groups == groups[index], -np.inf, gram[index] / (length * length[index]))
-    like = np.argsort(-likeness)[: min(_LIKE, int(np.isfinite(likeness).sum()))]
+    like = np.argsort(-likeness)[: min(TUNABLES.similar_pictures, int(np.isfinite(likeness).sum()))]
     among = gram[np.ix_(like, like)]
-    ridge = _RIDGE * np.trace(among) / len(like) * np.eye(len(like))
+    ridge = TUNABLES.ridge * np.trace(among) / len(like) * np.eye(len(like))
     return like, np.linalg.solve(among + ridge, gram[like, index])
 
 
 def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Floats:
-    """The pictures' shading (count, values), without features."""
-    size = (min(weights.shape[1], _THUMBNAIL), min(weights.shape[0], _THUMBNAIL))
+    """Small blurred pictures (count, values) that show shading without features."""
+    size = (min(weights.shape[1], TUNABLES.thumbnail_side_px), min(weights.shape[0], TUNABLES.thumbnail_side_px))
 
     def small(picture: NDArray[np.float32]) -> NDArray[np.float32]:
-        return gaussian_blur(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), _COARSE_PX)
+        return gaussian_blur(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), TUNABLES.thumbnail_blur_px)
 
-    # Light from outside the weights must not leak in, nor be missed at their edge.
+    # Normalized by the blurred weights, so that the edge is neither darkened nor mixed with what lies outside.
     share = small(weights)
     inside = np.sqrt(share) / np.maximum(share, 1e-3)
     return (
@@ -230,15 +248,15 @@ def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Floats:
 
 
 def visible_detail(light: NDArray[np.float32], shade: float) -> NDArray[np.float32]:
-    """Detail of linear light (height, width) as the eye weighs it: of the root, neither too fine nor too broad."""
+    """Band-pass of the square root of linear light (height, width): features, without noise and broad shading."""
     root = np.sqrt(np.maximum(light, 0) + np.float32(shade))
-    mean = cv2.blur(root, 2 * [round(_BROAD * max(light.shape))])
-    return np.asarray(gaussian_blur(root, _FINE_PX) - mean, np.float32)
+    mean = cv2.blur(root, 2 * [round(TUNABLES.broad_share * max(light.shape))])
+    return np.asarray(gaussian_blur(root, TUNABLES.fine_blur_px) - mean, np.float32)
 
 
 def without_border(weights: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Weights (height, width), 0 along the border, over which pictures move."""
-    border = max(2, round(_BORDER * max(weights.shape)))
+    """Weights (height, width) set to 0 along the border, over which pictures move."""
+    border = max(2, round(TUNABLES.border_share * max(weights.shape)))
     inner = np.zeros_like(weights)
     inner[border:-border, border:-border] = weights[border:-border, border:-border]
     return inner

@@ -1,1 +1,1 @@
-"""Capture from a film: from a video of a face under a moving lamp to one linear picture for each light."""
+"""Capture from a film: a face, one or two mirror balls and a moving lamp become one linear picture for each light."""

@@ -1,9 +1,9 @@
-"""Depth whose slopes are given normals, with steps where the surface has steps.
+"""Normal integration: the depth map whose slopes are those of given normals, with steps where the surface has steps.
 
-Bilateral normal integration (Cao, Santo, Shi, Okura and Matsushita, ECCV 2022). Along each axis a pixel's normal says
-how far its two neighbours lie before or behind it. On a continuous surface both are right; at a step one is wrong, and
-the side that fits better is believed: its weight is a sigmoid of how much worse the other fits. Weights and depth are
-found in turn; every round is a weighted Poisson equation.
+Bilateral normal integration (Cao, Santo, Shi, Okura and Matsushita, ECCV 2022). Along each axis a pixel's normal
+predicts how far its two neighbours lie before or behind it. On a continuous surface both predictions hold; at a step
+one fails, so each is weighted by a sigmoid of how much worse the other fits. Weights and depth are found in turn; every
+round is a weighted Poisson equation.
 """
 
 from __future__ import annotations
@@ -19,38 +19,50 @@ from scipy.special import expit
 Floats = NDArray[np.float32]
 Values = NDArray[np.float64]
 
-SHARPNESS = 2.0
-"""k of the sigmoid: how decidedly one side is believed (the paper's value)."""
-ROUNDS = 6
-CHANGE = 1e-3
-"""Rounds end when the energy changes by less than this share."""
-ACCURACY = 1e-3
-"""Of each round's equations, relative."""
-MIN_FACING = 0.15
-"""Least z of a normal: a slope of 6.6. Steeper ones are seen too narrowly to be measured."""
-ANCHOR = 1e-6
-"""Weight that holds every part of the picture near 0: pieces that do not touch have no common depth."""
+
+@dataclass(frozen=True)
+class IntegrationTunables:
+    """Constants of the integration, chosen by `relit evaluate field` on rendered heads unless the paper gives them.
+
+    Attributes:
+        sharpness: k of the sigmoid: how sharply one side is preferred over the other (the paper's value).
+        rounds: largest number of rounds of reweighting.
+        min_energy_change: relative change of the energy below which the rounds end.
+        solver_tolerance: relative residual to which each round's equations are solved.
+        min_facing: least z of a normal: a slope of 6.6. Steeper surfaces are seen too narrowly to be measured.
+        anchor: weight that pulls all depths toward 0, because pieces that do not touch have no common depth.
+    """
+
+    sharpness: float = 2.0
+    rounds: int = 6
+    min_energy_change: float = 1e-3
+    solver_tolerance: float = 1e-3
+    min_facing: float = 0.15
+    anchor: float = 1e-6
+
+
+TUNABLES = IntegrationTunables()
 
 
 @dataclass(frozen=True)
 class _Side:
-    """What the normals say of the step to the neighbour at one side, for all pixels: matrix @ depth = steps."""
+    """Equations for the depth step from each pixel to its neighbour on one side: matrix @ depth = steps."""
 
     matrix: csr_array
     steps: Values
 
 
 def integrate_normals(
-    normals: Floats, inside: NDArray[np.bool_], trust: Floats | None = None, focal_px: float | None = None
+    normals: Floats, inside: NDArray[np.bool_], confidence: Floats | None = None, focal_px: float | None = None
 ) -> Floats:
     """Depth (height, width) float32 in pixels, toward the camera, mean 0; NaN outside.
 
     Args:
         normals: (height, width, 3) unit vectors.
         inside: (height, width) pixels that have depth.
-        trust: (height, width), how much each pixel's normal counts; all alike where None.
+        confidence: (height, width) weight of each pixel's normal; equal weights where None.
         focal_px: the camera's focal length, its axis through the picture's middle; parallel projection where None. With
-            it a pixel is what it spans at the person's mean distance.
+            it the unit of depth is a pixel's width at the person's mean distance.
     """
     facing, right, up = _slopes(normals, inside, focal_px)
     count = len(facing)
@@ -60,22 +72,22 @@ def integrate_normals(
         _side(inside, facing, -1, 0, up),
         _side(inside, -facing, 1, 0, up),
     ]
-    share = np.ones(count) if trust is None else trust[inside].astype(np.float64)
-    weights = [0.5 * share] * 4
+    reliability = np.ones(count) if confidence is None else confidence[inside].astype(np.float64)
+    weights = [0.5 * reliability] * 4
     depth, energy, precondition = np.zeros(count), np.inf, None
-    for _ in range(ROUNDS):
+    for _ in range(TUNABLES.rounds):
         matrix, target = _normal_equations(sides, weights)
         if precondition is None:
-            # Weights of later rounds differ little from the first's: its factors serve all.
+            # Weights change little after the first round: its factorization preconditions all.
             factors = splu(csc_array(matrix), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
             precondition = LinearOperator(matrix.shape, factors.solve, dtype=np.float64)
-        depth, _ = cg(matrix, target, x0=depth, M=precondition, rtol=ACCURACY, maxiter=200)
+        depth, _ = cg(matrix, target, x0=depth, M=precondition, rtol=TUNABLES.solver_tolerance, maxiter=200)
         misfits = [(side.matrix @ depth - side.steps) ** 2 for side in sides]
         before, energy = energy, sum(float(w @ m) for w, m in zip(weights, misfits, strict=True))
-        if abs(before - energy) < CHANGE * energy:
+        if abs(before - energy) < TUNABLES.min_energy_change * energy:
             break
-        first, third = (expit(SHARPNESS * (misfits[i + 1] - misfits[i])) for i in (0, 2))
-        weights = [share * w for w in (first, 1 - first, third, 1 - third)]
+        first, third = (expit(TUNABLES.sharpness * (misfits[i + 1] - misfits[i])) for i in (0, 2))
+        weights = [reliability * w for w in (first, 1 - first, third, 1 - third)]
     if focal_px is not None:
         depth = focal_px * -np.expm1(-(depth - depth.mean()) / focal_px)
     result = np.full(inside.shape, np.nan, np.float32)
@@ -84,7 +96,7 @@ def integrate_normals(
 
 
 def _slopes(normals: Floats, inside: NDArray[np.bool_], focal_px: float | None) -> tuple[Values, Values, Values]:
-    """Of each pixel inside: z of its normal as the pixel's ray sees it, and that times its slope to the right and up.
+    """For each pixel inside: z of its normal along the pixel's ray, and that times its slope to the right and up.
 
     In perspective the unknown is −f·log of the distance, whose slopes are -n_x and -n_y over n_z − (n_x·x + n_y·y) / f
     for a pixel at (x, y) from the axis.
@@ -94,14 +106,14 @@ def _slopes(normals: Floats, inside: NDArray[np.bool_], focal_px: float | None) 
         height, width = inside.shape
         row, column = np.nonzero(inside)
         z = z - (x * (column + 0.5 - width / 2) + y * (height / 2 - row - 0.5)) / focal_px
-    return np.maximum(z, MIN_FACING), -x, -y
+    return np.maximum(z, TUNABLES.min_facing), -x, -y
 
 
 def _side(inside: NDArray[np.bool_], facing: Values, down: int, right: int, steps: Values) -> _Side:
-    """The equations facing · (neighbour − pixel) = steps toward the neighbour `down` rows and `right` columns away.
+    """Equations facing · (neighbour − pixel) = steps for the neighbour `down` rows and `right` columns away.
 
-    For neighbours at the left and below, facing and so the step come with the other sign. Pixels without that neighbour
-    have none.
+    For neighbours on the left and below, `facing` and so the step have the opposite sign. Pixels without that
+    neighbour have no equation.
     """
     height, width = inside.shape
     number = np.full((height + 2, width + 2), -1)
@@ -115,7 +127,8 @@ def _side(inside: NDArray[np.bool_], facing: Values, down: int, right: int, step
 
 
 def _normal_equations(sides: list[_Side], weights: list[Values]) -> tuple[csr_array, Values]:
-    matrix = csr_array(diags_array(np.full(len(weights[0]), ANCHOR)))
+    """The matrix and right-hand side of the weighted least-squares problem."""
+    matrix = csr_array(diags_array(np.full(len(weights[0]), TUNABLES.anchor)))
     target = np.zeros(len(weights[0]))
     for side, weight in zip(sides, weights, strict=True):
         weighted = side.matrix.T @ diags_array(weight)

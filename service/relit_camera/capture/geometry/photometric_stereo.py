@@ -1,8 +1,8 @@
-"""Normals and albedo from pictures under one light at a time, shadows and highlights left out.
+"""Photometric stereo: normals and albedo from pictures under one light at a time, robust to shadows and highlights.
 
 Lambert's law for one pixel under distant lights l of unit irradiance is I = ρ·max(0, n·l): three unknowns, ρ·n, and as
-many equations as lights (Woodham 1980). Some are false: light blocked by another part of the face, highlights, light
-that comes from the skin around. They are found as what does not fit, by iteratively reweighted least squares.
+many equations as lights (Woodham 1980). Some do not hold: light blocked by another part of the face, highlights,
+light that the skin around reflects. Iteratively reweighted least squares gives those little weight.
 """
 
 from __future__ import annotations
@@ -20,34 +20,50 @@ Floats = NDArray[np.float32]
 
 BLOCK = 1 << 12
 """Pixels solved at a time: 1 MB an array at 64 lights, which stays in the cache."""
-ITERATIONS = 10
 
-BRIGHT_PERCENTILE = 90.0
-"""Of a pixel's values: its unit, below its highlights."""
-SHADOW, LIT = 0.05, 0.25
-"""In that unit: what is darker than the first counts for nothing at first, what is brighter than the other wholly."""
-SPREAD = 0.05
-"""Least residual, in the pixel's unit, that makes an equation count half: so strobes vary, and skin from the law."""
-GRAZING = 0.3
-"""Cosine below which a light counts less: there indirect light and errors of direction weigh most."""
-QUANTUM = 0.004
-"""Noise of a picture in the whole set's unit: a step of 8 bits."""
-TRUSTED_DEG = 8.0
-"""Expected error of a normal that is trusted by half."""
-OBLIQUE = 0.15
-"""Cosine below which a light says nothing about what blocks it."""
+
+@dataclass(frozen=True)
+class PhotometricStereoTunables:
+    """Constants of the robust fit, chosen by `relit evaluate olat` and `relit evaluate field` (docs/reflectance.md).
+
+    Attributes:
+        iterations: of reweighting.
+        unit_percentile: of a pixel's values over the lights; that value, below its highlights, is the pixel's unit.
+        shadow: value in that unit below which an observation has no weight at first.
+        lit: value in that unit above which it has full weight at first.
+        spread: least residual, in the pixel's unit, at which an observation has half its weight: what strobes vary by,
+            and what skin deviates from Lambert's law.
+        grazing_cosine: cosine below which a light has less weight: there indirect light and errors of direction weigh
+            most.
+        noise: of a picture, as a share of the bright values of all pictures: a step of 8 bits.
+        half_confidence_deg: expected error of a normal whose confidence is one half.
+        oblique_cosine: cosine below which a light tells nothing about what blocks it.
+    """
+
+    iterations: int = 10
+    unit_percentile: float = 90.0
+    shadow: float = 0.05
+    lit: float = 0.25
+    spread: float = 0.05
+    grazing_cosine: float = 0.3
+    noise: float = 0.004
+    half_confidence_deg: float = 8.0
+    oblique_cosine: float = 0.15
+
+
+TUNABLES = PhotometricStereoTunables()
 
 
 @dataclass(frozen=True)
 class PhotometricStereoResult:
-    """What photometric stereo finds, every pixel by itself.
+    """Normals and albedo of every pixel, fitted independently of its neighbours.
 
     Attributes:
         normals: (height, width, 3) float32 unit vectors; (0, 0, 1) where nothing is known.
-        albedo: (height, width, 3) float32 linear: what a white wall under the same light would have as 1.
-        confidence: (height, width) float32, 0 unknown to 1 certain, by the error expected of the normal.
-        lit: (lights, height, width) float16, share 0..1 of what the normal predicts that arrived; NaN where the light
-            is behind the surface or nearly so.
+        albedo: (height, width, 3) float32 linear reflectance, 1 for a white wall.
+        confidence: (height, width) float32, 0 unknown to 1 certain, by the expected error of the normal.
+        lit: (lights, height, width) float16, measured light as a share 0..1 of what the normal predicts; NaN where the
+            light is behind the surface or nearly so.
     """
 
     normals: Floats
@@ -72,7 +88,7 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
     albedo = np.zeros((height * width, 3), np.float32)
     confidence = np.zeros(height * width, np.float32)
     lit = np.full((lights, height * width), np.nan, np.float16)
-    noise = QUANTUM * float(np.percentile(luminance(flat[:, inside[:: max(1, len(inside) // 4096)]]), 99))
+    noise = TUNABLES.noise * float(np.percentile(luminance(flat[:, inside[:: max(1, len(inside) // 4096)]]), 99))
 
     def solve(block: NDArray[np.intp]) -> None:
         colours = flat[:, block]
@@ -81,18 +97,18 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
         length = np.linalg.norm(scaled, axis=1, keepdims=True)
         known = length[:, 0] > 0
         normals[block[known]] = scaled[known] / length[known]
-        confidence[block] = np.where(known, 1 / (1 + (error_deg / TRUSTED_DEG) ** 2), 0)
+        confidence[block] = np.where(known, 1 / (1 + (error_deg / TUNABLES.half_confidence_deg) ** 2), 0)
         cosine = np.maximum(normals[block] @ toward.T, 0)
         shares = weights * cosine
         albedo[block] = (
             np.einsum("pl,lpc->pc", shares, colours) / np.maximum(np.einsum("pl,pl->p", shares, cosine), 1e-6)[:, None]
         )
         arrived = np.clip(values / np.maximum(length * cosine, 1e-6), 0, 1)
-        arrived[(cosine < OBLIQUE) | ~known[:, None]] = np.nan
+        arrived[(cosine < TUNABLES.oblique_cosine) | ~known[:, None]] = np.nan
         lit[:, block] = arrived.T
 
     with worker_pool() as pool:
-        # Asked for, so that what goes wrong is raised.
+        # Consuming the results raises what a worker raised.
         list(pool.map(solve, (inside[start : start + BLOCK] for start in range(0, len(inside), BLOCK))))
     return PhotometricStereoResult(
         normals.reshape(height, width, 3),
@@ -103,20 +119,20 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
 
 
 def _fit(values: Floats, toward: Floats, noise: float) -> tuple[Floats, Floats, Floats]:
-    """ρ·n (pixels, 3) of values (pixels, lights), the weights used, and the normals' expected error (pixels,) in °."""
-    unit = np.percentile(values, BRIGHT_PERCENTILE, axis=1, keepdims=True).astype(np.float32)
+    """ρ·n (pixels, 3) fitted to values (pixels, lights), the final weights, and the expected error in degrees."""
+    unit = np.percentile(values, TUNABLES.unit_percentile, axis=1, keepdims=True).astype(np.float32)
     values = np.asarray(values / np.maximum(unit, 1e-9), np.float32)
-    spread = np.hypot(SPREAD, noise / np.maximum(unit, 1e-9))
-    brightness = np.clip((values - SHADOW) / (LIT - SHADOW), 0, 1)
+    spread = np.hypot(TUNABLES.spread, noise / np.maximum(unit, 1e-9))
+    brightness = np.clip((values - TUNABLES.shadow) / (TUNABLES.lit - TUNABLES.shadow), 0, 1)
     weights = brightness
-    for _ in range(ITERATIONS):
+    for _ in range(TUNABLES.iterations):
         scaled, _ = _solve(weights, values, toward)
         predicted = np.maximum(scaled @ toward.T, 0)
         residual = np.abs(values - predicted)
         typical = np.einsum("pl,pl->p", weights, residual) / np.maximum(weights.sum(axis=1), 1e-6)
         scale = np.maximum(spread, typical[:, None])
         length = np.linalg.norm(scaled, axis=1, keepdims=True)
-        facing = np.clip(predicted / np.maximum(GRAZING * length, 1e-9), 0, 1)
+        facing = np.clip(predicted / np.maximum(TUNABLES.grazing_cosine * length, 1e-9), 0, 1)
         weights = facing * np.minimum(brightness * 2, 1) / (1 + (residual / scale) ** 2)
     scaled, inverse = _solve(weights, values, toward)
     misfit = np.sqrt(np.einsum("pl,pl->p", weights, residual**2) / np.maximum(weights.sum(axis=1), 1e-6))
@@ -130,7 +146,7 @@ def _fit(values: Floats, toward: Floats, noise: float) -> tuple[Floats, Floats, 
 def _solve(weights: Floats, values: Floats, toward: Floats) -> tuple[Floats, Floats]:
     """Weighted least squares of ρ·n (pixels, 3), and the inverse (pixels, 3, 3) of its normal matrix."""
     products = (toward[:, :, None] * toward[:, None, :]).reshape(-1, 9)
-    # A trace of a unit matrix, so that pixels with fewer than three lights have a solution, one of little worth.
+    # A small multiple of the unit matrix, so that pixels with fewer than three lights have a (poor) solution.
     normal_matrix = (weights @ products).reshape(-1, 3, 3) + np.float32(1e-3) * np.eye(3, dtype=np.float32)
     inverse = np.linalg.inv(normal_matrix)
     return np.einsum("pij,pj->pi", inverse, (weights * values) @ toward), inverse

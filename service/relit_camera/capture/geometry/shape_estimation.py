@@ -1,4 +1,4 @@
-"""What the shape of a person says about their light."""
+"""A person's geometry, estimated from one-light pictures: normals, albedo, depth and horizons."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class Geometry:
 
     Attributes:
         normals: (height, width, 3) float32 unit vectors; (0, 0, 1) outside of the matte.
-        albedo: (height, width, 3) float32 linear, where a white wall has 1; 0 outside.
-        confidence: (height, width) float32, how far a pixel's own pictures tell its normal: 0 not at all, 1 surely.
+        albedo: (height, width, 3) float32 linear reflectance, 1 for a white wall; 0 outside.
+        confidence: (height, width) float32, reliability of a pixel's own normal: 0 unknown to 1 certain.
         depth: (height, width) float32 in pixels toward the camera, mean 0; NaN outside.
-        horizon: which light the rest of the surface hides.
+        horizon: which lights the rest of the surface hides from each pixel.
     """
 
     normals: Floats
@@ -54,19 +54,8 @@ def estimate_geometry(
         matte: (height, width) alpha of the person.
         focal_px: focal length in pixels where it is known; the depth is then right in perspective.
     """
-    shading = photometric_stereo(pictures, directions, matte)
-    normals = complete_normals(shading.normals, shading.confidence, matte)
-    depth = integrate_normals(normals, matte > 0.5, shading.confidence, focal_px)
-    horizon = calibrate_horizon_map(compute_horizon_map(depth), shading.lit, directions)
-    return Geometry(normals, shading.albedo, shading.confidence, depth, horizon)
-
-
-def pixels_per_cm(distance_px: float, distance_cm: float) -> float:
-    """Scale of a depth in pixels, by something in the picture whose size is known: eyes are 6.3 cm apart on average.
-
-    Raises:
-        ValueError: a distance is not positive.
-    """
-    if not (distance_px > 0 and distance_cm > 0):
-        raise ValueError(f"no scale in {distance_px} px for {distance_cm} cm")
-    return distance_px / distance_cm
+    result = photometric_stereo(pictures, directions, matte)
+    normals = complete_normals(result.normals, result.confidence, matte)
+    depth = integrate_normals(normals, matte > 0.5, result.confidence, focal_px)
+    horizon = calibrate_horizon_map(compute_horizon_map(depth), result.lit, directions)
+    return Geometry(normals, result.albedo, result.confidence, depth, horizon)

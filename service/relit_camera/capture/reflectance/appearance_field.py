@@ -1,4 +1,4 @@
-"""A fitted model of each pixel's appearance, and what it leaves unexplained interpolated over directions."""
+"""The method `model`: the appearance model fitted to each pixel, plus its residual interpolated over directions."""
 
 from __future__ import annotations
 
@@ -26,18 +26,21 @@ from relit_camera.subject.reflectance_field import texel_vectors
 
 Floats = NDArray[np.float32]
 
-BLOCK = 512
+FIT_BLOCK = 512
 """Pixels fitted at a time: 2 MB of terms for 200 lights."""
-PAIRS = 1 << 17
-"""Of a pixel and a direction, answered at a time: half a megabyte a term, which stays in the cache."""
+QUERY_BLOCK = 1 << 17
+"""Pairs of a pixel and a direction evaluated at a time: half a megabyte a term, which stays in the cache."""
 VALIDATION_PIXELS = 4096
-"""Pixels by which the residual's kernel is chosen."""
+"""Number of pixels by which cross-validation chooses the residual's kernel."""
 FOLDS = 5
-NEAR_REACH = float(np.radians(4.0))
+"""Parts of the cross-validation."""
+SHORT_REACH_RAD = float(np.radians(4.0))
+"""Reach of the second kernel, for what is true of one light's own direction only."""
 MAX_COMPENSATION = 2.0
-"""With fewer captured lights on a pixel's own side of the shadow than half by weight, less of the residual is known."""
-MEASUREMENT = 0.01
-"""Variance of the pictures' own noise."""
+"""Largest factor that makes up for captured lights on the other side of a shadow's edge. Where less than half of the
+weight lies on the pixel's own side, the residual is predicted too small rather than extrapolated."""
+PICTURE_NOISE_VARIANCE = 0.01
+"""Variance of the pictures' own noise, in units of the residual's variance."""
 KERNEL_CANDIDATES = [
     Kernel(float(np.radians(reach)), noise) for reach in (10, 15, 20, 30, 45, 70) for noise in (0.03, 0.1, 0.3, 1.0)
 ]
@@ -45,29 +48,28 @@ KERNEL_CANDIDATES = [
 
 @dataclass(frozen=True)
 class AppearanceMethod:
-    """Appearance plus residual.
+    """The appearance model plus a Gaussian process for its residual.
 
-    The appearance model reaches beyond the sampled region, where interpolation has nothing to say; the residual, a
-    Gaussian process about 0, ends there by itself.
+    The appearance model extrapolates beyond the sampled region; the residual has mean 0 and fades to 0 there.
     """
 
     def build(self, samples: Samples) -> AppearanceField:
-        """The field; see `Method.build`. It rests on `samples.geometry`."""
+        """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         region_coverage(samples.directions, samples.directions[:1])
         inside = np.flatnonzero(samples.matte.ravel() > 0)
-        judges = inside[:: max(1, len(inside) // VALIDATION_PIXELS)]
-        gloss = specular_prior(_fit(samples, inside)[1], inside, samples.matte)
-        return AppearanceField(samples, _fit(samples, inside, gloss)[0], choose_kernel(samples, judges))
+        validation = inside[:: max(1, len(inside) // VALIDATION_PIXELS)]
+        specular = specular_prior(_fit(samples, inside)[1], inside, samples.matte)
+        return AppearanceField(samples, _fit(samples, inside, specular)[0], choose_kernel(samples, validation))
 
 
 @dataclass(frozen=True)
 class AppearanceField:
-    """What `AppearanceMethod` builds.
+    """The field that `AppearanceMethod` builds.
 
     Attributes:
         samples: the captured lights.
-        amounts: (pixels, 3, TERMS) of the appearance's terms.
-        kernel: of the residual over directions.
+        amounts: (pixels, 3, TERM_COUNT) of the appearance model's terms.
+        kernel: covariance of the residual over directions.
     """
 
     samples: Samples
@@ -81,29 +83,29 @@ class AppearanceField:
 
     def dense(self, start: int, stop: int) -> Floats:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
-        return self._answer(texel_vectors(), self._texel_weights, np.arange(start, stop)).transpose(0, 2, 1)
+        return self._evaluate(texel_vectors(), self._texel_weights, np.arange(start, stop)).transpose(0, 2, 1)
 
     def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
         weights = residual_weights(self.kernel, self.samples.directions, directions)
-        return self._answer(directions, weights, pixels).transpose(2, 0, 1)
+        return self._evaluate(directions, weights, pixels).transpose(2, 0, 1)
 
     @cached_property
     def _texel_weights(self) -> Floats:
         return residual_weights(self.kernel, self.samples.directions, texel_vectors())
 
     def fitted_to(self, samples: Samples, pixels: NDArray[np.intp]) -> AppearanceField:
-        """The same model of other samples of this person, fitted at some row-major pixels only."""
+        """A field with the same kernel, fitted to other samples of this person at these row-major pixels only."""
         return AppearanceField(samples, _fit(samples, pixels)[0], self.kernel)
 
     def appearance_at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
-        """R as `at`, without the residual."""
+        """R as `at` gives it, of the appearance model alone, without the residual."""
         return _modelled(self.samples, self.amounts, directions, pixels).transpose(2, 0, 1)
 
-    def _answer(self, directions: NDArray[np.float64], weights: Floats, pixels: NDArray[np.intp]) -> Floats:
-        """(pixels, 3, count), by weights (lights, count) of the residual."""
+    def _evaluate(self, directions: NDArray[np.float64], weights: Floats, pixels: NDArray[np.intp]) -> Floats:
+        """R as (pixels, 3, count), given the weights (lights, count) that predict the residual."""
         result = np.empty((len(pixels), 3, len(directions)), np.float32)
-        step = max(1, PAIRS // max(1, len(directions)))
+        step = max(1, QUERY_BLOCK // max(1, len(directions)))
         for start in range(0, len(pixels), step):
             block = pixels[start : start + step]
             found = _modelled(self.samples, self.amounts, directions, block)
@@ -113,61 +115,60 @@ class AppearanceField:
         return result
 
     def _residual(self, directions: NDArray[np.float64], weights: Floats, pixels: NDArray[np.intp]) -> Floats:
-        """The residual (pixels, 3, count) that the captured lights foretell: lit ones for lit pixels, others for dark.
+        """The predicted residual (pixels, 3, count): for lit queries from lights that reach the pixel, else the rest.
 
-        What the model is wrong by in the light says nothing of the shadow, and the other way round.
+        The model's error in direct light says nothing about its error in shadow, and the other way round.
         """
-        known, shape = self.samples.directions, self.samples.geometry
-        left = appearance_residual(self.samples, self.amounts, pixels)
-        lit, asked = (
-            direct_light_fractions(shape, known, pixels),
-            direct_light_fractions(shape, directions, pixels)[:, None],
-        )
-        in_light, in_shadow = (_predicted_residual(weights, share, left) for share in (lit, 1 - lit))
-        return np.asarray(asked * in_light + (1 - asked) * in_shadow)
+        geometry = self.samples.geometry
+        residual = appearance_residual(self.samples, self.amounts, pixels)
+        lit = direct_light_fractions(geometry, self.samples.directions, pixels)
+        query_lit = direct_light_fractions(geometry, directions, pixels)[:, None]
+        in_light, in_shadow = (_predicted_residual(weights, fraction, residual) for fraction in (lit, 1 - lit))
+        return np.asarray(query_lit * in_light + (1 - query_lit) * in_shadow)
 
 
-def _predicted_residual(weights: Floats, share: Floats, left: Floats) -> Floats:
-    """Residuals (pixels, 3, count) by weights (lights, count); captured ones (pixels, 3, lights) count by their share.
+def _predicted_residual(weights: Floats, fractions: Floats, residual: Floats) -> Floats:
+    """Residuals (pixels, 3, count) predicted from captured ones (pixels, 3, lights), each counted by its fraction.
 
-    The weights' sum over those that count is made up to the sum of all, within MAX_COMPENSATION.
+    The weights (lights, count) are rescaled, by MAX_COMPENSATION at most, so that those counted by their fractions
+    (pixels, lights) have the sum of all.
     """
-    counted = share @ weights
+    counted = fractions @ weights
     factor = np.clip(weights.sum(axis=0) / np.maximum(counted, 1e-3), 0, MAX_COMPENSATION)
-    foretold = (share[:, None] * left).reshape(-1, len(weights)) @ weights
-    return np.asarray(foretold.reshape(*left.shape[:2], -1) * factor[:, None])
+    predicted = (fractions[:, None] * residual).reshape(-1, len(weights)) @ weights
+    return np.asarray(predicted.reshape(*residual.shape[:2], -1) * factor[:, None])
 
 
 def _fit(
     samples: Samples, pixels: NDArray[np.intp], expected: SpecularEstimate | None = None
 ) -> tuple[Floats, SpecularEstimate]:
-    """Amounts of all pixels (height · width, 3, TERMS), 0 but at the given ones, and these ones' highlights."""
+    """Amounts (height · width, 3, TERM_COUNT), 0 but at the given pixels, and the specular estimate of those pixels."""
     geometry, bright = samples.geometry, _bright(samples)
     amounts = np.zeros((samples.matte.size, 3, TERM_COUNT), np.float32)
-    gloss = SpecularEstimate(*np.zeros((2, len(pixels), len(SPECULAR_TERMS)), np.float32))
+    specular = SpecularEstimate(*np.zeros((2, len(pixels), len(SPECULAR_TERMS)), np.float32))
 
     def fit(start: int) -> None:
-        part = slice(start, start + BLOCK)
+        part = slice(start, start + FIT_BLOCK)
         block = pixels[part]
         terms = distant_terms(geometry, samples.directions, block)
-        hoped = None if expected is None else SpecularEstimate(expected.amounts[part], expected.precision[part])
-        amounts[block], found = fit_appearance(terms, _values(samples, block), bright, hoped)
-        gloss.amounts[part], gloss.precision[part] = found.amounts, found.precision
+        prior = None if expected is None else SpecularEstimate(expected.amounts[part], expected.precision[part])
+        amounts[block], found = fit_appearance(terms, _values(samples, block), bright, prior)
+        specular.amounts[part], specular.precision[part] = found.amounts, found.precision
 
     with worker_pool() as pool:
-        # Asked for, so that what goes wrong is raised.
-        list(pool.map(fit, range(0, len(pixels), BLOCK)))
-    return amounts, gloss
+        # Consuming the results raises what a worker raised.
+        list(pool.map(fit, range(0, len(pixels), FIT_BLOCK)))
+    return amounts, specular
 
 
 def _values(samples: Samples, pixels: NDArray[np.intp]) -> Floats:
-    """What row-major pixels show (pixels, 3, lights)."""
+    """Captured values (pixels, 3, lights) of row-major pixels."""
     pictures = samples.pictures.reshape(len(samples.directions), -1, 3)
     return np.ascontiguousarray(pictures[:, pixels].transpose(1, 2, 0))
 
 
 def _bright(samples: Samples) -> float:
-    """The 99th percentile of the person's values."""
+    """The 99th percentile of the person's values: the level that counts as bright."""
     inside = np.flatnonzero(samples.matte.ravel() > 0.5)
     some = inside[:: max(1, len(inside) // VALIDATION_PIXELS)]
     return float(np.percentile(samples.pictures.reshape(len(samples.directions), -1, 3)[:, some], 99))
@@ -179,33 +180,32 @@ def _modelled(samples: Samples, amounts: Floats, directions: NDArray[np.float64]
 
 
 def appearance_residual(samples: Samples, amounts: Floats, pixels: NDArray[np.intp]) -> Floats:
-    """What the appearance leaves of the pictures at row-major pixels: (pixels, 3, lights)."""
+    """Captured values minus those of the appearance model at row-major pixels: (pixels, 3, lights)."""
     return np.asarray(_values(samples, pixels) - _modelled(samples, amounts, samples.directions, pixels))
 
 
 def residual_weights(kernel: Kernel, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> Floats:
-    """Weights (lights, queries) of a process about 0 (simple kriging): they fall to 0 away from every light.
+    """Weights (lights, queries) of simple kriging with mean 0: they fall to 0 away from every light.
 
-    What no other light explains is not all noise: most of it is true of its own direction and changes within a few
-    degrees, as a shadow's edge does. So it counts as a second process, of short reach, and a captured light returns
-    nearly its own picture (a nugget that is micro-scale variation; Cressie 1993, 2.3.1).
+    What other lights do not explain is mostly no noise but true of its own direction and changes within a few degrees,
+    as a shadow's edge does. So it is modelled as a second process of short reach, and a captured light returns nearly
+    its own picture (a nugget of micro-scale variation; Cressie 1993, 2.3.1).
     """
-    near = Kernel(NEAR_REACH, 0)
+    near = Kernel(SHORT_REACH_RAD, 0)
 
     def covariance(others: NDArray[np.float64]) -> NDArray[np.float64]:
         return kernel.covariance(directions, others) + kernel.noise * near.covariance(directions, others)
 
-    known = covariance(directions) + MEASUREMENT * np.eye(len(directions))
+    known = covariance(directions) + PICTURE_NOISE_VARIANCE * np.eye(len(directions))
     return np.asarray(cho_solve(cho_factor(known), covariance(queries)), np.float32)
 
 
 def choose_kernel(samples: Samples, pixels: NDArray[np.intp]) -> Kernel:
-    """The residual's kernel that foretells lights best which neither it nor the appearance was fitted to.
+    """The candidate kernel that best predicts lights left out of both the appearance fit and the residual.
 
-    Cross-validation in FOLDS parts, of one light at least, over row-major pixels. What the appearance leaves of lights
-    that it was fitted to is smaller and rougher than what it leaves of others, so leaving lights out of the residual
-    alone misleads. The shape is that of all lights, so those judged are not wholly unseen; and the appearance is fitted
-    without what neighbours tell of highlights.
+    Cross-validation in FOLDS parts, of one light at least, over row-major pixels. The appearance model is fitted anew
+    for each part, because its residual is smaller and rougher for lights that it was fitted to. The geometry is that of
+    all lights, so those left out are not wholly unseen, and the fit is without the specular prior.
     """
     lights = len(samples.directions)
     folds = min(FOLDS, lights)
@@ -214,14 +214,14 @@ def choose_kernel(samples: Samples, pixels: NDArray[np.intp]) -> Kernel:
     bright = _bright(samples)
 
     def errors_of(fold: int) -> list[float]:
-        """Of each candidate."""
+        """Sum of squared errors of each candidate for the lights of one part."""
         left_out = np.arange(lights) % folds == fold
         amounts, _ = fit_appearance(terms[..., ~left_out], values[..., ~left_out], bright)
-        off = values - amounts @ terms
-        known, asked = samples.directions[~left_out], samples.directions[left_out]
-        known_off, asked_off = (off[..., part].reshape(-1, part.sum()) for part in (~left_out, left_out))
-        foretold = (known_off @ residual_weights(kernel, known, asked) for kernel in KERNEL_CANDIDATES)
-        return [float(np.sum((asked_off - each) ** 2)) for each in foretold]
+        residual = values - amounts @ terms
+        known, queries = samples.directions[~left_out], samples.directions[left_out]
+        fitted, truth = (residual[..., part].reshape(-1, part.sum()) for part in (~left_out, left_out))
+        predicted = (fitted @ residual_weights(kernel, known, queries) for kernel in KERNEL_CANDIDATES)
+        return [float(np.sum((truth - each) ** 2)) for each in predicted]
 
     with worker_pool() as pool:
         errors = np.sum(list(pool.map(errors_of, range(folds))), axis=0)

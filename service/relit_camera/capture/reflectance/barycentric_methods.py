@@ -22,12 +22,12 @@ from relit_camera.subject.reflectance_field import FactoredField
 
 @dataclass(frozen=True)
 class SphericalBarycentric:
-    """Triangles on the sphere, weights by areas of spherical sub-triangles (Langer et al. 2006)."""
+    """Method `barycentric`: weights by areas of sub-triangles on the sphere (Langer et al. 2006)."""
 
     max_gap_deg: float = MAX_GAP_DEG
 
     def build(self, samples: Samples) -> FactoredField:
-        """The field; see `Method.build`."""
+        """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
     def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -40,13 +40,13 @@ class SphericalBarycentric:
 
 @dataclass(frozen=True)
 class PlanarBarycentric:
-    """Triangles and weights in the plane of azimuth and elevation: the thesis's first, simpler variant.
+    """Method `planar`: triangles and weights in the plane of azimuth and elevation, the thesis's first variant.
 
-    Nothing wraps round the seam behind the subject, as in the thesis.
+    As in the thesis no triangle crosses the seam behind the subject.
     """
 
     def build(self, samples: Samples) -> FactoredField:
-        """The field; see `Method.build`."""
+        """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
     def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -57,7 +57,7 @@ class PlanarBarycentric:
         except (QhullError, ValueError) as error:
             raise degenerate_directions_error(len(directions)) from error
         points = np.stack(spherical_from_direction(queries), axis=1)
-        # Not `find_simplex`: its tolerance is a share of each triangle, not an angle. The triangles turn
+        # Not `find_simplex`: its tolerance is relative to each triangle's size, not an angle. The triangles are
         # counter-clockwise, so a point inside lies to the left of every side.
         corners = plane[triangulation.simplices]
         sides = np.roll(corners, -1, axis=1) - corners

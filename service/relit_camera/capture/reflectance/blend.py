@@ -1,4 +1,4 @@
-"""The default: the fitted model of each pixel and a smooth interpolation, mixed as the capture itself says."""
+"""The method `blend`, the default: `model` and `rbf` mixed in a proportion that cross-validation chooses."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ from relit_camera.subject.reflectance_field import FactoredField, texel_vectors
 Floats = NDArray[np.float32]
 
 FOLDS = 4
+"""Parts of the cross-validation."""
 
 
 @dataclass(frozen=True)
 class Blend:
-    """A mean of `model` and `rbf` where lights were captured; `model` alone where none were.
+    """A weighted mean of `model` and `rbf` inside the sampled region; `model` alone beyond it.
 
-    The model has the shadows' edges where the shape says, the splines have none. Where the shape and the directions
-    are exact the model is nearly always right; where they are not, the truth mostly lies between the two.
+    The model has shadow edges where the geometry puts them, the splines have none. Where geometry and directions are
+    exact the model is nearly always right; where they are not, the truth mostly lies between the two.
     """
 
     def build(self, samples: Samples) -> BlendField:
-        """The field; see `Method.build`. It rests on `samples.geometry`."""
+        """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         modelled = AppearanceMethod().build(samples)
         smooth = factored_field(RadialBasis(), samples)
         return BlendField(modelled, smooth, choose_model_share(modelled))
@@ -37,12 +38,12 @@ class Blend:
 
 @dataclass(frozen=True)
 class BlendField:
-    """What `Blend` builds.
+    """The field that `Blend` builds.
 
     Attributes:
-        modelled: answers every direction.
-        smooth: black beyond the sampled region, into which it fades.
-        share: of the model inside the region; the rest is the smooth field's.
+        modelled: the field of `model`, for every direction.
+        smooth: the field of `rbf`, which fades to black beyond the sampled region.
+        share: weight of the model inside the region, 0..1; the smooth field has the rest.
     """
 
     modelled: AppearanceField
@@ -70,9 +71,9 @@ class BlendField:
         return region_coverage(self.smooth.directions, texel_vectors())
 
     def _mixed(self, modelled: Floats, smooth: Floats, covered: Floats) -> Floats:
-        """One field of two, which is written over the first.
+        """The weighted mean of both fields, written over `modelled`.
 
-        What the smooth field answers has `covered` in it as a factor already: it is its weight.
+        `covered` is the weight of the smooth field, whose values have it as a factor already.
         """
         rest = 1 - self.share
         total = self.share + rest * covered + 1e-9
@@ -82,11 +83,11 @@ class BlendField:
 
 
 def choose_model_share(modelled: AppearanceField) -> float:
-    """The model's share that foretells best the lights that neither part was fitted to: 0 to 1.
+    """The model's weight 0..1 that best predicts lights left out of both fits (stacking; Breiman 1996).
 
-    Cross-validation over the lights that others surround, by some pixels: least squares (stacking; Breiman 1996).
-    The model's shape and kernel are those of all lights, so those judged are not wholly unseen; and its appearance is
-    fitted without what neighbours tell of highlights, which the field's own has.
+    Cross-validation in FOLDS parts over the lights that others surround, by least squares over some pixels. Geometry
+    and kernel are those of all lights, so those left out are not wholly unseen; and unlike the final field the
+    appearance is fitted without the specular prior.
     """
     samples = modelled.samples
     lights = len(samples.directions)
@@ -105,10 +106,10 @@ def choose_model_share(modelled: AppearanceField) -> float:
             directions=samples.directions[kept],
             known_geometry=samples.geometry,
         )
-        asked = samples.directions[left_out]
-        smooth = np.maximum(factored_field(RadialBasis(), known).at(asked, pixels), 0)
-        apart = modelled.fitted_to(known, pixels).at(asked, pixels) - smooth
+        queries = samples.directions[left_out]
+        smooth = np.maximum(factored_field(RadialBasis(), known).at(queries, pixels), 0)
+        difference = modelled.fitted_to(known, pixels).at(queries, pixels) - smooth
         truth = samples.pictures.reshape(lights, -1, 3)[left_out][:, pixels]
-        agreement += float(np.vdot(apart, truth - smooth))
-        distance += float(np.vdot(apart, apart))
+        agreement += float(np.vdot(difference, truth - smooth))
+        distance += float(np.vdot(difference, difference))
     return float(np.clip(agreement / distance, 0, 1)) if distance else 1.0

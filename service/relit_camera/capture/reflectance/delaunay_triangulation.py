@@ -11,20 +11,21 @@ from scipy.spatial import ConvexHull, QhullError
 from relit_camera.base.errors import LightsError
 
 MAX_GAP_DEG = 60.0
-"""A circle of this angular radius with no light in it bounds the sampled region: wider triangles are no data."""
+"""Largest angular radius of a triangle's circumscribed circle. Wider triangles span unsampled directions, and are left
+out: they bound the sampled region."""
 
 TOLERANCE = np.radians(0.1)
-"""So far outside of the sampled region a direction still counts as on its edge: people and files round directions."""
+"""Directions this far outside the sampled region, in radians, count as on its edge: files round directions."""
 
 
 @dataclass(frozen=True)
 class TriangleLookup:
-    """Where directions lie among the sampled ones.
+    """Triangles of captured lights that contain some query directions, and the barycentric weights there.
 
     Attributes:
         covered: (count,) indices of the queries that lie in a triangle.
-        corners: (count, 3) lights at its corners.
-        weights: (count, 3) float32, the query's barycentric coordinates in it; they sum to 1.
+        corners: (count, 3) indices of the lights at the triangle's corners.
+        weights: (count, 3) float32, barycentric coordinates of the query in its triangle; they sum to 1.
     """
 
     covered: NDArray[np.intp]
@@ -46,7 +47,7 @@ def find_triangles(
     edges = np.cross(corners, np.roll(corners, -1, axis=1))
     edges /= np.linalg.norm(edges, axis=2, keepdims=True)
     inside = np.einsum("tec,qc->qte", edges, queries).min(axis=2)
-    # A direction on an edge or a vertex lies in several triangles, all of which give it the same weights.
+    # A direction on an edge or a vertex lies in several triangles; all give it the same weights.
     chosen = inside.argmax(axis=1)
     covered = np.flatnonzero(inside[np.arange(len(queries)), chosen] >= -TOLERANCE)
     vertices = triangles[chosen[covered]]

@@ -1,4 +1,4 @@
-"""A subject under one distant light at an exact direction, not through the 64 x 32 map."""
+"""Relighting a subject by one distant light from an exact direction, without the 64 × 32 light map."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from relit_camera.light.directions import MAP_HEIGHT, MAP_WIDTH, map_position_fr
 from relit_camera.subject.subject import Subject
 
 CAPTURED_LIGHT_RADIUS_DEG = 3.0
-"""A captured light's own picture counts for directions nearer than this: half a texel of the map."""
+"""Distance from a captured light within which its own picture has weight: half a texel of the map."""
 
 
 def relight_from_direction(subject: Subject, direction: NDArray[np.float64]) -> LinearImage:
     """The picture under a light of unit irradiance from `direction` (3,), a unit vector.
 
-    At a captured direction that is the captured frame, as the subject's compression kept it.
+    At a captured direction this is the captured frame, within the subject's compression accuracy.
 
     Raises:
         NotFoundError: the subject's method is not installed.
@@ -32,8 +32,8 @@ def directional_coefficients(
 ) -> NDArray[np.float32]:
     """Amounts (components, count) of the subject's shared basis under unit light from unit vectors (count, 3).
 
-    A linear method weighs the captured lights. Of another the file holds texels: they are read between their centres,
-    and near a captured light its own picture takes their place.
+    A linear method gives weights of the captured lights. For other methods the texels in the file are interpolated, and
+    near a captured light its own picture replaces them.
     """
     captured = subject.light_directions.astype(np.float64)
     if isinstance(method, LinearMethod):
@@ -41,8 +41,8 @@ def directional_coefficients(
     from_map = (bilinear_map_lookup(directions) @ subject.coefficients.T).T
     cosines = directions @ captured.T
     nearest = cosines.argmax(axis=1)
-    apart = np.degrees(np.arccos(np.clip(cosines.max(axis=1), -1, 1)))
-    share = np.clip(1 - apart / CAPTURED_LIGHT_RADIUS_DEG, 0, 1)
+    distance_deg = np.degrees(np.arccos(np.clip(cosines.max(axis=1), -1, 1)))
+    share = np.clip(1 - distance_deg / CAPTURED_LIGHT_RADIUS_DEG, 0, 1)
     return np.asarray(share * subject.light_coefficients[:, nearest] + (1 - share) * from_map, np.float32)
 
 
@@ -50,7 +50,7 @@ def bilinear_map_lookup(directions: NDArray[np.float64]) -> csr_array:
     """Bilinear interpolation on the 64 × 32 map as a matrix (count, 2048); at a texel's centre, that texel alone."""
     row, column = map_position_from_direction(directions)
     row = np.clip(row, 0, MAP_HEIGHT - 1)
-    # A centre's position may come out a rounding error short of its integer.
+    # The position of a texel's center may be a rounding error below its integer.
     top, left = np.floor(row + 1e-9).astype(int), np.floor(column + 1e-9).astype(int)
     down, right = np.maximum(row - top, 0), np.maximum(column - left, 0)
     entries = []

@@ -1,4 +1,4 @@
-"""A Gaussian process over directions: how far a light's picture tells another's is learned from the pictures."""
+"""The method `gp`: a Gaussian process over directions, its kernel fitted to the pictures by maximum likelihood."""
 
 from __future__ import annotations
 
@@ -17,29 +17,30 @@ from relit_camera.subject.reflectance_field import FactoredField
 Values = NDArray[np.float64]
 
 START_REACH, START_NOISE = np.radians(40.0), 1e-2
+"""Where the search for the kernel's parameters starts; the bounds below limit it."""
 REACH_BOUNDS = np.radians([3.0, 360.0])
 NOISE_BOUNDS = (1e-6, 1.0)
 
 
 @dataclass(frozen=True)
 class GaussianProcess:
-    """One kernel for all pixels, its parameters by their pooled marginal likelihood."""
+    """One kernel for all pixels, its parameters those of the largest pooled marginal likelihood."""
 
     def build(self, samples: Samples) -> FactoredField:
-        """The field; see `Method.build`."""
+        """The field; see `ReflectanceMethod.build`."""
         return factored_field(fit_kernel(samples), samples)
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """Covariance of a pixel's values under two lights, and its prediction (universal kriging; Matheron 1969).
+    """Covariance of a pixel's values under two lights, and the prediction by it (universal kriging; Matheron 1969).
 
     Matérn with smoothness 3/2 over the distance of unit vectors, about a mean that is linear in the direction, as
-    Lambert's law is. Beyond the sampled region the prediction fades as over the thesis's black ring.
+    Lambert's law is. Beyond the sampled region the prediction fades over the black ring (`sampled_region`).
 
     Attributes:
-        reach: distance over which values are alike.
-        noise: variance of what no other light explains, as a share.
+        reach: length scale, as the distance of unit vectors.
+        noise: variance that no other light explains (the nugget), in units of the process's variance.
     """
 
     reach: float
@@ -47,25 +48,25 @@ class Kernel:
 
     def covariance(self, first: Values, second: Values) -> Values:
         """Covariance (count, others) of unit vectors (count, 3) and (others, 3), 1 at no distance."""
-        apart = np.sqrt(np.maximum(2 - 2 * first @ second.T, 0)) * (np.sqrt(3) / self.reach)
-        return np.asarray((1 + apart) * np.exp(-apart))
+        distance = np.sqrt(np.maximum(2 - 2 * first @ second.T, 0)) * (np.sqrt(3) / self.reach)
+        return np.asarray((1 + distance) * np.exp(-distance))
 
     def weights(self, directions: Values, queries: Values) -> NDArray[np.float32]:
         """Weights (lights, queries); see `LinearMethod.weights`."""
         share = region_coverage(directions, queries)
         factor = cho_factor(self.covariance(directions, directions) + self.noise * np.eye(len(directions)))
-        trend, asked = _trend(directions), _trend(queries)
+        trend, query_trend = _trend(directions), _trend(queries)
         known = cho_solve(factor, self.covariance(directions, queries))
-        # What the mean's own estimate adds.
+        # The correction for the mean, which is estimated too.
         solved = cho_solve(factor, trend)
-        correction = np.linalg.lstsq(trend.T @ solved, asked.T - trend.T @ known, rcond=None)[0]
+        correction = np.linalg.lstsq(trend.T @ solved, query_trend.T - trend.T @ known, rcond=None)[0]
         return np.asarray((known + solved @ correction) * share, np.float32)
 
 
 def fit_kernel(samples: Samples) -> Kernel:
     """The kernel under which the pictures inside the matte are likeliest, whatever their mean (REML; Harville 1974).
 
-    All pixels and channels count as draws of one process, so the pictures enter by their products alone.
+    All pixels and channels count as independent draws of one process, so only the pictures' inner products matter.
 
     Raises:
         LightsError: the directions span no region.
@@ -80,9 +81,9 @@ def fit_kernel(samples: Samples) -> Kernel:
     def negative_log_likelihood(logarithms: Values) -> float:
         reach, noise = np.exp(logarithms)
         covariance = Kernel(reach, noise).covariance(samples.directions, samples.directions)
-        seen = contrasts.T @ (covariance + noise * np.eye(lights)) @ contrasts
-        factor = cho_factor(seen)
-        # The process's own variance at its best, given the two others.
+        contrast_covariance = contrasts.T @ (covariance + noise * np.eye(lights)) @ contrasts
+        factor = cho_factor(contrast_covariance)
+        # The variance that maximizes the likelihood, given the two other parameters.
         variance = np.trace(cho_solve(factor, products)) / len(products)
         return float(2 * np.log(np.diag(factor[0])).sum() + len(products) * np.log(max(variance, 1e-300)))
 
@@ -93,5 +94,5 @@ def fit_kernel(samples: Samples) -> Kernel:
 
 
 def _trend(directions: Values) -> Values:
-    """1, x, y, z (count, 4)."""
+    """Linear trend: columns 1, x, y, z (count, 4) of unit vectors (count, 3)."""
     return np.column_stack([np.ones(len(directions)), directions])

@@ -1,10 +1,12 @@
-"""The nearest captured light: the baseline under all others.
+"""Linear methods: a picture under any light is a weighted sum of the captured ones, the same weights for all pixels.
 
-Polynomial texture maps (thesis 4.1; Malzbender, Gelb and Wolters 2001).
+- `Nearest`: the nearest captured light, the baseline.
+- `PolynomialTextureMap`: a quadratic polynomial of the light's x and y.
+- `SphericalHarmonics`: real harmonics up to a degree; smooth, so shadows have no edges.
+- `RadialBasis`: thin-plate splines over directions; smooth, and nearly exact at the captured ones.
 
-Spherical harmonics of each pixel's reflectance map: smooth, and no shadow has an edge.
-
-Radial basis functions over directions: smooth, and nearly exact at the captured ones.
+All but the first are fitted, know nothing beyond the sampled region, and fade to black over the black ring around it
+(`sampled_region`).
 """
 
 from __future__ import annotations
@@ -23,6 +25,13 @@ from relit_camera.light.spherical_harmonics import basis
 from relit_camera.subject.reflectance_field import FactoredField
 
 MAX_DISTANCE_DEG = 60.0
+"""Distance from every captured light beyond which `Nearest` is black."""
+POLYNOMIAL_TERMS = 6
+HARMONICS_ROUGHNESS = 1e-5
+"""Weight of the mean squared Laplacian against the mean squared misfit: it keeps the harmonics small where no light
+constrains them, behind the subject."""
+SPLINE_SMOOTHING = 1e-4
+"""A thousandth of the kernel between lights 15° apart: pictures of nearly equal directions are averaged."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +41,7 @@ class Nearest:
     max_distance_deg: float = MAX_DISTANCE_DEG
 
     def build(self, samples: Samples) -> FactoredField:
-        """The field; see `Method.build`."""
+        """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
     def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -45,29 +54,25 @@ class Nearest:
         return weights
 
 
-COEFFICIENTS = 6
-
-
 @dataclass(frozen=True)
 class PolynomialTextureMap:
-    """Each pixel and channel is a quadratic polynomial of the light's x and y, fitted by least squares.
+    """Polynomial texture map (thesis 4.1; Malzbender, Gelb and Wolters 2001): a least-squares quadratic of x and y.
 
-    x and y tell only lights before the subject apart, so those behind are left out, and beyond the sampled region the
-    field fades as over the thesis's black ring.
+    x and y do not distinguish lights before the subject from those behind, so the latter are left out.
     """
 
     def build(self, samples: Samples) -> FactoredField:
-        """The field; see `Method.build`."""
+        """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
     def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
         """Weights (lights, queries); see `LinearMethod.weights`."""
         front = np.flatnonzero(directions[:, 2] > 0)
         known = _terms(directions[front])
-        if np.linalg.matrix_rank(known) < COEFFICIENTS:
+        if np.linalg.matrix_rank(known) < POLYNOMIAL_TERMS:
             raise LightsError(
                 f"{len(front)} of {len(directions)} lights before the subject carry no polynomial of two variables",
-                f"at least {COEFFICIENTS}, not all on one conic, are needed",
+                f"at least {POLYNOMIAL_TERMS}, not all on one conic, are needed",
             )
         weights = np.zeros((len(directions), len(queries)), np.float32)
         share = region_coverage(directions[front], queries) * (queries[:, 2] > 0)
@@ -81,52 +86,40 @@ def _terms(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
 
 
-SMOOTHNESS = 1e-5
-"""Weight of a map's roughness against its mean squared misfit: it holds what no light tells, behind the subject."""
-
-
 @dataclass(frozen=True)
 class SphericalHarmonics:
-    """Real harmonics up to `degree`, fitted by least squares with the squared Laplacian as roughness.
-
-    Beyond the sampled region, of which the fit knows nothing, it fades as over the thesis's black ring.
-    """
+    """Real spherical harmonics up to `degree`, fitted by least squares with the squared Laplacian as regularizer."""
 
     degree: int = 3
 
     def build(self, samples: Samples) -> FactoredField:
-        """The field; see `Method.build`."""
+        """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
     def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
         """Weights (lights, queries); see `LinearMethod.weights`."""
-        known = basis(directions, self.degree)
-        order = np.floor(np.sqrt(np.arange(known.shape[1])))
-        roughness = SMOOTHNESS * (order * (order + 1)) ** 2
-        fit = np.linalg.solve(known.T @ known / len(known) + np.diag(roughness), known.T / len(known))
-        asked = basis(queries, self.degree) * region_coverage(directions, queries)[:, None]
-        return np.asarray(fit.T @ asked.T, np.float32)
-
-
-SMOOTHING = 1e-4
-"""A thousandth of the kernel between lights 15° apart: pictures of nearly one direction are averaged, not resolved."""
+        fitted = basis(directions, self.degree)
+        order = np.floor(np.sqrt(np.arange(fitted.shape[1])))
+        penalty = HARMONICS_ROUGHNESS * (order * (order + 1)) ** 2
+        fit = np.linalg.solve(fitted.T @ fitted / len(fitted) + np.diag(penalty), fitted.T / len(fitted))
+        queried = basis(queries, self.degree) * region_coverage(directions, queries)[:, None]
+        return np.asarray(fit.T @ queried.T, np.float32)
 
 
 @dataclass(frozen=True)
 class RadialBasis:
     """Thin-plate splines of the distance between unit vectors, with a linear polynomial.
 
-    The light's cosine with a normal is such a polynomial, and so is reproduced. Beyond the sampled region it fades as
-    over the thesis's black ring.
+    The light's cosine with a normal is such a polynomial, so Lambert's law is reproduced.
     """
 
     def build(self, samples: Samples) -> FactoredField:
-        """The field; see `Method.build`."""
+        """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
     def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
         """Weights (lights, queries); see `LinearMethod.weights`."""
         share = region_coverage(directions, queries)
-        one_by_one = np.eye(len(directions))
-        spline = RBFInterpolator(directions, one_by_one, smoothing=SMOOTHING, kernel="thin_plate_spline", degree=1)
+        one_hot = np.eye(len(directions))
+        spline = RBFInterpolator(directions, one_hot, smoothing=SPLINE_SMOOTHING, kernel="thin_plate_spline", degree=1)
         return np.asarray((spline(queries) * share[:, None]).T, np.float32)

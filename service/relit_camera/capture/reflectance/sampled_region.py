@@ -1,4 +1,4 @@
-"""The thesis's extension beyond the sampled region: black samples round it (thesis 5.6, its final approach)."""
+"""The sampled region of directions: its boundary, and the ring of black samples beyond it (thesis 5.6)."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from relit_camera.capture.reflectance.barycentric_methods import SphericalBaryce
 from relit_camera.capture.reflectance.delaunay_triangulation import spherical_delaunay
 from relit_camera.capture.reflectance.samples import Samples
 
-DISTANCE_DEG = 25.0
-"""How far outside of the region the ring lies; the thesis gives no figure. Beyond it the field is black."""
+RING_DISTANCE_DEG = 25.0
+"""Distance of the ring from the region's boundary; the thesis gives no figure. Beyond the ring the field is black."""
 
 
 def boundary_lights(directions: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -28,31 +28,31 @@ def boundary_lights(directions: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.unique(different[count == 1])
 
 
-def ring_directions(directions: NDArray[np.float64], distance_deg: float = DISTANCE_DEG) -> NDArray[np.float64]:
-    """Where the ring's samples lie: unit vectors (count, 3), one beyond each of `boundary_lights`'s lights (lights, 3).
+def ring_directions(directions: NDArray[np.float64], distance_deg: float = RING_DISTANCE_DEG) -> NDArray[np.float64]:
+    """Directions of the black ring: unit vectors (count, 3), one beyond each of the lights (lights, 3) on the boundary.
 
-    Each lies on the great circle from the region's middle through its light, `distance_deg` farther out.
+    Each lies `distance_deg` beyond its light on the great circle from the region's center through that light.
 
     Raises:
         LightsError: the directions span no region.
     """
     edge = directions[boundary_lights(directions)]
-    middle = directions.sum(axis=0)
-    middle /= max(float(np.linalg.norm(middle)), 1e-12)
-    along = edge @ middle
-    outward = edge * along[:, None] - middle
+    center = directions.sum(axis=0)
+    center /= max(float(np.linalg.norm(center)), 1e-12)
+    along = edge @ center
+    outward = edge * along[:, None] - center
     length = np.linalg.norm(outward, axis=1)
-    # None past the pole opposite to the middle, where all ways meet.
+    # Never past the antipode of the center, where all great circles meet.
     distance = np.minimum(np.radians(distance_deg), 0.9 * (np.pi - np.arccos(np.clip(along, -1, 1))))
     ring = edge * np.cos(distance)[:, None] + outward * (np.sin(distance) / np.maximum(length, 1e-12))[:, None]
-    # A light in the middle itself has no way out.
+    # A light at the center itself has no outward direction.
     return np.asarray(ring[length > 1e-6])
 
 
-def with_black_ring(samples: Samples, distance_deg: float = DISTANCE_DEG) -> Samples:
-    """The samples with the black ring: there the field fades instead of ending.
+def with_black_ring(samples: Samples, distance_deg: float = RING_DISTANCE_DEG) -> Samples:
+    """The samples plus black ones on the ring, so that the field fades there instead of ending.
 
-    What is to use the person's shape must know it before: the ring's pictures are no shadows.
+    Estimate `geometry` from the samples without the ring: its black pictures are no shadows.
 
     Raises:
         LightsError: the directions span no region.
@@ -67,16 +67,16 @@ def with_black_ring(samples: Samples, distance_deg: float = DISTANCE_DEG) -> Sam
 
 
 def region_coverage(
-    directions: NDArray[np.float64], queries: NDArray[np.float64], distance_deg: float = DISTANCE_DEG
+    directions: NDArray[np.float64], queries: NDArray[np.float64], distance_deg: float = RING_DISTANCE_DEG
 ) -> NDArray[np.float32]:
-    """1 for queries (count, 3) in the region of the lights (lights, 3), falling to 0 over the ring: (count,).
+    """Weight (count,) of a fitted field at queries (count, 3): 1 in the sampled region, 0 beyond the ring.
 
-    Fitted methods are worth nothing far from their data; this ends them as the black ring ends interpolation.
+    Fitted methods mean nothing far from their data; this weight ends them as the black ring ends interpolation.
 
     Raises:
         LightsError: the directions span no region.
     """
     ringed = np.concatenate([directions, ring_directions(directions, distance_deg)])
     fading = SphericalBarycentric().weights(ringed, queries)[: len(directions)].sum(axis=0)
-    # With the ring's points, triangles at the region's edge may be others than without.
+    # The ring's points may change the triangles at the region's boundary, so the larger of both counts.
     return np.asarray(np.maximum(fading, SphericalBarycentric().weights(directions, queries).sum(axis=0)))

@@ -1,4 +1,4 @@
-"""What a capture yields: aligned pictures of one person, each under one known light."""
+"""Samples, the result of a capture: aligned pictures of one person, each under one known light."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from relit_camera.capture.geometry.shape_estimation import Geometry, estimate_ge
 
 @dataclass(frozen=True)
 class Samples:
-    """One-light-at-a-time pictures.
+    """One-light-at-a-time pictures of a person.
 
     Attributes:
         pictures: (lights, height, width, 3) float32 linear RGB, each under a distant light of unit irradiance.
         directions: (lights, 3) float64 unit vectors toward the lights.
         matte: (height, width) float32 straight alpha of the person.
-        known_geometry: the person's shape, where it is known already.
+        known_geometry: the person's geometry, where it is known already.
     """
 
     pictures: NDArray[np.float32]
@@ -36,5 +36,5 @@ class Samples:
 
     @cached_property
     def geometry(self) -> Geometry:
-        """The person's shape: as known, or else estimated from the pictures, once."""
+        """The person's geometry: `known_geometry`, else estimated from the pictures on first use."""
         return self.known_geometry or estimate_geometry(self.pictures, self.directions, self.matte)

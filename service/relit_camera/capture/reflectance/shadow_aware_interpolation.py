@@ -1,8 +1,8 @@
-"""Interpolation that knows where shadows end: visibility maps (thesis 5.3).
+"""Shadow-aware interpolation between the three captured lights around a direction, by the person's geometry.
 
-Interpolation that knows how squarely light falls on the skin: light adaptation (thesis 5.4).
-
-The thesis's final method: smoothed visibility, light adaptation, the black ring (5.3 to 5.6).
+- `VisibilityInterpolation` moves a shadow's edge continuously between lights, by visibility maps (thesis 5.3).
+- `LightAdaptation` interpolates colors divided by the cosine of light and normal (thesis 5.4).
+- `ThesisMethod` combines both with the black ring: the thesis's final method (5.3 to 5.6).
 """
 
 from __future__ import annotations
@@ -21,24 +21,27 @@ from relit_camera.capture.reflectance.triangle_field import TriangleCorners, Tri
 from relit_camera.light.directions import MAP_HEIGHT, MAP_WIDTH, direction_from_spherical, spherical_from_direction
 
 Interpolate = Callable[[Values, TriangleCorners], Values]
-"""Weights (count, 3, pixels) of the corners that are lit → colours (count, channels, pixels)."""
+"""A function of weights (count, 3, pixels) of the lit corners that gives colors (count, channels, pixels)."""
+GRAZING_COSINE = 0.05
+"""Cosine of light and normal below which indirect light prevails: from here down to 0 a growing part of a corner's
+light counts as indirect."""
 
 
 @dataclass(frozen=True)
 class VisibilityInterpolation:
-    """Between a light that a pixel sees and one that it does not, the colour changes where the shadow's edge is.
+    """Method `visibility`: where some corners are in shadow, the color changes across the shadow's edge.
 
-    The visibility map is smoothed by a 3 × 3 box of texels unless `smooth` is False, where it is 0 or 1.
+    The visibility map is smoothed by a 3 × 3 box of texels; where `smooth` is False it is 0 or 1.
     """
 
     smooth: bool = True
 
     def build(self, samples: Samples) -> TriangleField:
-        """The field; see `Method.build`. It rests on `samples.geometry`."""
+        """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         return TriangleField(samples, self.mix)
 
     def mix(self, corners: TriangleCorners) -> Values:
-        """See `triangles.Mix`."""
+        """See `triangle_field.CornerMix`."""
         return interpolate_by_visibility(
             corners, visibility_map(corners, self.smooth), lambda w, c: barycentric_mix(w, c.colors)
         )
@@ -46,27 +49,26 @@ class VisibilityInterpolation:
 
 @dataclass(frozen=True)
 class SharpVisibilityInterpolation(VisibilityInterpolation):
-    """With the map as it is: shadows have hard edges, in the wrong place where the shape is wrong."""
+    """Method `visibility-sharp`: visibility is 0 or 1, so shadows have hard edges, true only if the geometry is."""
 
     smooth: bool = False
 
 
 def visibility_map(corners: TriangleCorners, smooth: bool) -> tuple[Values, Values]:
-    """How far light reaches the pixels, 0 to 1: at the corners (count, 3, pixels), at the queries (count, pixels)."""
+    """Visibility 0..1 of lights from pixels: at the corners (count, 3, pixels) and at the queries (count, pixels)."""
 
-    def known(directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Values:
+    def visibility(directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Values:
         if smooth:
             return smoothed_visibility(corners.geometry, directions, pixels)
         return corners.geometry.visible(directions, pixels).astype(np.float32)
 
-    return corners.around(known)
+    return corners.around(visibility)
 
 
 def smoothed_visibility(geometry: Geometry, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Values:
-    """The visibility map through a 3 × 3 box filter: (pixels, count) of unit vectors (count, 3).
+    """Visibility (pixels, count) of unit vectors (count, 3), through a 3 × 3 box filter.
 
-    At a texel's centre that is the mean over it and its eight neighbours; elsewhere, over as many directions likewise
-    apart.
+    The mean over nine directions, spaced like texels of the light map, around each.
     """
     azimuth, elevation = spherical_from_direction(directions)
     steps = list(product((-1, 0, 1), repeat=2))
@@ -82,64 +84,60 @@ def smoothed_visibility(geometry: Geometry, directions: NDArray[np.float64], pix
 def interpolate_by_visibility(
     corners: TriangleCorners, visibility: tuple[Values, Values], lit_colors: Interpolate
 ) -> Values:
-    """Colours (count, channels, pixels) by the rule of thesis 5.3.
+    """Colors (count, channels, pixels) by the rule of thesis 5.3.
 
-    The corner seen least counts as in shadow, the one seen most as lit. The third is taken once as lit and once as in
-    shadow, and both are mixed by how near it is to those two. Each time the colour goes from that of the corners in
-    shadow to that of those lit, over the visibility between them; at a corner it is that corner's. The more the corners
-    differ, the more this counts; where they are seen alike, plain interpolation does.
+    The least visible corner counts as in shadow, the most visible one as lit. The third counts once as lit and once as
+    in shadow, and both results are mixed by how near its visibility is to those two. Each time the color goes from that
+    of the corners in shadow to that of the lit ones with the query's visibility; at a corner it is that corner's. The
+    result is mixed with plain interpolation by the difference in visibility between the corners.
 
     Args:
         corners: the triangles.
         visibility: see `visibility_map`.
-        lit_colors: how the colours of lit corners are interpolated.
+        lit_colors: interpolates the colors of the lit corners.
     """
-    seen, here = visibility
-    order = np.argsort(seen, axis=1, kind="stable")
+    at_corners, at_query = visibility
+    order = np.argsort(at_corners, axis=1, kind="stable")
     rank = np.argsort(order, axis=1)
-    least, middle, most = np.take_along_axis(seen, order, axis=1).transpose(1, 0, 2)
-    as_lit = _share(middle, least, most)
+    least, middle, most = np.take_along_axis(at_corners, order, axis=1).transpose(1, 0, 2)
+    as_lit = _interpolation_share(middle, least, most)
     stepped = np.zeros_like(corners.colors[:, 0])
     for first_lit, low, high, weight in ((1, least, middle, as_lit), (2, middle, most, 1 - as_lit)):
         is_lit = rank >= first_lit
         lit = lit_colors(_only(corners.weights, is_lit), corners)
         dark = barycentric_mix(_only(corners.weights, ~is_lit), corners.colors)
-        stepped += weight[:, None] * (dark + _share(here, low, high)[:, None] * (lit - dark))
+        stepped += weight[:, None] * (dark + _interpolation_share(at_query, low, high)[:, None] * (lit - dark))
     plain = barycentric_mix(corners.weights, corners.colors)
     return np.asarray(plain + (most - least)[:, None] * (stepped - plain))
 
 
-def _share(value: Values, low: Values, high: Values) -> Values:
-    """Where between two others a value lies: 0 at the lower or below, 1 at the higher or above; 1 where they agree."""
+def _interpolation_share(value: Values, low: Values, high: Values) -> Values:
+    """Position of `value` between two others: 0 at `low` or below, 1 at `high` or above, and 1 where both are equal."""
     span = high - low
     return np.where(span > 0, np.clip((value - low) / np.maximum(span, 1e-6), 0, 1), np.float32(1)).astype(np.float32)
 
 
 def _only(weights: Values, chosen: NDArray[np.bool_]) -> Values:
-    """Weights (count, 3, pixels) of the chosen corners alone, made to sum to 1; equal ones where all theirs are 0."""
+    """Weights (count, 3, pixels) of the chosen corners alone, normalized to sum 1; equal weights where all are 0."""
     kept = weights * chosen + np.float32(1e-7) * chosen
     return np.asarray(kept / kept.sum(axis=1, keepdims=True))
 
 
-GRAZING_COSINE = 0.05
-"""Cosine below which what comes from around outweighs the light itself: it counts as indirect the more, the lower."""
-
-
 @dataclass(frozen=True)
 class LightAdaptation:
-    """Colours are divided by their light's cosine factor, interpolated, and multiplied by the direction's own."""
+    """Method `adaptation`: colors divided by their light's cosine are interpolated, then times the query's."""
 
     def build(self, samples: Samples) -> TriangleField:
-        """The field; see `Method.build`. It rests on `samples.geometry`."""
+        """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         return TriangleField(samples, self.mix)
 
     def mix(self, corners: TriangleCorners) -> Values:
-        """See `triangles.Mix`."""
+        """See `triangle_field.CornerMix`."""
         return interpolate_with_adaptation(np.broadcast_to(corners.weights, corners.cosines[0].shape), corners)
 
 
 def interpolate_with_adaptation(weights: Values, corners: TriangleCorners) -> Values:
-    """Colours (count, channels, pixels) by Eq. 5.1 to 5.3, which are one formula.
+    """Colors (count, channels, pixels) by Eq. 5.1 to 5.3 of the thesis, which are one formula.
 
     Corners behind the surface (a cosine factor of 0 or less) have indirect light only: c_ind, interpolated, of weight
     w_ind. It is taken from the others before their direct light is scaled, and faded back in:
@@ -147,9 +145,8 @@ def interpolate_with_adaptation(weights: Values, corners: TriangleCorners) -> Va
         c_p = Σ w_i (c_i − w_ind c_ind) δ_p / δ_i + (1 − w_ind) w_ind c_ind + w_ind c_ind
 
     summed over the corners before the surface. Here c_ind is divided by its weight, without which Eq. 5.2 darkens a
-    constant field; differences and δ_p are not let below 0; a corner changes sides gradually, below `GRAZING_COSINE`,
-    which
-    also bounds 1 / δ_i. At a corner the colour is that corner's.
+    constant field; differences and δ_p are clamped at 0; a corner changes from direct to indirect gradually, below
+    `GRAZING_COSINE`, which also bounds 1 / δ_i. At a corner the color is that corner's.
 
     Args:
         weights: (count, 3, pixels) barycentric.
@@ -167,16 +164,16 @@ def interpolate_with_adaptation(weights: Values, corners: TriangleCorners) -> Va
 
 @dataclass(frozen=True)
 class ThesisMethod:
-    """All of chapter 5 together.
+    """Method `thesis`: all of chapter 5 together.
 
-    Adaptation is for the colours of lit corners where visibility differs: where it does not, 5.3 has regular
-    interpolation, and there skin, which is no Lambert surface, is better off without (by 1 to 3 dB on real faces).
-    Its normalisation (5.5) is the sum over light maps, which weighs every texel by its solid angle: a field holds none.
-    Triangles that reach to the ring are interpolated linearly, as in 5.6.
+    Adaptation applies to lit corners where visibility differs. Where it does not, 5.3 interpolates plainly, which suits
+    skin, no Lambert surface, better (by 1 to 3 dB on real faces). The normalization (5.5) is no part of a field: sums
+    over light maps weight every texel by its solid angle. Triangles that reach to the ring are interpolated linearly,
+    as in 5.6.
     """
 
     def build(self, samples: Samples) -> TriangleField:
-        """The field; see `Method.build`. It rests on `samples.geometry`."""
+        """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         captured = len(samples.directions)
         known = replace(samples, known_geometry=samples.geometry)
 
@@ -189,5 +186,5 @@ class ThesisMethod:
         return TriangleField(with_black_ring(known), mix)
 
     def mix(self, corners: TriangleCorners) -> Values:
-        """See `triangles.Mix`; between captured lights."""
+        """See `triangle_field.CornerMix`; between captured lights."""
         return interpolate_by_visibility(corners, visibility_map(corners, smooth=True), interpolate_with_adaptation)

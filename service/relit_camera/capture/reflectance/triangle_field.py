@@ -1,4 +1,4 @@
-"""Fields that mix, differently in every pixel, the three captured lights around a direction."""
+"""Fields that mix the three captured lights around a direction with weights that differ from pixel to pixel."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ BLOCK = 1 << 17
 
 @dataclass(frozen=True)
 class TriangleCorners:
-    """Some directions, the triangle of lights around each, and some pixels.
+    """Query directions, the triangle of captured lights around each, and a block of pixels.
 
     Attributes:
         lights: (lights, 3) float64 unit vectors of all lights.
         queries: (count, 3) float64 unit vectors inside the triangles.
-        triangles: (count, 3) lights at the corners.
+        triangles: (count, 3) indices of the lights at the corners.
         weights: (count, 3, 1) float32 barycentric.
-        colors: (count, 3, channels, pixels) float32 of the corners' pictures; pixels last, for numpy's inner loops.
-        geometry: the person's shape.
-        pixels: (pixels,) row-major.
+        colors: (count, 3, channels, pixels) float32 of the corners' pictures; pixels last, for fast inner loops.
+        geometry: the person's geometry.
+        pixels: (pixels,) row-major indices.
     """
 
     lights: NDArray[np.float64]
@@ -43,7 +43,7 @@ class TriangleCorners:
     pixels: NDArray[np.intp]
 
     def only(self, chosen: NDArray[np.bool_]) -> TriangleCorners:
-        """Those of the chosen queries (count,)."""
+        """The same for the queries chosen by a mask (count,)."""
         return replace(
             self,
             queries=self.queries[chosen],
@@ -57,31 +57,29 @@ class TriangleCorners:
         """n·l at the corners (count, 3, pixels) and at the queries (count, pixels)."""
         return self.around(self.geometry.cosines)
 
-    def around(self, known: Callable[[NDArray[np.float64], NDArray[np.intp]], NDArray]) -> tuple[NDArray, NDArray]:
-        """What a function of directions and pixels says at corners (count, 3, pixels) and queries (count, pixels)."""
-        return known(self.lights, self.pixels).T[self.triangles], known(self.queries, self.pixels).T
+    def around(self, function: Callable[[NDArray[np.float64], NDArray[np.intp]], NDArray]) -> tuple[NDArray, NDArray]:
+        """Values of a function of directions and pixels, at corners (count, 3, pixels) and queries (count, pixels)."""
+        return function(self.lights, self.pixels).T[self.triangles], function(self.queries, self.pixels).T
 
 
 CornerMix = Callable[[TriangleCorners], Values]
-"""Colours (count, channels, pixels) of the queries."""
+"""A function that gives the colors (count, channels, pixels) of the queries."""
 
 
 def barycentric_mix(weights: Values, colors: Values) -> Values:
-    """Σ over corners of weights (count, 3, pixels or 1) · colours (count, 3, channels, pixels).
-
-    Corner by corner: many times as fast as a sum over an axis of three.
-    """
+    """Sum over corners of weights (count, 3, pixels or 1) times colors (count, 3, channels, pixels)."""
+    # Corner by corner: many times as fast as a sum over an axis of three.
     first, second, third = (weights[:, corner, None] * colors[:, corner] for corner in range(3))
     return np.asarray(first + second + third)
 
 
 @dataclass(frozen=True)
 class TriangleField:
-    """A field that answers with `mix`; black where no triangle is.
+    """A field whose values `mix` computes from the corners; black where no triangle is.
 
     Attributes:
         samples: the captured lights.
-        mix: colours of queries by those of their corners.
+        mix: gives the colors of queries from those of their corners.
     """
 
     samples: Samples
@@ -94,18 +92,18 @@ class TriangleField:
 
     def dense(self, start: int, stop: int) -> Values:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
-        found = self._answer(texel_vectors(), self._texels, np.arange(start, stop))
+        found = self._evaluate(texel_vectors(), self._texels, np.arange(start, stop))
         return np.ascontiguousarray(found.transpose(1, 0, 2))
 
     def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Values:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
-        return self._answer(directions, find_triangles(self.samples.directions, directions), pixels)
+        return self._evaluate(directions, find_triangles(self.samples.directions, directions), pixels)
 
     @cached_property
     def _texels(self) -> TriangleLookup:
         return find_triangles(self.samples.directions, texel_vectors())
 
-    def _answer(self, directions: NDArray[np.float64], found: TriangleLookup, pixels: NDArray[np.intp]) -> Values:
+    def _evaluate(self, directions: NDArray[np.float64], found: TriangleLookup, pixels: NDArray[np.intp]) -> Values:
         lights = self.samples.directions
         pictures = self.samples.pictures.reshape(len(lights), -1, 3)
         result = np.zeros((len(directions), len(pixels), 3), np.float32)

@@ -1,4 +1,4 @@
-"""`relit bench`: how fast this machine is."""
+"""`relit bench`: speed of relighting and of the live pipeline on this machine."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ def bench(
         str | None, typer.Option(help="Live source; the test pattern with a made-up face if not given.")
     ] = None,
     tracker: Annotated[str | None, typer.Option(help="Tracker for the video.")] = None,
-    mode: Annotated[str, typer.Option(help="Mode of the live chain.")] = "reenact",
-    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the live chain.")] = "1280x720",
+    mode: Annotated[str, typer.Option(help="Mode of the live pipeline.")] = "reenact",
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the live pipeline.")] = "1280x720",
     seconds: Annotated[float, typer.Option(help="Length of the live measurement; 0 leaves it out.", min=0)] = 10.0,
 ) -> None:
-    """Measure relighting by every implementation, and each stage of the live chain. Let nothing else run."""
+    """Measure relighting by every implementation, and each stage of the live pipeline. Run nothing else meanwhile."""
     import json
 
     from relit_camera.app.wiring import make_tracker, session_options
@@ -56,9 +56,9 @@ def bench(
     before = machine_info()
     options = session_options(settings.inference)
     scene_controller = SceneController(settings.storage)
-    # What is missing shall be said before minutes of measuring, not after.
+    # Open everything before the long measurements, so that missing files are reported at once.
     source = open_source(settings.source)
-    followed = SyntheticTracker() if video is None else make_tracker(settings)
+    face_tracker = SyntheticTracker() if video is None else make_tracker(settings)
     measured = synthetic_subject() if subject is None else SubjectStore(settings.storage.subjects).resolve(subject)[1]
     maps = {name: scene_controller.environments.load(name).light_map for name in scene_controller.environments.names()}
     if environments is not None:
@@ -70,7 +70,7 @@ def bench(
         scene_controller.show_subject("bench", synthetic_subject(256, 256) if subject is None else measured)
         scene_controller.set_look(look)
         freeze_gc()  # as `relit run` does
-        result |= benchmark_live(settings, scene_controller, source, followed, seconds)
+        result |= benchmark_live(settings, scene_controller, source, face_tracker, seconds)
     result["machine"] = before
     typer.echo(json.dumps(result, indent=2) if as_json else _text(result))
 

@@ -1,4 +1,4 @@
-"""`relit capture`: from pictures to a subject."""
+"""`relit capture`: subjects from pictures or from a film."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ def import_lights(
     lights: Annotated[Path, typer.Argument(help="An RTI .lp file: a count, then 'file x y z' lines.")],
     out: Annotated[Path, typer.Option(help="The subject file to write (.relit).")],
     method: Annotated[str, typer.Option(help="Reflectance method.")] = "default",
-    gamma: Annotated[str, typer.Option(help="Curve of the pictures: srgb, linear, or an exponent.")] = "srgb",
+    gamma: Annotated[str, typer.Option(help="Transfer curve of the pictures: srgb, linear, or an exponent.")] = "srgb",
     landmarks: Annotated[
         Path | None,
-        typer.Option(help="JSON of known landmarks: {scheme: [[x, y], …]}; landmarks.json is found by itself."),
+        typer.Option(
+            help="JSON of known landmarks: {scheme: [[x, y], …]}; by default landmarks.json beside the pictures."
+        ),
     ] = None,
     align: Annotated[
         bool | None,
         typer.Option(
             "--align/--as-is",
-            help="Undo small motions and the strobes' varying strength, leave corrupt pictures out; by itself, where "
+            help="Undo small motions and the strobes' varying strength, leave corrupt pictures out; by default, where "
             "that helps.",
         ),
     ] = None,
@@ -86,46 +88,51 @@ def build(
         Path, typer.Argument(help="A film of you, a mirror ball and a blinking lamp: see docs/capture.md.")
     ],
     out: Annotated[Path, typer.Option(help="The subject file to write (.relit).")],
-    report: Annotated[Path | None, typer.Option(help="JSON of all that was found on the way.")] = None,
+    report: Annotated[Path | None, typer.Option(help="JSON of the results of every stage.")] = None,
     focal_px: Annotated[
         float | None, typer.Option(help="The camera's focal length in pixels of the upright video, where it is known.")
     ] = None,
     ball: Annotated[
-        str | None, typer.Option(help="X,Y,RADIUS of the mirror ball in those pixels; it is found by itself.")
+        str | None, typer.Option(help="X,Y,RADIUS of the mirror ball in those pixels; by default it is detected.")
     ] = None,
     balls: Annotated[
-        int, typer.Option(help="Mirror balls in the film: two of one size tell the lamp's distance.", min=1, max=2)
+        int, typer.Option(help="Mirror balls in the film; two of one size measure the lamp's distance.", min=1, max=2)
     ] = 1,
     second_ball: Annotated[
-        str | None, typer.Option(help="X,Y,RADIUS of the second ball; with --balls 2 it is found by itself.")
+        str | None, typer.Option(help="X,Y,RADIUS of the second ball; with --balls 2 it is detected by default.")
     ] = None,
     face: Annotated[
-        str | None, typer.Option(help="X,Y,RADIUS of the face, brow to chin; it is found by itself.")
+        str | None, typer.Option(help="X,Y,RADIUS of the face, brow to chin; by default it is detected.")
     ] = None,
     ball_diameter_cm: Annotated[
         float | None,
-        typer.Option(help="The ball's diameter; without, it is taken to be as far away as the head.", min=1),
+        typer.Option(
+            help="Diameter of the balls; by default they are taken to be as far from the camera as the head.", min=1
+        ),
     ] = None,
     light_distance_cm: Annotated[
-        float, typer.Option(help="From the lamp to the head, as far as two balls do not tell it.", min=20, max=1000)
+        float,
+        typer.Option(
+            help="Usual distance of the lamp from the head, where two balls do not measure it.", min=20, max=1000
+        ),
     ] = 100.0,
-    size: Annotated[int, typer.Option(help="Pixels a side, fewer where the video shows fewer.", min=64)] = 384,
+    size: Annotated[int, typer.Option(help="Pixels a side; fewer where the film shows fewer.", min=64)] = 384,
     method: Annotated[str, typer.Option(help="Reflectance method.")] = "default",
-    gamma: Annotated[str, typer.Option(help="Curve of the video: srgb, linear, or an exponent.")] = "srgb",
+    gamma: Annotated[str, typer.Option(help="Transfer curve of the film: srgb, linear, or an exponent.")] = "srgb",
     subtract_room: Annotated[
         bool | None,
-        typer.Option("--subtract-room/--keep-room", help="Take the room's light off; by itself, where that helps."),
+        typer.Option("--subtract-room/--keep-room", help="Subtract the room's light; by default, where that helps."),
     ] = None,
     near_lamp: Annotated[
         bool,
         typer.Option(
             "--near-lamp/--far-lamp",
-            help="Correct each pixel for the lamp's nearness; or leave that out, as for a lamp far away.",
+            help="Correct each pixel for the lamp's nearness; or not, as for a distant lamp.",
         ),
     ] = True,
-    threads: Annotated[int, typer.Option(help="Of the decoder.", min=1)] = 2,
+    threads: Annotated[int, typer.Option(help="Threads of the decoder.", min=1)] = 2,
     fresh: Annotated[
-        bool, typer.Option("--fresh", help="Start over, also where a build that was broken off could go on.")
+        bool, typer.Option("--fresh", help="Start over, even if an interrupted build could be resumed.")
     ] = False,
 ) -> None:
     """Build a subject from a film of a person, a mirror ball beside them and a blinking lamp that goes around."""
@@ -160,32 +167,36 @@ def build(
         threads=threads,
     )
     open_method(method)
-    kept = CheckpointFolder(out, input_fingerprint(video, options), partial(typer.echo, err=True))
-    # Opened before the work, so that what cannot be written is said at once; both appear at its end or not at all.
+    checkpoint_folder = CheckpointFolder(out, input_fingerprint(video, options), partial(typer.echo, err=True))
+    # Opened before the work, so that a path that cannot be written fails at once; both files appear at its end only.
     with (
-        kept.keep_until_done(),
+        checkpoint_folder.keep_until_done(),
         atomic_path(out) as subject_file,
         atomic_path(report) if report else nullcontext() as report_file,
     ):
         if fresh:
-            kept.remove()
-        found = kept.read()
+            checkpoint_folder.remove()
+        checkpoint = checkpoint_folder.read()
         with progress_bar() as progress:
-            tell = stage_reporter(progress)
-            if found is None:
-                film = build_samples(video, options, tell)
-                found = Checkpoint(film.samples, film.findings.report())
-                kept.write(found)
-            tell("Building the field", 0, None)
+            report_stage = stage_reporter(progress)
+            if checkpoint is None:
+                film = build_samples(video, options, report_stage)
+                checkpoint = Checkpoint(film.samples, film.findings.report())
+                checkpoint_folder.write(checkpoint)
+            report_stage("Building the field", 0, None)
             subject = build_subject(
-                found.samples, method, video.name, options.gamma, progress=partial(tell, "Building the field")
+                checkpoint.samples,
+                method,
+                video.name,
+                options.gamma,
+                progress=partial(report_stage, "Building the field"),
             )
         write_subject(subject_file, subject)
         if report_file:
-            report_file.write_text(json.dumps(found.report, indent=1), encoding="utf-8")
-    for warning in found.report["warnings"]:
+            report_file.write_text(json.dumps(checkpoint.report, indent=1), encoding="utf-8")
+    for warning in checkpoint.report["warnings"]:
         typer.echo(f"warning: {warning}", err=True)
-    meta, flashes = subject.metadata, found.report["light"]["frames"]
+    meta, flashes = subject.metadata, checkpoint.report["light"]["frames"]
     typer.echo(
         f"{out}: {meta.width}x{meta.height}, {meta.lights} lights of {flashes} flashes' frames, "
         f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better"
@@ -193,6 +204,7 @@ def build(
 
 
 def _circle(text: str, option: str) -> tuple[float, float, float]:
+    """X, Y and radius of an option, or a usage error."""
     from relit_camera.cli.arguments import parse_numbers
 
     x, y, radius = parse_numbers(text, 3, option)

@@ -1,4 +1,4 @@
-"""`relit evaluate`: what was built against what is known."""
+"""`relit evaluate`: accuracy of fields, captures and relit videos against known truth."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Out = Annotated[Path | None, typer.Option(help="Report to write: one .html file,
 AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable figures on stdout.")]
 GammaText = Annotated[str, typer.Option("--gamma", help="Curve of the pictures: srgb, linear, or an exponent.")]
 WithinDegrees = Annotated[
-    float | None, typer.Option(help="Use lights at most so many degrees from the camera's axis.", min=1, max=180)
+    float | None, typer.Option(help="Use lights within this many degrees of the camera's axis.", min=1, max=180)
 ]
 Methods = Annotated[list[str] | None, typer.Option("--method", help="Reflectance method; all that are installed.")]
 
@@ -45,7 +45,7 @@ def field(
     as_json: AsJson = False,
     gamma: GammaText = "srgb",
     within_deg: WithinDegrees = None,
-    every: Annotated[int, typer.Option(help="Use every so many-th of the captured lights.", min=1)] = 1,
+    every: Annotated[int, typer.Option(help="Use every N-th of the captured lights.", min=1)] = 1,
     method: Methods = None,
     environment: Annotated[
         list[str] | None, typer.Option(help="Stored name or panorama file; the built-in ones if none is given.")
@@ -60,7 +60,7 @@ def field(
         Path | None, typer.Option(help="truth.json of that film; --truth is the field filmed.")
     ] = None,
 ) -> None:
-    """Compare a reflectance field with pictures that were really taken under each light (thesis 7)."""
+    """Compare a reflectance field with pictures taken under each light (thesis 7)."""
     import json
 
     from relit_camera.capture.subject_builder import neutral_picture
@@ -124,7 +124,7 @@ def field(
 
 
 def _lights_file(path: Path) -> Path:
-    """The .lp file that is meant by itself or by the folder it lies in."""
+    """The .lp file of a path: the file itself, or lights.lp in a folder."""
     return path / LIGHTS_FILE_NAME if (path / LIGHTS_FILE_NAME).is_file() else path
 
 
@@ -182,8 +182,13 @@ def olat(
 
     from relit_camera.cli.progress import progress_bar
     from relit_camera.lab.evaluate.field.ground_truth import subsample_lights
-    from relit_camera.lab.evaluate.light_holdout import evaluate_hold_out as leave_out
-    from relit_camera.lab.evaluate.light_holdout import holdout_json, holdout_page, holdout_text, parse_hold_out
+    from relit_camera.lab.evaluate.light_holdout import (
+        evaluate_hold_out,
+        holdout_json,
+        holdout_page,
+        holdout_text,
+        parse_hold_out,
+    )
 
     shares = [parse_hold_out(text) for text in hold_out or ("every=4", "every=2")]
     results = []
@@ -195,7 +200,7 @@ def olat(
                 with progress_bar() as progress:
                     task = progress.add_task(f"{name}, every {every}", total=None)
                     advance = partial(_advance, progress, task)
-                    results.append(leave_out(name, samples, every, method or (), advance))
+                    results.append(evaluate_hold_out(name, samples, every, method or (), advance))
         if report_file:
             report_file.write_text(holdout_page(results), encoding="utf-8")
     typer.echo(json.dumps(holdout_json(results), indent=1) if as_json else holdout_text(results))
@@ -279,7 +284,7 @@ def stabilisation(
     )
 
     with _report_file(out) as report_file, progress_bar() as progress:
-        task = progress.add_task("Stabilising", total=None)
+        task = progress.add_task("Stabilizing", total=None)
         report = compare_stabilization(
             video, truth, lambda what, frames: progress.update(task, description=what, completed=frames)
         )

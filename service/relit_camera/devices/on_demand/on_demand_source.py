@@ -1,8 +1,7 @@
-"""Whether the webcam is wanted: somebody reads the virtual camera or watches a preview, or did a moment ago.
+"""A source that is open only while somebody reads the camera's output, and what decides that.
 
-A source that is open only while it is wanted.
-
-On-demand mode, wired: who reads the virtual camera decides whether the webcam is open.
+`OnDemandController` wires the parts: a `DemandMonitor` knows whether anybody reads the sink or watches a preview, and
+an `OnDemandSource` opens and closes the webcam accordingly.
 """
 
 from __future__ import annotations
@@ -11,72 +10,74 @@ import logging
 import math
 import sys
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
+from relit_camera.base.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import ConfigError, DeviceError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.devices.on_demand.reader_detection import ReaderMonitor
 from relit_camera.devices.sinks.sink import Sink
 from relit_camera.devices.sources.source import Source, SourceInfo, SourceState
 
+log = logging.getLogger(__name__)
+
 IDLE_TIMEOUT_S = 5.0
-"""The webcam is kept for so long after the last look: call apps let go and take again while they are being set up."""
+"""The webcam stays open for so long after the last reader: call apps close and reopen the camera while they start."""
+RETRY_S = 1.0
+"""Pause in seconds after the webcam could not be found."""
 
 
 class DemandMonitor:
-    """Wanted while anybody reads or views, and `idle_timeout_s` seconds longer."""
+    """Tells whether the webcam is wanted: while anybody reads or views, and `idle_timeout_s` seconds longer."""
 
     def __init__(
         self,
         has_readers: Callable[[], bool],
         idle_timeout_s: float = IDLE_TIMEOUT_S,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._has_readers, self._idle_timeout_s, self._clock = has_readers, idle_timeout_s, clock
         self._last_demand_at = -math.inf
 
     def note_viewer(self) -> None:
-        """Somebody has just asked for a preview or a snapshot. Any thread may say so."""
-        self._last_demand_at = self._clock()
+        """Note that somebody has just asked for a preview or a snapshot. May be called from any thread."""
+        self._last_demand_at = self._clock.now()
 
     def wanted(self) -> bool:
         """Whether the webcam should be open now."""
         if self._has_readers():
-            self._last_demand_at = self._clock()
-        return self._clock() - self._last_demand_at < self._idle_timeout_s
-
-
-log = logging.getLogger(__name__)
-
-RETRY_S = 1.0
-"""Pause after the camera could not be found."""
+            self._last_demand_at = self._clock.now()
+        return self._clock.now() - self._last_demand_at < self._idle_timeout_s
 
 
 class OnDemandSource:
-    """Closes the source that it wraps while nobody wants it, and makes a new one when somebody does.
+    """A source that wraps another: closed while it is not wanted, and made anew when it is.
 
-    Closing frees the device, so that a webcam's light goes out. Indices and times go on through the pauses.
+    Closing frees the device, so that a webcam's light goes out. Indices and times of the frames go on through the
+    pauses.
     """
 
-    def __init__(self, first: Source, make: Callable[[], Source], wanted: Callable[[], bool]) -> None:
+    def __init__(
+        self, first: Source, make: Callable[[], Source], wanted: Callable[[], bool], clock: Clock = SYSTEM_CLOCK
+    ) -> None:
         """Begin released.
 
         Args:
-            first: read when it is first wanted; nothing of it is open yet.
-            make: gives a new source, each time after that.
-            wanted: whether a source should be open now; asked at each `read`.
+            first: read when a source is first wanted; it must not be open yet.
+            make: makes a new source, each time after that.
+            wanted: whether a source should be open now; called at each `read`.
+            clock: to measure and wait by.
         """
         self._source: Source | None = first
-        self._make, self._wanted = make, wanted
+        self._make, self._wanted, self._clock = make, wanted, clock
         self._info = first.describe()
         self._began = False
         self._closing = threading.Event()
         self._lock = threading.Lock()  # `close` comes from another thread than `read`
         self._reason = ""
         self._retry_at = 0.0
-        self._started_at = time.monotonic()
+        self._started_at = clock.now()
         self._first = self._next_index = 0
         self._resumed_s = 0.0
 
@@ -90,12 +91,12 @@ class OnDemandSource:
             self._release()
         elif (source := self._opened_source()) is not None:
             return self._renumber(source.read(timeout_s), source)
-        self._closing.wait(timeout_s)
+        self._clock.wait(self._closing, timeout_s)
         return None
 
     @property
     def state(self) -> SourceState:
-        """What the source is doing: `released` while nobody wants it."""
+        """What the source is doing: `released` while it is not wanted."""
         source = self._source
         if self._closing.is_set():
             return SourceState.ENDED
@@ -136,7 +137,7 @@ class OnDemandSource:
             source, self._source, self._began = self._source, None, False
             self._first = self._next_index
             source.close()
-        log.info("nobody looks: %s is let go", self._info.id)
+        log.info("nobody reads the camera: %s is closed", self._info.id)
 
     def _opened_source(self) -> Source | None:
         with self._lock:
@@ -146,12 +147,12 @@ class OnDemandSource:
                 self._source = self._create_source()
             if self._source is not None and not self._began:
                 self._began = True
-                self._resumed_s = time.monotonic() - self._started_at if self._first else 0.0
+                self._resumed_s = self._clock.now() - self._started_at if self._first else 0.0
             return self._source
 
     def _create_source(self) -> Source | None:
-        """Make a source, or give None with the reason noted: a camera may have been unplugged meanwhile."""
-        now = time.monotonic()
+        """Make a source; None if the device is gone, with the reason noted."""
+        now = self._clock.now()
         if now < self._retry_at:
             return None
         try:
@@ -160,12 +161,14 @@ class OnDemandSource:
             self._reason, self._retry_at = error.what, now + RETRY_S
             return None
         self._reason = ""
-        log.info("somebody looks: %s is taken", self._info.id)
+        log.info("somebody reads the camera: %s is opened", self._info.id)
         return source
 
 
 class OnDemandController:
-    """Watches a sink for readers: a virtual camera by its node; a file always wants pictures, `null` never does.
+    """Opens the source on demand of a sink: a virtual camera while it is read, a file always, `null` never.
+
+    Viewers of a preview count as readers of any sink.
 
     Attributes:
         source: to be read in place of the plain one.
@@ -178,19 +181,19 @@ class OnDemandController:
             ConfigError: this system does not tell who reads a virtual camera.
         """
         kind = sink.describe().kind
-        self._watch = ReaderMonitor(lambda: sink.describe().id) if kind == "camera" else None
-        if self._watch is not None and not sys.platform.startswith("linux"):
+        self._readers = ReaderMonitor(lambda: sink.describe().id) if kind == "camera" else None
+        if self._readers is not None and not sys.platform.startswith("linux"):
             raise ConfigError(
                 "source.on_demand: only Linux tells who reads a virtual camera", "leave it out on this system"
             )
-        self._demand = DemandMonitor(self._watch.has_readers if self._watch else lambda: kind == "file")
+        self._demand = DemandMonitor(self._readers.has_readers if self._readers else lambda: kind == "file")
         self.source = OnDemandSource(first, make, self._demand.wanted)
 
     def note_viewer(self) -> None:
-        """Somebody asks for a preview or a snapshot: that counts as reading."""
+        """Note that somebody asks for a preview or a snapshot. May be called from any thread."""
         self._demand.note_viewer()
 
     def close(self) -> None:
-        """End what watches. The source belongs to whoever reads it."""
-        if self._watch is not None:
-            self._watch.close()
+        """Stop watching the sink. The source stays open: it belongs to whoever reads it."""
+        if self._readers is not None:
+            self._readers.close()

@@ -1,10 +1,8 @@
-"""Whether anybody takes pictures from a v4l2loopback device.
+"""Detects whether any program reads pictures from a v4l2loopback device.
 
-From version 0.13 on the driver says so itself, by an event of its own (V4L2_EVENT_PRI_CLIENT_USAGE, added by pull
-request 516): whoever subscribes is told at once, and at each change, how many take pictures. 0.12 (Debian 12) has
-nothing of the kind; there only the programs that have the node open can be counted, and of those only one's own.
-
-Looks out for readers of the virtual camera, in a thread of its own: /proc may be long to read.
+From version 0.13 on the driver reports it by an event of its own (V4L2_EVENT_PRI_CLIENT_USAGE, added by v4l2loopback's
+pull request 516): it gives every subscriber the number of readers, at once and at each change. Version 0.12 (Debian 12)
+has no such event; there the programs that have the node open are counted, and of those only the same user's.
 """
 
 from __future__ import annotations
@@ -17,20 +15,31 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from relit_camera.base.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import UnsupportedByDriverError
 from relit_camera.devices.device_users import PROC, find_device_users
 from relit_camera.devices.v4l2 import query_has_readers
 
+log = logging.getLogger(__name__)
+
+DRIVER_POLL_S, PROC_SCAN_S = 0.25, 1.0
+"""Seconds between two queries of the driver, and between two scans of /proc."""
+DEVICE_GONE_ERRNOS = (errno.ENOENT, errno.ENODEV, errno.ENXIO)
+"""What opening a node gives that no longer exists: nobody can read it."""
+
 ReaderQuery = Callable[[str], bool]
-"""(node) → whether anybody takes pictures from it."""
+"""Called with a device node; returns whether anybody reads pictures from it."""
 
 
 def driver_reports_readers(node: str) -> bool:
-    """Ask the driver whether anybody takes pictures from `node`.
+    """Ask the driver whether anybody reads pictures from `node`.
+
+    It subscribes anew each time: the first event of a subscription is the present state, so a lost event cannot mislead
+    for long.
 
     Raises:
         UnsupportedByDriverError: the driver has no such event.
-        OSError: the node is gone, or has as many openers as it takes; ask again later.
+        OSError: the node is gone, or no more programs may open it now; ask again later.
     """
     if not sys.platform.startswith("linux"):
         raise UnsupportedByDriverError("only Linux has v4l2loopback")
@@ -42,38 +51,36 @@ def driver_reports_readers(node: str) -> bool:
 
 
 def is_open_elsewhere(node: str, proc: Path = PROC) -> bool:
-    """Whether another program of ours (any, for root) has `node` open, be it to take pictures or not."""
+    """Whether another program of the same user (of any user, for root) has `node` open, to read pictures or not."""
     return bool(find_device_users(node, proc))
 
 
-log = logging.getLogger(__name__)
-
-DRIVER_POLL_S, PROC_SCAN_S = 0.25, 1.0
-"""Seconds between questions to the driver, and between walks through /proc."""
-DEVICE_GONE_ERRNOS = (errno.ENOENT, errno.ENODEV, errno.ENXIO)
-"""What a node says that is no more: nobody can read it."""
-
-
 class ReaderMonitor:
-    """Knows whether anybody reads the virtual camera at a node, which may change.
+    """Watches whether anybody reads the virtual camera at a node, which may change.
 
-    It begins with the first question. The driver is asked first; where it cannot answer, /proc is searched instead, for
-    good, and the log says so once.
+    A thread of its own does so, because scanning /proc may take long; it starts with the first call of `has_readers`.
+    The driver is asked first. If it does not report its readers, /proc is scanned from then on, and the log says so
+    once.
     """
 
     def __init__(
-        self, node: Callable[[], str], ask: ReaderQuery = driver_reports_readers, scan: ReaderQuery = is_open_elsewhere
+        self,
+        node: Callable[[], str],
+        ask: ReaderQuery = driver_reports_readers,
+        scan: ReaderQuery = is_open_elsewhere,
+        clock: Clock = SYSTEM_CLOCK,
     ) -> None:
-        self._node, self._ask, self._scan = node, ask, scan
+        self._node, self._ask, self._scan, self._clock = node, ask, scan, clock
         self._driver_answers = True
-        self._has_readers = False
+        self._has_readers = self._watching = False
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="readers", daemon=True)
+        self._thread = threading.Thread(target=self.run, name="readers", daemon=True)
 
     def has_readers(self) -> bool:
-        """Whether somebody read it when it was last looked at: not a second ago."""
-        if self._thread.ident is None and not self._stopping.is_set():
-            self._has_readers = self._query()  # the first answer is no guess
+        """Whether anybody read it at the last query, at most a second ago."""
+        if not self._watching and not self._stopping.is_set():
+            self._watching = True
+            self._has_readers = self._query()  # so that the first answer is no guess
             self._thread.start()
         return self._has_readers
 
@@ -81,8 +88,10 @@ class ReaderMonitor:
         """End the thread. Harmless when repeated."""
         self._stopping.set()
 
-    def _run(self) -> None:
-        while not self._stopping.wait(DRIVER_POLL_S if self._driver_answers else PROC_SCAN_S):
+    def run(self) -> None:
+        """Watch in the calling thread until `close`."""
+        self._watching = True
+        while not self._clock.wait(self._stopping, DRIVER_POLL_S if self._driver_answers else PROC_SCAN_S):
             self._has_readers = self._query()
 
     def _query(self) -> bool:
@@ -98,5 +107,6 @@ class ReaderMonitor:
                 node,
             )
         except OSError as error:
-            return self._has_readers and error.errno not in DEVICE_GONE_ERRNOS  # crowded: as it was
+            # A node that exists but may not be opened now leaves the last answer as it was.
+            return self._has_readers and error.errno not in DEVICE_GONE_ERRNOS
         return self._scan(node)

@@ -1,4 +1,4 @@
-"""The live chain as it runs: source, worker, publisher, null sink, for some seconds."""
+"""Benchmark of the live pipeline: source, worker, publisher and null sink, for some seconds."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WARM_UP_S = 2.0
 
 
 class SyntheticTracker:
-    """Stands in where no video is given: a mean face that turns and nods, with the landmarks a tracker would give."""
+    """Tracker for benchmarks without a video: gives a mean face that turns and nods, with its landmarks."""
 
     name = "nodding"
     scheme = "mesh478"
@@ -37,13 +37,13 @@ class SyntheticTracker:
         return FaceState(FaceStatus.FOUND, 1.0, self.scheme, landmarks, pose, eyes, mouth)
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Do nothing: the tracker has no state."""
 
 
 def benchmark_live(
     settings: RelitSettings, scene_controller: SceneController, source: Source, tracker: Tracker, seconds: float
 ) -> dict[str, dict[str, object]]:
-    """Run the daemon on a source into nothing.
+    """Run the camera service on a source, with a sink that discards the frames.
 
     Returns:
         `live`: stage → {p50_ms, p95_ms}, `capture_to_publish` among them; `live_run`: how it ran.

@@ -1,9 +1,4 @@
-"""Timing one function.
-
-Relighting one picture by every implementation, in one run (thesis, Table 6.1), and their agreement.
-
-What it costs to carry the data to the GPU each time (thesis, Table 6.2).
-"""
+"""Benchmarks of relighting: every implementation in one run (thesis, Table 6.1), and GPU transfers (Table 6.2)."""
 
 from __future__ import annotations
 
@@ -41,7 +36,7 @@ def median_ms(call: Callable[[], object], repeats: int = 30, at_most_s: float = 
 
 
 NAIVE_LOOP_PIXELS = 600
-"""The naive loop is timed on so many pixels and scaled up."""
+"""Number of pixels that the naive loop is timed on; the time is scaled up to the picture."""
 
 
 def benchmark_relighting(subject: Subject, maps: Mapping[str, LightMap], options: SessionOptions) -> dict[str, object]:

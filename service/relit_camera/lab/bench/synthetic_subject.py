@@ -1,4 +1,4 @@
-"""A generated subject to measure on where none is given: a coloured, bumpy, glossy head under 64 lights."""
+"""Synthetic subject for benchmarks: a colored, bumpy, glossy head under 64 lights."""
 
 from __future__ import annotations
 
@@ -47,6 +47,6 @@ def synthetic_subject(width: int = 150, height: int = 200) -> Subject:
 
 
 def _mean_face(width: int, height: int) -> Points:
-    """A mean face that looks into the camera from the picture's middle, so that the live chain can move it."""
+    """Landmarks of a mean face in the picture's middle that looks into the camera, for the live pipeline."""
     pose = HeadPose(Rotation.identity(), np.array([0.0, 0.0, -32.0]), guess_focal((width, height)))
     return project(landmark_scheme(LANDMARK_SCHEME).canonical.copy(), pose, (width, height))

@@ -1,1 +1,1 @@
-"""Evaluations against ground truth: reflectance fields, hold-out, relit videos, captures, stabilization."""
+"""Measuring what was built against what is known: fields, leave-out, relit videos; reports a person can read."""

@@ -1,6 +1,6 @@
-"""What a capture found in a video against the truth of a rendered one: frames, ball, light directions, head motion.
+"""Accuracy of a capture of a rendered video: frames, ball, light directions and head motion against the truth.
 
-A capture's errors as a report for people, as text and as JSON.
+Reports are written as HTML, text and JSON.
 """
 
 from __future__ import annotations
@@ -183,8 +183,8 @@ def capture_page(errors: CaptureErrors, title: str) -> str:
 def _capture_blocks(errors: CaptureErrors) -> Iterator[Block]:
     yield Paragraph(
         "A video of a person, a mirror ball and a blinking hand-held light was rendered, so that the truth of every "
-        f"frame is known. Of {errors.true_bright} frames that the flash lit wholly, {errors.used} were used "
-        f"({errors.used_share:.0%}); {errors.wrongly_bright} others were taken for bright wrongly."
+        f"frame is known. Of {errors.true_bright} frames that the flash lit completely, {errors.used} were used "
+        f"({errors.used_share:.0%}); {errors.wrongly_bright} other frames were classified as bright by mistake."
     )
     rows = []
     for name, values, unit in _error_rows(errors):
@@ -194,8 +194,8 @@ def _capture_blocks(errors: CaptureErrors) -> Iterator[Block]:
     yield table(
         ["error", "mean", "RMS", "95 % below", "largest"],
         rows,
-        "Light: angle between the found and the true direction toward it. Head: what remains of its motion in the "
-        "picture after the found transform, a constant taken out. Smaller is better everywhere.",
+        "Light: angle between the found and the true direction toward it. Head: motion in the picture that remains "
+        "after the found transform, without its mean. Smaller is better everywhere.",
     )
     if np.isfinite(errors.direction_deg).any() or np.isfinite(errors.at_ball_deg).any():
         lines = {"from the head": errors.direction_deg, "from the ball": errors.at_ball_deg}

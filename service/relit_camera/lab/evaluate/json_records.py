@@ -1,4 +1,4 @@
-"""JSON files with figures to compare."""
+"""Reading of JSON files into checked records."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Form = TypeVar("Form", bound="Record")
 
 
 class Record(BaseModel):
-    """What is read of a JSON object: finite numbers; what else it holds does not matter."""
+    """Base of records read from JSON objects: numbers must be finite, unknown keys are ignored."""
 
     model_config = ConfigDict(allow_inf_nan=False)
 

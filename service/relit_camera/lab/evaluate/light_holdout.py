@@ -1,7 +1,4 @@
-"""Leaving captured lights out and predicting them from the others: a truth that every capture has.
-
-The leave-out protocol as a report for people, as text and as JSON.
-"""
+"""Hold-out evaluation: some captured lights are left out and predicted from the others; reports as HTML, text, JSON."""
 
 from __future__ import annotations
 
@@ -31,7 +28,7 @@ _LARGEST_SHOWN_ERROR = 0.3
 
 @dataclass(frozen=True)
 class HoldOutScores:
-    """How well a method predicts the lights left out: means over them.
+    """Scores of a method: means over the lights left out.
 
     Attributes:
         method: its name.
@@ -51,13 +48,13 @@ class HoldOutScores:
 
 @dataclass(frozen=True)
 class HoldOutResult:
-    """One list of lights with every so many-th interior light left out.
+    """Result for one list of lights with every N-th interior light left out.
 
     Attributes:
         name: of the list.
         every: 4 leaves out every fourth.
         lights: how many were used to begin with.
-        rejected: index and reason of pictures that no light could make; they are neither used nor asked for.
+        rejected: index and reason of unusable pictures; they are neither used nor predicted.
         left_out: (some,) indices of those left out.
         scores: best first.
         worst_index: index into `left_out` of the picture that was predicted worst, on average over the methods.
@@ -89,7 +86,7 @@ def parse_hold_out(text: str) -> int:
 
 
 def interior_lights(directions: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Indices (some,) of the lights that are not on the edge of the sampled region: others surround them.
+    """Indices (some,) of the lights inside the sampled region, not on its boundary.
 
     Raises:
         LightsError: the directions (lights, 3) span no region.
@@ -104,7 +101,7 @@ def evaluate_hold_out(
     methods: Sequence[str] = (),
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> HoldOutResult:
-    """Leave out every so many-th interior light, in the list's order, and predict its picture from the rest.
+    """Leave out every N-th interior light, in the list's order, and predict its picture from the rest.
 
     The pictures that are kept are aligned with each other. Those left out are then aligned, for scoring only, as the
     kept ones were: with what a model of appearance fitted to the kept ones alone says of them; one motion and one gain
@@ -159,7 +156,7 @@ def evaluate_hold_out(
 
 
 def aligned_truth(kept: Samples, pictures: Colors, directions: NDArray[np.float64]) -> Colors:
-    """Pictures (some, height, width, 3) that were left out, moved and multiplied to fit the appearance of those kept.
+    """Left-out pictures (some, height, width, 3), aligned to the appearance model of the kept ones by motion and gain.
 
     A method's own prediction, or a mean of them, would favour methods that are wrong in the same way: interpolation is
     too dark between its lights, and a gain fitted to it is too small.
@@ -175,7 +172,7 @@ def aligned_truth(kept: Samples, pictures: Colors, directions: NDArray[np.float6
 
 
 def _scores(known: GroundTruth, method: str, predicted: Colors, truth: Colors, raw_peak_255_db: float) -> HoldOutScores:
-    """Of colours (some, pixels, 3) against the true ones."""
+    """Scores of predicted colors (some, pixels, 3) against the true ones."""
     relit = [compare_relit(known, seen, expected) for seen, expected in zip(predicted, truth, strict=True)]
     return HoldOutScores(
         method=method,
@@ -203,7 +200,7 @@ def holdout_json(results: Sequence[HoldOutResult]) -> dict[str, object]:
 
 
 def holdout_text(results: Sequence[HoldOutResult]) -> str:
-    """A table for each list and share left out: a row a method."""
+    """Plain-text table for each result, a row per method."""
     width = max(len(score.method) for each in results for score in each.scores)
     lines = ["PSNR in linear light, peak 255, dB: aligned (as captured)"]
     for each in results:

@@ -1,8 +1,8 @@
-"""The room's light, measured with the live face as probe.
+"""Estimating the room's light from the live face.
 
-The subject's field tells how the face looks under any light; so the light under which it looks as it does now is a
+The subject's reflectance field gives the face under any light, so the light under which it looks as it does now is a
 linear fit: non-negative amounts of some eighty soft lights, fixed in the room, that explain the live pixels of the
-face, robustly, a few times a second. Between fits the camera's exposure is followed by a gain a frame.
+face. It is fitted robustly, a few times a second. Between fits a gain per frame follows the camera's exposure.
 """
 
 from __future__ import annotations
@@ -33,25 +33,44 @@ from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.subject.relighting.relighter import weighted_light
 from relit_camera.subject.subject import Subject
 
-LOBE_COUNT = 80
-LOBE_SHARPNESS = 12.0
-"""Of exp(k (cos − 1)): half value at 20°, about the spacing of eighty directions."""
-RIDGE = 3e-3
-"""Pull toward the last fit, relative to the normal matrix's mean diagonal."""
-ROBUST_ITERATIONS = 3
-FITS_PER_S = 4.0
-LIGHT_SMOOTHING = 0.5
-"""Share of the way from the last light to the newly fitted one."""
-RESIDUAL_SMOOTHING = 0.1
-"""Share of the way that the reported residual goes to that of each frame."""
-CLIPPING_CODE = 250
-HUBER_THRESHOLD = 0.25
-"""Relative residual from which a sample loses weight (Huber)."""
+
+@dataclass(frozen=True)
+class RoomLightTunables:
+    """Constants of the estimation.
+
+    Attributes:
+        lobe_count: soft lights whose amounts are fitted.
+        lobe_sharpness: k of a light's exp(k (cos − 1)): with 12 half its value at 20°, about the spacing of 80 lights.
+        ridge: pull toward the last fit, relative to the normal matrix's mean diagonal.
+        robust_iterations: fits with new weights in each update.
+        fits_per_s: how often the light is fitted.
+        light_smoothing: share of the way from the last light to the newly fitted one.
+        residual_smoothing: share of the way that the reported residual goes to that of each frame.
+        clipping_code: sRGB code from which a sample counts as clipped.
+        huber_threshold: relative residual from which a sample loses weight (Huber).
+        min_samples: usable samples that the gain of a frame needs.
+        gain_range: limits of that gain.
+    """
+
+    lobe_count: int = 80
+    lobe_sharpness: float = 12.0
+    ridge: float = 3e-3
+    robust_iterations: int = 3
+    fits_per_s: float = 4.0
+    light_smoothing: float = 0.5
+    residual_smoothing: float = 0.1
+    clipping_code: int = 250
+    huber_threshold: float = 0.25
+    min_samples: int = 20
+    gain_range: tuple[float, float] = (0.25, 4.0)
+
+
+TUNABLES = RoomLightTunables()
 
 
 @dataclass(frozen=True)
 class RoomLightEstimate:
-    """What the probe says.
+    """The room's light in one frame.
 
     Attributes:
         light_map: (32, 64, 3) float32 room radiance in units of the live picture's linear values.
@@ -73,13 +92,13 @@ class RoomLightEstimator:
         self._triangles = _skin_triangles(face)
         self._samples = _sample_basis(subject, face.landmarks[self._triangles].mean(axis=1))
         self._coefficients = subject.coefficients
-        self._amounts = np.zeros((LOBE_COUNT, 3))
+        self._amounts = np.zeros((TUNABLES.lobe_count, 3))
         self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), dtype=np.float32)
         self._fitted_at = -np.inf
         self._residual: float | None = None
 
     def update(self, image: DisplayImage, landmarks: Points, rotation: Rotation, time_s: float) -> RoomLightEstimate:
-        """Follow the light in one live frame.
+        """Estimate the light of the next live frame.
 
         Args:
             image: the live picture, uint8 sRGB.
@@ -88,7 +107,7 @@ class RoomLightEstimator:
             time_s: of the frame.
         """
         live, usable = _sample_frame(image, landmarks[self._triangles].mean(axis=1))
-        if time_s - self._fitted_at > 1 / FITS_PER_S or time_s < self._fitted_at:
+        if time_s - self._fitted_at > 1 / TUNABLES.fits_per_s or time_s < self._fitted_at:
             self._fit(live, usable, rotation)
             self._fitted_at = time_s
             light = _lobe_maps(Rotation.identity()) @ self._amounts
@@ -96,13 +115,13 @@ class RoomLightEstimator:
         in_head_frame = rotate_light_map(self._light_map, rotation)
         predicted = self._predict(in_head_frame)
         gain = np.ones(3, np.float32)
-        if usable.sum() >= 20:
+        if usable.sum() >= TUNABLES.min_samples:
             ratio = live[usable] / np.maximum(predicted[usable], 1e-4)
-            gain = np.clip(np.median(ratio, axis=0), 0.25, 4.0).astype(np.float32)
+            gain = np.clip(np.median(ratio, axis=0), *TUNABLES.gain_range).astype(np.float32)
             deviation = np.abs(predicted * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
             now = float(np.median(deviation))
             self._residual = (
-                now if self._residual is None else self._residual + RESIDUAL_SMOOTHING * (now - self._residual)
+                now if self._residual is None else self._residual + TUNABLES.residual_smoothing * (now - self._residual)
             )
         return RoomLightEstimate(
             self._light_map, in_head_frame, gain, 0.0 if self._residual is None else self._residual
@@ -121,19 +140,22 @@ class RoomLightEstimator:
             amounts = self._amounts[:, channel]
             weight = usable.astype(np.float64)
             level = max(float(live[usable, channel].mean()) if usable.any() else 0.0, 1e-4)
-            for _ in range(ROBUST_ITERATIONS):
-                fitted = _regularized_nnls(design, live[:, channel], weight, amounts)
+            for _ in range(TUNABLES.robust_iterations):
+                fitted = regularized_nnls(design, live[:, channel], weight, amounts)
                 error = np.abs(design @ fitted - live[:, channel]) / level
-                weight = usable * np.minimum(1, HUBER_THRESHOLD / np.maximum(error, 1e-9))
-            self._amounts[:, channel] = fitted if first else amounts + LIGHT_SMOOTHING * (fitted - amounts)
+                weight = usable * np.minimum(1, TUNABLES.huber_threshold / np.maximum(error, 1e-9))
+            self._amounts[:, channel] = fitted if first else amounts + TUNABLES.light_smoothing * (fitted - amounts)
 
 
-def _regularized_nnls(
+def regularized_nnls(
     design: NDArray[np.float64], values: NDArray[np.float32], weight: NDArray[np.float64], prior: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """argmin_{x ≥ 0} Σ w (A x − b)² + λ |x − prior|²; solved on the Cholesky factor, which is small."""
+    """Solve argmin_{x ≥ 0} Σ w (A x − b)² + λ |x − prior|², with λ from `RoomLightTunables.ridge`.
+
+    It is solved on the Cholesky factor of the normal matrix, which is small.
+    """
     normal = design.T @ (design * weight[:, None])
-    ridge = RIDGE * max(float(np.trace(normal)) / len(normal), 1e-12)
+    ridge = TUNABLES.ridge * max(float(np.trace(normal)) / len(normal), 1e-12)
     normal[np.diag_indices_from(normal)] += ridge
     right = design.T @ (weight * values) + ridge * prior
     factor = np.linalg.cholesky(normal)
@@ -142,9 +164,9 @@ def _regularized_nnls(
 
 
 def _lobe_maps(rotation: Rotation) -> NDArray[np.float64]:
-    """Soft lights fixed in the room, as a head under `rotation` sees them: (2048, LOBES)."""
-    seen = rotation.inv().apply(fibonacci_directions(LOBE_COUNT))
-    return np.exp(LOBE_SHARPNESS * (texel_directions().reshape(-1, 3) @ seen.T - 1))
+    """The soft lights, fixed in the room, in the frame of a head under `rotation`: (2048, lobe_count)."""
+    seen = rotation.inv().apply(fibonacci_directions(TUNABLES.lobe_count))
+    return np.exp(TUNABLES.lobe_sharpness * (texel_directions().reshape(-1, 3) @ seen.T - 1))
 
 
 def _skin_triangles(face: SourceFace) -> NDArray[np.intp]:
@@ -161,7 +183,7 @@ def _skin_triangles(face: SourceFace) -> NDArray[np.intp]:
 
 
 def _sample_basis(subject: Subject, points: Points) -> NDArray[np.float32]:
-    """The subject's rows at `points` (count, 2): (3, count, components), softened as the live samples are."""
+    """The subject's rows at `points` (count, 2): (3, count, components), blurred as the live samples are."""
     width, height = subject.size
     reach = _blur_size(points)
     # What a box filter and then bilinear interpolation would read there, borders repeated.
@@ -193,9 +215,9 @@ def _sample_frame(image: DisplayImage, points: Points) -> tuple[NDArray[np.float
     values = cv2.remap(soft, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
     brightest = cv2.remap(part, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)[0].max(axis=1)
     inside = ((points > 0) & (points < [width, height])).all(axis=1)
-    return values, inside & (brightest < CLIPPING_CODE)
+    return values, inside & (brightest < TUNABLES.clipping_code)
 
 
 def _blur_size(points: Points) -> int:
-    """Box size in pixels: about the spacing of the samples, so that both pictures are seen equally coarse."""
+    """Box size in pixels: about the spacing of the samples, so that both pictures are sampled equally coarsely."""
     return max(int(np.ptp(points[:, 0]) / 24), 1)

@@ -1,4 +1,4 @@
-"""The picture shown while there is nothing else to show."""
+"""The placeholder: a picture for when there is no other, with a line that says why."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 def placeholder(size: tuple[int, int], reason: str = "", picture: Path | None = None) -> DisplayImage:
-    """Make the placeholder.
+    """Draw the placeholder, or fit the user's own picture.
 
     Args:
         size: width and height in pixels.
-        reason: one line under our own picture; characters beyond ASCII are shown as `?`.
-        picture: a picture file of the user's own, fitted whole into the size, without title or reason.
+        reason: one line under the drawing; characters beyond ASCII are shown as `?`.
+        picture: a picture file to show in place of the drawing, fitted whole into the size, without title or reason.
 
     Returns:
         uint8 sRGB RGB (height, width, 3).
@@ -44,7 +44,7 @@ def placeholder(size: tuple[int, int], reason: str = "", picture: Path | None = 
 
 
 def _draw(size: tuple[int, int], reason: str) -> DisplayImage:
-    """A ball under a warm key and a cool rim light, and the words below it."""
+    """Draw a ball under a warm key light and a cool rim light, with title and reason below it."""
     width, height = size
     unit = min(width * 9 / 16, height)
     middle = height * 0.40
@@ -54,9 +54,9 @@ def _draw(size: tuple[int, int], reason: str) -> DisplayImage:
     return canvas
 
 
-def _ball(width: int, height: int, centre: tuple[float, float], radius: float) -> NDArray[np.float32]:
-    x = ((np.arange(width, dtype=np.float32) + 0.5 - centre[0]) / radius)[None, :]
-    y = ((centre[1] - np.arange(height, dtype=np.float32) - 0.5) / radius)[:, None]
+def _ball(width: int, height: int, center: tuple[float, float], radius: float) -> NDArray[np.float32]:
+    x = ((np.arange(width, dtype=np.float32) + 0.5 - center[0]) / radius)[None, :]
+    y = ((center[1] - np.arange(height, dtype=np.float32) - 0.5) / radius)[:, None]
     squared = x**2 + y**2
     image = BACKGROUND_COLOR + 0.035 * np.exp(squared / -9)[..., None] * KEY_COLOR
     rows, columns = np.nonzero(squared < (1 + 1 / radius) ** 2)
@@ -70,12 +70,12 @@ def _ball(width: int, height: int, centre: tuple[float, float], radius: float) -
 
 
 def _write(canvas: DisplayImage, text: str, baseline: float, cap_height: float, ink: tuple[int, int, int]) -> None:
-    """Write one centred line, smaller where it would not fit."""
+    """Write one centered line, scaled down where it would not fit."""
     thickness = max(1, round(cap_height / 20))
     scale = cv2.getFontScaleFromHeight(FONT, max(1, round(cap_height)), thickness)
     (text_width, _), _ = cv2.getTextSize(text, FONT, scale, thickness)
-    room = canvas.shape[1] * 0.9
-    if text_width > room:
-        scale, text_width = scale * room / text_width, int(room)
+    max_width = canvas.shape[1] * 0.9
+    if text_width > max_width:
+        scale, text_width = scale * max_width / text_width, int(max_width)
     origin = (int((canvas.shape[1] - text_width) / 2), round(baseline))
     cv2.putText(canvas, text, origin, FONT, scale, ink, thickness, cv2.LINE_AA)

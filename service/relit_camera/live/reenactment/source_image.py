@@ -18,6 +18,7 @@ from relit_camera.base.images.image_types import LinearImage, Mask, Points
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.head_pose import HeadPose, fit_pose, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
+from relit_camera.face.tracking.track_recording import RecordedTracker
 from relit_camera.face.tracking.trackers import open_tracker, track_still
 from relit_camera.live.reenactment.warp import Box, Warp, sample_bilinear
 from relit_camera.subject.subject import Subject
@@ -56,7 +57,7 @@ def find_source_face(subject: Subject, tracker: Tracker) -> SourceFace:
         ModelError: a recorded track is played back, the subject keeps no landmarks, and the models are missing.
     """
     scheme = landmark_scheme(tracker.scheme)
-    recorded = tracker.name == "recorded"
+    recorded = isinstance(tracker, RecordedTracker)
     landmarks = None if recorded else _tracked_landmarks(subject, tracker)
     if landmarks is None:
         landmarks = subject.landmarks.get(scheme.name)

@@ -1,4 +1,4 @@
-"""Things that happened, for whoever listens: a bounded queue each, so that a slow one loses events, never time."""
+"""Hands events to listeners, each through a bounded queue: a slow listener loses events and delays nobody."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ QUEUE_LENGTH = 64
 
 @dataclass(frozen=True)
 class Event:
-    """One happening.
+    """Something that happened to the camera.
 
     Attributes:
         kind: `state`, `tracking`, `neutral-pose`, `degraded`, `recovered`; `collection` from the API; `caption` from

@@ -1,4 +1,4 @@
-"""What is shown while the picture path fails or hangs."""
+"""The picture that is shown while the pipeline fails or hangs."""
 
 from __future__ import annotations
 
@@ -24,18 +24,19 @@ log = logging.getLogger(__name__)
 
 
 class FallbackRenderer:
-    """Makes pictures without tracker and reenactor: the subject's still at rest, relit as the scene says.
+    """Renders without tracker and reenactor: the subject's source image at rest, relit as the scene says.
 
-    Where there is no subject, or that fails too: the live picture or the placeholder, as configured. Not thread-safe.
+    Where there is no subject, or where that fails too, it gives the live picture or the placeholder, as configured. Not
+    thread-safe.
     """
 
     def __init__(self, size: tuple[int, int], fallback: Fallback, placeholder: DisplayImage) -> None:
-        """For an output of `size` (width, height).
+        """Set up; nothing is rendered yet.
 
         Args:
-            size: of the pictures to make.
-            fallback: what is shown where no still can be.
-            placeholder: uint8 sRGB RGB of the output's size.
+            size: (width, height) of the output in pixels.
+            fallback: what is shown where the source image cannot be relit.
+            placeholder: uint8 sRGB RGB (height, width, 3), of the output's size.
         """
         self._size, self._fallback, self._placeholder = size, fallback, placeholder
         self._background_renderer = BackgroundRenderer(size)
@@ -44,17 +45,17 @@ class FallbackRenderer:
         self._failed_subject: Subject | None = None
 
     def release(self) -> None:
-        """Let go of the memory that pictures take: none is wanted now."""
+        """Free the memory of the relit source image, while no fallback is needed."""
         self._source = None
 
     def picture(self, frame: Frame, scene: Scene) -> DisplayImage:
-        """A picture for this live frame: uint8 sRGB RGB of the output's size. Never fails."""
+        """A picture in place of this live frame: uint8 sRGB RGB (height, width, 3). Never raises."""
         subject = scene.subject
         if subject is not None and subject is not self._failed_subject:
             try:
                 return self._relit(subject, scene, frame.time_s)
             except Exception:  # this is what is shown when all else fails
-                log.exception("the still cannot be relit either")
+                log.exception("the source image cannot be relit either")
                 self._failed_subject = subject
         return crop_to_fill(frame.image, self._size) if self._fallback is Fallback.LIVE else self._placeholder
 
@@ -66,7 +67,7 @@ class FallbackRenderer:
 
 
 class _RelitSource:
-    """One subject, in its place in the output."""
+    """The source image of one subject, placed in the output as it is at rest."""
 
     def __init__(self, subject: Subject, size: tuple[int, int]) -> None:
         self.subject = subject
@@ -78,7 +79,7 @@ class _RelitSource:
         self._last: tuple[LightMap, WarpedLayer] | None = None
 
     def render(self, light: LightMap) -> WarpedLayer:
-        """The person under `light`; the last picture again while that stays."""
+        """The person under `light`; the previous layer again if the light has not changed."""
         if self._last is None or not np.array_equal(self._last[0], light):
             picture, alpha = self._person.sampled(self._relighter.relight(light), self._positions)
             self._last = light, WarpedLayer(picture, alpha, self._box[:2])

@@ -13,17 +13,18 @@ from relit_camera.light.light_map import LightMap
 from relit_camera.subject.reflectance_field import TEXELS
 
 DARK_LIGHT_FRACTION = 0.01
-"""A light whose picture is darker than this share of the brightest light's is judged by that."""
+"""Least peak that accuracy is relative to, as a share of the brightest light's: darker pictures may have larger errors
+relative to their own peak."""
 
 
 @dataclass(frozen=True)
 class CompressionTarget:
-    """How well pictures must come back inside the matte, in dB (see `base.images.image_quality.psnr`).
+    """Least PSNR, in dB, of pictures of the compressed field inside the matte (see `base.images.image_quality.psnr`).
 
     Attributes:
-        texel_db: of any texel alone, by its own peak: light maps, which mix them, are then no worse.
-        light_db: of any captured light.
-        maps: light maps (32, 64, 3) that the result is tried on.
+        texel_db: of the picture under any single texel, by its own peak; light maps mix texels and are no worse.
+        light_db: of the picture of any captured light.
+        maps: light maps (32, 64, 3) under which the quality of the result is measured too.
     """
 
     texel_db: float = 43.0
@@ -31,11 +32,11 @@ class CompressionTarget:
     maps: Sequence[LightMap] = ()
 
     def allowed(self, peaks: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Root mean square error (columns,) allowed, by the peak of each column: texels, then captured lights."""
+        """Allowed root mean square error (columns,), by the peak of each column: texels, then captured lights."""
         decibels = np.full(len(peaks), self.light_db)
         decibels[:TEXELS] = self.texel_db
-        judged = np.maximum(peaks, max(DARK_LIGHT_FRACTION * float(peaks.max()), 1e-6))
-        return np.asarray(judged * 10 ** (-decibels / 20), np.float32)
+        reference = np.maximum(peaks, max(DARK_LIGHT_FRACTION * float(peaks.max()), 1e-6))
+        return np.asarray(reference * 10 ** (-decibels / 20), np.float32)
 
     @property
     def light(self) -> NDArray[np.float32]:

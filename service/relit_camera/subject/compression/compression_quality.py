@@ -17,21 +17,22 @@ from relit_camera.subject.reflectance_field import TEXELS
 Values = NDArray[np.float32]
 
 MAX_PSNR_DB = 200.0
-"""Of pictures that are equal."""
+"""PSNR given for equal pictures."""
 PEAK_PIXEL_STRIDE = 4
+"""A texel's peak is taken from every fourth pixel."""
 LIGHTS_PER_BATCH = 32
-"""Lights restored at once: bounds the memory."""
+"""Lights restored at a time, which bounds the memory."""
 
 
 @dataclass(frozen=True)
 class CompressionQuality:
-    """Figures in dB (see `base.images.image_quality.psnr`), and bytes.
+    """Worst PSNRs in dB (see `base.images.image_quality.psnr`), and the size of a compressed field.
 
     Attributes:
-        light_db: of the captured light that comes back worst.
-        texel_db: of the texel, alone, that comes back worst.
-        map_db: of the light map, of those it was tried on, that comes back worst; None where it was tried on none.
-        bytes_share: bytes kept, by those of the dense float32 matrix of all pixels.
+        light_db: of the least accurate captured light.
+        texel_db: of the least accurate single texel.
+        map_db: of the least accurate light map of the target; None where it has none.
+        bytes_share: bytes of the compressed field over those of the dense float32 matrix.
     """
 
     light_db: float
@@ -41,17 +42,17 @@ class CompressionQuality:
 
 
 def dense_bytes(matte: Mask) -> int:
-    """Bytes of the matrix (pixels, 3, 2048) in float32."""
+    """Bytes of the uncompressed matrix (pixels, 3, 2048) in float32."""
     return matte.size * 3 * TEXELS * 4
 
 
 def worst_texel_db(basis: LocalBasis, coefficients: Values, errors: Values, matte: Mask) -> float:
-    """PSNR in dB of the texel, alone, that comes back worst, inside the matte.
+    """Lowest PSNR in dB of the picture under a single texel, inside the matte.
 
     Its peak, the 99.5th percentile, is taken from the compressed field, at every fourth pixel.
 
     Args:
-        basis: the rows of the field.
+        basis: the basis of the compressed field.
         coefficients: (components, 2048).
         errors: (2048,) mean square errors.
         matte: (height, width).
@@ -62,17 +63,17 @@ def worst_texel_db(basis: LocalBasis, coefficients: Values, errors: Values, matt
         part = slice(start, start + LIGHTS_PER_BATCH)
         pictures = basis.at(coefficients[:, part], inside)
         peaks[part] = np.percentile(pictures.reshape(len(pictures), -1), 99.5, axis=1)
-    judged = np.maximum(peaks, DARK_LIGHT_FRACTION * peaks.max())
-    return float(min(-10 * np.log10((errors / judged**2).max() + 1e-20), MAX_PSNR_DB))
+    reference = np.maximum(peaks, DARK_LIGHT_FRACTION * peaks.max())
+    return float(min(-10 * np.log10((errors / reference**2).max() + 1e-20), MAX_PSNR_DB))
 
 
 def worst_light_db(basis: LocalBasis, light_coefficients: Values, captured: Values, matte: Mask) -> float:
-    """PSNR in dB of the captured light (lights, height, width, 3) that comes back worst, inside the matte.
+    """Lowest PSNR in dB of the captured lights' pictures, inside the matte.
 
     Args:
-        basis: the rows of the field.
+        basis: the basis of the compressed field.
         light_coefficients: (components, lights).
-        captured: the truth.
+        captured: (lights, height, width, 3) the captured pictures.
         matte: (height, width).
     """
     inside = np.flatnonzero(matte.ravel() > 0.5)
@@ -91,10 +92,10 @@ def worst_light_db(basis: LocalBasis, light_coefficients: Values, captured: Valu
 
 
 def worst_map_db(basis: LocalBasis, coefficients: Values, light: Values, truth: Values, matte: Mask) -> float | None:
-    """PSNR in dB of the light map that comes back worst, inside the matte; None of no map.
+    """Lowest PSNR in dB of the pictures under the light maps, inside the matte; None without a map.
 
     Args:
-        basis: the rows of the field.
+        basis: the basis of the compressed field.
         coefficients: (components, 2048).
         light: (maps, 2048, 3) radiance times solid angle.
         truth: (maps, height · width, 3), the dense field's pictures.

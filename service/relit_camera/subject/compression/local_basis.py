@@ -1,8 +1,8 @@
-"""The pictures that a compressed field is mixed from: few for each cluster of pixels, its own ones.
+"""The local basis of a compressed field: each cluster of pixels has a few basis pictures of its own.
 
 Clustered principal components (Sloan et al., Clustered Principal Components for Precomputed Radiance Transfer,
-SIGGRAPH 2003): neighbouring pixels see the same shadows, so that a dozen or two of components tell as much of them as
-hundreds tell of the whole picture.
+SIGGRAPH 2003): neighbouring pixels have the same shadows, so one or two dozen components describe a cluster as well
+as hundreds describe the whole picture.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class LocalBasis:
         """Check that the arrays fit together.
 
         Raises:
-            ValueError: they do not; the message has what is wrong.
+            ValueError: they do not; the message says how.
         """
         count = len(self.values)
         if self.pixels.ndim != 2 or self.values.shape[1:] != (3, self.pixels.shape[1]):
@@ -55,20 +55,20 @@ class LocalBasis:
 
     @property
     def components(self) -> int:
-        """How many the shared basis has."""
+        """Number of components of the shared basis."""
         return int(self.mixes.shape[1])
 
     @property
     def nbytes(self) -> int:
-        """What the arrays take."""
+        """Bytes of all arrays."""
         return sum(a.nbytes for a in (self.pixels, self.first, self.values, self.scales, self.mixes))
 
     def scaled_mixes(self, part: slice = slice(None)) -> NDArray[np.float32]:
-        """The mixes times their scales, float32, of some of the components."""
+        """The mixes times their scales, float32, for a slice of the components."""
         return np.asarray(self.mixes[part].astype(np.float32) * self.scales[part, None])
 
     def at(self, amounts: NDArray[np.float32], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Colours (count, some, 3) of row-major pixels (some,), none twice, for amounts (components, count)."""
+        """Colors (count, some, 3) of distinct row-major pixels (some,), for amounts (components, count)."""
         result = np.zeros((amounts.shape[1], len(pixels), 3), np.float32)
         place = np.full(self._end(pixels), -1, np.intp)
         place[pixels] = np.arange(len(pixels))
@@ -82,7 +82,7 @@ class LocalBasis:
         return result
 
     def rows(self, weights: csr_array) -> NDArray[np.float32]:
-        """Weighted sums of the pixels' rows: (3, count, components), by weights (count, pixels)."""
+        """Weighted sums (3, count, components) of the pixels' rows, by weights (count, pixels)."""
         columns = weights.tocsc()
         result = np.zeros((3, weights.shape[0], self.components), np.float32)
         for cluster, part in self._clusters():
@@ -117,7 +117,7 @@ class LocalBasis:
 
 
 def global_basis(pictures: NDArray[np.float16], matte: Mask) -> LocalBasis:
-    """One cluster of all pixels where the matte is not 0: the shared basis's pictures themselves.
+    """A basis of one cluster, all pixels where the matte is not 0, with the shared basis's pictures as they are.
 
     Args:
         pictures: (3, components, height, width).

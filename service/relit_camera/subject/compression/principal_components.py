@@ -1,6 +1,7 @@
-"""One cluster of pixels as principal components in 8 bits, as many as the error asks for.
+"""Principal components of a cluster of pixels, quantized to 8 bits, and the basis over lights that all clusters share.
 
-What the components of all clusters have in common: one basis over lights, in which each is short to tell.
+A cluster keeps as many components as its error threshold requires. The components of all clusters are then expressed
+in one orthonormal basis over lights, in which each has few coefficients.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ class ClusterComponents:
     Attributes:
         codes: (count, rows) int8.
         scales: (count,) float32.
-        vectors: (count, columns) float16 of unit length; one occurs again where 8 bits do not tell its amounts.
+        vectors: (count, columns) float16 of unit length; one is repeated where 8 bits do not hold its amounts.
     """
 
     codes: NDArray[np.int8]
@@ -35,66 +36,66 @@ class ClusterComponents:
 
     @property
     def energies(self) -> Values:
-        """Sum (count,) of the squares that each component stands for."""
+        """Energy (count,) of each component: the sum of squares of its part of the rows."""
         codes = self.codes.astype(np.float32)
         return np.asarray(np.einsum("jr,jr->j", codes, codes) * self.scales**2)
 
     def restored(self) -> Values:
-        """The rows (rows, columns)."""
+        """The rows (rows, columns), decoded."""
         amounts = self.codes.astype(np.float32) * self.scales[:, None]
         return np.asarray(amounts.T @ self.vectors.astype(np.float32))
 
 
 @dataclass(frozen=True)
 class PixelCluster:
-    """Rows (rows, columns) float32 of a cluster: its pixels' channels, under lights that all count alike."""
+    """The rows (rows, columns) float32 of a cluster: its pixels' channels under columns scaled to equal importance."""
 
     rows: Values
 
     @cached_property
     def _principal(self) -> tuple[Values, Values]:
-        """Unit vectors over rows, as columns, by falling energy, and that energy."""
-        # By the smaller side: a cluster has fewer rows than there are lights.
+        """Principal directions over the rows, as columns, by falling energy; and the energies."""
+        # From the smaller Gram matrix: a cluster has fewer rows than columns.
         energies, vectors = np.linalg.eigh((self.rows @ self.rows.T).astype(np.float64))
         return np.ascontiguousarray(vectors[:, ::-1], np.float32), energies[::-1].astype(np.float32)
 
     def components(self, threshold: float) -> ClusterComponents:
-        """The principal components that explain more than `threshold`, in 8 bits.
+        """The principal components whose energy exceeds `threshold`, quantized to 8 bits.
 
-        What 8 bits leave of a component is kept as another one, by the same rule.
+        The quantization error of a component is kept as another component, by the same rule.
         """
         directions, energies = self._principal
         kept = directions[:, : max(1, int((energies > threshold).sum()))]
         vectors = kept.T @ self.rows
         lengths = np.linalg.norm(vectors, axis=1) + np.float32(1e-20)
-        left, vectors = (kept * lengths).T, vectors / lengths[:, None]
+        residual, vectors = (kept * lengths).T, vectors / lengths[:, None]
         codes, scales, used = [], [], []
-        chosen = np.arange(len(left))
+        chosen = np.arange(len(residual))
         while len(chosen):
-            scale = np.abs(left).max(axis=1) / MAX_CODE + np.float32(1e-30)
-            code = np.rint(left / scale[:, None])
+            scale = np.abs(residual).max(axis=1) / MAX_CODE + np.float32(1e-30)
+            code = np.rint(residual / scale[:, None])
             codes.append(code.astype(np.int8))
             scales.append(scale)
             used.append(chosen)
-            left = left - code * scale[:, None]
-            again = np.einsum("jr,jr->j", left, left) > threshold
-            left, chosen = left[again], chosen[again]
+            residual = residual - code * scale[:, None]
+            again = np.einsum("jr,jr->j", residual, residual) > threshold
+            residual, chosen = residual[again], chosen[again]
         order = np.concatenate(used)
         return ClusterComponents(np.concatenate(codes), np.concatenate(scales), vectors[order].astype(np.float16))
 
 
 CLUSTERS_PER_BATCH = 64
-"""Clusters whose products are added up at once: one at a time, adding takes longer than multiplying."""
+"""Clusters whose Gram matrices are summed together; one at a time the addition would take longer than the product."""
 
 
 @dataclass(frozen=True)
 class SharedBasis:
-    """Orthonormal vectors over lights.
+    """Orthonormal vectors over columns (texels and lights), and the clusters' components in them.
 
     Attributes:
         vectors: (components, columns) float32.
-        mixes: for each cluster (count, components) float16, its components in them.
-        error: (columns,) sum of squares, over all clusters, that is lost.
+        mixes: for each cluster (count, components) float16, the coefficients of its components.
+        error: (columns,) sum of squared residuals over all clusters.
     """
 
     vectors: Values
@@ -105,7 +106,7 @@ class SharedBasis:
 def fit_shared_basis(clusters: Sequence[ClusterComponents], allowed: float) -> SharedBasis:
     """The fewest principal directions of all clusters' components with an error of `allowed` at most in every column.
 
-    Principal components of the parts' principal components are those of the whole, but for what the parts left out.
+    Principal components of the clusters' principal components are those of the whole, up to what the clusters dropped.
     """
     energies, directions = _principal_directions(clusters)
     lost = np.cumsum((directions**2 * energies)[:, ::-1], axis=1)[:, ::-1].max(axis=0)
@@ -117,7 +118,7 @@ def fit_shared_basis(clusters: Sequence[ClusterComponents], allowed: float) -> S
 
 
 def _principal_directions(clusters: Sequence[ClusterComponents]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Energies (count,), falling, and unit vectors (columns, count) of all clusters' components together."""
+    """Energies (count,), falling, and principal directions (columns, count) of all clusters' components together."""
     columns = clusters[0].vectors.shape[1]
     weighted = (each.vectors.astype(np.float32) * np.sqrt(each.energies)[:, None] for each in clusters)
     if sum(len(each.scales) for each in clusters) < columns:
@@ -136,6 +137,6 @@ def _squared_error(
 ) -> NDArray[np.float64]:
     error = np.zeros(vectors.shape[1])
     for cluster, mix in zip(clusters, mixes, strict=True):
-        left = cluster.vectors.astype(np.float32) - mix.astype(np.float32) @ vectors
-        error += cluster.energies @ left**2
+        residual = cluster.vectors.astype(np.float32) - mix.astype(np.float32) @ vectors
+        error += cluster.energies @ residual**2
     return error

@@ -1,4 +1,4 @@
-"""A subject made small enough to be shipped: fewer principal pictures, each kept as a picture of 8 bits."""
+"""Packing a subject for shipping: fewer principal pictures, all kept in one lossless WebP picture of 8 bits."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from relit_camera.subject.compression.local_basis import global_basis
 from relit_camera.subject.subject import Subject
 
 _MAX_WEBP_SIDE = 16383
-"""Pixels a side that the format allows."""
+"""Largest side, in pixels, of a WebP picture."""
 _LIGHTS_PER_BATCH = 32
-"""Lights restored at once."""
+"""Lights restored at a time."""
 
 
 def pack_subject(subject: Subject, components: int) -> Subject:
-    """The subject in its `components` first principal pictures, as `write_subject` with `small` keeps them.
+    """The subject reduced to its `components` first principal pictures, as `write_subject` with `small` stores them.
 
-    Lights count for what they add to the picture, so that environments, which mix all of them, come out best; a single
-    lamp from behind loses most. `metadata.psnr_db` becomes the worst over the captured lights, against the given
+    Lights are weighted by the energy of their pictures, so environments, which mix all of them, are most accurate; a
+    single lamp from behind loses most. `metadata.psnr_db` becomes the worst over the captured lights, against the given
     subject's pictures of them.
 
     Raises:
@@ -46,7 +46,7 @@ def pack_subject(subject: Subject, components: int) -> Subject:
     scale = np.abs(found).reshape(components, -1).max(axis=1) + 1e-20
     rounded = encode_basis((found / scale[:, None, None, None]).transpose(3, 0, 1, 2))
     basis = decode_basis(rounded, (3, components, meta.height, meta.width))
-    # Every answer's share in the pictures kept: orthogonal projection.
+    # Orthogonal projection of every picture onto those kept.
     projection = np.linalg.solve(mixed.T @ gram @ mixed, mixed.T @ gram) * scale[:, None]
     small = replace(
         subject,
@@ -82,11 +82,11 @@ def light_psnrs_db(subject: Subject, reference: Subject) -> list[float]:
 def encode_basis(basis: NDArray) -> NDArray[np.uint8]:
     """Principal pictures (3, components, height, width) within -1..1 as one lossless WebP picture: bytes (count,).
 
-    They stand side by side in rows. A value is kept as the sign and the root of its amount in steps of 1/127: finer
-    near zero, where most of them lie.
+    They are tiled in a grid. A value is stored as its sign and the root of its magnitude in steps of 1/127: finer near
+    zero, where most values lie.
 
     Raises:
-        InputError: they are so many or so large that the format cannot hold them.
+        InputError: they are too many or too large for one WebP picture.
     """
     _, components, height, width = basis.shape
     across, down = _grid(components)
@@ -100,13 +100,13 @@ def encode_basis(basis: NDArray) -> NDArray[np.uint8]:
     codes[:, :components] = np.rint(rooted * 127 + 128).astype(np.uint8)
     tiled = codes.reshape(3, down, across, height, width).transpose(1, 3, 2, 4, 0)
     picture = tiled.reshape(down * height, across * width, 3)
-    # A quality above 100 is OpenCV's word for lossless.
+    # In OpenCV a quality above 100 means lossless.
     _, encoded = cv2.imencode(".webp", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_WEBP_QUALITY, 101])
     return np.asarray(encoded, np.uint8).ravel()
 
 
 def decode_basis(encoded: NDArray[np.uint8], shape: tuple[int, int, int, int]) -> NDArray[np.float16]:
-    """What `encode_basis` was given, (3, components, height, width), rounded to its steps.
+    """The principal pictures (3, components, height, width) from `encode_basis`, rounded to its steps.
 
     Raises:
         SubjectError: the bytes are no such picture.
@@ -127,7 +127,7 @@ def decode_basis(encoded: NDArray[np.uint8], shape: tuple[int, int, int, int]) -
 
 
 def _header_has_size(data: bytes, size: tuple[int, int]) -> bool:
-    """Whether a picture file's header says this size, and it is one that decoders take."""
+    """Whether a picture file's header gives this size, and decoders accept it."""
     try:
         return image_size_from_bytes(data) == size and size[0] * size[1] <= MAX_IMAGE_PIXELS
     except ValueError:
@@ -135,12 +135,12 @@ def _header_has_size(data: bytes, size: tuple[int, int]) -> bool:
 
 
 def _grid(components: int) -> tuple[int, int]:
-    """Pictures in a row, and rows: about a square."""
+    """Columns and rows of a near-square grid of that many pictures."""
     across = int(np.ceil(np.sqrt(components)))
     return across, -(-components // across)
 
 
 def _light_pictures(subject: Subject) -> Iterator[NDArray[np.float32]]:
-    # Some at a time: together they are some gigabytes.
+    # In batches: all together they take gigabytes.
     for start in range(0, subject.metadata.lights, _LIGHTS_PER_BATCH):
         yield from subject.pictures(subject.light_coefficients[:, start : start + _LIGHTS_PER_BATCH])

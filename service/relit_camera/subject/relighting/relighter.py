@@ -85,7 +85,10 @@ def open_relighter(name: str, subject: Subject, session: SessionOptions | None =
     """
     factory, argument = RELIGHTERS.load(name)
     relighter = factory(subject, RelighterOptions(session or SessionOptions(), argument))
-    log.info("the subject is relit by %s on %s", relighter.name, relighter.provider)
+    usual = relighter.provider == "numpy"
+    log.log(
+        logging.DEBUG if usual else logging.INFO, "the subject is relit by %s on %s", relighter.name, relighter.provider
+    )
     return relighter
 
 

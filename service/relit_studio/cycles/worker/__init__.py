@@ -1,1 +1,1 @@
-"""The code that runs inside the environment of Cycles: bpy and numpy only."""
+"""Worker inside Cycles' environment. It may import bpy and numpy, and no other part of this project."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from relit_studio.cycles.worker.materials import build_material
 from relit_studio.cycles.worker.objects import add_mesh, add_strands, reshape
-from relit_studio.cycles.worker.stage import set_camera, set_light, set_quality
+from relit_studio.cycles.worker.render_settings import set_camera, set_light, set_quality
 
 
 def main(job_file: Path) -> None:

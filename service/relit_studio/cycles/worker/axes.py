@@ -1,4 +1,4 @@
-"""Between our axes (X right in the picture, Y up, Z toward the camera) and Blender's (Z up, -Y toward the camera)."""
+"""Conversion from room axes (X right in the picture, Y up, Z to the camera) to Blender's (Z up, -Y to the camera)."""
 
 from __future__ import annotations
 
@@ -16,5 +16,5 @@ def to_blender(points: ArrayLike) -> NDArray[np.float32]:
 
 
 def matrix_to_blender(matrix: ArrayLike) -> NDArray[np.float64]:
-    """A rigid motion (4, 4) given in our axes, in Blender's."""
+    """Rigid motion (4, 4) converted from room axes to Blender's."""
     return np.asarray(BLENDER_FROM_OURS @ np.asarray(matrix, np.float64) @ BLENDER_FROM_OURS.T)

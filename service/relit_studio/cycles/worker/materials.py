@@ -1,4 +1,4 @@
-"""What a person is made of. The constants were found by looking at renders."""
+"""Materials of a person. The constants were chosen by looking at renders."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 
 from relit_studio.cycles.worker.nodes import Nodes, Socket
 
-Colour = list[float]
+Color = list[float]
 _SHADE = 0.07
-"""What a strand's shade of 1 adds to its melanin."""
-_GREY_MELANIN = 0.05
+"""Melanin that a strand's shade of 1 adds."""
+_GRAY_MELANIN = 0.05
 
 
 def build_material(name: str, description: Mapping[str, Any]) -> Any:
@@ -29,10 +29,10 @@ def _skin(
     folds: str = "",
     age: float = 0.0,
 ) -> Any:
-    """Photographed albedo over subsurface scattering; oily where the mesh says so, and moist on the lips."""
+    """Skin: photographed albedo with subsurface scattering, oily by a mesh attribute, moist on the lips."""
     lips, oil, scalp = (nodes.attribute(name) for name in ("lips", "oil", "scalp"))
     where = nodes.position()
-    colour = nodes.mix_colour(
+    colour = nodes.mix_color(
         nodes.math("MULTIPLY", scalp, scalp_shade), nodes.picture(albedo), [0.12, 0.09, 0.08], "MULTIPLY"
     )
     cells = nodes.add("TexVoronoi", {"Vector": where, "Scale": 26.0}, feature="SMOOTH_F1").outputs["Distance"]
@@ -70,7 +70,7 @@ def _skin(
     return nodes.finish(shader.outputs[0])
 
 
-def _plain(nodes: Nodes, colour: Colour, roughness: float = 0.5, scattering: float = 0.0, metallic: float = 0.0) -> Any:
+def _plain(nodes: Nodes, colour: Color, roughness: float = 0.5, scattering: float = 0.0, metallic: float = 0.0) -> Any:
     shader = nodes.add(
         "BsdfPrincipled",
         {
@@ -86,7 +86,7 @@ def _plain(nodes: Nodes, colour: Colour, roughness: float = 0.5, scattering: flo
 
 
 def _painted(nodes: Nodes) -> Any:
-    """Diffuse below GGX, as the mesh's vertices say: red, green, blue, f0 and GGX width alpha."""
+    """Diffuse base with GGX gloss, from the vertex attributes red, green, blue, f0 and alpha (GGX width)."""
     red, green, blue, f0, alpha = (nodes.attribute(name) for name in ("red", "green", "blue", "f0", "alpha"))
     colour = nodes.add("CombineColor", {"Red": red, "Green": green, "Blue": blue}).outputs[0]
     root = nodes.math("SQRT", f0, 0.0)
@@ -130,25 +130,25 @@ def _wet(nodes: Nodes) -> Any:
 
 
 def _lens(nodes: Nodes) -> Any:
-    """Thin coated glass: what is behind it stays in its place, and little is reflected."""
+    """Thin coated glass: no refraction, little reflection."""
     return nodes.finish(_film(nodes, 1.16, 0.015))
 
 
 def _film(nodes: Nodes, index: float, roughness: float) -> Socket:
-    """Clear and without refraction, so without noise: Fresnel's share is reflected."""
+    """Clear film without refraction, so without noise; it reflects Fresnel's share."""
     fresnel = nodes.add("Fresnel", {"IOR": index}).outputs[0]
     clear = nodes.add("BsdfTransparent").outputs[0]
     gloss = nodes.add("BsdfAnisotropic", {"Roughness": roughness}).outputs[0]
     return nodes.mix_shader(fresnel, clear, gloss)
 
 
-def _lid_shade(nodes: Nodes, colour: Colour) -> Any:
-    """Coloured transparency where the lids shade the eyeball."""
-    tint = nodes.mix_colour(nodes.attribute("edge"), [1.0, 1.0, 1.0], colour)
+def _lid_shade(nodes: Nodes, colour: Color) -> Any:
+    """Colored transparency where the lids shade the eyeball."""
+    tint = nodes.mix_color(nodes.attribute("edge"), [1.0, 1.0, 1.0], colour)
     return nodes.finish(nodes.add("BsdfTransparent", {"Color": tint}).outputs[0])
 
 
-def _cloth(nodes: Nodes, colour: Colour) -> Any:
+def _cloth(nodes: Nodes, colour: Color) -> Any:
     where = nodes.position()
     folds = nodes.add("TexNoise", {"Vector": where, "Scale": 0.28, "Detail": 2.0}).outputs[0]
     knit = nodes.add("TexNoise", {"Vector": where, "Scale": 14.0, "Detail": 6.0}).outputs[0]
@@ -172,12 +172,12 @@ def _cloth(nodes: Nodes, colour: Colour) -> Any:
 
 
 def _hair(nodes: Nodes, melanin: float, redness: float, roughness: float = 0.26, grey: float = 0.0) -> Any:
-    """Hair of the given pigments; the share `grey` of the strands has next to none."""
+    """Hair of the given pigments; the share `grey` of the strands has almost none."""
     shader = nodes.add("BsdfHairPrincipled", model="CHIANG", parametrization="MELANIN")
     pigment = nodes.scaled_sum(melanin, (nodes.attribute("shade"), _SHADE))
     if grey:
-        coloured = nodes.math("GREATER_THAN", nodes.add("HairInfo").outputs["Random"], grey)
-        pigment = nodes.scaled_sum(_GREY_MELANIN, (nodes.math("MULTIPLY", pigment, coloured), 1.0))
+        colored = nodes.math("GREATER_THAN", nodes.add("HairInfo").outputs["Random"], grey)
+        pigment = nodes.scaled_sum(_GRAY_MELANIN, (nodes.math("MULTIPLY", pigment, colored), 1.0))
     values = {
         "Melanin": pigment,
         "Melanin Redness": redness,

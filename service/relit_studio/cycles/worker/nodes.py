@@ -1,4 +1,4 @@
-"""A short way to write material nodes."""
+"""Helper to write material node trees."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import bpy
 Socket = Any
 """bpy.types.NodeSocket."""
 REST = "rest"
-"""The vertex attribute that holds where vertices were when the scene was built."""
+"""Vertex attribute with the positions that vertices had when the scene was built."""
 
 
 class Nodes:
@@ -33,7 +33,7 @@ class Nodes:
         return node
 
     def connect(self, value: Any, socket: Socket) -> None:
-        """Link a socket, or set a constant; a colour may have three parts."""
+        """Link a socket, or set a constant; a color may have three parts."""
         if isinstance(value, bpy.types.NodeSocket):
             self.tree.links.new(value, socket)
         elif isinstance(value, (tuple, list)) and socket.type == "RGBA" and len(value) == 3:
@@ -57,19 +57,19 @@ class Nodes:
         return self.add("Attribute", attribute_name=name).outputs["Fac"]
 
     def position(self) -> Socket:
-        """The surface's coordinates as the scene was built: what moves takes its texture along."""
+        """Surface coordinates of the scene as built, so that textures move with the surface."""
         return self.add("Attribute", attribute_name=REST).outputs["Vector"]
 
     def picture(self, path: str, *, linear: bool = False) -> Socket:
-        """A picture file's colour at the mesh's texture coordinates."""
+        """A picture file's color at the mesh's texture coordinates."""
         image = bpy.data.images.load(path, check_existing=True)
         if linear:
             image.colorspace_settings.name = "Non-Color"
         where = self.add("UVMap", uv_map="uv").outputs[0]
         return self.add("TexImage", {"Vector": where}, image=image, interpolation="Cubic").outputs["Color"]
 
-    def mix_colour(self, factor: Any, first: Any, second: Any, blend: str = "MIX") -> Socket:
-        """Two colours mixed."""
+    def mix_color(self, factor: Any, first: Any, second: Any, blend: str = "MIX") -> Socket:
+        """Two colors mixed."""
         node = self.tree.nodes.new("ShaderNodeMix")
         # The sockets by these names change with the type.
         node.data_type, node.blend_type = "RGBA", blend

@@ -1,4 +1,4 @@
-"""Meshes and strands as Blender objects, and their change from picture to picture."""
+"""Meshes and strands as Blender objects, and their changes between pictures."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def add_strands(description: Mapping[str, Any], arrays: Arrays, materials: Mappi
 
 
 def reshape(arrays: Arrays) -> None:
-    """Move what `arrays` name: "object.vertices", "object.points", or "object.matrix" (4, 4) in our axes."""
+    """Apply changed geometry: "object.vertices", "object.points", or "object.matrix" (4, 4) in room axes."""
     for key, values in arrays.items():
         name, field = key.split(".")
         placed = bpy.data.objects[name]

@@ -1,1 +1,1 @@
-"""The performances of driving videos: what a person does before the webcam, one module each."""
+"""The performances, one file each."""

@@ -1,10 +1,10 @@
-"""Six seconds of which some are without anybody: the person leaves the picture sideways and comes back."""
+"""Performance `away`, six seconds: the person leaves the picture sideways and comes back."""
 
 from __future__ import annotations
 
 from relit_camera.base.easing import interpolate_keyframes
-from relit_studio.drive.performance import FPS, Moment, Performance
-from relit_studio.drive.performances.acting import Keys, Syllables, add, blink, look, speak, swaying
+from relit_studio.drive.performance import FPS, ActorState, Performance
+from relit_studio.drive.performances.face_animation import Keys, Syllables, add, blink, look, speak, swaying
 from relit_studio.people.expressions import NEUTRAL
 
 FRAMES = 144
@@ -23,7 +23,7 @@ _SYLLABLES: Syllables = (
 )  # fmt: skip
 
 
-def _away(time_s: float) -> Moment:
+def _away(time_s: float) -> ActorState:
     expression = dict(NEUTRAL)
     speak(expression, _SYLLABLES, time_s)
     add(expression, {"mouthSmile": 0.4, "cheekSquint": 0.4}, interpolate_keyframes(time_s, _SMILE))
@@ -31,7 +31,7 @@ def _away(time_s: float) -> Moment:
     blink(expression, _BLINKS_S, time_s)
     angles = [interpolate_keyframes(time_s, keys) for keys in (_YAW, _PITCH, _ROLL)]
     shift_cm = (interpolate_keyframes(time_s, _RIGHT_CM), interpolate_keyframes(time_s, _UP_CM), 0.0)
-    return Moment(swaying(angles, expression, time_s, FRAMES / FPS), shift_cm)
+    return ActorState(swaying(angles, expression, time_s, FRAMES / FPS), shift_cm)
 
 
 AWAY = Performance("away", FRAMES, _away, "leaves the picture sideways and comes back")

@@ -1,12 +1,12 @@
-"""Eight seconds with hands before the face: a drink from a mug, then a hand that passes."""
+"""Performance `hands`, eight seconds: a drink from a mug, then a hand that passes in front of the face."""
 
 from __future__ import annotations
 
 from relit_camera.base.easing import interpolate_keyframes
-from relit_studio.drive.performance import FPS, Moment, Performance
-from relit_studio.drive.performances.acting import Keys, Syllables, add, blink, look, speak, swaying
+from relit_studio.drive.performance import FPS, ActorState, Performance
+from relit_studio.drive.performances.face_animation import Keys, Syllables, add, blink, look, speak, swaying
 from relit_studio.people.expressions import NEUTRAL
-from relit_studio.props.held import Gesture
+from relit_studio.props.held_objects import Gesture
 
 FRAMES = 192
 
@@ -27,7 +27,7 @@ _SYLLABLES: Syllables = (
 )  # fmt: skip
 
 
-def _hands(time_s: float) -> Moment:
+def _hands(time_s: float) -> ActorState:
     expression = dict(NEUTRAL)
     speak(expression, _SYLLABLES, time_s)
     add(expression, {"mouthPucker": 0.25, "mouthFunnel": 0.2, "jawOpen": 0.05}, interpolate_keyframes(time_s, _SIP))
@@ -38,7 +38,7 @@ def _hands(time_s: float) -> Moment:
         interpolate_keyframes(time_s, keys) for keys in (_MUG, _TILT_DEG, _HAND, _ACROSS_CM)
     )
     gesture = Gesture(mug, tilt_deg, hand, across_cm)
-    return Moment(swaying(angles, expression, time_s, FRAMES / FPS), gesture=gesture)
+    return ActorState(swaying(angles, expression, time_s, FRAMES / FPS), gesture=gesture)
 
 
 HANDS = Performance("hands", FRAMES, _hands, "drinks from a mug, then passes a hand before the face")

@@ -1,10 +1,10 @@
-"""Six seconds of talk to a webcam."""
+"""Performance `talk`, six seconds: talking to a webcam."""
 
 from __future__ import annotations
 
 from relit_camera.base.easing import interpolate_keyframes
-from relit_studio.drive.performance import FPS, Moment, Performance
-from relit_studio.drive.performances.acting import Keys, Syllables, add, blink, look, speak, swaying
+from relit_studio.drive.performance import FPS, ActorState, Performance
+from relit_studio.drive.performances.face_animation import Keys, Syllables, add, blink, look, speak, swaying
 from relit_studio.people.expressions import NEUTRAL
 
 FRAMES = 144
@@ -55,10 +55,10 @@ _SYLLABLES: Syllables = (
     (3.46, "eh"), (3.58, "ff"), (3.70, "oo"), (3.84, "ah"), (3.98, "mm"), (4.12, "rest"), (4.45, "rest"), (4.58, "ee"),
     (4.70, "ah"), (4.82, "ss"), (4.96, "oh"), (5.10, "mm"), (5.24, "ah"), (5.38, "ee"), (5.54, "rest"), (6.0, "rest"),
 )  # fmt: skip
-"""When the mouth reaches which shape: about seven a second, as in speech."""
+"""Keyframes of mouth shapes, about seven a second as in speech."""
 
 
-def _talk(time_s: float) -> Moment:
+def _talk(time_s: float) -> ActorState:
     expression = dict(NEUTRAL)
     speak(expression, _SYLLABLES, time_s)
     smile = interpolate_keyframes(time_s, _SMILE)
@@ -69,7 +69,7 @@ def _talk(time_s: float) -> Moment:
     look(expression, interpolate_keyframes(time_s, _LOOK_RIGHT_DEG), interpolate_keyframes(time_s, _LOOK_DOWN_DEG))
     blink(expression, _BLINKS_S, time_s)
     angles = [interpolate_keyframes(time_s, keys) for keys in (_YAW, _PITCH, _ROLL)]
-    return Moment(swaying(angles, expression, time_s, FRAMES / FPS))
+    return ActorState(swaying(angles, expression, time_s, FRAMES / FPS))
 
 
 TALK = Performance("talk", FRAMES, _talk, "talks, turns to 27 degrees, blinks and looks about")

@@ -1,4 +1,4 @@
-"""Photographs of a mirror ball in a painted room, traced ray by ray: what a capture must find is put in."""
+"""Photographs of a mirror ball in a painted room, traced ray by ray, with a known lamp."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import LinearImage
+from relit_camera.capture.film.ball.specular_highlight import Highlight, NoHighlight, find_highlight
+from relit_camera.capture.film.ball.sphere_projection import BallOutline, BallView, PinholeView
 
 Vector = NDArray[np.float64]
 FINE = 5
@@ -107,8 +109,8 @@ class MirrorScene:
         if lamp is not None:
             ball = ball + self.lamp_seen(points[hit], mirrored, lamp, brightness)
         seen[hit] = self.reflectance * ball
-        seen = cv2.GaussianBlur(seen, (0, 0), self.lens_px * FINE)
-        return np.asarray(seen.reshape(height, FINE, width, FINE).mean(axis=(1, 3)))
+        blurred = cv2.GaussianBlur(seen, (0, 0), self.lens_px * FINE)
+        return np.asarray(blurred.reshape(height, FINE, width, FINE).mean(axis=(1, 3)))
 
     def outline(self) -> tuple[float, float, float]:
         """Centre and radius of the circle of the outline's area, counted out."""
@@ -120,8 +122,30 @@ class MirrorScene:
         return float(x[hit].mean()), float(y[hit].mean()), float(np.sqrt(area / np.pi))
 
 
+def view_of(scene: MirrorScene) -> PinholeView:
+    """The camera's view of the scene's ball."""
+    return PinholeView(BallOutline(*scene.outline()), scene.size, scene.focal_px)
+
+
+def highlight_in(
+    photograph: LinearImage, view: BallView, dark: LinearImage | None = None, typical_area_px: float = 0.0
+) -> Highlight | NoHighlight:
+    """The highlight in a photograph in color, by the mean of its channels."""
+    light = photograph.mean(axis=2)
+    return find_highlight(light, view, None if dark is None else dark.mean(axis=2), typical_area_px)
+
+
+def true_normal(scene: MirrorScene, lamp: Vector) -> Vector:
+    """The ball's normal at the highlight, where the directions to camera and lamp make equal angles with it."""
+    normal = unit(unit(lamp - scene.center) - unit(scene.center))
+    for _ in range(50):
+        point = scene.center + scene.radius_cm * normal
+        normal = unit(unit(lamp - point) - unit(point))
+    return normal
+
+
 def hand_path(count: int, distance_cm: float, about: Vector) -> list[Vector]:
-    """Places of a lamp that moves up and down from left to right, before and beside the head."""
+    """Positions of a lamp that moves up and down from left to right, before and beside the head."""
     share = (np.arange(count) + 0.5) / count
     azimuth, elevation = np.radians(-65 + 130 * share), np.radians(25 + 40 * np.sin(2 * np.pi * 2.5 * share))
     way = np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)], -1)

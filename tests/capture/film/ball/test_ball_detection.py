@@ -1,4 +1,4 @@
-"""The ball found by itself: in painted scenes whose truth is known, and in photographs of a real one."""
+"""Detection of mirror balls in painted scenes whose truth is known, and in photographs of a real ball."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from relit_camera.base.images.image_types import LinearImage
 from relit_camera.capture.film.ball.ball_detection import (
     DetectedBall,
     ball_from_outline,
-    detect_ball,
     detect_balls,
-    refine_ball,
+    find_balls,
 )
 from relit_camera.capture.film.ball.scene_sample import sample_scene
-from relit_camera.capture.film.ball.specular_highlight import Highlight, find_highlight
+from relit_camera.capture.film.ball.specular_highlight import Highlight
 from relit_camera.capture.film.ball.sphere_projection import BallOutline, DistantView
 from relit_camera.capture.film.focal_length import focal_length_from_option, typical_focal_length
-from tests.capture.film.ball.mirror_scene import MirrorScene, hand_path
+from tests.capture.film.ball.mirror_scene import MirrorScene, hand_path, highlight_in
 
 HEAD = np.array([0.0, -2.0, -58.0])
 SCENE = MirrorScene(noise=0.002)
@@ -64,8 +63,8 @@ def frames() -> list[LinearImage]:
     return film(SCENE)
 
 
-def test_among_other_round_things(frames: list[LinearImage]) -> None:
-    ball = detect_ball(sample_scene(with_decoys(frames)), GIVEN)
+def test_a_ball_among_other_round_things(frames: list[LinearImage]) -> None:
+    (ball,) = find_balls(sample_scene(with_decoys(frames)), GIVEN)
     center, radius = off(ball.outline, SCENE.outline())
     assert center < 0.02
     assert radius < 0.02
@@ -74,10 +73,10 @@ def test_among_other_round_things(frames: list[LinearImage]) -> None:
     assert ball.evidence > 0.6
 
 
-def test_without_it_none_of_them_is_taken(frames: list[LinearImage]) -> None:
+def test_other_round_things_are_no_balls(frames: list[LinearImage]) -> None:
     plain = np.full_like(frames[0], 0.06)
     with pytest.raises(CaptureError, match="no mirror ball was found") as refusal:
-        detect_ball(sample_scene(with_decoys([plain] * 10)), GIVEN)
+        find_balls(sample_scene(with_decoys([plain] * 10)), GIVEN)
     assert "--ball X,Y,RADIUS" in refusal.value.cure
 
 
@@ -95,7 +94,7 @@ def test_two_balls() -> None:
 def test_cut_off_by_the_edge() -> None:
     scene = MirrorScene(center=np.array([29.5, 5.0, -60.0]), radius_cm=6.0, noise=0.002)
     with pytest.raises(CaptureError, match="cut off by the picture's right edge"):
-        detect_ball(sample_scene(film(scene)), GIVEN)
+        find_balls(sample_scene(film(scene)), GIVEN)
 
 
 def test_over_exposed(frames: list[LinearImage]) -> None:
@@ -104,7 +103,7 @@ def test_over_exposed(frames: list[LinearImage]) -> None:
     for frame in white:
         cv2.circle(frame, (round(x), round(y)), round(radius), (1.0, 1.0, 1.0), -1, cv2.LINE_AA)
     with pytest.raises(CaptureError, match="over-exposed"):
-        detect_ball(sample_scene(white), GIVEN)
+        find_balls(sample_scene(white), GIVEN)
 
 
 def test_a_given_circle_is_taken_as_it_is(frames: list[LinearImage]) -> None:
@@ -116,21 +115,19 @@ def test_a_given_circle_is_taken_as_it_is(frames: list[LinearImage]) -> None:
         ball_from_outline(sample_scene(frames), BallOutline(100, 3, 20), GIVEN)
 
 
-def test_a_given_circle_is_measured(frames: list[LinearImage]) -> None:
-    x, y, radius = SCENE.outline()
-    ball = refine_ball(sample_scene(frames), BallOutline(x + 1.5, y - 1.0, radius * 1.04), GIVEN)
-    assert max(off(ball.outline, SCENE.outline())) < 0.02
-    with pytest.raises(CaptureError, match="cut off by the picture's left edge"):
-        refine_ball(sample_scene(frames), BallOutline(5, 60, 20), GIVEN)
-    with pytest.raises(CaptureError, match="no outline of a ball at 100, 100"):
-        refine_ball(sample_scene([np.zeros((200, 200, 3), np.float32)]), BallOutline(100, 100, 20), GIVEN)
+def test_a_second_ball_that_is_missing_beside_a_given_one_is_refused(frames: list[LinearImage]) -> None:
+    given = BallOutline(*SCENE.outline())
+    with pytest.raises(
+        CaptureError, match=rf"only one mirror ball was found, at {given.x:.0f}, {given.y:.0f}, not two"
+    ):
+        find_balls(sample_scene(frames), GIVEN, 2, [given])
 
 
-def test_the_outline_tells_of_the_focal_length() -> None:
+def test_the_outline_corrects_the_focal_length() -> None:
     scene = MirrorScene(size=(320, 400), center=np.array([17.0, 26.0, -60.0]), radius_cm=6.5, noise=0.002)
     guess = typical_focal_length(scene.size)
     assert abs(guess.pixels / scene.focal_px - 1) > 0.2
-    ball = detect_ball(sample_scene(film(scene)), guess)
+    (ball,) = find_balls(sample_scene(film(scene)), guess)
     assert abs(ball.focal.pixels / scene.focal_px - 1) < 0.12
     assert ball.focal.error < 0.15
     assert "corrected by the ball's outline" in ball.focal.source
@@ -177,7 +174,7 @@ def published(shared: Path, photographs: list[LinearImage]) -> tuple[float, floa
 @pytest.fixture(scope="module")
 def found(photographs: list[LinearImage]) -> DetectedBall:
     sample = sample_scene(photographs)
-    return detect_ball(sample, typical_focal_length(sample.size))
+    return find_balls(sample, typical_focal_length(sample.size))[0]
 
 
 def test_a_real_ball(found: DetectedBall, published: tuple[float, float, float]) -> None:
@@ -193,9 +190,9 @@ def test_real_lights_and_never_the_second_highlight(
         view = DistantView(outline)
         angles = []
         for photograph, light in zip(photographs, lights, strict=True):
-            place = find_highlight(photograph, view)
+            place = highlight_in(photograph, view)
             assert isinstance(place, Highlight)
             assert abs(place.x - published[0]) < 0.3 * published[2]  # the second one is at 0.75 radii
-            angles.append(np.degrees(np.arccos(view.mirrored(place.normal) @ light / np.linalg.norm(light))))
+            angles.append(np.degrees(np.arccos(view.reflect(place.normal) @ light / np.linalg.norm(light))))
         assert np.mean(angles) < 1.0
         assert np.max(angles) < 2.0

@@ -1,4 +1,4 @@
-"""A ball that is covered, or moves, in a film made for it."""
+"""A ball that is covered or moved, in a film made for it."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def frames() -> list[LinearImage]:
     return whole + covered + [pushed.photograph(lamps[i // 2 + 5] if i % 2 else None, seed=40 + i) for i in range(6)]
 
 
-def test_hidden_and_moved_frames_are_told(frames: list[LinearImage]) -> None:
-    watch = BallTracker(sample_scene(frames), OUTLINE)
-    found = find_episodes([watch.see(index, frame) for index, frame in enumerate(frames)], OUTLINE.radius)
+def test_hidden_and_moved_frames_are_episodes(frames: list[LinearImage]) -> None:
+    tracker = BallTracker(sample_scene(frames), OUTLINE)
+    found = find_episodes([tracker.observe(index, frame) for index, frame in enumerate(frames)], OUTLINE.radius)
     assert [(episode.kind, episode.first, episode.last) for episode in found] == [("hidden", 12, 15), ("moved", 16, 21)]
     scale = SCENE.focal_px / -SCENE.center[2]
     assert found[1].dx == pytest.approx(SHIFT_CM[0] * scale, abs=0.3)
@@ -45,20 +45,20 @@ def test_hidden_and_moved_frames_are_told(frames: list[LinearImage]) -> None:
 
 
 def test_a_ball_that_stays_has_no_episodes(frames: list[LinearImage]) -> None:
-    watch = BallTracker(sample_scene(frames[:12]), OUTLINE)
-    sightings = [watch.see(index, frame) for index, frame in enumerate(frames[:12])]
-    assert find_episodes(sightings, OUTLINE.radius) == []
-    assert max(np.hypot(sighting.dx, sighting.dy) for sighting in sightings) < 0.4
+    tracker = BallTracker(sample_scene(frames[:12]), OUTLINE)
+    observations = [tracker.observe(index, frame) for index, frame in enumerate(frames[:12])]
+    assert find_episodes(observations, OUTLINE.radius) == []
+    assert max(np.hypot(each.dx, each.dy) for each in observations) < 0.4
 
 
-def test_where_it_is_in_a_frame() -> None:
+def test_the_outline_in_a_frame() -> None:
     found = [BallEpisode("hidden", 3, 5, 0, 0), BallEpisode("moved", 8, 12, 4, -2)]
     assert outline_at_frame(found, OUTLINE, 2) == OUTLINE
     assert outline_at_frame(found, OUTLINE, 4) is None
     assert outline_at_frame(found, OUTLINE, 8) == BallOutline(OUTLINE.x + 4, OUTLINE.y - 2, OUTLINE.radius)
 
 
-def test_one_odd_frame_is_no_episode() -> None:
+def test_a_single_deviating_frame_is_no_episode() -> None:
     still = [BallObservation(index, 0.0, 0.0, 0.95) for index in range(9)]
     still[4] = BallObservation(4, 3.0, 0.0, 0.9)
     assert find_episodes(still, 30.0) == []

@@ -31,7 +31,7 @@ def test_elongation_is_that_of_the_counted_outline() -> None:
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_rays_are_mirrored_as_the_law_says(scene: MirrorScene) -> None:
+def test_rays_obey_the_law_of_reflection(scene: MirrorScene) -> None:
     view = PinholeView(BallOutline(*scene.outline()), scene.size, scene.focal_px)
     x0, y0, radius = scene.outline()
     for dx, dy in [(0.0, 0.0), (0.6, 0.2), (-0.5, 0.5), (0.1, -0.8)]:
@@ -41,8 +41,8 @@ def test_rays_are_mirrored_as_the_law_says(scene: MirrorScene) -> None:
         hit, point = scene.hit(ray)
         assert hit
         assert degrees_between(normal, point - scene.center) < 0.4
-        assert degrees_between(view.mirrored(normal), scene.mirror(ray, point)) < 0.8
-        np.testing.assert_allclose(view.picture(normal), (x, y), atol=1e-6)
+        assert degrees_between(view.reflect(normal), scene.mirror(ray, point)) < 0.8
+        np.testing.assert_allclose(view.project(normal), (x, y), atol=1e-6)
 
 
 def test_beside_the_ball_there_is_no_surface() -> None:
@@ -54,7 +54,7 @@ def test_from_afar_the_angle_of_the_normal_doubles() -> None:
     # Thesis 4.3.4: p = atan2(H), q = 2 asin |H|.
     view = DistantView(BallOutline(50, 40, 20))
     across, up = 0.3, -0.4
-    direction = view.mirrored(view.normals(np.array(50 + 20 * across), np.array(40 - 20 * up)))
+    direction = view.reflect(view.normals(np.array(50 + 20 * across), np.array(40 - 20 * up)))
     p, q = np.arctan2(up, across), 2 * np.arcsin(np.hypot(across, up))
     np.testing.assert_allclose(direction, [np.cos(p) * np.sin(q), np.sin(p) * np.sin(q), np.cos(q)], atol=1e-12)
 
@@ -64,5 +64,5 @@ def test_a_long_lens_sees_as_from_afar() -> None:
     pinhole, distant = PinholeView(outline, (320, 240), 1e5), DistantView(outline)
     x, y = np.array([150.0, 175.0]), np.array([130.0, 105.0])
     np.testing.assert_allclose(
-        pinhole.mirrored(pinhole.normals(x, y)), distant.mirrored(distant.normals(x, y)), atol=1e-3
+        pinhole.reflect(pinhole.normals(x, y)), distant.reflect(distant.normals(x, y)), atol=1e-3
     )

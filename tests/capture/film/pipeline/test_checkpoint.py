@@ -1,4 +1,4 @@
-"""What a build keeps until it is done: taken back bit by bit, or not at all."""
+"""The checkpoint of a build: read back bit by bit, or deleted."""
 
 from __future__ import annotations
 
@@ -39,43 +39,43 @@ def found() -> Checkpoint:
 
 
 @pytest.fixture
-def told() -> list[str]:
+def messages() -> list[str]:
     return []
 
 
 @pytest.fixture
-def kept(tmp_path: Path, told: list[str]) -> CheckpointFolder:
-    return CheckpointFolder(tmp_path / "me.relit", "this film", told.append)
+def kept(tmp_path: Path, messages: list[str]) -> CheckpointFolder:
+    return CheckpointFolder(tmp_path / "me.relit", "this film", messages.append)
 
 
 def test_what_was_written_is_read_again_bit_by_bit(
-    kept: CheckpointFolder, found: Checkpoint, told: list[str], tmp_path: Path
+    kept: CheckpointFolder, found: Checkpoint, messages: list[str], tmp_path: Path
 ) -> None:
     assert kept.read() is None
-    assert not told
+    assert not messages
     kept.write(found)
-    again = CheckpointFolder(tmp_path / "me.relit", "this film", told.append).read()
+    again = CheckpointFolder(tmp_path / "me.relit", "this film", messages.append).read()
     assert again is not None
     for name in ("pictures", "directions", "matte"):
         value, expected = getattr(again.samples, name), getattr(found.samples, name)
         assert value.dtype == expected.dtype
         np.testing.assert_array_equal(value, expected)
     assert again.report == found.report
-    assert told == [f"going on from {tmp_path / 'me.relit.partial'}, where the last build was broken off"]
+    assert messages == [f"going on from {tmp_path / 'me.relit.partial'}, where the last build was broken off"]
 
 
-def test_nobody_else_may_enter(kept: CheckpointFolder, found: Checkpoint) -> None:
+def test_the_folder_is_private(kept: CheckpointFolder, found: Checkpoint) -> None:
     kept.folder.mkdir(mode=0o755)
     kept.write(found)
     assert kept.folder.stat().st_mode & 0o777 == 0o700
 
 
-def test_of_another_film_it_is_deleted(
-    kept: CheckpointFolder, found: Checkpoint, told: list[str], tmp_path: Path
+def test_a_checkpoint_of_another_film_is_deleted(
+    kept: CheckpointFolder, found: Checkpoint, messages: list[str], tmp_path: Path
 ) -> None:
     kept.write(found)
-    assert CheckpointFolder(tmp_path / "me.relit", "another", told.append).read() is None
-    assert "is of another film, other options or another version: starting over" in told[0]
+    assert CheckpointFolder(tmp_path / "me.relit", "another", messages.append).read() is None
+    assert "is of another film, other options or another version: starting over" in messages[0]
     assert not kept.folder.exists()
 
 
@@ -94,18 +94,18 @@ def _one_letter_of_the_report(data: bytes) -> bytes:
 @pytest.mark.parametrize(
     "spoil", [_cut_off, _one_bit_of_a_picture, _one_letter_of_the_report, lambda data: b"", lambda data: b"{}" * 99]
 )
-def test_a_damaged_one_is_deleted(
-    spoil: Callable[[bytes], bytes], kept: CheckpointFolder, found: Checkpoint, told: list[str]
+def test_a_damaged_checkpoint_is_deleted(
+    spoil: Callable[[bytes], bytes], kept: CheckpointFolder, found: Checkpoint, messages: list[str]
 ) -> None:
     kept.write(found)
     file = kept.folder / SAMPLES_FILE_NAME
     file.write_bytes(spoil(file.read_bytes()))
     assert kept.read() is None
-    assert told == [f"what lies in {kept.folder} is damaged: starting over"]
+    assert messages == [f"what lies in {kept.folder} is damaged: starting over"]
     assert not kept.folder.exists()
 
 
-def test_what_it_is_made_of_decides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fingerprint_depends_on_content_and_options(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     codes = np.arange(12, dtype=np.uint8)[:, None, None, None] * np.ones((64, 64, 3), np.uint8)
     film, other = (write_film(tmp_path / name, codes + add) for name, add in (("a.mp4", 0), ("b.mp4", 9)))
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path))
@@ -126,8 +126,8 @@ def test_what_it_is_made_of_decides(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     [(None, False), (CaptureError("no ball"), False), (StorageError("full"), True), (KeyboardInterrupt(), True),
      (SystemExit(143), True), (MemoryError(), True)],
 )  # fmt: skip
-def test_it_stays_where_the_build_could_go_on(
-    end: BaseException | None, stays: bool, kept: CheckpointFolder, found: Checkpoint, told: list[str]
+def test_a_checkpoint_is_kept_where_the_build_could_resume(
+    end: BaseException | None, stays: bool, kept: CheckpointFolder, found: Checkpoint, messages: list[str]
 ) -> None:
     def build() -> None:
         with kept.keep_until_done():
@@ -142,10 +142,10 @@ def test_it_stays_where_the_build_could_go_on(
         build()
     assert kept.folder.exists() == stays
     broken_off = isinstance(end, KeyboardInterrupt | SystemExit)
-    assert told == [f"kept in {kept.folder}: the same command goes on from there, --fresh starts over"] * broken_off
+    assert messages == [f"kept in {kept.folder}: the same command goes on from there, --fresh starts over"] * broken_off
 
 
-def test_only_what_is_ours_is_deleted(kept: CheckpointFolder, found: Checkpoint) -> None:
+def test_only_own_files_are_deleted(kept: CheckpointFolder, found: Checkpoint) -> None:
     kept.write(found)
     (kept.folder / ".samples.half.safetensors").touch()
     (kept.folder / "diary.txt").touch()
@@ -153,11 +153,11 @@ def test_only_what_is_ours_is_deleted(kept: CheckpointFolder, found: Checkpoint)
     assert [path.name for path in kept.folder.iterdir()] == ["diary.txt"]
 
 
-def test_where_nothing_can_be_kept_the_build_goes_on(
-    kept: CheckpointFolder, found: Checkpoint, told: list[str]
+def test_without_a_writable_checkpoint_the_build_goes_on(
+    kept: CheckpointFolder, found: Checkpoint, messages: list[str]
 ) -> None:
     kept.folder.write_text("a file of that name")
     kept.write(found)
-    assert len(told) == 1
-    assert told[0].startswith("warning: if broken off, this build cannot go on: cannot write")
+    assert len(messages) == 1
+    assert messages[0].startswith("warning: if broken off, this build cannot go on: cannot write")
     assert kept.folder.read_text() == "a file of that name"

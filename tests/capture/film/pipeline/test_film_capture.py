@@ -1,4 +1,4 @@
-"""Films in, samples out, against what was put in."""
+"""The whole capture, against the head, lamps, gains and motion from which its film was made."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import pytest
 
 from relit_camera.base.errors import ConfigError, InputError
 from relit_camera.capture.film.face_circle import FaceCircle
+from relit_camera.capture.film.olat.olat_pictures import max_pictures_in_memory
 from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
-from relit_camera.capture.film.pipeline.film_capture import CaptureResult, build_samples, max_frames_in_memory
+from relit_camera.capture.film.pipeline.film_capture import CaptureResult, build_samples
 from tests.capture.film.ball.mirror_scene import degrees_between
 from tests.capture.film.generated_film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film, write_film
 
@@ -40,17 +41,17 @@ def test_lamps_gains_and_motion_are_those_of_the_film(built: CaptureResult) -> N
 
 
 def test_samples_are_pictures_under_distant_lights(built: CaptureResult) -> None:
-    film, samples, square = Film(), built.samples, built.findings.square
+    film, samples, crop = Film(), built.samples, built.findings.crop
     normals = film.surface[0]
     reflectance = film.reflectance.astype(np.float32)
-    x, y = film.shift(built.findings.analysis.motion.reference)
+    x, y = film.shift(built.findings.motion.reference)
     back = np.array([[1, 0, x], [0, 1, y]])
     inside = samples.matte > 0.99
     ratios = []
     for picture, direction in zip(samples.pictures, samples.directions, strict=True):
         shade = np.maximum(normals @ direction, 0)[..., None].astype(np.float32)
         moved = cv2.warpAffine(reflectance * shade, back, SIZE)
-        left, top, side = round(square.left), round(square.top), round(square.side)
+        left, top, side = round(crop.left), round(crop.top), round(crop.side)
         wanted = cv2.resize(
             moved[top : top + side, left : left + side], samples.matte.shape, interpolation=cv2.INTER_AREA
         )
@@ -63,12 +64,12 @@ def test_samples_are_pictures_under_distant_lights(built: CaptureResult) -> None
     assert samples.pictures[:, samples.matte == 0].max() == 0
 
 
-def test_the_report_tells_what_the_lamps_nearness_is_worth(built: CaptureResult) -> None:
+def test_the_report_has_the_gain_of_the_near_field_correction(built: CaptureResult) -> None:
     near = built.findings.report()["near_field"]
     assert 0 < near["misfit"] < near["misfit_if_far"]
 
 
-def test_the_room_is_taken_off(built: CaptureResult) -> None:
+def test_the_room_is_subtracted(built: CaptureResult) -> None:
     report = built.findings.report()
     assert report["room"]["taken_off"]
     assert report["room"]["left"] < 0.02
@@ -76,36 +77,35 @@ def test_the_room_is_taken_off(built: CaptureResult) -> None:
     assert np.median(shaded[built.samples.matte[:, 60:66] > 0.99]) < 0.02
 
 
-def test_a_good_film_is_taken_without_warnings_but_of_the_detector(built: CaptureResult) -> None:
+def test_a_good_film_warns_of_the_missing_detector_only(built: CaptureResult) -> None:
     assert all("no face detector is installed" in warning for warning in built.findings.warnings)
 
 
 @pytest.mark.parametrize(
-    ("detector", "visible", "told"),
+    ("detector", "visible", "messages"),
     [
         (False, 0.9, ["the flash reaches everything", "no face detector is installed"]),
         (True, 0.0, ["the room is too dark", "the eyes are not found"]),
     ],
 )
-def test_warnings_tell_what_is_amiss(built: CaptureResult, detector: bool, visible: float, told: list[str]) -> None:
-    analysis = built.findings.analysis
-    gains = replace(analysis.gains, share=0.0, visible=visible)
-    amiss = replace(built.findings, analysis=replace(analysis, gains=gains, detector=detector, eyes_px=None))
+def test_warnings(built: CaptureResult, detector: bool, visible: float, messages: list[str]) -> None:
+    gains = replace(built.findings.gains, share=0.0, visible=visible)
+    amiss = replace(built.findings, gains=gains, detector_installed=detector, eyes_px=None)
     warnings = amiss.warnings[-2:]
-    assert all(warning.startswith(start) for warning, start in zip(warnings, told, strict=True))
+    assert all(warning.startswith(start) for warning, start in zip(warnings, messages, strict=True))
 
 
 def test_a_size_that_memory_cannot_hold_is_refused(tmp_path: Path) -> None:
-    assert max_frames_in_memory(96) == max_frames_in_memory(512) == 600
-    assert 150 <= max_frames_in_memory(1024) < 160
+    assert max_pictures_in_memory(96) == max_pictures_in_memory(512) == 600
+    assert 150 <= max_pictures_in_memory(1024) < 160
     with pytest.raises(InputError, match=r"1200 pixels a side.*--size of 1024 or less"):
         build_samples(tmp_path / "film.mp4", replace(OPTIONS, size=1200))
 
 
 def test_a_face_outside_of_the_picture_is_refused_before_a_frame_is_read(tmp_path: Path) -> None:
-    told: list[str] = []
+    messages: list[str] = []
     options = replace(OPTIONS, face=FaceCircle(SIZE[0] + 5, 60, 40))
     video = write_film(tmp_path / "film.mp4", np.zeros((12, *SIZE[::-1], 3), np.uint8))
     with pytest.raises(ConfigError, match=f"face at {SIZE[0] + 5}, 60 is outside of the picture, which is {SIZE[0]}x"):
-        build_samples(video, options, lambda stage, done, total: told.append(stage))
-    assert not told
+        build_samples(video, options, lambda stage, done, total: messages.append(stage))
+    assert not messages

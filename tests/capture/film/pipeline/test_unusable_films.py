@@ -47,7 +47,7 @@ def build(film: Path, shot: Shot, folder: Path) -> Answer:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "told", "cure"),
+    ("spoil", "what", "cure"),
     [
         (films.lamp_off, "no flash found: the brightness stays within", "let a light blink"),
         (films.lamp_on_all_the_time, "no flash found: the brightness changes by a factor", "must not be on all the"),
@@ -72,16 +72,16 @@ def build(film: Path, shot: Shot, folder: Path) -> Answer:
         (films.black_without_the_flash, "the face shows nothing that can be followed", "a little brighter"),
         (films.black_about_a_small_circle, "only 0 points of the face can be followed", "a little brighter"),
         (films.nobody, "nothing that the flash lights looks like a head", "--face X,Y,RADIUS"),
-        (films.sun_on_the_face, "the person cannot be told from the room", "make the room darker"),
+        (films.sun_on_the_face, "the person cannot be what from the room", "make the room darker"),
     ],
     ids=lambda value: value.__name__ if callable(value) else "",
 )
 def test_a_bad_film_is_refused(
-    spoil: Callable[[np.ndarray], Shot], told: str, cure: str, good: np.ndarray, out: Path, tmp_path: Path
+    spoil: Callable[[np.ndarray], Shot], what: str, cure: str, good: np.ndarray, out: Path, tmp_path: Path
 ) -> None:
     shot = spoil(good)
     film = write_film(tmp_path / "film.mp4", shot.codes)
-    build(film, shot, out).complains(told, cure)
+    build(film, shot, out).complains(what, cure)
 
 
 def _first_half(film: bytes) -> bytes:
@@ -94,7 +94,7 @@ def _hole_in_the_middle(film: bytes) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "told", "cure"),
+    ("spoil", "what", "cure"),
     [
         (_first_half, "film.mp4 is cut off", "record or copy it again"),
         (_hole_in_the_middle, "film.mp4 is damaged", "copy it again"),
@@ -102,11 +102,11 @@ def _hole_in_the_middle(film: bytes) -> bytes:
     ids=["cut off", "damaged"],
 )
 def test_a_bad_file_is_refused(
-    spoil: Callable[[bytes], bytes], told: str, cure: str, good: np.ndarray, out: Path, tmp_path: Path
+    spoil: Callable[[bytes], bytes], what: str, cure: str, good: np.ndarray, out: Path, tmp_path: Path
 ) -> None:
     film = write_film(tmp_path / "film.mp4", good[:60])
     film.write_bytes(spoil(film.read_bytes()))
-    build(film, Shot(good), out).complains(told, cure)
+    build(film, Shot(good), out).complains(what, cure)
 
 
 def test_a_refusal_leaves_an_empty_folder_empty(good: np.ndarray, tmp_path: Path) -> None:
@@ -116,7 +116,7 @@ def test_a_refusal_leaves_an_empty_folder_empty(good: np.ndarray, tmp_path: Path
     assert contents(tmp_path) == before
 
 
-def test_a_film_that_is_hardly_good_enough_is_taken_with_warnings(good: np.ndarray, tmp_path: Path) -> None:
+def test_a_film_that_is_barely_good_enough_gives_warnings(good: np.ndarray, tmp_path: Path) -> None:
     shot = films.board_before_the_ball(good)
     answer = build(write_film(tmp_path / "film.mp4", shot.codes), shot, tmp_path)
     assert answer.code == 0, answer

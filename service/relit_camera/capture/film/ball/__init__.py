@@ -1,1 +1,1 @@
-"""The mirror ball: from pictures to the direction of the light."""
+"""The mirror balls of a film: found, followed, and read for the lamp's mirror image."""

@@ -1,10 +1,13 @@
-"""Whether something in the picture mirrors the lamp, wherever the lamp is.
+"""Finding the mirror balls in a sample of a film's frames.
 
-Finding the mirror ball in pictures of a fixed scene.
+Circles that the edges suggest are tried. Those in which one small place is bright wherever the lamp is
+(`HighlightVisibility`) and whose line lies on significantly many edges are balls; `fit_mirror_outline` then measures
+their outlines.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -13,68 +16,57 @@ import numpy as np
 from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.ball.circle_detection import (
     MIN_RADIUS,
-    EdgeMap,
     OutlineFit,
     circle_candidates,
-    edge_map,
     fit_outline_to_edges,
 )
 from relit_camera.capture.film.ball.mirror_outline import fit_mirror_outline
-from relit_camera.capture.film.ball.scene_sample import SceneSample
-from relit_camera.capture.film.ball.specular_highlight import Highlight, find_highlight_in_plane
+from relit_camera.capture.film.ball.scene_sample import EdgeMap, SceneSample, edge_map
+from relit_camera.capture.film.ball.specular_highlight import Highlight, find_highlight
 from relit_camera.capture.film.ball.sphere_projection import BallOutline, DistantView
 from relit_camera.capture.film.focal_length import FocalLength
 
-_MAX_SIDE = 480
-_STILL_SHARE = 0.2
-_BRIGHT = 0.5
-"""The mirror image of a lamp is far brighter than anything that it lights."""
-_INNER = 0.9
-"""Radii: there a mirror ball shows what is 128 degrees off the camera. No lamp that lights a face is farther."""
-_FEW = 5
-"""So few pictures do not tell what is there without the lamp."""
+
+@dataclass(frozen=True)
+class DetectionTunables:
+    """What counts as a ball; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        max_side_px: longer side of the pictures in which highlights are looked for.
+        dark_quantile: quantile of a pixel's brightness over the pictures that stands for the scene without the lamp.
+        min_pictures: fewer pictures do not show the scene without the lamp.
+        min_brightness: least brightness of the lamp's mirror image, which is far brighter than what the lamp lights.
+        inner_radius: radii within which a highlight counts. At 0.9 a mirror ball shows what is 128 degrees off the
+            camera's axis; no lamp that lights a face is farther off.
+        candidates: circles that are tried.
+        min_visibility: least share of the pictures in which a ball shows the lamp.
+        min_relative_visibility: the same relative to the circle with the largest share.
+        min_significance: least significance of a ball's outline.
+        chance_coverage: share of a circle's line that lies on edges by chance in a busy picture.
+        cut_off: radii by which an outline may exceed the picture.
+        white_code, max_white: a ball is over-exposed if more than this share of it has codes above this one.
+        averages: pictures to which the sample is averaged before its outlines are measured.
+        max_error_ratio: the focal length is taken from the outline if that reduces its error to this share.
+    """
+
+    max_side_px: int = 480
+    dark_quantile: float = 0.2
+    min_pictures: int = 5
+    min_brightness: float = 0.5
+    inner_radius: float = 0.9
+    candidates: int = 100
+    min_visibility: float = 0.15
+    min_relative_visibility: float = 0.6
+    min_significance: float = 8.0
+    chance_coverage: float = 0.5
+    cut_off: float = 0.02
+    white_code: int = 250
+    max_white: float = 0.4
+    averages: int = 6
+    max_error_ratio: float = 0.8
 
 
-class SpecularHighlights:
-    """Small bright places that a scene shows in some of its pictures and not in others."""
-
-    def __init__(self, sample: SceneSample) -> None:
-        """Take the scene as it is in its darker pictures, pixel by pixel, for what is there without the lamp."""
-        shape = sample.codes.shape[1:]
-        self._factor = min(1.0, _MAX_SIDE / max(shape))
-        size = (max(1, round(shape[1] * self._factor)), max(1, round(shape[0] * self._factor)))
-        self._lights = np.stack(
-            [
-                cv2.resize(sample.luminance(index), size, interpolation=cv2.INTER_AREA)
-                for index in range(len(sample.codes))
-            ]
-        )
-        enough = len(self._lights) >= _FEW
-        self._dark = np.quantile(self._lights, _STILL_SHARE, axis=0).astype(np.float32) if enough else None
-
-    def share(self, circle: BallOutline) -> float:
-        """Share of the pictures in which one small place in this circle is bright by the lamp.
-
-        Args:
-            circle: in pixels of the sample.
-        """
-        small = circle.scaled(self._factor)
-        view = DistantView(small)
-        found = (find_highlight_in_plane(light, view, self._dark) for light in self._lights)
-        glints = [place for place in found if isinstance(place, Highlight) and place.brightness > _BRIGHT]
-        inner = [place for place in glints if np.hypot(place.x - small.x, place.y - small.y) < _INNER * small.radius]
-        return len(inner) / len(self._lights)
-
-
-_CANDIDATES = 100
-_LEAST_GLINTS, _GLINTS_OF_BEST = 0.15, 0.6
-"""Share of the pictures in which a ball shows the lamp: at least, and of what the circle with most has."""
-_LEAST_SIGNIFICANCE = 8.0
-_CHANCE_COVERAGE = 0.5
-"""Share of a circle that lies on edges by chance, in a busy picture."""
-_CUT_OFF = 0.02
-_CLIPPED, _MOSTLY = 250, 0.4
-_AVERAGES = 6
+_TUNABLES = DetectionTunables()
 _CORRECTED = "; corrected by the ball's outline"
 
 
@@ -84,10 +76,10 @@ class DetectedBall:
 
     Attributes:
         outline: in pixels of the frames.
-        evidence: share of the outline that shows in the pictures. Below about 0.7 the outline may be off by several
-            per cent of the radius, and the light by as many degrees. None for a circle that was given.
-        glints: share of the pictures in which it shows the lamp.
-        focal: of the camera: what was known, improved by the outline's shape.
+        evidence: share of the outline that is visible in the pictures. Below about 0.7 the outline may be off by
+            several per cent of the radius, and the light by as many degrees. None for a circle that was given.
+        glints: share of the pictures in which the ball shows the lamp.
+        focal: focal length of the camera, corrected by the outline's shape where that is more accurate.
     """
 
     outline: BallOutline
@@ -96,45 +88,69 @@ class DetectedBall:
     focal: FocalLength
 
 
-def detect_ball(sample: SceneSample, focal: FocalLength) -> DetectedBall:
-    """Find the mirror ball: a round thing in which, whatever way the lamp is, one small place is very bright.
+class HighlightVisibility:
+    """How often a circle of the scene shows a small bright place that the scene without the lamp does not have."""
 
-    Circles that the scene's edges suggest are tried; of those with glints the one counts that has most edge on its line
-    for its size, and its outline is fitted as a mirror's.
+    def __init__(self, sample: SceneSample) -> None:
+        """Take the scene without the lamp from the darker pictures, pixel by pixel."""
+        shape = sample.codes.shape[1:]
+        self._factor = min(1.0, _TUNABLES.max_side_px / max(shape))
+        size = (max(1, round(shape[1] * self._factor)), max(1, round(shape[0] * self._factor)))
+        self._lights = np.stack(
+            [
+                cv2.resize(sample.luminance(index), size, interpolation=cv2.INTER_AREA)
+                for index in range(len(sample.codes))
+            ]
+        )
+        enough = len(self._lights) >= _TUNABLES.min_pictures
+        dark = np.quantile(self._lights, _TUNABLES.dark_quantile, axis=0).astype(np.float32) if enough else None
+        self._dark = dark
+
+    def share(self, circle: BallOutline) -> float:
+        """Share of the pictures in which the lamp makes one small place in this circle bright.
+
+        Args:
+            circle: in pixels of the sample.
+        """
+        small = circle.scaled(self._factor)
+        view = DistantView(small)
+        found = (find_highlight(light, view, self._dark) for light in self._lights)
+        bright = [each for each in found if isinstance(each, Highlight) and each.brightness > _TUNABLES.min_brightness]
+        reach = _TUNABLES.inner_radius * small.radius
+        inner = [each for each in bright if np.hypot(each.x - small.x, each.y - small.y) < reach]
+        return len(inner) / len(self._lights)
+
+
+def find_balls(
+    sample: SceneSample, focal: FocalLength, count: int = 1, given: Sequence[BallOutline] = ()
+) -> list[DetectedBall]:
+    """The mirror balls of a film: those given, then those found, the clearest first.
 
     Args:
-        sample: of the video's frames, dark and bright, or of photographs under several lights. A single one is taken at
-            its word: the best circle with a bright place in it.
-        focal: the camera's, as far as it is known.
+        sample: of the film's dark and bright frames.
+        focal: focal length of the camera, as far as it is known.
+        count: number of balls that must be there, 1 or 2.
+        given: outlines in pixels of the frames, where they are known.
 
     Raises:
-        CaptureError: there is none, it is cut off by the picture's edge, or over-exposed.
+        CaptureError: there are fewer, or one is cut off by the picture's edge or over-exposed.
     """
-    return detect_balls(sample, focal, 1)[0]
-
-
-def detect_balls(sample: SceneSample, focal: FocalLength, count: int) -> list[DetectedBall]:
-    """At most `count` mirror balls that do not overlap, at least one, the clearest first (see `detect_ball`).
-
-    What one's outline tells of the focal length, is known when the next is measured.
-
-    Raises:
-        CaptureError: there is none, one is cut off by the picture's edge, or over-exposed.
-    """
-    edges, glints = edge_map(sample), SpecularHighlights(sample)
-    circles = circle_candidates(edges, _CANDIDATES)
-    shares = [glints.share(circle) for circle in circles]
-    enough = max(_LEAST_GLINTS, _GLINTS_OF_BEST * max(shares, default=0.0))
-    limbs = _distinct(
-        [fit_outline_to_edges(edges, circle) for circle, share in zip(circles, shares, strict=True) if share >= enough]
-    )
-    if not limbs:
-        raise _nothing_found(sample, edges, circles)
-    found: list[DetectedBall] = []
-    for limb in limbs[:count]:
-        _check_whole(limb.outline, sample)
-        found.append(_measured(sample, limb.outline, glints, found[-1].focal if found else focal))
-    return found
+    known = [ball_from_outline(sample, outline, focal) for outline in given]
+    if len(known) >= count:
+        return known
+    found = [
+        ball
+        for ball in detect_balls(sample, focal, count)
+        if not any(ball.outline.overlaps(other.outline) for other in known)
+    ]
+    balls = [*known, *found][:count]
+    if len(balls) < count:
+        raise CaptureError(
+            f"only one mirror ball was found, at {balls[0].outline.x:.0f}, {balls[0].outline.y:.0f}, not two",
+            "film the second on the other side of the head, all of it in the picture and before something plain, or "
+            "give its circle, --second-ball X,Y,RADIUS; or leave --balls 2 out",
+        )
+    return balls
 
 
 def ball_from_outline(sample: SceneSample, given: BallOutline, focal: FocalLength) -> DetectedBall:
@@ -144,65 +160,85 @@ def ball_from_outline(sample: SceneSample, given: BallOutline, focal: FocalLengt
         CaptureError: it is cut off by the picture's edge.
     """
     circle = given.scaled(sample.scale)
-    _check_whole(circle, sample)
-    return DetectedBall(given, None, SpecularHighlights(sample).share(circle), focal)
+    _require_whole(circle, sample)
+    return DetectedBall(given, None, HighlightVisibility(sample).share(circle), focal)
 
 
-def refine_ball(sample: SceneSample, given: BallOutline, focal: FocalLength) -> DetectedBall:
-    """A ball whose outline is given in pixels of the frames to within a tenth of its radius, measured.
+def detect_balls(sample: SceneSample, focal: FocalLength, count: int) -> list[DetectedBall]:
+    """At most `count` mirror balls that do not overlap, at least one, the most significant first.
+
+    The focal length that the first outline corrects is used in measuring the next.
+
+    Args:
+        sample: of a film's frames, dark and bright, or of photographs under several lights. Of a single photograph, the
+            best circle with a bright place in it is taken.
+        focal: focal length of the camera, as far as it is known.
+        count: most balls to find.
 
     Raises:
-        CaptureError: no edge is there, or it is cut off by the picture's edge.
+        CaptureError: there is none, one is cut off by the picture's edge, or over-exposed.
     """
-    rough = given.scaled(sample.scale)
-    _check_whole(rough, sample)
-    limb = fit_outline_to_edges(edge_map(sample), rough)
-    if limb is None:
-        place = f"{given.x:.0f}, {given.y:.0f} with radius {given.radius:.0f}"
-        raise CaptureError(
-            f"there is no outline of a ball at {place}", "give the circle in pixels of the upright picture"
-        )
-    return _measured(sample, limb.outline, SpecularHighlights(sample), focal)
+    edges, visibility = edge_map(sample), HighlightVisibility(sample)
+    circles = circle_candidates(edges, _TUNABLES.candidates)
+    shares = [visibility.share(circle) for circle in circles]
+    enough = max(_TUNABLES.min_visibility, _TUNABLES.min_relative_visibility * max(shares, default=0.0))
+    showing = [circle for circle, share in zip(circles, shares, strict=True) if share >= enough]
+    fits = _significant([fit_outline_to_edges(edges, circle) for circle in showing])
+    if not fits:
+        raise _nothing_found(sample, edges, circles)
+    found: list[DetectedBall] = []
+    for fit in fits[:count]:
+        _require_whole(fit.outline, sample)
+        found.append(_measure(sample, fit.outline, visibility, found[-1].focal if found else focal))
+    return found
 
 
-def _measured(sample: SceneSample, rough: BallOutline, glints: SpecularHighlights, focal: FocalLength) -> DetectedBall:
+def _measure(
+    sample: SceneSample, rough: BallOutline, visibility: HighlightVisibility, focal: FocalLength
+) -> DetectedBall:
+    """A ball with this rough outline in pixels of the sample, its outline and the focal length measured."""
     known = focal.scaled(sample.scale)
-    limb = fit_mirror_outline(sample.averages(_AVERAGES), rough, known.log, known.error)
-    better = limb.log_focal_error < 0.8 * focal.error
+    fit = fit_mirror_outline(sample.averages(_TUNABLES.averages), rough, known.log, known.error)
+    better = fit.log_focal_error < _TUNABLES.max_error_ratio * focal.error
     source = focal.source if focal.source.endswith(_CORRECTED) or not better else focal.source + _CORRECTED
-    pixels = float(np.exp(limb.log_focal)) / sample.scale
+    pixels = float(np.exp(fit.log_focal)) / sample.scale
     return DetectedBall(
-        limb.outline.scaled(1 / sample.scale),
-        limb.evidence,
-        glints.share(limb.outline),
-        FocalLength(pixels, limb.log_focal_error, source) if better else focal,
+        fit.outline.scaled(1 / sample.scale),
+        fit.evidence,
+        visibility.share(fit.outline),
+        FocalLength(pixels, fit.log_focal_error, source) if better else focal,
     )
 
 
-def _significance(limb: OutlineFit) -> float:
-    """How unlikely it is that so much of a circle's line lies on edges by chance, as a logarithm.
+def _significance(fit: OutlineFit) -> float:
+    """Negative logarithm of the probability that so much of a circle's line lies on edges by chance.
 
     After the a-contrario validation of Desolneux, Moisan and Morel (2000): Chernoff's bound of the binomial tail. Every
     other pixel of the line counts as independent.
     """
-    p, q = min(max(limb.coverage, _CHANCE_COVERAGE), 0.999), _CHANCE_COVERAGE
-    return float(np.pi * limb.outline.radius * (p * np.log(p / q) + (1 - p) * np.log((1 - p) / (1 - q))))
+    q = _TUNABLES.chance_coverage
+    p = min(max(fit.coverage, q), 0.999)
+    return float(np.pi * fit.outline.radius * (p * np.log(p / q) + (1 - p) * np.log((1 - p) / (1 - q))))
 
 
-def _distinct(limbs: list[OutlineFit | None]) -> list[OutlineFit]:
-    """The significant ones that do not overlap a more significant one, the most significant first."""
-    significant = [limb for limb in limbs if limb is not None and _significance(limb) > _LEAST_SIGNIFICANCE]
+def _significant(fits: list[OutlineFit | None]) -> list[OutlineFit]:
+    """The significant outlines that do not overlap a more significant one, the most significant first."""
+    significant = [fit for fit in fits if fit is not None and _significance(fit) > _TUNABLES.min_significance]
     kept: list[OutlineFit] = []
-    for limb in sorted(significant, key=_significance, reverse=True):
-        a = limb.outline
-        if all(np.hypot(a.x - b.outline.x, a.y - b.outline.y) > a.radius + b.outline.radius for b in kept):
-            kept.append(limb)
+    for fit in sorted(significant, key=_significance, reverse=True):
+        if not any(fit.outline.overlaps(other.outline) for other in kept):
+            kept.append(fit)
     return kept
 
 
-def _check_whole(outline: BallOutline, sample: SceneSample) -> None:
+def _require_whole(outline: BallOutline, sample: SceneSample) -> None:
+    """Check that a ball with this outline, in pixels of the sample, is inside the picture.
+
+    Raises:
+        CaptureError: it is cut off.
+    """
     height, width = sample.codes.shape[1:]
-    reach = (1 - _CUT_OFF) * outline.radius
+    reach = (1 - _TUNABLES.cut_off) * outline.radius
     over = {
         "left": reach - outline.x,
         "right": outline.x + reach - width,
@@ -219,15 +255,14 @@ def _check_whole(outline: BallOutline, sample: SceneSample) -> None:
 
 
 def _nothing_found(sample: SceneSample, edges: EdgeMap, circles: list[BallOutline]) -> CaptureError:
-    """Why no circle counts as a ball: one that is white all over, one that shows no lamp, or none at all."""
-    limbs = _distinct([fit_outline_to_edges(edges, circle) for circle in circles])
-    usual = np.median(sample.codes, axis=0)
-    for limb in limbs:
-        outline = limb.outline
-        rows, columns = outline.pixels_within(1.0, (usual.shape[1], usual.shape[0]))
+    """Why no circle counts as a ball: the clearest one is white all over, or none shows the lamp."""
+    median = np.median(sample.codes, axis=0)
+    for fit in _significant([fit_outline_to_edges(edges, circle) for circle in circles]):
+        outline = fit.outline
+        rows, columns = outline.pixels_within(1.0, (median.shape[1], median.shape[0]))
         place = outline.scaled(1 / sample.scale)
         where = f"at {place.x:.0f}, {place.y:.0f} with radius {place.radius:.0f}"
-        if np.mean(usual[rows, columns] > _CLIPPED) > _MOSTLY:
+        if np.mean(median[rows, columns] > _TUNABLES.white_code) > _TUNABLES.max_white:
             return CaptureError(
                 f"the ball {where} is over-exposed: most of it is white",
                 "lower the exposure and lock it, or turn off lamps that the ball shows",

@@ -1,11 +1,10 @@
-"""How brightness runs across the limb of a mirror ball.
+"""A mirror ball's outline measured to a fraction of a pixel, by a model of the brightness across its limb.
 
-Toward its limb a mirror ball shows what is behind it: at the limb itself rays pass unbent, and the picture goes over
-into the background with no step but for the light that the metal takes. The edges that one sees lie inside, where the
-squeezed mirror image of something else begins: one or two hundredths of the radius, which is a degree of light. So the
-limb is sought not as an edge but as the place up to which the picture is background.
-
-A mirror ball's outline, as well as its picture tells.
+A mirror ball has no edge at its limb. There it reflects what is behind it, and at the limb itself rays pass unbent, so
+the picture blends into the background but for the light that the metal absorbs. The visible edges lie one or two
+hundredths of the radius inside, where the squeezed reflection of something else begins; that would be an error of a
+degree of light. So the limb is found as the place up to which a brightness profile is background
+(`OutlineProfileModel`).
 """
 
 from __future__ import annotations
@@ -19,74 +18,141 @@ from scipy.optimize import fmin
 
 from relit_camera.capture.film.ball.sphere_projection import BallOutline, PinholeView
 
-INSIDE_SAMPLES, OUTSIDE_SAMPLES = 16, 12
-"""Samples on both sides of the supposed limb."""
-SHIFTS = np.arange(-6, 6.01, 0.3)
-"""Places of the limb that are tried, in sample distances."""
-
-_BLACK, _LEVEL, _BLUR = 0.0003, 0.02, 0.03
-"""Errors of a picture: one code of dark sRGB; a share of the brightness; a share of the contrast, for what is not known
-of the lens's blur and a video's compression."""
-_REFLECTION_VARIANCES = (1e1, 1e2, 1e3, 1e4, 1e5)
-"""Variance a radian that the mirrored surroundings may have, and ..."""
-_BACKGROUND_VARIANCES = ((0.03, 0.0), (1.0, 3.0), (100.0, 10.0))
-"""... a sample that the background may have, in units of the error's variance, with how much less likely it is taken to
-be (logarithm): a background is mostly plain so near. Of both, what fits a profile best counts."""
-_ABSORBED, _ABSORBED_SPREAD = 0.15, 0.12
-"""Share of the light that metal takes, and its spread."""
-_ANY_LEVEL = 1e6
-_BLUR_SAMPLES = 5
-
 Floats = NDArray[np.float64]
+
+INSIDE_SAMPLES, OUTSIDE_SAMPLES = 16, 12
+"""Samples of a profile on either side of the supposed limb."""
+SHIFTS = np.arange(-6, 6.01, 0.3)
+"""Positions of the limb that are tried, in sample distances from the supposed one."""
+
+
+@dataclass(frozen=True)
+class ProfileTunables:
+    """Noise and priors of a profile; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        black_error: error of a dark picture: one sRGB code, linear.
+        level_error: error as a share of the brightness.
+        blur_error: error as a share of the contrast, by the unknown part of lens blur and compression.
+        reflection_variances: variances per radian of the reflected surroundings that are tried, over that of the error.
+        background_variances: variances per sample of the background that are tried, over that of the error, each with
+            its negative log prior: a background this near is mostly plain.
+        absorption, absorption_error: share of the light that metal absorbs, and its standard deviation.
+        level_variance: variance of the unknown brightness, over that of the error: practically unlimited.
+        blur_samples: steps per sample distance in which the lens blur is integrated.
+    """
+
+    black_error: float = 0.0003
+    level_error: float = 0.02
+    blur_error: float = 0.03
+    reflection_variances: tuple[float, ...] = (1e1, 1e2, 1e3, 1e4, 1e5)
+    background_variances: tuple[tuple[float, float], ...] = ((0.03, 0.0), (1.0, 3.0), (100.0, 10.0))
+    absorption: float = 0.15
+    absorption_error: float = 0.12
+    level_variance: float = 1e6
+    blur_samples: int = 5
+
+
+@dataclass(frozen=True)
+class OutlineTunables:
+    """Fit of the outline; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        step_px, step_radii: distance of the samples across the limb: the larger of the two.
+        blurs_px: standard deviations of the lens blur that are tried.
+        rays: number of profiles around the ball.
+        samples_per_value: samples that count as one independent value, since neighbors along and across the limb are
+            correlated.
+        outlier: log likelihood below its best that a ray may lose at most: the weight of one without a limb.
+        evidence: log likelihood by which a ray must prefer the limb over any other position to be evidence of it.
+        grid: offsets of x, y and radius that are tried first, in sample distances.
+        rounds: fits, each about the outline of the one before.
+        error_px: standard error of a diameter of a limb that is visible all around. Where parts are missing, both ends
+            of a diameter are seldom visible.
+    """
+
+    step_px: float = 0.5
+    step_radii: float = 1 / 300
+    blurs_px: tuple[float, ...] = (0.5, 1.0, 2.0)
+    rays: int = 240
+    samples_per_value: float = 6.0
+    outlier: float = 5.0
+    evidence: float = 1.0
+    grid: tuple[float, ...] = tuple(float(offset) for offset in range(-5, 6))
+    rounds: int = 3
+    error_px: float = 0.4
+
+
+_PROFILE = ProfileTunables()
+_OUTLINE = OutlineTunables()
 
 
 class OutlineProfileModel:
-    """Likelihood of brightness profiles across the limb, for each place that it may have in them.
+    """Likelihood of brightness profiles across the limb, for each position of the limb that is tried.
 
-    A Gaussian process. Outside, a profile is a random walk in pixels from an unknown level. Inside, it goes on from the
-    level at the limb, less what the metal takes, as a random walk in the angle by which the ball turns the rays: that
-    is 2 acos(ρ) at ρ radii from the middle, so it sets in steeply. The lens blurs both.
+    The profile is a Gaussian process. Outside, it is a random walk in pixels from an unknown level. Inside, it
+    continues from the level at the limb, less what the metal absorbs, as a random walk in the angle by which the ball
+    turns the rays: that is 2 acos(ρ) at ρ radii from the center, so it varies steeply near the limb. The lens blurs
+    both.
     """
 
     def __init__(self, step_px: float, radius: float, blur_px: float) -> None:
-        """Prepare for profiles sampled every `step_px` across the limb of a ball of this radius, pixels."""
+        """Invert the covariances of the profiles.
+
+        Args:
+            step_px: distance of the samples across the limb.
+            radius: of the ball, pixels.
+            blur_px: standard deviation of the lens blur.
+        """
         self.places = np.arange(-INSIDE_SAMPLES, OUTSIDE_SAMPLES + 1) * step_px
         samples = len(self.places)
         margin = 4 * blur_px + step_px
-        fine = np.arange(self.places[0] - margin, self.places[-1] + margin, step_px / _BLUR_SAMPLES)
+        fine = np.arange(self.places[0] - margin, self.places[-1] + margin, step_px / _PROFILE.blur_samples)
         lens = np.exp(-0.5 * ((self.places[:, None] - fine) / blur_px) ** 2)
         lens /= lens.sum(axis=1, keepdims=True)
-        inverse = np.empty((len(SHIFTS), len(_REFLECTION_VARIANCES) * len(_BACKGROUND_VARIANCES), samples, samples))
+        scales = [(a, b) for a in _PROFILE.reflection_variances for b in _PROFILE.background_variances]
+        inverse = np.empty((len(SHIFTS), len(scales), samples, samples))
         self._offset = np.empty(inverse.shape[:2])
         steps = np.empty((len(SHIFTS), samples))
         for index, shift in enumerate(SHIFTS * step_px):
             turn = 2 * np.arccos(np.clip(1 - np.maximum(shift - fine, 0) / radius, -1, 1))
             away = np.maximum(fine - shift, 0) / step_px
             steps[index] = lens @ (fine < shift)
-            walk, clutter = (lens @ np.minimum.outer(way, way) @ lens.T for way in (turn, away))
+            reflection, background = (lens @ np.minimum.outer(way, way) @ lens.T for way in (turn, away))
             fixed = (
-                (_ABSORBED_SPREAD / _LEVEL) ** 2 * np.outer(steps[index], steps[index]) + _ANY_LEVEL + np.eye(samples)
+                (_PROFILE.absorption_error / _PROFILE.level_error) ** 2 * np.outer(steps[index], steps[index])
+                + _PROFILE.level_variance
+                + np.eye(samples)
             )
-            scales = [(a, b) for a in _REFLECTION_VARIANCES for b in _BACKGROUND_VARIANCES]
-            for column, (walk_scale, (clutter_scale, unlikely)) in enumerate(scales):
-                lower = np.linalg.cholesky(fixed + walk_scale * walk + clutter_scale * clutter)
+            for column, (reflection_scale, (background_scale, prior_cost)) in enumerate(scales):
+                lower = np.linalg.cholesky(fixed + reflection_scale * reflection + background_scale * background)
                 half = np.linalg.inv(lower)
                 inverse[index, column] = half.T @ half
-                self._offset[index, column] = np.log(np.diag(lower)).sum() + unlikely
+                self._offset[index, column] = np.log(np.diag(lower)).sum() + prior_cost
         stepped = np.einsum("dkuv,dv->dku", inverse, steps)
         self._inverse = inverse.reshape(-1, samples, samples).transpose(1, 0, 2).reshape(samples, -1)
         self._stepped = stepped.reshape(-1, samples).T
         self._step_squared = np.einsum("dku,du->dk", stepped, steps)
 
     def log_likelihood(self, light: NDArray[np.float32], x: Floats, y: Floats) -> Floats:
-        """Log likelihood (count, shifts) of the profiles at pixels x, y (count, samples) of luminance (h, w)."""
+        """Log likelihood (count, shifts) of profiles.
+
+        Args:
+            light: linear luminance (height, width) float32.
+            x: (count, samples) pixel positions of the profiles' samples.
+            y: the same.
+        """
         at = [(place - 0.5).astype(np.float32) for place in (x, y)]
         profile = cv2.remap(light, at[0], at[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(np.float64)
         outside = np.median(profile[:, -OUTSIDE_SAMPLES // 2 :], axis=1, keepdims=True)
         level = np.median(profile, axis=1, keepdims=True)
-        error = _BLACK + _LEVEL * level + _BLUR * np.ptp(profile, axis=1, keepdims=True)
+        error = (
+            _PROFILE.black_error
+            + _PROFILE.level_error * level
+            + _PROFILE.blur_error * np.ptp(profile, axis=1, keepdims=True)
+        )
         profile /= error
-        taken = _ABSORBED * (outside / error)[..., None]
+        taken = _PROFILE.absorption * (outside / error)[..., None]
         shape = (len(profile), *self._offset.shape)
         # (profile + taken · step)ᵀ K⁻¹ (profile + taken · step), multiplied out.
         halves = (profile @ self._inverse).reshape(len(profile), -1, profile.shape[1])
@@ -95,33 +161,15 @@ class OutlineProfileModel:
         return np.asarray((-0.5 * squared - self._offset).max(axis=2))
 
 
-_STEP_PX, _STEP_RADII = 0.5, 1 / 300
-"""Distance of the samples across the limb: the larger of the two."""
-_BLURS_PX = (0.5, 1.0, 2.0)
-_RAYS = 240
-_OVERLAP = 6.0
-"""Each sample says again what its neighbours along and across the limb said: so many count as one."""
-_OUTLIER = 5.0
-"""Least log likelihood of a ray, below its best: so little weight has one that shows something else than the limb."""
-_TELLING = 1.0
-"""Log likelihood by which a ray must prefer the limb where it is to anywhere, to be evidence of it."""
-_GRID = np.arange(-5.0, 5.1, 1.0)
-"""Offsets of x, y and radius that are tried first, in sample distances."""
-_ROUNDS = 3
-_OUTLINE_ERROR_PX = 0.4
-"""Of the outline along a diameter: what compression and clutter leave of a limb that shows all around. Where parts are
-missing, a diameter's two ends are seldom both seen."""
-
-
 @dataclass(frozen=True)
 class MirrorOutlineFit:
-    """A fitted outline.
+    """A measured outline of a mirror ball.
 
     Attributes:
         outline: in pixels.
-        evidence: share of the rays from its middle along which the limb shows where it was found.
-        log_focal, log_focal_error: natural logarithm of the focal length in pixels, and its standard error: what was
-            known, and what the outline's shape says about it.
+        evidence: share of the rays from its center along which the limb is evident where it was found.
+        log_focal, log_focal_error: natural logarithm of the focal length in pixels, and its standard error: prior
+            knowledge combined with that from the outline's shape.
     """
 
     outline: BallOutline
@@ -133,64 +181,75 @@ class MirrorOutlineFit:
 def fit_mirror_outline(
     lights: NDArray[np.float32], rough: BallOutline, log_focal: float, log_focal_error: float
 ) -> MirrorOutlineFit:
-    """Fit the outline of a mirror ball.
+    """Measure the outline of a mirror ball.
 
     Args:
-        lights: linear luminance (count, height, width) of one scene; each picture counts the same.
-        rough: the outline within two per cent of the radius or three pixels.
+        lights: linear luminance (count, height, width) of one scene; all pictures count equally.
+        rough: the outline to within two per cent of the radius or three pixels.
         log_focal: natural logarithm of the focal length in pixels, as far as it is known.
         log_focal_error: its standard error.
     """
-    step = max(_STEP_PX, _STEP_RADII * rough.radius)
-    models = [OutlineProfileModel(step, rough.radius, blur) for blur in _BLURS_PX if blur < 2.5 * step]
+    step = max(_OUTLINE.step_px, _OUTLINE.step_radii * rough.radius)
+    models = [OutlineProfileModel(step, rough.radius, blur) for blur in _OUTLINE.blurs_px if blur < 2.5 * step]
     found, prior = np.array([rough.x, rough.y, rough.radius, log_focal]), (log_focal, log_focal_error)
     evidence = 0.0
-    for turn in range(_ROUNDS):
+    for number in range(_OUTLINE.rounds):
         rays = [_Rays(lights, model, found) for model in models]
-        fits = [each.best_outline(each.searched() if turn == 0 else found, prior) for each in rays]
+        fits = [each.best_outline(each.best_of_grid() if number == 0 else found, prior) for each in rays]
         chosen = int(np.argmax([each.peak + score for each, (_, score) in zip(rays, fits, strict=True)]))
         found = fits[chosen][0]
         evidence = rays[chosen].evidence(found)
     outline = BallOutline(float(found[0]), float(found[1]), float(found[2]))
-    # An ellipse's stretch falls with the focal length's square; so sure is what the fitted stretch says of it.
+    # The stretch of the ellipse is inverse to the square of the focal length, which gives the error of the latter.
     stretch = 2 * np.log(PinholeView(outline, (lights.shape[2], lights.shape[1]), float(np.exp(log_focal))).elongation)
-    error = np.sqrt(2) * _OUTLINE_ERROR_PX / max(evidence, 0.1) / outline.radius / max(stretch, 1e-9)
+    error = np.sqrt(2) * _OUTLINE.error_px / max(evidence, 0.1) / outline.radius / max(stretch, 1e-9)
     share = log_focal_error**2 / (log_focal_error**2 + error**2)
     combined = log_focal + share * float(found[3] - log_focal)
     return MirrorOutlineFit(outline, evidence, combined, float(log_focal_error * np.sqrt(1 - share)))
 
 
 class _Rays:
-    """What the rays from a ball's middle say of its outline: x, y, radius, logarithm of the focal length."""
+    """Log likelihoods of outlines by the profiles along rays from a ball's center.
+
+    An outline is an array of x, y, radius in pixels and the natural logarithm of the focal length in pixels.
+    """
 
     def __init__(self, lights: NDArray[np.float32], model: OutlineProfileModel, base: Floats) -> None:
-        """Look along rays from the middle of `base`, across its line."""
-        angle = (np.arange(_RAYS) + 0.5) * 2 * np.pi / _RAYS
+        """Sample profiles along rays from the center of the outline `base`, across its line."""
+        angle = (np.arange(_OUTLINE.rays) + 0.5) * 2 * np.pi / _OUTLINE.rays
         self._size, self._base = (lights.shape[2], lights.shape[1]), base
         self._step = float(model.places[1] - model.places[0])
         distance = self._line(base, angle)[:, None] + model.places
         x, y = base[0] + distance * np.cos(angle)[:, None], base[1] + distance * np.sin(angle)[:, None]
-        seen = ((x > 0) & (y > 0) & (x < self._size[0]) & (y < self._size[1])).all(axis=1)
-        self._angle = angle[seen]
-        likely = np.mean([model.log_likelihood(light, x[seen], y[seen]) for light in lights], axis=0) / _OVERLAP
+        inside = ((x > 0) & (y > 0) & (x < self._size[0]) & (y < self._size[1])).all(axis=1)
+        self._angle = angle[inside]
+        likely = (
+            np.mean([model.log_likelihood(light, x[inside], y[inside]) for light in lights], axis=0)
+            / _OUTLINE.samples_per_value
+        )
         best = likely.max(axis=1, keepdims=True, initial=-np.inf)
         self.peak = float(best.sum())
         self._likely = likely - best
 
-    def searched(self) -> Floats:
-        """The best of a grid of outlines about the base, with its focal length."""
-        across, down, wide = (grid.ravel() for grid in np.meshgrid(_GRID, _GRID, _GRID))
-        off = across[:, None] * np.cos(self._angle) + down[:, None] * np.sin(self._angle) + wide[:, None]
-        value, beyond = self._at(off)
+    def best_of_grid(self) -> Floats:
+        """The most likely of a grid of outlines about the base, with the base's focal length."""
+        across, down, wide = (grid.ravel() for grid in np.meshgrid(_OUTLINE.grid, _OUTLINE.grid, _OUTLINE.grid))
+        offset = across[:, None] * np.cos(self._angle) + down[:, None] * np.sin(self._angle) + wide[:, None]
+        value, beyond = self._interpolate(offset)
         best = int(np.argmax(_robust(value, beyond)))
         return self._base + self._step * np.array([across[best], down[best], wide[best], 0])
 
     def best_outline(self, start: Floats, prior: tuple[float, float]) -> tuple[Floats, float]:
-        """The outline that the rays and what is known of the focal length prefer, and its log likelihood."""
+        """The most likely outline near a start, and its log likelihood.
+
+        Args:
+            start: outline at which the simplex search (Nelder and Mead 1965) starts.
+            prior: logarithm of the focal length and its standard error.
+        """
 
         def cost(parameters: Floats) -> float:
-            known = 0.5 * ((parameters[3] - prior[0]) / prior[1]) ** 2
-            return float(known - _robust(*self._at(self._off(parameters))))
+            prior_cost = 0.5 * ((parameters[3] - prior[0]) / prior[1]) ** 2
+            return float(prior_cost - _robust(*self._interpolate(self._offsets(parameters))))
 
         sides = np.diag([self._step, self._step, self._step, prior[1]])
         simplex = start + np.vstack([np.zeros(4), sides])
@@ -198,20 +257,20 @@ class _Rays:
         return best, -cost(best)
 
     def evidence(self, parameters: Floats) -> float:
-        """Share of all rays that prefer the limb there to anywhere."""
-        value, beyond = self._at(self._off(parameters))
-        telling = (value - self._likely.mean(axis=1) > _TELLING / _OVERLAP) & (beyond == 0)
-        return float(np.count_nonzero(telling) / _RAYS)
+        """Share of all rays that clearly prefer the limb at this outline over other positions."""
+        value, beyond = self._interpolate(self._offsets(parameters))
+        telling = (value - self._likely.mean(axis=1) > _OUTLINE.evidence / _OUTLINE.samples_per_value) & (beyond == 0)
+        return float(np.count_nonzero(telling) / _OUTLINE.rays)
 
-    def _off(self, parameters: Floats) -> Floats:
-        """How far (rays,) an outline's line is outside the base's, in sample distances."""
+    def _offsets(self, parameters: Floats) -> Floats:
+        """Distance (rays,) of an outline's line outside the base's, in sample distances."""
         moved = parameters[0] - self._base[0], parameters[1] - self._base[1]
         wider = self._line(parameters, self._angle) - self._line(self._base, self._angle)
         return np.asarray((wider + moved[0] * np.cos(self._angle) + moved[1] * np.sin(self._angle)) / self._step)
 
-    def _at(self, off: Floats) -> tuple[Floats, Floats]:
-        """Log likelihoods (..., rays), 0 the best, of a limb so far off, and how far that is outside what was tried."""
-        column = (off - SHIFTS[0]) / (SHIFTS[1] - SHIFTS[0])
+    def _interpolate(self, offset: Floats) -> tuple[Floats, Floats]:
+        """Log likelihood (..., rays) of a limb at an offset, relative to the best, and the offset's excess."""
+        column = (offset - SHIFTS[0]) / (SHIFTS[1] - SHIFTS[0])
         inside = np.clip(column, 0, len(SHIFTS) - 1.001)
         left, ray = inside.astype(int), np.arange(len(self._likely))
         part = inside - left
@@ -219,7 +278,7 @@ class _Rays:
         return np.asarray(value), np.abs(column - inside)
 
     def _line(self, parameters: Floats, angle: Floats) -> Floats:
-        """Distance (rays,) of an outline from its centre."""
+        """Distance (rays,) of an outline's line from its center, in pixels."""
         x, y, radius, log_focal = parameters
         view = PinholeView(BallOutline(x, y, radius), self._size, float(np.exp(log_focal)))
         stretch = np.sqrt(view.elongation)
@@ -228,5 +287,5 @@ class _Rays:
 
 
 def _robust(value: Floats, beyond: Floats) -> Floats:
-    """Sum over the rays (last axis) of log likelihoods, none below the outliers'."""
-    return np.asarray(np.logaddexp(value - beyond, -_OUTLIER).sum(axis=-1) - 0.01 * beyond.sum(axis=-1))
+    """Sum over the rays (last axis) of log likelihoods, with a lower limit for outliers."""
+    return np.asarray(np.logaddexp(value - beyond, -_OUTLINE.outlier).sum(axis=-1) - 0.01 * beyond.sum(axis=-1))

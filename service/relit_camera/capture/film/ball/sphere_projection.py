@@ -1,8 +1,7 @@
-"""A ball's outline in the picture.
+"""A mirror ball's outline in the picture, and the camera's view of the ball: surface normals and reflected rays.
 
-How the camera sees a mirror ball: the surface and the mirrored ray at a place in the picture.
-
-Everything is in camera axes and in radii of the ball: what a picture of a ball shows does not tell its size.
+Everything is in camera axes (x right, y up, the camera looking along -z) and in radii of the ball, since a picture of a
+ball does not show its size.
 """
 
 from __future__ import annotations
@@ -13,16 +12,21 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+Vectors = NDArray[np.float64]
+
+_MAX_ITERATIONS = 30
+"""Fixed-point iterations from an outline to its cone of rays."""
+
 
 @dataclass(frozen=True)
 class BallOutline:
-    """Where a ball is in the picture, in pixels, pixel centres at integers + ½.
+    """A ball's outline in the picture, in pixels, pixel centers at integers + ½.
 
-    A ball beside the camera's axis has an ellipse for its outline, drawn out away from the picture's middle.
+    A ball beside the camera's axis has an ellipse for its outline, elongated toward the picture's middle.
 
     Attributes:
-        x, y: the outline's centre, which is not quite the picture of the ball's centre.
-        radius: of the circle of the outline's area.
+        x, y: center of the outline, which is not exactly the projection of the ball's center.
+        radius: of the circle whose area the outline has.
     """
 
     x: float
@@ -30,15 +34,24 @@ class BallOutline:
     radius: float
 
     def moved(self, dx: float, dy: float) -> BallOutline:
-        """The same elsewhere."""
+        """The outline shifted by pixels to the right and down."""
         return BallOutline(self.x + dx, self.y + dy, self.radius)
 
     def scaled(self, factor: float) -> BallOutline:
-        """The same in a picture of `factor` times as many pixels along each side."""
+        """The outline in the same picture with `factor` times as many pixels along each side."""
         return BallOutline(self.x * factor, self.y * factor, self.radius * factor)
 
+    def overlaps(self, other: BallOutline) -> bool:
+        """Whether the circles of two outlines overlap or touch."""
+        return bool(np.hypot(self.x - other.x, self.y - other.y) <= self.radius + other.radius)
+
     def pixels_within(self, share: float, size: tuple[int, int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rows and columns (count,) of a picture's pixels whose centres are within so many radii of the centre."""
+        """Rows and columns (count,) of the pixels whose centers are less than `share` radii from the center.
+
+        Args:
+            share: reach in radii.
+            size: width and height of the picture.
+        """
         reach = self.radius * share
         rows, columns = (
             np.arange(max(0, int(middle - reach)), min(side, int(middle + reach) + 2), dtype=np.intp)
@@ -49,13 +62,8 @@ class BallOutline:
         return rows[place[0]], columns[place[1]]
 
 
-Vectors = NDArray[np.float64]
-
-_ROUNDS = 30
-
-
 class BallView(Protocol):
-    """A camera's view of a ball."""
+    """A camera's view of a mirror ball."""
 
     @property
     def outline(self) -> BallOutline:
@@ -63,21 +71,21 @@ class BallView(Protocol):
         ...
 
     def normals(self, x: NDArray, y: NDArray) -> Vectors:
-        """Outward unit normals (..., 3) at picture positions (...) in pixels; NaN beside the ball."""
+        """Outward unit normals (..., 3) of the surface at picture positions (...) in pixels; NaN beside the ball."""
         ...
 
-    def mirrored(self, normals: Vectors) -> Vectors:
-        """Unit vectors (..., 3) into which the camera's rays are mirrored where the surface has these normals."""
+    def reflect(self, normals: Vectors) -> Vectors:
+        """Unit vectors (..., 3): the camera's rays after reflection where the surface has these normals."""
         ...
 
-    def picture(self, normals: Vectors) -> tuple[NDArray, NDArray]:
-        """Pixels x and y (...) at which the surface with these normals (..., 3) is seen."""
+    def project(self, normals: Vectors) -> tuple[NDArray, NDArray]:
+        """Pixel positions x and y (...) of the places where the surface has these normals (..., 3)."""
         ...
 
 
 @dataclass(frozen=True)
 class DistantView:
-    """From far away: all rays are parallel to the axis (thesis 4.3.4; Mudge et al. 2006)."""
+    """Orthographic view from far away: all rays are parallel to the axis (thesis 4.3.4; Mudge et al. 2006)."""
 
     outline: BallOutline
 
@@ -89,12 +97,12 @@ class DistantView:
         inside = np.where(squared > 0, 1.0, np.nan)
         return np.stack([across * inside, up * inside, np.sqrt(squared * inside)], axis=-1)
 
-    def mirrored(self, normals: Vectors) -> Vectors:
-        """See `BallView.mirrored`: the normal's angle from the axis, doubled."""
+    def reflect(self, normals: Vectors) -> Vectors:
+        """See `BallView.reflect`: the normal's angle from the axis, doubled."""
         return np.asarray(2 * normals[..., 2:] * normals - [0.0, 0.0, 1.0])
 
-    def picture(self, normals: Vectors) -> tuple[NDArray, NDArray]:
-        """See `BallView.picture`."""
+    def project(self, normals: Vectors) -> tuple[NDArray, NDArray]:
+        """See `BallView.project`."""
         return (
             self.outline.x + self.outline.radius * normals[..., 0],
             self.outline.y - self.outline.radius * normals[..., 1],
@@ -102,18 +110,25 @@ class DistantView:
 
 
 class PinholeView:
-    """From a pinhole at the origin, its axis through the picture's middle.
+    """Perspective view from a pinhole at the origin, its axis through the picture's middle.
 
     Attributes:
-        outline: as given.
+        outline: the ball's outline.
         size: width and height of the picture.
         focal_px: focal length in pixels.
-        off_axis, half_angle: angles (radians) between the axis and the ball's centre, and across half the ball.
-        center: (3,) the ball's centre in radii of the ball.
+        off_axis: angle in radians between the axis and the ball's center.
+        half_angle: angle in radians that the ball's radius subtends.
+        center: (3,) center of the ball, in radii of the ball.
     """
 
     def __init__(self, outline: BallOutline, size: tuple[int, int], focal_px: float) -> None:
-        """Place a ball of radius 1 so that its outline is this."""
+        """Place a ball of radius 1 so that it has this outline.
+
+        Args:
+            outline: in pixels.
+            size: width and height of the picture.
+            focal_px: focal length in pixels.
+        """
         self.outline, self.size, self.focal_px = outline, size, focal_px
         across, up = outline.x - size[0] / 2, size[1] / 2 - outline.y
         away = float(np.hypot(across, up))
@@ -123,9 +138,13 @@ class PinholeView:
         toward = [sin * side[0], sin * side[1], -np.cos(self.off_axis)]
         self.center: Vectors = np.array(toward) / np.sin(self.half_angle)
 
+    def with_outline(self, outline: BallOutline) -> PinholeView:
+        """The same camera's view of a ball with another outline."""
+        return self if outline == self.outline else PinholeView(outline, self.size, self.focal_px)
+
     @property
     def elongation(self) -> float:
-        """Long over short axis of the outline's ellipse, whose long axis points to the picture's middle."""
+        """Ratio of the outline's long axis, which points to the picture's middle, to its short one."""
         return _elongation(self.off_axis, self.half_angle)
 
     def rays(self, x: NDArray, y: NDArray) -> Vectors:
@@ -136,35 +155,70 @@ class PinholeView:
         return np.asarray(ray / np.linalg.norm(ray, axis=-1, keepdims=True))
 
     def normals(self, x: NDArray, y: NDArray) -> Vectors:
-        """See `BallView.normals`: where the ray meets the ball first."""
+        """See `BallView.normals`: of the first place where the ray meets the ball."""
         rays = self.rays(x, y)
         along = rays @ self.center
         squared = along**2 - (self.center @ self.center - 1)
         distance = along - np.sqrt(np.where(squared > 0, squared, np.nan))
         return np.asarray(distance[..., None] * rays - self.center)
 
-    def mirrored(self, normals: Vectors) -> Vectors:
-        """See `BallView.mirrored`."""
+    def reflect(self, normals: Vectors) -> Vectors:
+        """See `BallView.reflect`."""
         points = self.center + normals
         rays = points / np.linalg.norm(points, axis=-1, keepdims=True)
         return np.asarray(rays - 2 * np.sum(rays * normals, axis=-1, keepdims=True) * normals)
 
-    def picture(self, normals: Vectors) -> tuple[NDArray, NDArray]:
-        """See `BallView.picture`."""
+    def project(self, normals: Vectors) -> tuple[NDArray, NDArray]:
+        """See `BallView.project`."""
         points = self.center + normals
         scale = self.focal_px / -points[..., 2]
         return self.size[0] / 2 + scale * points[..., 0], self.size[1] / 2 - scale * points[..., 1]
 
 
+class CroppedView:
+    """A view of the ball in pixels of a downscaled crop of the picture; see `BallView`."""
+
+    def __init__(self, view: PinholeView, corner: tuple[int, int], step: tuple[float, float]) -> None:
+        """Convert to pixels of the crop.
+
+        Args:
+            view: in pixels of the picture.
+            corner: x and y of the crop in the picture.
+            step: pixels of the picture per pixel of the crop, along x and y.
+        """
+        self._view, self._corner, self._step = view, corner, step
+        x, y = self._to_crop(view.outline.x, view.outline.y)
+        self.outline = BallOutline(float(x), float(y), view.outline.radius / step[0])
+
+    def to_picture(self, x: NDArray | float, y: NDArray | float) -> tuple[NDArray, NDArray]:
+        """Position in the picture of a position in the crop."""
+        return np.asarray(x) * self._step[0] + self._corner[0], np.asarray(y) * self._step[1] + self._corner[1]
+
+    def _to_crop(self, x: NDArray | float, y: NDArray | float) -> tuple[NDArray, NDArray]:
+        return (np.asarray(x) - self._corner[0]) / self._step[0], (np.asarray(y) - self._corner[1]) / self._step[1]
+
+    def normals(self, x: NDArray, y: NDArray) -> Vectors:
+        """See `BallView.normals`."""
+        return self._view.normals(*self.to_picture(x, y))
+
+    def reflect(self, normals: Vectors) -> Vectors:
+        """See `BallView.reflect`."""
+        return self._view.reflect(normals)
+
+    def project(self, normals: Vectors) -> tuple[NDArray, NDArray]:
+        """See `BallView.project`."""
+        return self._to_crop(*self._view.project(normals))
+
+
 def _elongation(off_axis: float, half_angle: float) -> float:
-    """Of the ellipse in which the cone of rays that touch the ball cuts the picture's plane."""
+    """Ratio of the axes of the ellipse in which the cone of rays tangent to the ball cuts the image plane."""
     return float(np.cos(half_angle) / np.sqrt(np.cos(half_angle) ** 2 - np.sin(off_axis) ** 2))
 
 
 def _cone(away: float, radius: float, focal_px: float) -> tuple[float, float]:
-    """Angles (radians) off the axis and across half the ball, of an outline `away` from the picture's middle."""
+    """Angles in radians, off the axis and half across the ball, of an outline `away` from the picture's middle."""
     stretch = 1.0
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         along = radius * np.sqrt(stretch)
         outer, inner = np.arctan((away + along) / focal_px), np.arctan((away - along) / focal_px)
         off_axis, half_angle = float(outer + inner) / 2, float(outer - inner) / 2

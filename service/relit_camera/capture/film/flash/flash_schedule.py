@@ -1,8 +1,6 @@
-"""How often the light blinks.
+"""When the light was on: its frequency, the moments at which it went on and off, and the schedule made of them.
 
-When the light goes on and off, from frame to frame.
-
-The light's schedule as it was, and which share of each frame's exposure it lights.
+Films in which nothing blinks are refused here (`require_blinking`).
 """
 
 from __future__ import annotations
@@ -14,23 +12,58 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import lombscargle
 
+from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.flash.flash_signal import NOISE_FLOOR
 
 Floats = NDArray[np.float64]
 
 MIN_FREQUENCY_HZ = 0.7
-_WINDOW_S = 4.0
-"""Spectra of pieces this long are averaged, so that a light whose clock drifts has a peak too."""
-_STEP_HZ = 0.02
+"""Slowest flashes that are looked for."""
+MIN_FLASHES = 8
+"""Least flashes of a film."""
+FULLY_LIT_FRACTION = 0.98
+"""A frame is bright if every row has at least this exposure fraction, and dark if every row has at most 1 less this."""
+_SHUTTER_ROWS = np.linspace(0, 1, 33)
+"""Rows (or columns) at which exposure fractions are computed, as shares of the picture's height (or width)."""
+
+
+@dataclass(frozen=True)
+class BlinkTunables:
+    """What counts as blinking; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        window_s: length of the pieces whose spectra are averaged, so that a drifting frequency has one peak too.
+        step_hz: distance of the frequencies that are tried.
+        window_periods: length of the window in which the darkest and the brightest frame are sought.
+        min_height: change of the level, relative to the 90th percentile, that counts as an edge.
+        min_variance_share: least share of the variance that the frequency explains.
+        min_contrast: least ratio of bright to dark.
+        min_step: least share of the whole change that a flash makes from one frame to the next; a slow wave makes less.
+        slow_frames: frames per period from which `min_step` applies.
+        changing: ratio of brightness over a film in which a light was on all the time.
+    """
+
+    window_s: float = 4.0
+    step_hz: float = 0.02
+    window_periods: float = 1.1
+    min_height: float = 0.04
+    min_variance_share: float = 0.2
+    min_contrast: float = 1.15
+    min_step: float = 0.25
+    slow_frames: float = 8
+    changing: float = 1.5
+
+
+_TUNABLES = BlinkTunables()
 
 
 @dataclass(frozen=True)
 class FlashFrequency:
-    """A periodic change.
+    """The frequency of a periodic change.
 
     Attributes:
-        frequency_hz: how often.
-        share: of the variance (of the logarithm) that its fundamental explains, 0..1.
+        frequency_hz: of its fundamental.
+        share: of the variance of the logarithm that the fundamental explains, 0..1.
     """
 
     frequency_hz: float
@@ -38,19 +71,21 @@ class FlashFrequency:
 
 
 def find_flash_frequency(level: Floats, times_s: Floats) -> FlashFrequency:
-    """The strongest periodic change from 0.7 Hz up to half the frame rate (Lomb 1976, Scargle 1982: any frame times).
+    """The strongest periodic change from 0.7 Hz to half the frame rate, by Lomb-Scargle periodograms.
+
+    These need no even frame times (Lomb 1976, Scargle 1982).
 
     Args:
-        level: (frames,) brightness, linear.
+        level: (frames,) linear brightness.
         times_s: (frames,).
     """
     logarithm = np.log(level + NOISE_FLOOR)
     fastest = 0.5 / float(np.median(np.diff(times_s)))
-    frequencies = np.arange(MIN_FREQUENCY_HZ, max(fastest, MIN_FREQUENCY_HZ + 2 * _STEP_HZ), _STEP_HZ)
-    starts = np.arange(times_s[0], max(times_s[-1] - _WINDOW_S, times_s[0]) + 1e-9, _WINDOW_S / 2)
+    frequencies = np.arange(MIN_FREQUENCY_HZ, max(fastest, MIN_FREQUENCY_HZ + 2 * _TUNABLES.step_hz), _TUNABLES.step_hz)
+    starts = np.arange(times_s[0], max(times_s[-1] - _TUNABLES.window_s, times_s[0]) + 1e-9, _TUNABLES.window_s / 2)
     spectra = []
     for start in starts:
-        inside = (times_s >= start) & (times_s <= start + _WINDOW_S)
+        inside = (times_s >= start) & (times_s <= start + _TUNABLES.window_s)
         if inside.sum() < 6:
             continue
         piece = _without_trend(times_s[inside], logarithm[inside])
@@ -64,21 +99,17 @@ def find_flash_frequency(level: Floats, times_s: Floats) -> FlashFrequency:
 
 
 def _without_trend(times_s: Floats, values: Floats) -> Floats:
-    """The values less a parabola: the moving light and the automatics are slow."""
+    """The values less a fitted parabola, as which the slow changes by a moving light and camera gains count."""
     return np.asarray(values - np.polynomial.Polynomial.fit(times_s, values, 2)(times_s))
-
-
-_WEAKEST = 0.04
-"""Changes of level below this share of the usual one are no flash."""
 
 
 @dataclass(frozen=True, eq=False)
 class FlashEdges:
-    """The moments at which the light goes on and off, in turns.
+    """The moments at which the light goes on and off, by turns.
 
     Attributes:
         times_s: (edges,) growing, on the clock of the frames' first exposed row.
-        rising: (edges,) whether it goes on.
+        rising: (edges,) whether the light goes on.
         frame: (edges,) index of the last frame before the middle of the change.
     """
 
@@ -87,46 +118,79 @@ class FlashEdges:
     frame: NDArray[np.intp]
 
     def only(self, some: slice) -> FlashEdges:
-        """Some of them."""
+        """Some of the edges."""
         return FlashEdges(self.times_s[some], self.rising[some], self.frame[some])
 
 
 def find_flash_edges(level: Floats, times_s: Floats, frequency_hz: float) -> FlashEdges:
-    """Where the level crosses the middle between its local extremes; between frames by interpolation."""
-    interval = float(np.median(np.diff(times_s)))
-    window = max(3, round(1.1 / frequency_hz / interval))
-    low, high = minimum_filter1d(level, window), maximum_filter1d(level, window)
+    """Moments at which the level crosses the middle between its local extremes, interpolated between frames.
+
+    Args:
+        level: (frames,) linear brightness.
+        times_s: (frames,).
+        frequency_hz: of the flashes, about.
+    """
+    low, high = _local_extremes(level, float(np.median(np.diff(times_s))), frequency_hz)
     middle, height = (low + high) / 2, high - low
     above = level > middle
     frame = np.flatnonzero(above[1:] != above[:-1])
-    frame = frame[height[frame] > _WEAKEST * np.percentile(height, 90)]
+    frame = frame[height[frame] > _TUNABLES.min_height * np.percentile(height, 90)]
     rising = above[frame + 1]
-    # In turns: a fall that was too weak to count leaves two rises in a row.
+    # By turns: a fall too weak to count leaves two rises in a row.
     kept = np.ones(len(frame), bool)
     kept[:-1] &= ~(rising[:-1] & rising[1:])
     kept[1:] &= ~(~rising[1:] & ~rising[:-1])
     frame, rising = frame[kept], rising[kept]
-    # Where the level stands, it is the middle that moves past it.
+    # Where the level does not change, it is the middle that crosses it.
     step = level[frame + 1] - level[frame]
     share = np.divide(middle[frame] - level[frame], step, out=np.full(len(frame), 0.5), where=step != 0)
     return FlashEdges(times_s[frame] + np.clip(share, 0, 1) * (times_s[frame + 1] - times_s[frame]), rising, frame)
 
 
-FULLY_LIT_FRACTION = 0.98
-"""Lit share of every row from which a frame counts as bright; what is missing to 1, and a frame counts as dark."""
+def _local_extremes(level: Floats, interval_s: float, frequency_hz: float) -> tuple[Floats, Floats]:
+    """Minimum and maximum (frames,) of the level (frames,) in a window of about a period around each frame."""
+    window = max(3, round(_TUNABLES.window_periods / frequency_hz / interval_s))
+    return np.asarray(minimum_filter1d(level, window)), np.asarray(maximum_filter1d(level, window))
 
-_PLACES = np.linspace(0, 1, 33)
+
+def require_blinking(level: Floats, interval_s: float, beat: FlashFrequency, edges: FlashEdges) -> None:
+    """Check that the level goes up and down as that of a blinking light does, often enough.
+
+    Args:
+        level: (frames,) linear brightness.
+        interval_s: from frame to frame.
+        beat: the strongest periodic change.
+        edges: of the level.
+
+    Raises:
+        CaptureError: it does not: the light is on all the time, there is none, or the film is too short.
+    """
+    low, high = _local_extremes(level, interval_s, beat.frequency_hz)
+    contrast = float(np.median(high / np.maximum(low, 1e-6)))
+    step = np.abs(level[edges.frame + 1] - level[edges.frame]) / np.maximum((high - low)[edges.frame], 1e-9)
+    slow = 1 / beat.frequency_hz / interval_s >= _TUNABLES.slow_frames
+    blinks = beat.share >= _TUNABLES.min_variance_share and contrast >= _TUNABLES.min_contrast and len(step) > 0
+    if not blinks or (slow and np.median(step) < _TUNABLES.min_step):
+        ratio = float(np.percentile(level, 98) / max(np.percentile(level, 2), 1e-6))
+        if ratio > _TUNABLES.changing:
+            what = f"no flash found: the brightness changes by a factor of {ratio:.1f}, but nothing blinks"
+            raise CaptureError(what, "the light must not be on all the time: let it blink, about five times a second")
+        what = f"no flash found: the brightness stays within {ratio - 1:.0%}"
+        raise CaptureError(what, "let a light blink about five times a second, a metre away, in a dim room")
+    flashes = int(edges.rising.sum())
+    if flashes < MIN_FLASHES:
+        raise CaptureError(f"only {flashes} flashes found", "record half a minute or more of the blinking light")
 
 
 @dataclass(frozen=True)
 class RollingShutter:
-    """How the camera takes a picture.
+    """A camera's rolling shutter.
 
     Attributes:
-        exposure_s: of each row.
-        readout_s: from the first row's exposure to the last one's; negative if the lowest comes first.
-        by_columns: whether columns follow one another instead, as in a phone held upright.
-        jitter_s: how much the flashes' clock strays from one to the next; so much less are edges sure.
+        exposure_s: exposure time of each row.
+        readout_s: from the exposure of the first row to that of the last; negative if the lowest is read first.
+        by_columns: whether columns are read one after another instead, as with a phone held upright.
+        jitter_s: deviation of the flashes from a regular period, from one to the next; edges are so much less certain.
     """
 
     exposure_s: float
@@ -137,10 +201,10 @@ class RollingShutter:
 
 @dataclass(frozen=True, eq=False)
 class FlashSchedule:
-    """When the light is on.
+    """When the light was on.
 
     Attributes:
-        on_s, off_s: (flashes,) growing; at the video's beginning and end as usual.
+        on_s, off_s: (flashes,) growing times; at the film's beginning and end extrapolated.
     """
 
     on_s: Floats
@@ -148,27 +212,27 @@ class FlashSchedule:
 
     @property
     def frequency_hz(self) -> float:
-        """Of the flashes, their median; 0 of a single one."""
+        """Median frequency of the flashes; 0 of a single one."""
         return float(1 / np.median(np.diff(self.on_s))) if len(self.on_s) > 1 else 0.0
 
     @property
     def duty(self) -> float:
-        """Share of the time that the light is on."""
+        """Share of the time for which the light is on."""
         return float(np.median(self.off_s - self.on_s)) * self.frequency_hz
 
-    def lit_shares(self, times_s: Floats, shutter: RollingShutter) -> Floats:
-        """Share (frames, 33) of the exposure for which the light is on, from the first row to the last."""
-        start = times_s[:, None] + shutter.readout_s * _PLACES
+    def exposure_fractions(self, times_s: Floats, shutter: RollingShutter) -> Floats:
+        """Share (frames, 33) of the exposure for which the light is on, at 33 rows from the first to the last."""
+        start = times_s[:, None] + shutter.readout_s * _SHUTTER_ROWS
         return (self._on_before(start + shutter.exposure_s) - self._on_before(start)) / shutter.exposure_s
 
     def flash_of(self, times_s: Floats, shutter: RollingShutter) -> NDArray[np.intp]:
-        """The flash (frames,) whose middle is nearest to each frame's."""
+        """Number (frames,) of the flash whose middle is nearest to that of each frame."""
         middle = (self.on_s + self.off_s) / 2
         frame = times_s + (shutter.readout_s + shutter.exposure_s) / 2
         return np.asarray(np.abs(frame[:, None] - middle).argmin(axis=1), np.intp)
 
     def _on_before(self, time_s: Floats) -> Floats:
-        """Seconds (...) for which it was on until then."""
+        """Seconds (...) for which the light was on before times (...)."""
         times = np.stack([self.on_s, self.off_s], axis=1).ravel()
         lit = np.concatenate([[0.0], np.cumsum(self.off_s - self.on_s)])
         known = np.stack([lit[:-1], lit[1:]], axis=1).ravel()
@@ -176,16 +240,16 @@ class FlashSchedule:
 
 
 def schedule_from_edges(edges: FlashEdges) -> FlashSchedule:
-    """The schedule that these edges tell, and one flash more at either end: its edge may be just outside of the video.
+    """The schedule of these edges, with one more flash at either end, whose edge may be just outside the film.
 
-    There must be two flashes with both their edges, at least.
+    At least two flashes must have both their edges.
     """
     on, off = edges.times_s[edges.rising], edges.times_s[~edges.rising]
     period, first_on, last_on = float(np.median(np.diff(on))), edges.rising[0], edges.rising[-1]
-    usual = float(np.median((off if first_on else off[1:])[: len(on) - last_on] - on[: len(on) - last_on]))
+    duration = float(np.median((off if first_on else off[1:])[: len(on) - last_on] - on[: len(on) - last_on]))
     if not first_on:
-        on = np.append(off[0] - usual, on)
+        on = np.append(off[0] - duration, on)
     if last_on:
-        off = np.append(off, on[-1] + usual)
+        off = np.append(off, on[-1] + duration)
     on = np.concatenate([[on[0] - period], on, [on[-1] + period]])
-    return FlashSchedule(on, np.concatenate([[on[0] + usual], off, [on[-1] + usual]]))
+    return FlashSchedule(on, np.concatenate([[on[0] + duration], off, [on[-1] + duration]]))

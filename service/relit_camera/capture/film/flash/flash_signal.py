@@ -1,6 +1,6 @@
-"""The brightness of every frame of a video, cell by cell: all that is kept of it for finding the flashes.
+"""The brightness of a film on a coarse grid, and from it the flash signal: one value a frame, camera gains removed.
 
-One curve from a grid of brightness: what the flash reaches, made good for what the camera's automatics did.
+The grid is all that is kept of a film for finding its flashes.
 """
 
 from __future__ import annotations
@@ -19,24 +19,53 @@ from relit_camera.base.images.image_types import DisplayImage, LinearImage
 from relit_camera.base.video.video_readers import LinearVideoReader
 from relit_camera.capture.film.face_circle import FaceCircle
 
+Floats = NDArray[np.float64]
+
 GRID_CELLS = 32
 """Cells along the longer side."""
-_PIXELS_A_CELL = 8
-"""Frames are decoded so small that a cell has so many pixels a side: 4K costs little more than its decoding."""
-
+_PIXELS_PER_CELL = 8
+"""Pixels a side of a cell in the small pictures to which frames are decoded; even 4K then costs little more than
+decoding."""
 MIN_FRAMES = 8
+"""Least frames of a film."""
+NOISE_FLOOR = 1e-4
+"""Linear brightness below which there is only the camera's noise."""
+
+
+@dataclass(frozen=True)
+class SignalTunables:
+    """Which cells the flash reaches; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        min_response: share of the strongest response (logarithm) from which a cell counts as reached by the flash.
+        least_following: percentile of the cells' regression on the flash that stands for the camera's gains alone;
+            automatic exposure follows the flash too, mostly against it.
+        following_margin: a cell shows the gains if its regression exceeds that by no more.
+        reached_everywhere: if the percentile exceeds this, the flash reaches everything.
+        min_visible: least mean brightness of a cell that shows the gains.
+        min_unreached: least share of all cells that must show the gains.
+    """
+
+    min_response: float = 0.5
+    least_following: float = 5
+    following_margin: float = 0.1
+    reached_everywhere: float = 0.35
+    min_visible: float = 0.003
+    min_unreached: float = 0.04
+
+
+_TUNABLES = SignalTunables()
 
 
 @dataclass(frozen=True, eq=False)
 class BrightnessGrid:
-    """How bright each cell of a grid over the upright picture is, frame by frame.
+    """Brightness of every frame of a film in a grid over the upright picture.
 
     Attributes:
-        cells: (frames, rows, columns) float32 mean luminance, linear; the video's white is 1.
+        cells: (frames, rows, columns) float32 mean luminance, linear; the film's white is 1.
         times_s: (frames,) float64 presentation times, growing.
-        size: width and height of the video's upright pictures in pixels.
-        brightest_picture: small uint8 sRGB picture in which each pixel is as bright as it ever was: where the face is,
-            it shows.
+        size: width and height of the film's upright pictures in pixels.
+        brightest_picture: small uint8 sRGB picture, for each pixel the maximum over the frames; it shows the face.
     """
 
     cells: NDArray[np.float32]
@@ -46,27 +75,27 @@ class BrightnessGrid:
 
     @property
     def interval_s(self) -> float:
-        """The usual time from frame to frame."""
+        """Median time from frame to frame."""
         return float(np.median(np.diff(self.times_s)))
 
 
 def measure_brightness(
-    path: Path, gamma: Gamma = "srgb", *, threads: int = 1, progress: Callable[[int], None] = lambda watched: None
+    path: Path, gamma: Gamma = "srgb", *, threads: int = 1, progress: Callable[[int], None] = lambda frames: None
 ) -> BrightnessGrid:
-    """Watch a whole video once, small. Memory: 4 KB a frame.
+    """Read a whole film once at low resolution. Memory: 4 KB a frame.
 
     Args:
-        path: the video.
-        gamma: its curve.
+        path: the film.
+        gamma: its transfer curve.
         threads: of the decoder.
-        progress: called with the number of frames watched.
+        progress: called with the number of frames read.
 
     Raises:
         VideoError: as `base.video.video_readers.LinearVideoReader`, or it has fewer than eight frames.
     """
     cells, times_s = [], []
     brightest: LinearImage | None = None
-    with LinearVideoReader(path, gamma, longer_side=GRID_CELLS * _PIXELS_A_CELL, threads=threads) as video:
+    with LinearVideoReader(path, gamma, longer_side=GRID_CELLS * _PIXELS_PER_CELL, threads=threads) as video:
         for frame in video:
             brightest = frame.image if brightest is None else np.maximum(brightest, frame.image)
             cells.append(cell_means(luminance(frame.image)))
@@ -86,77 +115,63 @@ def cell_means(picture: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
-Floats = NDArray[np.float64]
-
-NOISE_FLOOR = 1e-4
-"""Brightness below this is the camera's noise."""
-
-_RESPONDS = 0.5
-"""Share of the strongest response, in logarithms, from which a cell counts as reached by the flash."""
-_UNREACHED, _LEAST_FOLLOWING = 0.1, 5
-"""A cell goes along with the automatics alone if it follows the flash by at most so much more than the least following
-ones (percentile) do. Automatics follow the flash too, mostly against it."""
-_NOT_REACHED_AT_ALL = 0.35
-"""If even those follow the flash by this share, it reaches everything."""
-_VISIBLE = 0.003
-_MIN_UNREACHED = 0.04
-"""Share of all cells that must be unreached, so that they can stand for the automatics."""
-
-
 @dataclass(frozen=True, eq=False)
 class FlashSignal:
-    """What the flash does to the picture.
+    """Brightness of what the flash reaches, frame by frame.
 
     Attributes:
-        level: (frames,) brightness of what the flash reaches, linear, gains divided out.
-        reached: (rows, columns) which cells those are.
-        gains: (frames,) brightness of what it does not reach, relative to its mean; 1 where there is no such part.
+        level: (frames,) linear brightness of the reached cells, divided by the gains.
+        reached: (rows, columns) mask of those cells.
+        gains: (frames,) brightness of the cells that the flash does not reach, relative to its mean; all 1 where there
+            are too few.
     """
 
     level: Floats
     reached: NDArray[np.bool_]
     gains: Floats
 
-    @property
-    def has_gains(self) -> bool:
-        """Whether there was anything that the flash does not reach."""
-        return bool(np.ptp(self.gains) > 0)
-
 
 def reached_cells(brightness: BrightnessGrid, circle: FaceCircle | None = None) -> NDArray[np.bool_]:
-    """Which cells (rows, columns) change most over the video, in ratio; of those in `circle` where it is given."""
+    """Mask (rows, columns) of the cells whose brightness varies most in ratio, inside a circle where it is given."""
     cells = brightness.cells.astype(np.float64) + NOISE_FLOOR
     response = np.log(np.percentile(cells, 95, axis=0) / np.percentile(cells, 5, axis=0))
     inside = np.ones(response.shape, bool) if circle is None else _inside(circle, brightness)
     if not inside.any():
         inside[:] = True
-    return np.asarray(inside & (response >= _RESPONDS * np.percentile(response[inside], 95)))
+    return np.asarray(inside & (response >= _TUNABLES.min_response * np.percentile(response[inside], 95)))
 
 
 def extract_flash_signal(brightness: BrightnessGrid, frequency_hz: float, reached: NDArray[np.bool_]) -> FlashSignal:
-    """The curve of a light that blinks at about this frequency."""
+    """The signal of a light that blinks at about this frequency.
+
+    Args:
+        brightness: of the film.
+        frequency_hz: of the flashes, about.
+        reached: (rows, columns) mask of the cells that the flash reaches.
+    """
     logarithm = np.log(brightness.cells.astype(np.float64) + NOISE_FLOOR)
     lag = max(1, round(0.5 / frequency_hz / brightness.interval_s))
     change = logarithm[lag:] - logarithm[:-lag]
     common = np.log(mean_level(brightness, reached) + NOISE_FLOOR)
     common = common[lag:] - common[:-lag]
-    follows = np.tensordot(common, change, axes=1) / max(float(common @ common), 1e-12)
-    visible = brightness.cells.mean(axis=0) > _VISIBLE
-    least = float(np.percentile(follows[visible], _LEAST_FOLLOWING)) if visible.any() else 1.0
-    unreached = visible & (follows < least + _UNREACHED)
+    following = np.tensordot(common, change, axes=1) / max(float(common @ common), 1e-12)
+    visible = brightness.cells.mean(axis=0) > _TUNABLES.min_visible
+    least = float(np.percentile(following[visible], _TUNABLES.least_following)) if visible.any() else 1.0
+    unreached = visible & (following < least + _TUNABLES.following_margin)
     gains = np.ones(len(logarithm))
-    if least < _NOT_REACHED_AT_ALL and unreached.mean() >= _MIN_UNREACHED:
-        still = logarithm[:, unreached]
-        gains = np.exp(np.median(still - still.mean(axis=0), axis=1))
+    if least < _TUNABLES.reached_everywhere and unreached.mean() >= _TUNABLES.min_unreached:
+        room = logarithm[:, unreached]
+        gains = np.exp(np.median(room - room.mean(axis=0), axis=1))
     return FlashSignal(mean_level(brightness, reached) / gains, reached, gains)
 
 
 def mean_level(brightness: BrightnessGrid, reached: NDArray[np.bool_]) -> Floats:
-    """Mean brightness (frames,) of these cells (rows, columns)."""
+    """Mean brightness (frames,) of the cells of a mask (rows, columns)."""
     return np.asarray(brightness.cells[:, reached].mean(axis=1), np.float64)
 
 
 def _inside(circle: FaceCircle, brightness: BrightnessGrid) -> NDArray[np.bool_]:
+    """Mask (rows, columns) of the cells whose centers are in a circle given in the film's pixels."""
     rows, columns = brightness.cells.shape[1:]
     x = (np.arange(columns) + 0.5) * brightness.size[0] / columns
     y = (np.arange(rows) + 0.5) * brightness.size[1] / rows

@@ -1,8 +1,9 @@
-"""When the light goes on and off to a fraction of a frame, told by the frames that it lights in part.
+"""The camera's rolling shutter, and the flash's edges to a fraction of a frame, from partly lit frames.
 
 A row (or column) at share y of the picture is exposed from t + y · readout for `exposure_s`. A light that goes on at
-time a is on for the share clip((t + y · readout + exposure − a) / exposure, 0, 1) of it. All edges of a video together
-tell readout and exposure; that flashes come at nearly regular times tells the rest where few frames are lit in part.
+time a is on for the share clip((t + y · readout + exposure − a) / exposure, 0, 1) of it. Readout and exposure are
+fitted to all edges of a film together; where few frames are partly lit, the nearly regular times of the flashes
+determine the rest.
 """
 
 from __future__ import annotations
@@ -27,81 +28,93 @@ from relit_camera.capture.film.flash.flash_signal import BrightnessGrid, FlashSi
 
 Floats = NDArray[np.float64]
 
-_TRIAL_EDGES = 48
-"""At the video's beginning, on which shutters are tried."""
-_ROUNDS = 2
-"""Of measuring shares between frames found to be whole, and fitting again."""
-_STEP_S = 0.002
-_SHARE_NOISE = 0.04
-"""Of a block's lit share: light and head move from frame to frame."""
-_CLOCK_JITTER_S = (0.0001, 0.001, 0.005)
-"""How much the clock of a flash may stray from one to the next: of a steady one, an app's, and one by hand. What is
-more counts in proportion, not squared: a flash that jitters is followed where frames tell of it."""
-_USUAL_EXPOSURE = 0.5
-"""As a share of the frame interval. A flash in step with the frames tells only how exposure and readout compare: then
-this decides, and else it counts for no more than one block of one frame."""
-_ITERATIONS = 60
-_ABOUT_AS_WELL = 1.25
+
+@dataclass(frozen=True)
+class ShutterTunables:
+    """Fit of the shutter; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        trial_edges: edges at the film's beginning on which shutters are tried.
+        rounds: times that fractions are measured between frames found to be fully lit and unlit, and fitted again.
+        step_s: distance of the edge offsets that are tried.
+        fraction_error: standard error of a block's exposure fraction, by motion of light and head between frames.
+        jitters_s: standard deviations of the flash's period that are tried: of a steady one, of an app's, and by hand.
+            Larger deviations count linearly, not squared, so a flash that jitters is followed where frames show it.
+        usual_exposure: exposure as a share of the frame interval. A flash in step with the frames shows only the
+            relation of exposure and readout: then this prior decides; else it counts no more than one block.
+        iterations: most iterations of the fit.
+        tolerance: ratio of the cost to the best at which the steadier flash is preferred.
+    """
+
+    trial_edges: int = 48
+    rounds: int = 2
+    step_s: float = 0.002
+    fraction_error: float = 0.04
+    jitters_s: tuple[float, ...] = (0.0001, 0.001, 0.005)
+    usual_exposure: float = 0.5
+    iterations: int = 60
+    tolerance: float = 1.25
+
+
+_TUNABLES = ShutterTunables()
 
 
 def fit_rolling_shutter(
     brightness: BrightnessGrid, signal: FlashSignal, edges: FlashEdges, frequency_hz: float
 ) -> tuple[FlashEdges, RollingShutter]:
-    """Edges to a fraction of a frame, and the shutter that explains them best.
+    """Fit edges and shutter to the exposure fractions of a film.
 
     Args:
-        brightness: brightness of the video.
-        signal: what the flash reaches in it, and the gains.
+        brightness: of the film.
+        signal: which cells the flash reaches, and the gains.
         edges: first guesses.
-        frequency_hz: about.
+        frequency_hz: of the flashes, about.
 
     Returns:
-        The edges on the clock of the picture's first row (or column), and the shutter.
+        The edges on the clock of the picture's first row (or column), to a fraction of a frame, and the shutter.
     """
     film = _Film(brightness.times_s, BrightnessBlocks.of(brightness, signal), edges, frequency_hz)
-    beginning = film.beginning(_TRIAL_EDGES)
+    beginning = film.beginning(_TUNABLES.trial_edges)
     trials = []
     for by_columns in (False, True):
-        starts = _starts(beginning.first_shares(by_columns), brightness.interval_s)
-        for jitter_s in _CLOCK_JITTER_S:
-            fit = _Fit(beginning, beginning.first_shares(by_columns), jitter_s)
+        starts = _starts(beginning.first_fractions(by_columns), brightness.interval_s)
+        for jitter_s in _TUNABLES.jitters_s:
+            fit = _Fit(beginning, beginning.first_fractions(by_columns), jitter_s)
             best = min((fit.solve(start) for start in starts), key=fit.cost)
-            fit, best = _between_whole_frames(fit, best)
+            fit, best = _remeasure(fit, best)
             trials.append((jitter_s, fit.cost(best), by_columns, best[:2]))
-    # The steadiest flash that explains the frames about as well as one that comes at any time.
-    enough = _ABOUT_AS_WELL * min(cost for _, cost, *_ in trials)
+    # The steadiest flash that explains the frames about as well as the best fit.
+    enough = _TUNABLES.tolerance * min(cost for _, cost, *_ in trials)
     jitter_s, _, by_columns, shutter = min((each for each in trials if each[1] <= enough), key=lambda each: each[:2])
-    fit = _Fit(film, film.first_shares(by_columns), jitter_s)
-    offsets = _best_offsets(fit.shares, shutter[0], shutter[1], _offset_grid(brightness.interval_s))
-    fit, best = _between_whole_frames(fit, fit.solve(np.concatenate([shutter, offsets])))
+    fit = _Fit(film, film.first_fractions(by_columns), jitter_s)
+    offsets = _best_offsets(fit.fractions, shutter[0], shutter[1], _offset_grid(brightness.interval_s))
+    fit, best = _remeasure(fit, fit.solve(np.concatenate([shutter, offsets])))
     return fit.refined(best), fit.shutter(best)
 
 
-def _between_whole_frames(fit: _Fit, parameters: Floats) -> tuple[_Fit, Floats]:
-    """The same fit, shares measured between frames that it finds to be lit wholly and not at all."""
+def _remeasure(fit: _Fit, parameters: Floats) -> tuple[_Fit, Floats]:
+    """A fit with fractions measured between the frames that this one finds fully lit and unlit, and its parameters."""
     film = fit.film
-    for _ in range(_ROUNDS):
-        lit = schedule_from_edges(fit.refined(parameters)).lit_shares(film.times_s, fit.shutter(parameters))
-        whole, dark = (
-            np.flatnonzero(lit.min(axis=1) >= FULLY_LIT_FRACTION),
-            np.flatnonzero(lit.max(axis=1) <= 1 - FULLY_LIT_FRACTION),
-        )
-        if len(whole) < 3 or len(dark) < 3:
+    for _ in range(_TUNABLES.rounds):
+        lit = schedule_from_edges(fit.refined(parameters)).exposure_fractions(film.times_s, fit.shutter(parameters))
+        fully_lit = np.flatnonzero(lit.min(axis=1) >= FULLY_LIT_FRACTION)
+        dark = np.flatnonzero(lit.max(axis=1) <= 1 - FULLY_LIT_FRACTION)
+        if len(fully_lit) < 3 or len(dark) < 3:
             break
-        fit = replace(fit, shares=film.shares(fit.shares.by_columns, dark, whole))
+        fit = replace(fit, fractions=film.fractions(fit.fractions.by_columns, dark, fully_lit))
         parameters = fit.solve(parameters)
     return fit, parameters
 
 
 @dataclass(frozen=True, eq=False)
 class _Film:
-    """What the shutter is fitted to.
+    """The part of a film to which a shutter is fitted.
 
     Attributes:
         times_s: (frames,).
         blocks: brightness of the frames.
         edges: first guesses.
-        frequency_hz: of the flash, about.
+        frequency_hz: of the flashes, about.
     """
 
     times_s: Floats
@@ -111,72 +124,75 @@ class _Film:
 
     @property
     def interval_s(self) -> float:
-        """The usual time from frame to frame."""
+        """Median time from frame to frame."""
         return float(np.median(np.diff(self.times_s)))
 
     @cached_property
     def clock(self) -> csr_array:
-        """Rows (sums, edges) whose sums of edge times vanish for a steady light."""
+        """Matrix (sums, edges) whose product with the edge times vanishes for a steady light."""
         return _clock_rows(self.edges.times_s, self.edges.rising, self.frequency_hz)
 
     def beginning(self, edges: int) -> _Film:
-        """The part with the first so many edges."""
+        """The part with the first `edges` edges."""
         if len(self.edges.times_s) <= edges:
             return self
         end = int(self.edges.frame[edges]) + 1
         blocks = replace(self.blocks, level=self.blocks.level[:end])
         return _Film(self.times_s[:end], blocks, self.edges.only(slice(0, edges)), self.frequency_hz)
 
-    def first_shares(self, by_columns: bool) -> ExposureFractions:
-        """Lit shares between the darkest and the brightest about each frame."""
+    def first_fractions(self, by_columns: bool) -> ExposureFractions:
+        """Fractions between the darkest and the brightest level about each frame."""
         levels = self.blocks.local_extremes(1 / self.frequency_hz / self.interval_s)
         return ExposureFractions.of(self.blocks, by_columns, self.times_s, self.edges, *levels)
 
-    def shares(self, by_columns: bool, dark: NDArray[np.intp], whole: NDArray[np.intp]) -> ExposureFractions:
-        """Lit shares between dark and wholly lit frames."""
-        levels = self.blocks.between(dark), self.blocks.between(whole)
+    def fractions(self, by_columns: bool, dark: NDArray[np.intp], fully_lit: NDArray[np.intp]) -> ExposureFractions:
+        """Fractions between the levels of dark and of fully lit frames, given by their indices."""
+        levels = self.blocks.between(dark), self.blocks.between(fully_lit)
         return ExposureFractions.of(self.blocks, by_columns, self.times_s, self.edges, *levels)
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Exposure, readout and each edge's offset from its first guess, by robust least squares of shares and clock.
+    """Robust least-squares fit of exposure, readout and each edge's offset to exposure fractions and a regular period.
+
+    Parameters are an array (2 + edges,): exposure, readout, and the offsets of the edges from the first guesses, in
+    seconds.
 
     Attributes:
-        film: what it is fitted to.
-        shares: measured about the edges.
-        jitter_s: how much the film's clock may stray.
+        film: what the shutter is fitted to.
+        fractions: exposure fractions about the edges.
+        jitter_s: standard deviation of the flash's period.
     """
 
     film: _Film
-    shares: ExposureFractions
+    fractions: ExposureFractions
     jitter_s: float
 
     def refined(self, parameters: Floats) -> FlashEdges:
-        """The edges that these parameters mean."""
+        """The edges with these parameters."""
         return replace(self.film.edges, times_s=self.film.edges.times_s + parameters[2:])
 
     def shutter(self, parameters: Floats) -> RollingShutter:
-        """The shutter that they mean."""
-        return RollingShutter(float(parameters[0]), float(parameters[1]), self.shares.by_columns, self.jitter_s)
+        """The shutter with these parameters."""
+        return RollingShutter(float(parameters[0]), float(parameters[1]), self.fractions.by_columns, self.jitter_s)
 
     def solve(self, parameters: Floats) -> Floats:
-        """The best parameters (2 + edges,) near these: Levenberg and Marquardt's way, reweighted for outliers.
+        """The best parameters near these, by the Levenberg-Marquardt method reweighted for outliers.
 
-        scipy's `least_squares` would need an iterative solver for these sparse systems, at twenty times the time.
+        scipy's `least_squares` would need an iterative solver for these sparse systems and take twenty times as long.
         """
         limit_s = self.film.interval_s
         least, most = np.array([1e-3, -1.2 * limit_s]), np.array([limit_s, 1.2 * limit_s])
         damping, cost = 1e-3, np.inf
         candidate = parameters.copy()
-        for _ in range(_ITERATIONS):
+        for _ in range(_TUNABLES.iterations):
             candidate[:2] = np.clip(candidate[:2], least, most)
             residuals = self._residuals(candidate)
-            reached = _robust(residuals)
-            if reached < cost:
-                if cost - reached < 1e-5 * reached:
+            new_cost = _robust(residuals)
+            if new_cost < cost:
+                if cost - new_cost < 1e-5 * new_cost:
                     return candidate
-                parameters, cost, damping = candidate, reached, damping / 5
+                parameters, cost, damping = candidate, new_cost, damping / 5
                 jacobian = self._jacobian(parameters)
                 weights = 1 / np.sqrt(1 + residuals**2)
                 normal = csc_array(jacobian.T @ (jacobian * weights[:, None]))
@@ -189,64 +205,67 @@ class _Fit:
         return parameters
 
     def cost(self, parameters: Floats) -> float:
-        """How badly the shares are explained (robust, as they are fitted)."""
-        return _robust(self._share_errors(parameters))
+        """Robust cost of the exposure fractions alone."""
+        return _robust(self._fraction_errors(parameters))
 
     def _residuals(self, parameters: Floats) -> Floats:
-        strays = self.film.clock @ (self.film.edges.times_s + parameters[2:])
-        usual = np.log(parameters[:1] / (_USUAL_EXPOSURE * self.film.interval_s))
-        return np.concatenate([self._share_errors(parameters), strays / self.jitter_s, usual])
+        deviations = self.film.clock @ (self.film.edges.times_s + parameters[2:])
+        prior = np.log(parameters[:1] / (_TUNABLES.usual_exposure * self.film.interval_s))
+        return np.concatenate([self._fraction_errors(parameters), deviations / self.jitter_s, prior])
 
     def _jacobian(self, parameters: Floats) -> csr_array:
-        of_shares = self.shares.jacobian(parameters[0], parameters[1], parameters[2:]) * (-1 / _SHARE_NOISE)
+        of_fractions = self.fractions.jacobian(parameters[0], parameters[1], parameters[2:]) * (
+            -1 / _TUNABLES.fraction_error
+        )
         of_clock = hstack([csr_array((self.film.clock.shape[0], 2)), self.film.clock / self.jitter_s])
-        of_usual = csr_array(([1 / parameters[0]], ([0], [0])), shape=(1, len(parameters)))
-        return csr_array(vstack([of_shares, of_clock, of_usual]))
+        of_prior = csr_array(([1 / parameters[0]], ([0], [0])), shape=(1, len(parameters)))
+        return csr_array(vstack([of_fractions, of_clock, of_prior]))
 
-    def _share_errors(self, parameters: Floats) -> Floats:
-        error = self.shares.share - self.shares.expected(parameters[0], parameters[1], parameters[2:])
-        return np.asarray((self.shares.root_weight * error).ravel() / _SHARE_NOISE)
+    def _fraction_errors(self, parameters: Floats) -> Floats:
+        error = self.fractions.fraction - self.fractions.expected(parameters[0], parameters[1], parameters[2:])
+        return np.asarray((self.fractions.root_weight * error).ravel() / _TUNABLES.fraction_error)
 
 
 def _robust(residuals: Floats) -> float:
-    """Sum of squares near 0, of absolute values beyond 1."""
+    """Pseudo-Huber loss: sums squares near 0, absolute values beyond 1."""
     return float(np.sum(np.sqrt(1 + residuals**2) - 1))
 
 
-def _starts(shares: ExposureFractions, interval_s: float) -> list[Floats]:
-    """Parameters to start from: for each way of reading out the best of a few exposures, each edge for itself."""
+def _starts(fractions: ExposureFractions, interval_s: float) -> list[Floats]:
+    """Start parameters: for readout upward, at once and downward the best of a few exposures, each edge independent."""
     grid = _offset_grid(interval_s)
     starts = []
     for readouts in ((-0.8, -0.5, -0.25), (0.0,), (0.25, 0.5, 0.8)):
         pairs = [(exposure * interval_s, readout * interval_s) for exposure in (0.2, 0.5, 0.9) for readout in readouts]
-        best = min(pairs, key=lambda pair: float(_costs(shares, pair[0], pair[1], grid).min(axis=0).mean()))
-        starts.append(np.concatenate([best, _best_offsets(shares, best[0], best[1], grid)]))
+        best = min(pairs, key=lambda pair: float(_costs(fractions, pair[0], pair[1], grid).min(axis=0).mean()))
+        starts.append(np.concatenate([best, _best_offsets(fractions, best[0], best[1], grid)]))
     return starts
 
 
-def _costs(shares: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
-    """Mean absolute error of the shares (offsets, edges) at each of the offsets (offsets,)."""
-    edges, weight = len(shares.rising), shares.root_weight**2
-    errors = (shares.share - shares.expected(exposure_s, readout_s, np.full(edges, offset)) for offset in grid)
+def _costs(fractions: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
+    """Mean absolute error (offsets, edges) of the fractions, for each offset of a grid (offsets,)."""
+    edges, weight = len(fractions.rising), fractions.root_weight**2
+    errors = (fractions.fraction - fractions.expected(exposure_s, readout_s, np.full(edges, offset)) for offset in grid)
     return np.array([(weight * np.abs(error)).mean(axis=(1, 2)) for error in errors])
 
 
-def _best_offsets(shares: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
-    """The offset (edges,) that explains each edge best; the middle of those that do about equally well."""
-    costs = _costs(shares, exposure_s, readout_s, grid)
+def _best_offsets(fractions: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
+    """Best offset (edges,) of each edge on a grid (offsets,); the mean of those that are about equally good."""
+    costs = _costs(fractions, exposure_s, readout_s, grid)
     good = costs <= costs.min(axis=0) + 0.002
     return np.asarray((good * grid[:, None]).sum(axis=0) / good.sum(axis=0))
 
 
 def _offset_grid(interval_s: float) -> Floats:
-    return np.arange(-1.2 * interval_s, 3.2 * interval_s, _STEP_S)
+    """Offsets (offsets,) in seconds from one frame before the first guess of an edge to three after it."""
+    return np.arange(-1.2 * interval_s, 3.2 * interval_s, _TUNABLES.step_s)
 
 
 def _clock_rows(times_s: Floats, rising: NDArray[np.bool_], frequency_hz: float) -> csr_array:
-    """Sums of edge times that vanish for a steady light, as rows (sums, edges).
+    """Matrix (sums, edges) whose product with the edge times vanishes for a steady light.
 
-    An edge lies between its neighbours of the same kind in proportion to the flashes counted between them, and the
-    light is on for as long as the time before.
+    An edge lies between its neighbors of the same kind in proportion to the number of flashes between them, and every
+    flash is as long as the one before.
     """
     rows: list[dict[int, float]] = []
     for kind in (True, False):

@@ -1,1 +1,1 @@
-"""What the light of a capture is: camera gains, the room's share, where the lamp stands, and who it reaches."""
+"""Where the lamp stood in every frame, relative to the head: position, distance, and whether the light suffices."""

@@ -1,22 +1,20 @@
-"""Where head and ball stand before the camera, in centimetres."""
+"""Where the head stands before the camera and how large the balls are, in centimeters."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.capture.film.ball.light_direction import NearLight, radius_at_depth
-from relit_camera.capture.film.ball.sphere_projection import BallOutline, PinholeView
-from relit_camera.face.tracking.face_detector import FaceDetector
-
-Vector = NDArray[np.float64]
+from relit_camera.capture.film.ball.sphere_projection import PinholeView
+from relit_camera.capture.film.lamp.lamp_position import radius_at_depth
 
 INTERPUPILLARY_DISTANCE_CM = 6.3
-"""Between the middles of the eyes: adults have 6.3 cm on average, give or take .36 (Dodgson 2004)."""
+"""Mean distance of adults' pupils, with a standard deviation of 0.36 cm (Dodgson 2004)."""
+_FACE_RADIUS_CM = 9.5
+"""Half the height of a face, brow to chin, as detectors box it: the scale where the eyes are not found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,69 +23,44 @@ class SceneLayout:
 
     Attributes:
         head_cm: (3,) middle of the face's surface.
-        pixels_per_cm: at the head's distance.
-        ball: how the camera sees the ball, the first if there are two.
-        ball_radius_cm: as given, or as it is if the ball is as far from the camera as the head; of two that are of one
-            size, if they are so in the mean.
-        light_distance_cm: from the lamp to the head, as far as two balls do not tell it.
+        pixels_per_cm: scale of the picture at the head's distance.
+        ball_radius_cm: radius of the balls.
     """
 
-    head_cm: Vector
+    head_cm: NDArray[np.float64]
     pixels_per_cm: float
-    ball: PinholeView
     ball_radius_cm: float
-    light_distance_cm: float
 
-    def near_light(self, outline: BallOutline, distance_cm: float | None = None) -> NearLight:
-        """The lamp as a ball with this outline tells it: another ball's, or that of one that was pushed.
 
-        Args:
-            outline: of the ball.
-            distance_cm: from the lamp to the head, where it is not the usual.
-
-        Raises:
-            InputError: the lamp would be nearer to the head than the ball is.
-        """
-        distance_cm = self.light_distance_cm if distance_cm is None else distance_cm
-        return NearLight(self.view(outline), self.ball_radius_cm, self.head_cm, distance_cm)
-
-    def view(self, outline: BallOutline) -> PinholeView:
-        """How the camera sees a ball with this outline."""
-        return self.ball if outline == self.ball.outline else PinholeView(outline, self.ball.size, self.ball.focal_px)
+def eye_distance_from_face(face_radius_px: float) -> float:
+    """Distance of the eyes in pixels, guessed from the radius of the face's circle."""
+    return face_radius_px / _FACE_RADIUS_CM * INTERPUPILLARY_DISTANCE_CM
 
 
 def estimate_scene_layout(
-    ball: PinholeView,
+    balls: Sequence[PinholeView],
     head_px: tuple[float, float],
     eyes_px: float,
-    light_distance_cm: float,
     ball_radius_cm: float | None = None,
-    second: PinholeView | None = None,
 ) -> SceneLayout:
-    """Place head and balls: the head by the distance of its eyes, a ball by its size, or else beside the head.
+    """Place the head by the distance of its eyes, and find the balls' size unless it is known.
+
+    A ball of unknown size is taken to be as far from the camera as the head; two of one size, to be so on average.
 
     Args:
-        ball: how the camera sees it.
+        balls: the camera's views of one ball, or of two that are of one size.
         head_px: middle of the face in the picture.
-        eyes_px: distance of the eyes' middles.
-        light_distance_cm: from the lamp to the head.
-        ball_radius_cm: where it is known.
-        second: how the camera sees a second ball of the same size.
+        eyes_px: distance of the pupils.
+        ball_radius_cm: radius of the balls, where it is known.
     """
+    view = balls[0]
     pixels_per_cm = eyes_px / INTERPUPILLARY_DISTANCE_CM
-    depth_cm = ball.focal_px / pixels_per_cm
-    x, y = (head_px[0] - ball.size[0] / 2) / pixels_per_cm, (ball.size[1] / 2 - head_px[1]) / pixels_per_cm
+    depth_cm = view.focal_px / pixels_per_cm
+    x, y = (head_px[0] - view.size[0] / 2) / pixels_per_cm, (view.size[1] / 2 - head_px[1]) / pixels_per_cm
     if ball_radius_cm is None:
-        alone = [radius_at_depth(each, depth_cm) for each in (ball, second) if each is not None]
-        # The mean of their depths, which go with the size, is then the head's.
-        radius_cm = len(alone) / sum(1 / each for each in alone)
+        radii = [radius_at_depth(each, depth_cm) for each in balls]
+        # A ball's depth is proportional to its size: this is the size that makes the mean depth the head's.
+        radius_cm = len(radii) / sum(1 / each for each in radii)
     else:
         radius_cm = ball_radius_cm
-    return SceneLayout(np.array([x, y, -depth_cm]), pixels_per_cm, ball, radius_cm, light_distance_cm)
-
-
-def median_eye_distance_px(stills: Iterable[DisplayImage], detector: FaceDetector) -> float | None:
-    """Median distance in pixels of the eyes' middles over pictures of one size, None where no face is found."""
-    found = (detector.detect(still) for still in stills)
-    distances = [float(np.linalg.norm(face.eyes[0] - face.eyes[1])) for face in found if face is not None]
-    return float(np.median(distances)) if distances else None
+    return SceneLayout(np.array([x, y, -depth_cm]), pixels_per_cm, radius_cm)

@@ -1,1 +1,1 @@
-"""The whole way from a video to samples, unattended."""
+"""The unattended way from a film to samples: its stages in order, options, report and checkpoint."""

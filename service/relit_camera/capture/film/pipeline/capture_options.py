@@ -1,4 +1,4 @@
-"""What a person may tell the chain, and what it tells them meanwhile."""
+"""Options of a capture, and the callback that reports its progress."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ DEFAULT_SIZE = 384
 LIGHT_DISTANCE_CM = 100.0
 
 Progress = Callable[[str, int, int | None], None]
-"""Told the stage, how much of it is done, and of how much, where that is known."""
+"""Called with the name of a stage, how much of it is done, and how much there is, None where that is unknown."""
 
 
 @dataclass(frozen=True)
 class CaptureOptions:
-    """How to read a capture.
+    """How to read a film.
 
     Attributes:
-        gamma: the video's curve.
-        size: pixels a side of the subject; fewer where the video shows fewer.
-        focal_px: the camera's focal length in pixels of the upright video, where it is known.
-        balls: how many mirror balls there are, 1 or 2; two, of one size, tell the lamp's distance.
-        ball, second_ball: their outlines in those pixels, where they are known.
-        face: its circle, brow to chin, where it is known.
-        ball_diameter_cm: its size, where it is known.
-        light_distance_cm: from the lamp to the head, as far as two balls do not tell it.
-        subtract_room: whether the room's light is taken off; None where it helps.
+        gamma: transfer curve of the film.
+        size: pixels a side of the subject; fewer where the film shows fewer.
+        focal_px: focal length of the camera in pixels of the upright film; None where it is unknown.
+        balls: number of mirror balls, 1 or 2; two of one size measure the lamp's distance.
+        ball, second_ball: their outlines in those pixels; None where they are to be found.
+        face: circle about the face, brow to chin; None where it is to be found.
+        ball_diameter_cm: diameter of the balls; None where it is unknown.
+        light_distance_cm: usual distance of the lamp from the head, where two balls do not measure it.
+        subtract_room: whether the room's light is subtracted; None for where that leaves less than half of it.
         near_field: whether the lamp's nearness is corrected.
         threads: of the decoder.
     """
@@ -49,4 +49,4 @@ class CaptureOptions:
 
 
 def no_progress(stage: str, done: int, total: int | None) -> None:
-    """Tell nobody."""
+    """Report to nobody."""

@@ -1,4 +1,4 @@
-"""What the chain found in a video, and the report that tells it."""
+"""The report of a capture: results of all stages as JSON, and warnings of what may have made them worse."""
 
 from __future__ import annotations
 
@@ -9,51 +9,89 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.capture.film.flash.frame_classification import FrameClass
-from relit_camera.capture.film.focal_length import TAG_ERROR
-from relit_camera.capture.film.lamp.flash_strength import FlashStrengths
-from relit_camera.capture.film.lamp.head_crop import HeadCrop
-from relit_camera.capture.film.pipeline.ball_observations import ObservedBall
-from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
-from relit_camera.capture.film.pipeline.film_analysis import FilmAnalysis
-from relit_camera.capture.film.pipeline.lamp_localization import UsableLamps
+from relit_camera.capture.film.ball.ball_tracking import ObservedBall
+from relit_camera.capture.film.face_localization import LocatedFace
+from relit_camera.capture.film.flash.frame_classification import Flashes, FlashFrame, FrameClass
+from relit_camera.capture.film.focal_length import TAG_ERROR, FocalLength
+from relit_camera.capture.film.lamp.lamp_localization import LampPositions
+from relit_camera.capture.film.lamp.light_coverage import covered_solid_angle
+from relit_camera.capture.film.lamp.scene_layout import SceneLayout
+from relit_camera.capture.film.olat.camera_gains import FrameGains
+from relit_camera.capture.film.olat.flash_strength import FlashStrengths
+from relit_camera.capture.film.olat.head_crop import HeadCrop
+from relit_camera.capture.film.pipeline.light_observation import UsableFrames
+from relit_camera.capture.film.stabilization.film_stabilization import Stabilization
 
 REPORT_VERSION = 1
 
-_DOUBTFUL_BALL = 0.7
-"""Share of the ball's outline that shows, below which its place is uncertain."""
-_FEW_LOCATED = 0.5
-"""Share of the usable frames in which two balls show the lamp, below which they hardly tell its distance."""
-_DISAGREE_DEG = 1.5
-"""Gap between two balls' rays that is thrice what their errors make."""
-_UNLIKE_REASON = "its light does not fit the person's shape: the lamp was hidden, or its mirror image mistaken"
+
+@dataclass(frozen=True)
+class WarningTunables:
+    """When the report warns; `relit evaluate capture` (docs/evaluate.md) shows what errors such films have.
+
+    Attributes:
+        min_evidence: share of a ball's outline that is visible, below which its position is uncertain.
+        min_triangulated: share of the usable frames in which two balls show the lamp, below which its distance is
+            uncertain.
+        max_gap_deg: median gap between two balls' rays, three times what their errors make.
+    """
+
+    min_evidence: float = 0.7
+    min_triangulated: float = 0.5
+    max_gap_deg: float = 1.5
+
+
+_TUNABLES = WarningTunables()
+_OUTLIER_REASON = "its light does not fit the person's shape: the lamp was hidden, or its mirror image mistaken"
 
 
 @dataclass(frozen=True, eq=False)
 class Findings:
-    """All that the chain found.
+    """Results of all stages of a capture.
 
     Attributes:
-        video: file name.
-        options: what was asked for.
-        analysis: what the video shows.
-        lamps: where the lamp was in the usable frames.
-        kept: growing indices of those frames that were read as pictures: of a long film's not all are needed.
-        square: what was cut out.
-        room_taken_off: whether the room's light was.
-        strengths: of the kept frames' flashes.
-        misfit_if_far: how far skin would be from the law of the cosine if the lamp were far away.
-        good: (some,) which of those were used.
-        lights: pictures left after those under nearly the same light were merged.
+        video: name of the film's file.
+        size: width and height of its upright pictures.
+        flashes: when the lamp was on, and the class of every frame.
+        face: where the face was found.
+        motion: how it moved.
+        usable: bright and dark frames in which it was found.
+        gains: the camera's, of `usable.all` in order.
+        balls: the mirror balls, one or two.
+        focal: focal length of the camera.
+        detector_installed: whether a detector that finds the eyes is installed.
+        eyes_px: distance of the pupils; None where they were not found.
+        layout: positions of head and balls.
+        lamps: where the lamp was in the frames that show it.
+        light_distance_cm: usual distance of the lamp that the user gave.
+        crop: the square that became the subject's picture.
+        room_subtracted: whether the room's light was subtracted.
+        near_field: whether the lamp's nearness was corrected.
+        kept: growing indices of those frames of `lamps` that were read as pictures; of a long film, not all.
+        strengths: of the flashes of the kept frames.
+        misfit_if_far: median misfit of the strengths if the lamp were far away.
+        good: (count,) rows of `kept` that were used.
+        lights: number of pictures after merging.
     """
 
     video: str
-    options: CaptureOptions
-    analysis: FilmAnalysis
-    lamps: UsableLamps
+    size: tuple[int, int]
+    flashes: Flashes
+    face: LocatedFace
+    motion: Stabilization
+    usable: UsableFrames
+    gains: FrameGains
+    balls: tuple[ObservedBall, ...]
+    focal: FocalLength
+    detector_installed: bool
+    eyes_px: float | None
+    layout: SceneLayout
+    lamps: LampPositions
+    light_distance_cm: float
+    crop: HeadCrop
+    room_subtracted: bool
+    near_field: bool
     kept: NDArray[np.intp]
-    square: HeadCrop
-    room_taken_off: bool
     strengths: FlashStrengths
     misfit_if_far: float
     good: NDArray[np.intp]
@@ -62,180 +100,217 @@ class Findings:
     @property
     def warnings(self) -> list[str]:
         """What may have made the result worse, and what to do about it."""
-        analysis, told = self.analysis, []
-        for ball, name, option in zip(
-            analysis.balls, ("ball", "second ball"), ("--ball", "--second-ball"), strict=False
-        ):
-            if ball.found.evidence is not None and ball.found.evidence < _DOUBTFUL_BALL:
-                told.append(
-                    f"only {ball.found.evidence:.0%} of the {name}'s outline shows, directions may be degrees off: "
-                    f"film it before something plain, or give its circle with {option} X,Y,RADIUS"
-                )
-            told += [
-                f"the {name} was {each.kind} in the frames {each.first} to {each.last}: fix it in its place"
-                for each in ball.episodes
-            ]
-        if analysis.focal.error > TAG_ERROR:
-            told.append(
-                f"the camera's focal length is a guess, give or take {analysis.focal.error:.0%}, directions may be "
+        warnings = []
+        for ball, name, option in zip(self.balls, ("ball", "second ball"), ("--ball", "--second-ball"), strict=False):
+            warnings += _ball_warnings(ball, name, option)
+        if self.focal.error > TAG_ERROR:
+            warnings.append(
+                f"the camera's focal length is a guess, give or take {self.focal.error:.0%}, directions may be "
                 "degrees off: give it with --focal-px, or film with a phone that writes it into the film"
             )
-        told += self._of_two_balls()
-        if analysis.gains.too_dim:
-            told.append(
-                "the room is too dark, or too bright, in nearly all of the picture, so that it does not tell what the "
-                "camera's automatics did: make some light in it, or film with exposure and white balance locked"
-            )
-        elif not analysis.gains.share:
-            told.append(
-                "the flash reaches everything in the picture, so that the camera's automatics are known only between "
-                "flashes: film before something far away, or with exposure and white balance locked"
-            )
-        if not analysis.detector:
-            told.append("no face detector is installed, the head's size is a guess: run `relit models pull`")
-        elif analysis.eyes_px is None:
-            told.append(
+        if len(self.balls) > 1:
+            warnings += _two_ball_warnings(self.lamps)
+        warnings += _gain_warnings(self.gains)
+        if not self.detector_installed:
+            warnings.append("no face detector is installed, the head's size is a guess: run `relit models pull`")
+        elif self.eyes_px is None:
+            warnings.append(
                 "the eyes are not found, the head's size is a guess from the face's circle: look into the camera, and "
                 "begin with the lamp before the face; or give the face, brow to chin, with --face X,Y,RADIUS"
             )
-        return told
+        return warnings
 
     def report(self) -> dict[str, Any]:
-        """The report of `relit capture build`; docs/capture.md tells what is in it."""
-        analysis = self.analysis
+        """The JSON of `relit capture build --report`; docs/capture.md describes it."""
+        names = ("ball", "second_ball")
+        width, height = self.size
         return {
             "version": REPORT_VERSION,
             "video": self.video,
-            "width_px": analysis.size[0],
-            "height_px": analysis.size[1],
-            "focal_px": analysis.focal.pixels,
-            "focal": {"source": analysis.focal.source, "error": analysis.focal.error},
-            **{name: self._ball(ball) for name, ball in zip(("ball", "second_ball"), analysis.balls, strict=False)},
-            "flash": {
-                "frequency_hz": analysis.flashes.schedule.frequency_hz,
-                "duty": analysis.flashes.schedule.duty,
-                "exposure_s": analysis.flashes.shutter.exposure_s,
-                "readout_s": analysis.flashes.shutter.readout_s,
+            "width_px": width,
+            "height_px": height,
+            "focal_px": self.focal.pixels,
+            "focal": {"source": self.focal.source, "error": self.focal.error},
+            **{
+                name: _ball_entry(ball, self.layout.ball_radius_cm)
+                for name, ball in zip(names, self.balls, strict=False)
             },
+            "flash": _flash_entry(self.flashes),
             "face": {
-                **analysis.motion.circle._asdict(),
-                "found_by": analysis.face.by,
-                "eyes_px": analysis.eyes_px,
-                "head_cm": _numbers(self.lamps.place.head_cm),
-                "pixels_per_cm": self.lamps.place.pixels_per_cm,
+                **self.motion.circle._asdict(),
+                "found_by": self.face.by,
+                "eyes_px": self.eyes_px,
+                "head_cm": _numbers(self.layout.head_cm),
+                "pixels_per_cm": self.layout.pixels_per_cm,
             },
-            "motion": {"reference": analysis.motion.reference, "unsteady_px": analysis.motion.unsteady_px},
-            "room": {
-                "taken_off": self.room_taken_off,
-                "left_as_is": analysis.gains.left_as_is,
-                "left": analysis.gains.left,
-                "gains_from": analysis.gains.source,
-                "gains_share": analysis.gains.share,
-                "gains_spread": analysis.gains.spread,
-            },
+            "motion": {"reference": self.motion.reference, "unsteady_px": self.motion.unsteady_px},
+            "room": {"taken_off": self.room_subtracted} | _gain_entry(self.gains),
             "near_field": {
-                "corrected": self.options.near_field,
-                "light_distance_cm": self.options.light_distance_cm,
+                "corrected": self.near_field,
+                "light_distance_cm": self.light_distance_cm,
                 "misfit": float(np.median(self.strengths.misfit[self.good])),
                 "misfit_if_far": self.misfit_if_far,
             },
-            "lamp_distance": self._lamp_distance(),
-            "light": {"area_sr": self.lamps.area_sr, "frames": len(self.good), "lights": self.lights},
+            "lamp_distance": _distance_entry(self.lamps, two_balls=len(self.balls) > 1),
+            "light": {
+                "area_sr": covered_solid_angle(self.lamps.lamps_cm),
+                "frames": len(self.good),
+                "lights": self.lights,
+            },
             "square": {
-                "left": self.square.left,
-                "top": self.square.top,
-                "side": self.square.side,
-                "size": self.square.size,
+                "left": self.crop.left,
+                "top": self.crop.top,
+                "side": self.crop.side,
+                "size": self.crop.size,
             },
             "warnings": self.warnings,
-            "frames": [self._frame(index) for index in range(len(analysis.flashes.frames))],
+            "frames": [self._frame_entry(frame) for frame in self.flashes.frames],
         }
 
-    def _of_two_balls(self) -> list[str]:
-        """Warnings of what two balls tell of the lamp's distance."""
-        if len(self.analysis.balls) == 1:
-            return []
-        told, share = [], len(self.lamps.located) / max(len(self.lamps.index), 1)
-        if share < _FEW_LOCATED:
-            told.append(
-                f"both balls show the lamp in {share:.0%} of the flashes' frames only, its distance is uncertain in "
-                "the others: stand them on either side of the head, where lamp and camera see both"
-            )
-        if self.lamps.located and self._gap_deg > _DISAGREE_DEG:
-            told.append(
-                f"the two balls disagree about the lamp by {self._gap_deg:.1f} degrees, its distance may be far off: "
-                "use balls of one size, and give the camera's focal length with --focal-px"
-            )
-        return told
-
-    @property
-    def _gap_deg(self) -> float:
-        return float(np.median([each.gap_deg for each in self.lamps.located.values()]))
-
-    def _lamp_distance(self) -> dict[str, Any]:
-        told: dict[str, Any] = {"median_cm": float(np.median(self.lamps.distances.cm))}
-        if len(self.analysis.balls) == 1:
-            return {"source": "said"} | told
-        located = {"frames": len(self.lamps.located), "gap_deg": self._gap_deg if self.lamps.located else None}
-        return {"source": "two balls"} | told | {"error": float(np.median(self.lamps.distances.error))} | located
-
-    def _ball(self, ball: ObservedBall) -> dict[str, Any]:
-        return {
-            **asdict(ball.found.outline),
-            "radius_cm": self.lamps.place.ball_radius_cm,
-            "evidence": ball.found.evidence,
-            "glints": ball.found.glints,
-            "episodes": [
-                {"kind": each.kind, "first": each.first, "last": each.last, "shift_px": [each.dx, each.dy]}
-                for each in ball.episodes
-            ],
-        }
-
-    def _frame(self, index: int) -> dict[str, Any]:
-        analysis = self.analysis
-        frame, motion = analysis.flashes.frames[index], analysis.motion.transforms[index]
-        told: dict[str, Any] = {
+    def _frame_entry(self, frame: FlashFrame) -> dict[str, Any]:
+        """Class, motion, gain, and lamp of one frame."""
+        index, motion = frame.index, self.motion.transforms[frame.index]
+        entry: dict[str, Any] = {
             "index": index,
             "time_s": frame.time_s,
             "kind": frame.kind.value,
             "reason": frame.reason,
         }
-        if index in analysis.motion.lost:
-            rejected = frame.kind is FrameClass.BRIGHT
-            return told | {
-                "kind": FrameClass.REJECTED.value if rejected else told["kind"],
-                "reason": "the face is not found",
-            }
-        told |= {"rotation_deg": motion.rotation_deg, "translation_px": [motion.x, motion.y]}
-        if index in self._gain:
-            told["gain"] = _numbers(self._gain[index])
+        if index in self.motion.lost:
+            if frame.kind is FrameClass.BRIGHT:
+                entry["kind"] = FrameClass.REJECTED.value
+            return entry | {"reason": "the face is not found"}
+        entry |= {"rotation_deg": motion.rotation_deg, "translation_px": [motion.x, motion.y]}
+        if index in self._gain_by_frame:
+            entry["gain"] = _numbers(self._gain_by_frame[index])
         if index in self.lamps.unusable:
-            return told | {"kind": FrameClass.REJECTED.value, "reason": self.lamps.unusable[index]}
-        if index in self._place:
-            place = self._place[index]
-            told |= {
-                "direction": _numbers(self.lamps.directions[place]),
-                "at_ball": _numbers(self.lamps.at_ball[place]),
-                "distance_cm": round(float(self.lamps.distances.cm[place]), 2),
-            }
-        if index in self._kept:
-            kept = self._kept[index]
-            told["strength"] = float(self.strengths.strength[kept])
-            if kept not in self.good:
-                told |= {"kind": FrameClass.REJECTED.value, "reason": _UNLIKE_REASON}
-        return told
+            return entry | {"kind": FrameClass.REJECTED.value, "reason": self.lamps.unusable[index]}
+        if index in self._lamp_row:
+            entry |= _lamp_entry(self.lamps, self._lamp_row[index])
+        if index in self._kept_row:
+            row = self._kept_row[index]
+            entry["strength"] = float(self.strengths.strength[row])
+            if row not in self.good:
+                entry |= {"kind": FrameClass.REJECTED.value, "reason": _OUTLIER_REASON}
+        return entry
 
     @cached_property
-    def _gain(self) -> dict[int, NDArray[np.float64]]:
-        return dict(zip(self.analysis.frames.tolist(), self.analysis.gains.rgb, strict=True))
+    def _gain_by_frame(self) -> dict[int, NDArray[np.float64]]:
+        return dict(zip(self.usable.all.tolist(), self.gains.rgb, strict=True))
 
     @cached_property
-    def _place(self) -> dict[int, int]:
-        return {int(index): place for place, index in enumerate(self.lamps.index)}
+    def _lamp_row(self) -> dict[int, int]:
+        return {int(index): row for row, index in enumerate(self.lamps.index)}
 
     @cached_property
-    def _kept(self) -> dict[int, int]:
-        return {int(index): place for place, index in enumerate(self.kept)}
+    def _kept_row(self) -> dict[int, int]:
+        return {int(index): row for row, index in enumerate(self.kept)}
+
+
+def _ball_warnings(ball: ObservedBall, name: str, option: str) -> list[str]:
+    warnings = []
+    evidence = ball.found.evidence
+    if evidence is not None and evidence < _TUNABLES.min_evidence:
+        warnings.append(
+            f"only {evidence:.0%} of the {name}'s outline shows, directions may be degrees off: "
+            f"film it before something plain, or give its circle with {option} X,Y,RADIUS"
+        )
+    warnings += [
+        f"the {name} was {each.kind} in the frames {each.first} to {each.last}: fix it in its place"
+        for each in ball.episodes
+    ]
+    return warnings
+
+
+def _two_ball_warnings(lamps: LampPositions) -> list[str]:
+    warnings = []
+    share = len(lamps.triangulated) / max(len(lamps.index), 1)
+    if share < _TUNABLES.min_triangulated:
+        warnings.append(
+            f"both balls show the lamp in {share:.0%} of the flashes' frames only, its distance is uncertain in "
+            "the others: stand them on either side of the head, where lamp and camera see both"
+        )
+    gap_deg = _median_gap_deg(lamps)
+    if gap_deg is not None and gap_deg > _TUNABLES.max_gap_deg:
+        warnings.append(
+            f"the two balls disagree about the lamp by {gap_deg:.1f} degrees, its distance may be far off: "
+            "use balls of one size, and give the camera's focal length with --focal-px"
+        )
+    return warnings
+
+
+def _gain_warnings(gains: FrameGains) -> list[str]:
+    if gains.too_dim:
+        return [
+            "the room is too dark, or too bright, in nearly all of the picture, so the camera's automatic exposure and "
+            "white balance cannot be measured: make some light in it, or film with both locked"
+        ]
+    if not gains.share:
+        return [
+            "the flash reaches everything in the picture, so the camera's automatic exposure and white balance are "
+            "measured only between flashes: film before something far away, or with both locked"
+        ]
+    return []
+
+
+def _ball_entry(ball: ObservedBall, radius_cm: float) -> dict[str, Any]:
+    return {
+        **asdict(ball.found.outline),
+        "radius_cm": radius_cm,
+        "evidence": ball.found.evidence,
+        "glints": ball.found.glints,
+        "episodes": [
+            {"kind": each.kind, "first": each.first, "last": each.last, "shift_px": [each.dx, each.dy]}
+            for each in ball.episodes
+        ],
+    }
+
+
+def _flash_entry(flashes: Flashes) -> dict[str, Any]:
+    schedule, shutter = flashes.schedule, flashes.shutter
+    return {
+        "frequency_hz": schedule.frequency_hz,
+        "duty": schedule.duty,
+        "exposure_s": shutter.exposure_s,
+        "readout_s": shutter.readout_s,
+    }
+
+
+def _gain_entry(gains: FrameGains) -> dict[str, Any]:
+    return {
+        "left_as_is": gains.left_as_is,
+        "left": gains.left,
+        "gains_from": gains.source,
+        "gains_share": gains.share,
+        "gains_spread": gains.spread,
+    }
+
+
+def _distance_entry(lamps: LampPositions, *, two_balls: bool) -> dict[str, Any]:
+    median_cm = float(np.median(lamps.distances.cm))
+    if not two_balls:
+        return {"source": "said", "median_cm": median_cm}
+    return {
+        "source": "two balls",
+        "median_cm": median_cm,
+        "error": float(np.median(lamps.distances.error)),
+        "frames": len(lamps.triangulated),
+        "gap_deg": _median_gap_deg(lamps),
+    }
+
+
+def _median_gap_deg(lamps: LampPositions) -> float | None:
+    """Median angle between two balls' rays; None where no frame shows the lamp in both."""
+    gaps = [each.gap_deg for each in lamps.triangulated.values()]
+    return float(np.median(gaps)) if gaps else None
+
+
+def _lamp_entry(lamps: LampPositions, row: int) -> dict[str, Any]:
+    return {
+        "direction": _numbers(lamps.directions[row]),
+        "at_ball": _numbers(lamps.at_ball[row]),
+        "distance_cm": round(float(lamps.distances.cm[row]), 2),
+    }
 
 
 def _numbers(vector: NDArray) -> list[float]:

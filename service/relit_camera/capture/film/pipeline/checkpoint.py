@@ -1,7 +1,7 @@
-"""What a build keeps on disk until its subject is written, so that one that was broken off goes on from there.
+"""Checkpoint of a build: samples kept on disk until the subject is written, so that an interrupted build can resume.
 
-Samples are half of a build's time, and all that later steps need of the film. They are kept beside the subject, where
-their owner sees them and can delete them, in a folder that nobody else may enter: they are pictures of a person.
+Samples take half of a build's time and are all that later steps need of the film. They are pictures of a person, so
+they lie in a folder that only its owner may enter, beside the subject, where the owner sees it and can delete it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from relit_camera.capture.reflectance.samples import Samples
 
 CHECKPOINT_VERSION = 1
 FOLDER_SUFFIX = ".partial"
-"""After the subject's name."""
+"""The folder's name is the subject's with this suffix."""
 SAMPLES_FILE_NAME = "samples.safetensors"
 
 _TENSORS = ("pictures", "directions", "matte")
@@ -40,8 +40,8 @@ class Checkpoint:
     """What a film gave.
 
     Attributes:
-        samples: whose shape is not known yet.
-        report: `Findings.report` of what was found on the way.
+        samples: aligned pictures under one distant light each.
+        report: of the capture, `Findings.report`.
     """
 
     samples: Samples
@@ -49,7 +49,7 @@ class Checkpoint:
 
 
 def input_fingerprint(video: Path, options: CaptureOptions) -> str:
-    """All that samples depend on, as a text: the film's name and content, options, program, and whether it finds eyes.
+    """Text of all that samples depend on: film name and content, options, version, and whether a detector is installed.
 
     Raises:
         VideoError: there is no such film, or nothing of it can be read.
@@ -62,12 +62,12 @@ def input_fingerprint(video: Path, options: CaptureOptions) -> str:
 
 
 class CheckpointFolder:
-    """`me.relit.partial/` beside `me.relit`.
+    """The folder of a build's checkpoint: `me.relit.partial/` beside `me.relit`.
 
     Args:
         subject: the file that is built.
-        made_of: the `input_fingerprint` of what is kept here.
-        tell: told, in one line, what became of what was kept.
+        made_of: `input_fingerprint` of the build.
+        tell: called with one line for the user about what happens to the checkpoint.
     """
 
     def __init__(self, subject: Path, made_of: str, tell: Callable[[str], None]) -> None:
@@ -75,7 +75,7 @@ class CheckpointFolder:
         self._made_of, self._tell = made_of, tell
 
     def read(self) -> Checkpoint | None:
-        """What was kept of the same origin. Anything else is deleted, and that is told."""
+        """The checkpoint of the same input, if there is one. Any other is deleted, and the user is told."""
         try:
             found = self._read()
             why = "is of another film, other options or another version"
@@ -91,7 +91,7 @@ class CheckpointFolder:
         return found
 
     def write(self, found: Checkpoint) -> None:
-        """Keep what was found. Where that cannot be done it is told: the build goes on, but could not be resumed."""
+        """Write the checkpoint. If that fails, the user is told and the build goes on, but it could not be resumed."""
         tensors = {name: np.ascontiguousarray(getattr(found.samples, name)) for name in _TENSORS}
         report = json.dumps(found.report)
         header = {"made_of": self._made_of, "report": report, "checksum": str(_checksum(tensors, report))}
@@ -102,7 +102,7 @@ class CheckpointFolder:
             self._tell(f"warning: if broken off, this build cannot go on: {error}")
 
     def remove(self) -> None:
-        """Delete what is kept, and what a write that was broken off has left; nothing else that lies there.
+        """Delete the checkpoint and what an interrupted write has left, but no other files of the folder.
 
         Raises:
             StorageError: it cannot be deleted.
@@ -117,7 +117,7 @@ class CheckpointFolder:
 
     @contextmanager
     def keep_until_done(self) -> Iterator[None]:
-        """Delete it when the subject is written, or when the input is refused; keep it however else the build ends."""
+        """Context of a build: delete the checkpoint if the build succeeds or its input is refused, else keep it."""
         try:
             yield
         except InputError:
@@ -141,7 +141,7 @@ class CheckpointFolder:
 
 
 def _checksum(tensors: Mapping[str, NDArray], report: str) -> int:
-    """CRC-32 of all values in their order, then of the report."""
+    """CRC-32 of the tensors' bytes in order, then of the report."""
     value = 0
     for name in _TENSORS:
         value = zlib.crc32(tensors[name].data, value)

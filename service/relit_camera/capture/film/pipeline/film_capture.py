@@ -1,62 +1,66 @@
-"""From a video of a person, a mirror ball and a blinking lamp to samples, unattended (thesis 4.3)."""
+"""From a film to samples, unattended: the stages of a capture in order (thesis 4.3).
+
+The film is read five times and never held in memory.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from relit_camera.base.errors import CaptureError, InputError
-from relit_camera.base.images.image_types import Mask
-from relit_camera.base.threads import worker_pool
-from relit_camera.capture.film.ball.sphere_projection import BallOutline
-from relit_camera.capture.film.face_circle import FaceCircle
-from relit_camera.capture.film.lamp.flash_matte import estimate_flash_matte
-from relit_camera.capture.film.lamp.flash_strength import FlashStrengths, estimate_flash_strengths
-from relit_camera.capture.film.lamp.head_crop import HeadCrop, place_head_crop
-from relit_camera.capture.film.lamp.near_field import distant_light_factor
-from relit_camera.capture.film.lamp.olat_pictures import OlatPictures, read_olat_pictures
-from relit_camera.capture.film.pipeline.capture_options import CaptureOptions, Progress, no_progress
-from relit_camera.capture.film.pipeline.capture_report import Findings
-from relit_camera.capture.film.pipeline.film_analysis import analyze_film
-from relit_camera.capture.film.pipeline.lamp_localization import UsableLamps, find_usable_lamps, require_light_coverage
-from relit_camera.capture.film.pipeline.light_clustering import (
+from relit_camera.base.errors import ModelError
+from relit_camera.base.images.color import Gamma
+from relit_camera.base.models.model_store import model_path
+from relit_camera.base.video.video_readers import LinearVideoFrame, LinearVideoReader
+from relit_camera.capture.film.ball.ball_detection import find_balls
+from relit_camera.capture.film.ball.scene_sample import MAX_FRAMES, SceneSample, sample_scene
+from relit_camera.capture.film.face_localization import LocatedFace, locate_face, require_face_in_picture
+from relit_camera.capture.film.flash.flash_signal import measure_brightness
+from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass, detect_flashes
+from relit_camera.capture.film.focal_length import known_focal_length
+from relit_camera.capture.film.lamp.lamp_localization import locate_lamps
+from relit_camera.capture.film.lamp.light_coverage import require_light_coverage
+from relit_camera.capture.film.lamp.scene_layout import estimate_scene_layout, eye_distance_from_face
+from relit_camera.capture.film.olat.camera_gains import require_uniform_gains
+from relit_camera.capture.film.olat.flash_matte import estimate_flash_matte, require_face_in_matte
+from relit_camera.capture.film.olat.flash_strength import (
+    downsample_for_strengths,
+    estimate_flash_strengths,
+    misfit_under_distant_lamps,
+)
+from relit_camera.capture.film.olat.head_crop import place_head_crop
+from relit_camera.capture.film.olat.light_clustering import (
     cluster_lights,
-    merge_pictures,
+    merge_lights,
     subsample_cluster,
     subsample_evenly,
 )
+from relit_camera.capture.film.olat.olat_pictures import (
+    max_pictures_in_memory,
+    read_olat_pictures,
+    require_size_in_memory,
+)
+from relit_camera.capture.film.pipeline.capture_options import CaptureOptions, Progress, no_progress
+from relit_camera.capture.film.pipeline.capture_report import Findings
+from relit_camera.capture.film.pipeline.light_observation import UsableFrames, observe_light
+from relit_camera.capture.film.stabilization.film_stabilization import stabilize_film
 from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.face.tracking.face_detector import FaceDetector
 
-_MOST_FRAMES, _FEWEST_FRAMES = 600, 150
-"""Bright frames that are kept in memory: a minute's, and fewer of larger pictures, but no fewer than these."""
-_MEMORY_BYTES = 944_000_000
-_PIXEL_BYTES = 6
-"""Of a picture: three halves of a float."""
-_SMALL = 96
-"""Pixels a side of the pictures in which strengths and shape are found."""
 _BALL_REACH = 1.15
-"""Radii about a ball in which nobody is."""
-_UNLIKE = 3.0
-"""Frames whose light fits the person's shape so many times worse than usual are left out."""
-_FAR = 1e3
-"""Times as far as it was, a lamp is as good as infinitely far away."""
-_LEAST_FACE = 0.5
-"""Share of the face's circle that must be the person."""
+"""Radii about a ball within which the person cannot be."""
 
 
 @dataclass(frozen=True, eq=False)
 class CaptureResult:
-    """What a video gave.
+    """What a film gave.
 
     Attributes:
         samples: aligned pictures of the person under one distant light each.
-        findings: on the way; the report is made of them.
+        findings: results of all stages, for the report.
     """
 
     samples: Samples
@@ -66,117 +70,157 @@ class CaptureResult:
 def build_samples(
     video: Path, options: CaptureOptions | None = None, progress: Progress = no_progress
 ) -> CaptureResult:
-    """Samples of a capture video. It is read five times and never held in memory.
+    """Build samples from a capture film.
 
     Raises:
-        VideoError: the video cannot be read, is cut off or damaged, or shows no face.
+        VideoError: the film cannot be read, is cut off or damaged, or shows no face.
         CaptureError: something is missing in it; the message says what to do differently.
         InputError: an option is impossible.
     """
     options = options or CaptureOptions()
-    _require_size_in_memory(options.size)
-    analysis = analyze_film(video, options, progress)
-    found = find_usable_lamps(analysis, options)
-    square = place_head_crop(analysis.motion.circle, analysis.size, options.size)
-    lamps = found.only(subsample_evenly(found.directions, max_frames_in_memory(square.size)))
-    subtract = analysis.gains.can_subtract_room if options.subtract_room is None else options.subtract_room
-    total = len(analysis.flashes.frames)
-    lights = read_olat_pictures(
+    given_balls = [ball for ball in (options.ball, options.second_ball) if ball is not None]
+    require_size_in_memory(options.size)
+    if options.face:
+        require_face_in_picture(options.face, video)
+
+    # Flashes: which frames the lamp lit.
+    brightness = measure_brightness(
+        video, options.gamma, threads=options.threads, progress=_reporter(progress, "Looking for flashes")
+    )
+    flashes = detect_flashes(brightness)
+    total = len(flashes.frames)
+
+    # Mirror balls, whose outlines correct the focal length.
+    progress("Looking for the mirror ball", 0, None)
+    sample = _sample_frames(video, flashes, options.gamma, options.threads)
+    focal = known_focal_length(video, brightness.size, options.focal_px)
+    balls = find_balls(sample, focal, options.balls, given_balls)
+
+    # Face: where it is, and how it moves.
+    face = LocatedFace(options.face, "user") if options.face else locate_face(brightness, flashes)
+    motion = stabilize_film(
+        video,
+        flashes,
+        face.circle,
+        threads=options.threads,
+        progress=_reporter(progress, "Following the face", total),
+    )
+    usable = UsableFrames.of(flashes, motion.lost)
+
+    # Camera gains, highlights on the balls, distance of the eyes.
+    detector = _installed_detector()
+    with LinearVideoReader(
+        video, options.gamma, only=frozenset(usable.all.tolist()), threads=options.threads
+    ) as reader:
+        film = _reporting(reader, _reporter(progress, "Looking at the light", total))
+        observed = observe_light(film, usable, flashes, balls, sample, detector)
+    gains = observed.gains
+    require_uniform_gains(gains.spread)
+    del sample  # tens of megabytes that no later stage needs
+
+    # Lamp: where it was, seen from the head.
+    layout = estimate_scene_layout(
+        [ball.view for ball in observed.balls],
+        (motion.circle.x, motion.circle.y),
+        observed.eyes_px or eye_distance_from_face(motion.circle.radius),
+        None if options.ball_diameter_cm is None else options.ball_diameter_cm / 2,
+    )
+    lamps = locate_lamps(observed.balls, usable.bright, flashes.times_s, layout, options.light_distance_cm)
+    require_light_coverage(lamps.directions, len(usable.bright))
+
+    # OLAT pictures: the head under one flash each, without the room's light.
+    crop = place_head_crop(motion.circle, brightness.size, options.size)
+    kept = subsample_evenly(lamps.directions, max_pictures_in_memory(crop.size))
+    directions, lamps_cm = lamps.directions[kept], lamps.lamps_cm[kept]
+    subtract = gains.can_subtract_room if options.subtract_room is None else options.subtract_room
+    olat = read_olat_pictures(
         video,
         options.gamma,
-        square,
-        dict(enumerate(analysis.motion.transforms)),
-        dict(zip(analysis.frames.tolist(), analysis.gains.rgb, strict=True)),
-        lamps.index,
-        analysis.dark,
+        crop,
+        dict(enumerate(motion.transforms)),
+        dict(zip(usable.all.tolist(), gains.rgb, strict=True)),
+        lamps.index[kept],
+        usable.dark,
         subtract=subtract,
         threads=options.threads,
-        progress=lambda done: progress("Cutting out the flash's light", done, total),
+        progress=_reporter(progress, "Cutting out the flash's light", total),
     )
+
+    # Matte: the person, without the balls.
     progress("Finding the person", 0, None)
-    matte = _matte(lights, square, [ball.found.outline for ball in analysis.balls], analysis.motion.circle)
-    strengths, misfit_if_far = _strengths(lights, lamps, square, matte, analysis.motion.circle)
-    good = strengths.consistent(_UNLIKE)
-    require_light_coverage(lamps.directions[good], len(analysis.bright))
-    groups = [subsample_cluster(good[group]) for group in cluster_lights(lamps.directions[good])]
-    pictures = np.empty((len(groups), square.size, square.size, 3), np.float32)
-    with worker_pool() as pool:
-        merging = pool.map(lambda group: _merged(lights, strengths, group, matte, options.near_field), groups)
-        for place, picture in enumerate(merging):
-            pictures[place] = picture
-    directions = np.stack([lamps.directions[group].mean(axis=0) for group in groups])
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    discs = [crop.disc(ball.x, ball.y, _BALL_REACH * ball.radius) for ball in (each.outline for each in balls)]
+    matte = estimate_flash_matte(olat.pictures, olat.room, np.logical_or.reduce(discs))
+    require_face_in_matte(matte, crop.disc(*motion.circle))
+
+    # Strengths of the flashes, with the person's rough shape.
+    small = downsample_for_strengths(olat.pictures, matte)
+    x, y = crop.to_crop(motion.circle.x, motion.circle.y)
+    head, pixels_per_cm = (x * small.scale, y * small.scale), layout.pixels_per_cm * crop.scale * small.scale
+    evidence = (small.pictures, lamps_cm, small.matte, head, pixels_per_cm)
+    strengths = estimate_flash_strengths(*evidence, measured=lamps.measured)
+    misfit_if_far = misfit_under_distant_lamps(*evidence, measured=lamps.measured)
+    good = strengths.consistent()
+    require_light_coverage(directions[good], len(usable.bright))
+
+    # Samples: pictures under nearly the same light merged, each as under a distant lamp.
+    clusters = [subsample_cluster(good[cluster]) for cluster in cluster_lights(directions[good])]
+    pictures = merge_lights(olat.pictures, strengths, clusters, matte, near_field=options.near_field)
+    means = np.stack([directions[cluster].mean(axis=0) for cluster in clusters])
+    means /= np.linalg.norm(means, axis=1, keepdims=True)
     findings = Findings(
-        video.name, options, analysis, found, lamps.index, square, subtract, strengths, misfit_if_far, good, len(groups)
+        video=video.name,
+        size=brightness.size,
+        flashes=flashes,
+        face=face,
+        motion=motion,
+        usable=usable,
+        gains=gains,
+        balls=observed.balls,
+        focal=balls[-1].focal,
+        detector_installed=detector is not None,
+        eyes_px=observed.eyes_px,
+        layout=layout,
+        lamps=lamps,
+        light_distance_cm=options.light_distance_cm,
+        crop=crop,
+        room_subtracted=subtract,
+        near_field=options.near_field,
+        kept=lamps.index[kept],
+        strengths=strengths,
+        misfit_if_far=misfit_if_far,
+        good=good,
+        lights=len(clusters),
     )
-    return CaptureResult(Samples(pictures, directions, matte), findings)
+    return CaptureResult(Samples(pictures, means, matte), findings)
 
 
-def max_frames_in_memory(size: int) -> int:
-    """How many bright frames are kept in memory as pictures with so many pixels a side."""
-    return min(_MOST_FRAMES, _MEMORY_BYTES // (_PIXEL_BYTES * size**2))
+def _reporter(progress: Progress, stage: str, total: int | None = None) -> Callable[[int], None]:
+    """A callback of the number of frames done in a stage."""
+    return lambda done: progress(stage, done, total)
 
 
-def _require_size_in_memory(size: int) -> None:
-    if max_frames_in_memory(size) < _FEWEST_FRAMES:
-        most = math.isqrt(_MEMORY_BYTES // (_PIXEL_BYTES * _FEWEST_FRAMES))
-        raise InputError(f"{size} pixels a side are more than memory holds", f"give a --size of {most} or less")
+def _reporting(frames: Iterable[LinearVideoFrame], report: Callable[[int], None]) -> Iterator[LinearVideoFrame]:
+    """The frames, each reported as done when the next one is asked for."""
+    for frame in frames:
+        yield frame
+        report(frame.index + 1)
 
 
-def _matte(lights: OlatPictures, square: HeadCrop, balls: Sequence[BallOutline], face: FaceCircle) -> Mask:
-    discs = [_disc(square, ball.x, ball.y, _BALL_REACH * ball.radius) for ball in balls]
-    nobody = np.logical_or.reduce(discs)
-    matte = estimate_flash_matte(lights.pictures, lights.room, nobody)
-    share = matte[_disc(square, *face)].mean()
-    if share < _LEAST_FACE:
-        raise CaptureError(
-            f"the flash lights {share:.0%} of the face: the person cannot be told from the room",
-            "make the room darker, or hold the lamp nearer, about a metre from the face",
-        )
-    return matte
+def _sample_frames(video: Path, flashes: Flashes, gamma: Gamma, threads: int) -> SceneSample:
+    """As many dark frames as bright ones, spread over the film."""
+    half = MAX_FRAMES // 2
+    picked = [
+        indices[:: max(1, -(-len(indices) // half))]
+        for indices in map(flashes.indices, (FrameClass.BRIGHT, FrameClass.DARK))
+    ]
+    only = frozenset(np.concatenate(picked).tolist())
+    with LinearVideoReader(video, gamma, only=only, threads=threads) as reader:
+        return sample_scene(frame.image for frame in reader)
 
 
-def _disc(square: HeadCrop, x: float, y: float, radius: float) -> NDArray[np.bool_]:
-    """Pixels (size, size) of the square that are in a circle of the reference frame."""
-    x, y = square.place(x, y)
-    place = np.arange(square.size) + 0.5
-    return np.asarray(np.hypot(place - x, place[:, None] - y) < radius * square.scale)
-
-
-def _strengths(
-    lights: OlatPictures, lamps: UsableLamps, square: HeadCrop, matte: Mask, face: FaceCircle
-) -> tuple[FlashStrengths, float]:
-    """The flashes' strengths, by small pictures; and how badly these would fit if the lamps were far away."""
-    side = min(_SMALL, square.size)
-    small = np.stack(
-        [cv2.resize(each.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA) for each in lights.pictures]
-    )
-    small, inside = np.maximum(small, 0), cv2.resize(matte, (side, side), interpolation=cv2.INTER_AREA)
-    factor = side / square.size
-    x, y = square.place(face.x, face.y)
-    near, far = (
-        estimate_flash_strengths(
-            small,
-            lamps.lamps_cm * times,
-            inside,
-            (x * factor, y * factor),
-            lamps.place.pixels_per_cm * square.scale * factor,
-            measured=lamps.measured,
-        )
-        for times in (1.0, _FAR)
-    )
-    return near, far.usual_misfit
-
-
-def _merged(
-    lights: OlatPictures, strengths: FlashStrengths, group: NDArray[np.intp], matte: Mask, near_field: bool
-) -> NDArray[np.float32]:
-    """One picture (size, size, 3) of a group's, each as under a distant flash of the usual strength; black outside."""
-    surface = strengths.surface.resized((matte.shape[1], matte.shape[0]))
-    pictures = []
-    for each in group:
-        factor = distant_light_factor(surface, strengths.lamps[each]) if near_field else np.ones_like(matte)
-        scale = (factor * (matte > 0) / np.float32(strengths.strength[each]))[..., None]
-        pictures.append(lights.pictures[each].astype(np.float32) * scale)
-    # A weak flash's picture, made as bright as others, has more noise.
-    return np.maximum(merge_pictures(np.stack(pictures), strengths.strength[group] ** 2), 0)
+def _installed_detector() -> FaceDetector | None:
+    """The face detector; None where it is not installed, which the report's warnings say."""
+    try:
+        return FaceDetector(model_path("face_detector_yunet"))
+    except ModelError:
+        return None

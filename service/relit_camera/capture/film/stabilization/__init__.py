@@ -1,5 +1,5 @@
-"""Where the face went: for every frame the rigid transform that takes it to the reference (thesis 4.3.3).
+"""How the face moves: for every frame of a film, the rigid transform to a reference frame (thesis 4.3.3).
 
-`sparse` follows corners over the dark frames, `dense` aligns what they see to their mean, `predicted` aligns pictures
-under different light to what the others predict; `stabilise` does it for a video.
+Corners are tracked through the dark frames (`corner_tracking`), the face is cropped accordingly (`face_crops`), and the
+crops are aligned by their pixels (`refinement`); `film_stabilization` does it all for a film.
 """

@@ -1,4 +1,4 @@
-"""From a video whose dark frames are known to the transform of every frame (thesis 4.2.6, 4.3.3, and finer)."""
+"""Stabilization of a film: the transform of every frame to a reference frame of the face (thesis 4.2.6, 4.3.3)."""
 
 from __future__ import annotations
 
@@ -19,29 +19,30 @@ from relit_camera.capture.film.stabilization.refinement import align_bright, ali
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_LEAST_FOLLOWED = 0.7
+_MIN_TRACKED = 0.7
 """Share of the dark frames in which the face must be found."""
-_HARDLY_FOLLOWED = 0.1
-"""Share below which it has nothing to follow."""
-_LEAST_BRIGHT = 8
-_FAR_FLASHES = 1.5
-"""Flashes to the nearest dark frame beyond which a frame's transform is not known."""
+_MIN_FEATURES = 0.1
+"""Share of the dark frames below which the face has no features to track."""
+_MIN_BRIGHT_FRAMES = 8
+"""Least bright frames for the refinement of their transforms."""
+_MAX_FLASH_PERIODS = 1.5
+"""Periods of the flash to the nearest measured dark frame beyond which the transform of a bright frame is unknown."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stabilization:
-    """Where the face went.
+    """The motion of the face through a film.
 
     Attributes:
-        transforms: for every frame of the video, from it to the reference.
-        reference: index of the frame to which all are taken; its own transform is none.
+        transforms: of every frame to the reference.
+        reference: index of the reference frame, whose transform is the identity.
         circle: of the face in the reference.
-        measured: growing indices of the dark frames that were measured; between them it is interpolated.
-        inliers: (measured,) corners of the face that agree on each one's transform.
-        residual_px: (measured,) how far those are from where it has them (RMS).
-        lost: indices of frames about which the face was not found.
-        unsteady_px: how far frames are from where those before and after them would have them: the head's haste and the
-            measurement's noise (RMS).
+        measured: growing indices of the dark frames in which motion was measured; between them it is interpolated.
+        inliers: (measured,) number of corners that agree with each transform.
+        residual_px: (measured,) root mean square distance of those from where the transform takes them.
+        lost: indices of the bright and dark frames in which the face was not found.
+        unsteady_px: root mean square distance of dark frames from the interpolation between others, by the head's
+            motion and the measurement's noise.
     """
 
     transforms: tuple[RigidTransform, ...]
@@ -59,89 +60,99 @@ def stabilize_film(
     flashes: Flashes,
     circle: FaceCircle,
     *,
-    finer: bool = True,
+    refine: bool = True,
     threads: int = 1,
     progress: Callable[[int], None] = lambda frames: None,
 ) -> Stabilization:
-    """Follow the face through a video, reading it once.
+    """Measure the motion of the face, reading the film once.
 
-    Corners are followed from dark frame to dark frame; then each is aligned to the mean of all by its pixels, which is
-    what a dark frame is predicted to look like. Bright frames lie between, by time; what is left in them is aligned to
-    what the other bright frames predict, as far as the dark ones leave room for it.
+    Corners are tracked from dark frame to dark frame; then each dark frame is aligned to the mean of all by its pixels.
+    Transforms of bright frames are interpolated over time, and refined by aligning each to the picture that the other
+    bright frames predict.
 
     Args:
-        path: the video.
-        flashes: what its frames are.
-        circle: of the face, as in `find_face_circle`.
-        finer: without, corners and time alone tell, as in the thesis.
+        path: the film.
+        flashes: of the film.
+        circle: of the face in the film's pixels, to about a fifth of its radius.
+        refine: whether transforms are refined by pixels; else corners alone are used, as in the thesis.
         threads: of the decoder.
-        progress: called with the number of frames looked at.
+        progress: called with the number of frames read.
 
     Raises:
         VideoError: the video cannot be read.
-        CaptureError: the face has nothing to follow, or it goes away.
+        CaptureError: the face has no features to track, or it leaves its place.
     """
     dark_frames, bright_frames, times_s = (
         flashes.indices(FrameClass.DARK),
         flashes.indices(FrameClass.BRIGHT),
         flashes.times_s,
     )
-    views = crop_faces(path, dark_frames, bright_frames, circle, threads, progress)
-    dark = views.of(dark_frames)
+    crops = crop_faces(path, dark_frames, bright_frames, circle, threads, progress)
+    dark = crops.of(dark_frames)
     transforms = dark.transforms
-    if finer and transforms:
-        transforms, unlike = align_dark(dark)
-        dark, transforms = dark.only(~unlike), [each for each, bad in zip(transforms, unlike, strict=True) if not bad]
-    lost = _lost(dark_frames, bright_frames, dark.index, times_s, flashes.schedule.frequency_hz)
-    _require_followed_face(dark.index, dark_frames, lost, times_s)
+    if refine and transforms:
+        transforms, outliers = align_dark(dark)
+        dark, transforms = (
+            dark.only(~outliers),
+            [each for each, bad in zip(transforms, outliers, strict=True) if not bad],
+        )
+    lost = _lost_frames(dark_frames, bright_frames, dark.index, times_s, flashes.schedule.frequency_hz)
+    _require_tracked_face(dark.index, dark_frames, lost, times_s)
     rows = transforms_to_array(transforms)
     reference = int(np.square(rows - np.median(rows, axis=0)).sum(axis=1).argmin())
     unsteady = _unsteadiness(dark.index, times_s, rows)
     every = interpolate_transforms(times_s, times_s[dark.index], transforms)
-    bright = views.of(np.setdiff1d(bright_frames, list(lost)))
-    if finer and len(bright.index) >= _LEAST_BRIGHT:
+    bright = crops.of(np.setdiff1d(bright_frames, list(lost)))
+    if refine and len(bright.index) >= _MIN_BRIGHT_FRAMES:
         flash = np.array([flashes.frames[index].flash for index in bright.index])
         by_time = [every[index] for index in bright.index]
         for index, aligned in zip(bright.index, align_bright(bright, by_time, flash, unsteady), strict=True):
             every[index] = aligned
     to_reference = transforms[reference].inverse()
     return Stabilization(
-        transforms=tuple(each.then(to_reference).scaled(1 / views.scale) for each in every),
+        transforms=tuple(each.then(to_reference).scaled(1 / crops.scale) for each in every),
         reference=int(dark.index[reference]),
-        circle=_moved(views.circle, to_reference, views.window.size).scaled(1 / views.scale),
+        circle=_moved(crops.circle, to_reference, crops.window.size).scaled(1 / crops.scale),
         measured=dark.index,
         inliers=np.array([match.inliers for match in dark.matches], np.intp),
-        residual_px=np.array([match.residual_px for match in dark.matches]) / views.scale,
+        residual_px=np.array([match.residual_px for match in dark.matches]) / crops.scale,
         lost=lost,
-        unsteady_px=float(np.hypot(*unsteady[1:])) / views.scale,
+        unsteady_px=float(np.hypot(*unsteady[1:])) / crops.scale,
     )
 
 
 def _unsteadiness(index: Indices, times_s: Floats, rows: Floats) -> Floats:
-    """RMS (3,) of rotation and shift from what the dark frames between the flashes before and after would have them."""
-    gap = np.cumsum(np.diff(index, prepend=index[0]) > 2)
-    left = []
-    for each in range(1, int(gap[-1])):
-        here, there = gap == each, gap != each
+    """Root mean square (3,) of rotation and shifts from the interpolation between the dark frames of other pauses."""
+    pause = np.cumsum(np.diff(index, prepend=index[0]) > 2)
+    deviations = []
+    for each in range(1, int(pause[-1])):
+        here, there = pause == each, pause != each
         others = [np.interp(times_s[index[here]], times_s[index[there]], column[there]) for column in rows.T]
-        left.append((rows[here] - np.stack(others, axis=1)).mean(axis=0))
-    return np.sqrt(np.mean(np.square(left), axis=0)) if left else np.zeros(3)
+        deviations.append((rows[here] - np.stack(others, axis=1)).mean(axis=0))
+    return np.sqrt(np.mean(np.square(deviations), axis=0)) if deviations else np.zeros(3)
 
 
-def _lost(dark: Indices, bright: Indices, measured: Indices, times_s: Floats, frequency_hz: float) -> frozenset[int]:
-    """Dark frames without a measurement, and bright ones too far from any."""
+def _lost_frames(
+    dark: Indices, bright: Indices, measured: Indices, times_s: Floats, frequency_hz: float
+) -> frozenset[int]:
+    """Dark frames without a measurement, and bright ones too far in time from any."""
     lost = np.setdiff1d(dark, measured)
     if len(measured):
-        away_s = np.abs(times_s[bright][:, None] - times_s[measured]).min(axis=1)
-        bright = bright[away_s > _FAR_FLASHES / frequency_hz]
+        distance_s = np.abs(times_s[bright][:, None] - times_s[measured]).min(axis=1)
+        bright = bright[distance_s > _MAX_FLASH_PERIODS / frequency_hz]
     return frozenset(lost.tolist()) | frozenset(bright.tolist())
 
 
-def _require_followed_face(measured: Indices, dark: Indices, lost: frozenset[int], times_s: Floats) -> None:
-    if len(measured) < max(2, _HARDLY_FOLLOWED * len(dark)):
+def _require_tracked_face(measured: Indices, dark: Indices, lost: frozenset[int], times_s: Floats) -> None:
+    """Check that the face was found in enough dark frames.
+
+    Raises:
+        CaptureError: it was not.
+    """
+    if len(measured) < max(2, _MIN_FEATURES * len(dark)):
         what = "the face shows nothing that can be followed in the dark frames"
         raise CaptureError(what, "make the room a little brighter, so that the face shows without the flash")
-    if len(measured) < _LEAST_FOLLOWED * len(dark):
+    if len(measured) < _MIN_TRACKED * len(dark):
         first = float(times_s[min(lost)])
         followed = f"the face is found in {len(measured)} of {len(dark)} dark frames only"
         cure = "sit still, the head against something, until the end; keep hands off the face"
@@ -149,5 +160,6 @@ def _require_followed_face(measured: Indices, dark: Indices, lost: frozenset[int
 
 
 def _moved(circle: FaceCircle, transform: RigidTransform, size: tuple[int, int]) -> FaceCircle:
+    """The circle after a transform about the center of a picture of this width and height."""
     x, y = transform.apply(np.array([[circle.x, circle.y]]), size)[0]
     return FaceCircle(float(x), float(y), circle.radius)

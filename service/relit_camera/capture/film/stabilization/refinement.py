@@ -1,4 +1,4 @@
-"""What corners and time leave, removed by aligning pictures to what they are predicted to look like."""
+"""Refinement of transforms by aligning crops, by their pixels, to the picture predicted for each."""
 
 from __future__ import annotations
 
@@ -15,51 +15,54 @@ from relit_camera.capture.film.stabilization.face_crops import FaceCrops
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_COUNTED = 0.6
-"""Share of the face's radius that counts: features, not the outline, where the background does not move along."""
-_NOISE_PX = 1.0
-_LEAST_LIKENESS = 0.6
-"""Correlation with the mean below which a frame shows no face there."""
+_FEATURE_RADIUS = 0.6
+"""Share of the face's radius within which pixels count: features, and not the background at the outline."""
+_BLUR_PX = 1.0
+"""Standard deviation of the Gaussian that reduces noise."""
+_MIN_CORRELATION = 0.6
+"""Correlation with the mean below which a frame does not show the face."""
 _ROUNDS = 2
+"""Of predicting and aligning bright frames."""
 
 
 def align_dark(dark: FaceCrops) -> tuple[list[RigidTransform], NDArray[np.bool_]]:
-    """Dark frames aligned to their mean, which is what each is predicted to look like.
+    """Align dark frames to their mean.
 
     Returns:
-        Transforms from each frame to the first one that was followed, and (count,) which frames are unlike the mean.
+        Transforms from each frame to the first dark one, and a mask (count,) of the frames that do not show the face.
     """
-    weights = dark.window.disc(dark.circle, _COUNTED)
-    squares = [gaussian_blur(square.astype(np.float32), _NOISE_PX) for square in dark.codes]
+    weights = dark.window.disc(dark.circle, _FEATURE_RADIUS)
+    squares = [gaussian_blur(square.astype(np.float32), _BLUR_PX) for square in dark.codes]
     small, mean = align_to_mean(squares, weights, [RigidTransform()] * len(squares))
     correlation = np.array([mean.correlation(square, each) for square, each in zip(squares, small, strict=True)])
     found = [rough.then(dark.window.in_picture(each)) for rough, each in zip(dark.transforms, small, strict=True)]
-    return found, correlation < _LEAST_LIKENESS
+    return found, correlation < _MIN_CORRELATION
 
 
 def align_bright(
     bright: FaceCrops, by_time: Sequence[RigidTransform], flash: Indices, unsteady: Floats
 ) -> list[RigidTransform]:
-    """Bright frames aligned to what those of other flashes predict for their light.
+    """Align bright frames to pictures that those of other flashes predict for their light.
 
-    Alignment under changing light has errors of its own. Of the corrections' variance as much is believed as the dark
-    frames leave room for: half way between two of them a quarter of theirs (Wiener 1949).
+    Alignment under changing light has errors of its own, so corrections are scaled by a Wiener filter (Wiener 1949):
+    the expected variance, half way between two dark frames a quarter of that at a dark frame, over that of the
+    corrections.
 
     Args:
-        bright: the frames.
+        bright: crops of the frames.
         by_time: their transforms by interpolation between dark frames.
-        flash: (count,) number of each one's flash.
-        unsteady: (3,) RMS by which dark frames differ from interpolation between others.
+        flash: (count,) number of each frame's flash.
+        unsteady: (3,) root mean square of rotation and shifts by which dark frames differ from such interpolation.
 
     Returns:
         Transforms like `by_time`.
     """
     window = bright.window
-    left = [rough.inverse().then(each) for rough, each in zip(bright.transforms, by_time, strict=True)]
-    start = [window.in_window(each) for each in left]
+    remaining = [rough.inverse().then(each) for rough, each in zip(bright.transforms, by_time, strict=True)]
+    start = [window.in_window(each) for each in remaining]
     light = srgb_decode(bright.codes.astype(np.float32))
-    aligned = align_across_lights(light, window.disc(bright.circle, _COUNTED), start, flash, _ROUNDS)
+    aligned = align_across_lights(light, window.disc(bright.circle, _FEATURE_RADIUS), start, flash, _ROUNDS)
     correction = transforms_to_array(aligned) - transforms_to_array(start)
-    believed = np.clip(unsteady**2 / 16 / np.maximum(correction.var(axis=0), 1e-12), 0, 1)
-    corrected = transforms_from_array(transforms_to_array(start) + believed * correction)
+    gain = np.clip(unsteady**2 / 16 / np.maximum(correction.var(axis=0), 1e-12), 0, 1)
+    corrected = transforms_from_array(transforms_to_array(start) + gain * correction)
     return [rough.then(window.in_picture(each)) for rough, each in zip(bright.transforms, corrected, strict=True)]

@@ -1,4 +1,4 @@
-"""What is compared with the truth: methods on the captured pictures, or a built subject."""
+"""Candidates of an evaluation: reflectance methods on captured pictures, or a built subject."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from relit_camera.subject.subject import Subject
 BASELINE_METHOD = "barycentric"
 """The method that is shown with the black ring too."""
 BLACK_RING_METHOD = f"{BASELINE_METHOD} + black ring"
-"""Name of the thesis's extension (5.6) of its own interpolation."""
+"""Name of the baseline method with black samples around the captured region (thesis 5.6)."""
 
 _PIXEL_BLOCK = 1024
 """Pixels of a dense field taken at a time: 25 MB."""
@@ -29,12 +29,12 @@ Predictor = Callable[[NDArray[np.float64], NDArray[np.intp]], NDArray[np.float32
 
 @dataclass(frozen=True)
 class Candidate:
-    """Something that answers light from any direction, at the pixels inside a matte.
+    """Predictor of the person's colors under light from any direction, at the pixels inside a matte.
 
     Attributes:
         name: shown to people.
         inside: row-major indices (pixels,) of those pixels.
-        predict: unit vectors (count, 3), row-major pixel indices (some,) → linear colours (count, some, 3).
+        predict: unit vectors (count, 3), row-major pixel indices (some,) → linear colors (count, some, 3).
     """
 
     name: str
@@ -42,21 +42,21 @@ class Candidate:
     predict: Predictor
 
     def pictures_at(self, directions: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Colours (count, pixels, 3) under unit light from each of the unit vectors (count, 3)."""
+        """Colors (count, pixels, 3) under unit light from each of the unit vectors (count, 3)."""
         return self.predict(directions, self.inside)
 
     def maps_at(self, directions: NDArray[np.float64], places: NDArray[np.intp]) -> NDArray[np.float32]:
-        """Colours (places, count, 3) of some pixels, given by their place in `inside`, under each light."""
+        """Colors (places, count, 3) of some pixels, given by their place in `inside`, under each light."""
         return np.ascontiguousarray(self.predict(directions, self.inside[places]).transpose(1, 0, 2))
 
 
 def method_candidates(samples: Samples, inside: NDArray[np.intp], names: Sequence[str] = ()) -> list[Candidate]:
-    """A candidate for each named method, all that are installed unless given, and for the thesis's black ring.
+    """Candidates for the named methods; by default for all installed ones and the baseline with the black ring.
 
     Args:
         samples: captured pictures.
         inside: row-major indices of the pixels to be answered for.
-        names: as `open_method` knows them; the ring's own name too.
+        names: of installed methods, or `BLACK_RING_METHOD`.
 
     Raises:
         NotFoundError: one is not installed.
@@ -75,7 +75,7 @@ def _all_names() -> list[str]:
 
 
 def _method_predictor(method: ReflectanceMethod, samples: Samples) -> Predictor:
-    """Of the method's field, which is built when it is first asked."""
+    """Predictor of a method; its field is built at the first call."""
     field = cache(lambda: method.build(samples))
 
     def predict(directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> NDArray[np.float32]:
@@ -92,14 +92,14 @@ def _method_predictor(method: ReflectanceMethod, samples: Samples) -> Predictor:
 def _interpolate_texels(
     field: ReflectanceField, directions: NDArray[np.float64], pixels: NDArray[np.intp]
 ) -> NDArray[np.float32]:
-    """Colours (count, some, 3) of a field that knows texels only: its map is read between their centres."""
+    """Colors (count, some, 3) of a field that is defined at texels only, interpolated bilinearly between them."""
     lookup = bilinear_map_lookup(directions)
     pictures = np.empty((len(directions), len(pixels), 3), np.float32)
     order = np.argsort(pixels)
     for start in range(0, len(pixels), _PIXEL_BLOCK):
         chosen = order[start : start + _PIXEL_BLOCK]
         first, last = int(pixels[chosen[0]]), int(pixels[chosen[-1]])
-        # Pixels of a matte lie close together, chosen spots do not: never the dense field of all between them.
+        # Few pixels that lie far apart are read one by one: the dense field of all pixels between them is too large.
         block = (
             field.dense(first, last + 1)[pixels[chosen] - first]
             if last - first < 4 * _PIXEL_BLOCK
@@ -111,7 +111,7 @@ def _interpolate_texels(
 
 
 def subject_candidate(name: str, subject: Subject, inside: NDArray[np.intp]) -> Candidate:
-    """A subject as its file holds it, compressed.
+    """Candidate of a subject, compressed as in its file.
 
     Args:
         name: to show.

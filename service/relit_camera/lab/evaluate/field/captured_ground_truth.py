@@ -1,4 +1,4 @@
-"""The truth of a subject built from a rendered capture: the field that was filmed, as the capture cut it out."""
+"""Truth of a subject built from a rendered capture: the filmed field, cropped as the capture cropped it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import InputError
 from relit_camera.capture.alignment.rigid_transform import RigidTransform
-from relit_camera.capture.film.lamp.head_crop import HeadCrop
+from relit_camera.capture.film.olat.head_crop import HeadCrop
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.candidates import Candidate
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
@@ -38,7 +38,7 @@ class _Report(Record):
 
 
 def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
-    """A field's pictures as they would be in the capture's reference frame, cut out as the capture did.
+    """Move a field's pictures into the capture's reference frame and crop them as the capture did.
 
     Args:
         field: the pictures that were filmed (`python -m relit_studio field`), of the video's shape at any size.
@@ -66,9 +66,9 @@ def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
 def scale_to_truth(
     candidate: Candidate, truth: GroundTruth, lights: NDArray[np.intp]
 ) -> tuple[Candidate, NDArray[np.float64]]:
-    """A candidate in the truth's unit, and the gains (3,) that do it: a film does not tell how bright white is.
+    """A candidate scaled to the truth, since a film does not tell how bright white is, and the gains (3,) used.
 
-    Least squares by channel over all pixels of the lights (some,).
+    The gains are least squares by channel over all pixels of the lights (some,).
     """
     seen, known = candidate.pictures_at(truth.directions[lights]), truth.colors[lights]
     gains = np.einsum("lpc,lpc->c", seen, known) / np.maximum(np.einsum("lpc,lpc->c", seen, seen), 1e-12)
@@ -78,4 +78,4 @@ def scale_to_truth(
 
 def _cut(picture: NDArray[np.float32], square: HeadCrop, transform: RigidTransform) -> NDArray[np.float32]:
     large = cv2.resize(picture, square.picture, interpolation=cv2.INTER_CUBIC)
-    return np.maximum(square.cut(large, transform), 0)
+    return np.maximum(square.crop(large, transform), 0)

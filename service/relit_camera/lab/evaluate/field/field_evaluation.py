@@ -1,4 +1,4 @@
-"""A field on a subject with truth, as thesis 7 validates it."""
+"""Evaluation of a reflectance field on a subject with known truth (thesis 7)."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ from relit_camera.light.directions import texel_directions
 from relit_camera.light.light_map import LightMap
 
 HARMONIC_DEGREES = (2, 3, 8)
-"""Of the spherical harmonics that environments are put through; 2 is what learned relighting uses."""
+"""Degrees of the spherical harmonics that environments are projected onto; learned relighting uses 2."""
 PROFILE_BINS = 24
 
 
 @dataclass(frozen=True)
 class CandidateScores:
-    """One candidate's figures. The error is the thesis's, of linear colours.
+    """Scores of one candidate. Errors are the thesis's measure of linear colors.
 
     Attributes:
         name: the candidate's.
         error_whole, error_region: (pixels,) over all lights, and over those inside the sampled region.
         error_of_light: (truth lights,) mean squared distance over the pixels.
         light_psnr_db: mean over single lights inside the region that were not captured.
-        mid_tone_share: of the spots between lit and dark (see `ghosts`).
-        histogram: (30,) where on the scale from dark to lit these spots lie.
+        mid_tone_share: share of the pixels between lit and dark that are mid-tones (see `ghost_shadows`).
+        histogram: (30,) shares of these pixels on the scale from dark to lit.
         relit: by environment.
         maps: (spots, 2048, 3) reflectance maps at the spots, on the 64 × 32 map.
-        ghost: (pixels, 3) colours under the light of the ghost example; empty if there is none.
+        ghost: (pixels, 3) colors under the light of the ghost example; empty if there is none.
     """
 
     name: str
@@ -77,17 +77,17 @@ class CandidateScores:
 
 @dataclass(frozen=True)
 class FieldReport:
-    """All that is known of a field after its evaluation.
+    """Result of a field's evaluation.
 
     Attributes:
-        truth: what it was compared with.
-        captured: (lights, 3) directions that it was built from.
+        truth: the true pictures.
+        captured: (lights, 3) directions that the field was built from.
         in_region: (truth lights,) which lie inside the sampled region.
         candidate_scores: the candidates, best first by the error inside the region.
-        spots: whose reflectance maps are held.
+        spots: sample points whose reflectance maps are kept.
         environments: by name.
         truth_mid_tones, truth_histogram: as `CandidateScores` has them, of the truth itself.
-        ghost: where ghosts are seen best, or None.
+        ghost: the light under which ghosts are most visible, or None.
         harmonics: environment → degree → the truth under the light put through harmonics, against the light itself.
     """
 
@@ -103,20 +103,20 @@ class FieldReport:
     harmonics: Mapping[str, Mapping[int, RelitComparison]]
 
     def across(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Mean (24,) of values (pixels,) by place across the person, row by row from its left to its right edge."""
+        """Mean (24,) of values (pixels,) by position across the person, from the left edge of each row to the right."""
         places = (self.positions + 1) / 2 * PROFILE_BINS
         bins = np.clip(places.astype(int), 0, PROFILE_BINS - 1)
         counts = np.bincount(bins, minlength=PROFILE_BINS)
         return np.asarray(np.bincount(bins, values, PROFILE_BINS) / np.maximum(counts, 1))
 
     def sides_over_middle(self, values: NDArray[np.float64]) -> float:
-        """How many times larger values (pixels,) are in the outer sixths than in the middle third."""
+        """Ratio of the mean value (pixels,) in the outer sixths to that in the middle third."""
         place = np.abs(self.positions)
         return float(values[place > 2 / 3].mean() / max(values[place < 1 / 3].mean(), 1e-30))
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """Place (pixels,) of each pixel across the person: −1 at the left edge of its row, 1 at the right."""
+        """Position (pixels,) of each pixel across the person: −1 at the left edge of its row, 1 at the right."""
         width = self.truth.samples.matte.shape[1]
         row, column = np.divmod(self.truth.inside, width)
         first = np.full(row.max() + 1, width)
@@ -138,12 +138,13 @@ def evaluate_field(
     """Compare candidates with the truth.
 
     Args:
-        candidates: what is judged.
+        candidates: predictors to compare.
         captured: (lights, 3) the directions that they were built from.
-        captured_samples: those pictures, to look for ghost shadows between; None where only a subject is known.
-        truth: what is so.
+        captured_samples: pictures under these lights, to find ghost shadows between them; None if there is a subject
+            only.
+        truth: the true pictures.
         environments: light maps by name.
-        spots: whose reflectance maps are kept.
+        spots: sample points whose reflectance maps are kept.
         progress: called with candidates done and their total.
 
     Raises:
@@ -160,7 +161,7 @@ def evaluate_field(
     spots_lit_or_dark = find_shadow_transitions(captured_samples, truth, judged_lights) if captured_samples else []
     example: ShadowTransition | None = None
     candidate_scores = []
-    # The example of ghosts is the thesis's own method's; the others are shown beside it.
+    # The baseline method comes first, since it chooses the light of the ghost example.
     ordered = sorted(candidates, key=lambda candidate: candidate.name != BASELINE_METHOD)
     for done, candidate in enumerate(ordered):
         colors = candidate.pictures_at(truth.directions)
@@ -212,6 +213,6 @@ def relight_through_harmonics(truth: GroundTruth, light_map: LightMap) -> dict[i
 
 
 def pixel_positions(spots: Sequence[SamplePoint], truth: GroundTruth) -> NDArray[np.intp]:
-    """Place (spots,) of each spot among the truth's pixels inside."""
+    """Index (spots,) of each sample point among the truth's pixels inside the matte."""
     width = truth.samples.matte.shape[1]
     return np.searchsorted(truth.inside, [spot.y * width + spot.x for spot in spots])

@@ -1,8 +1,8 @@
-"""Ghost shadows (thesis 5.3): a shadow edge that interpolation shows twice, each at half strength.
+"""Ghost shadows (thesis 5.3): shadow edges that interpolation shows twice, each at half strength.
 
-Between a light that reaches a spot and one that does not, a mixture gives a mid-tone; in truth the spot is lit or in
-shadow. So spots are looked at that are lit under one of the captured lights round a direction and dark under another,
-and each picture's value is put on a scale from the darkest of those captures (0) to the brightest (1).
+Between a light that reaches a pixel and one that does not, interpolation gives a mid-tone; in truth the pixel is lit or
+in shadow. The measure considers pixels that are lit under one of the captured lights around a direction and dark under
+another. It puts predicted luminance on a scale from the darkest of these captures (0) to the brightest (1).
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, pixel_colors
 
 DARK_FRACTION = 0.15
-"""Dark under one captured light: at most this share of what the brightest of them gives."""
+"""A pixel is dark under a captured light at this share or less of its luminance under the brightest one."""
 BRIGHT_FRACTION = 0.5
-"""Lit: at least this share of the bright parts of the picture. So bright a spot faces the light within about 60°; where
-it is dark under a neighbouring light, that light does not graze it, but something stands before it."""
+"""A pixel is lit at this share or more of the picture's bright parts. It then faces the light within about 60°, so
+where it is dark under a neighboring light, it is occluded and not just grazed."""
 MID_TONE_RANGE = (0.15, 0.6)
-"""Above it lie spots that the light truly reaches, though aslant."""
+"""Positions on the scale that count as mid-tones. Higher ones occur in truth under slanted light."""
 HISTOGRAM_EDGES = np.linspace(-0.25, 1.25, 31)
 """Bins of the histograms."""
 
 
 @dataclass(frozen=True)
 class ShadowTransition:
-    """Spots that some of the captured lights round a direction reach and others do not.
+    """Pixels that some of the captured lights around a direction reach and others do not.
 
     Attributes:
         light: index of the truth light.
-        around: indices (up to 3,) of the captured lights round it, the nearest in weight first.
-        decided: (pixels,) which pixels inside the matte are such spots.
-        low, high: (decided pixels,) least and largest luminance under the lights around.
+        around: indices (up to 3,) of the captured lights around it, by falling weight.
+        decided: (pixels,) which pixels inside the matte are such pixels.
+        low, high: (decided pixels,) least and largest luminance under the lights around it.
     """
 
     light: int
@@ -46,11 +46,11 @@ class ShadowTransition:
     high: NDArray[np.float32]
 
     def scale(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Luminance (pixels,) of all pixels inside → its place from low 0 to high 1 at the decided ones."""
+        """Luminance (pixels,) of all pixels inside → position from low 0 to high 1 of the decided ones."""
         return np.asarray((values[self.decided] - self.low) / (self.high - self.low))
 
     def mid_tones(self, values: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Which pixels inside (pixels,) are such spots and show a mid-tone at luminance `values` (pixels,)."""
+        """Which pixels inside (pixels,) are decided and show a mid-tone at luminance `values` (pixels,)."""
         shown = np.zeros(len(self.decided), bool)
         scale = self.scale(values)
         shown[self.decided] = (scale > MID_TONE_RANGE[0]) & (scale < MID_TONE_RANGE[1])
@@ -58,7 +58,7 @@ class ShadowTransition:
 
 
 def find_shadow_transitions(samples: Samples, truth: GroundTruth, lights: NDArray[np.intp]) -> list[ShadowTransition]:
-    """For each truth light of these indices (inside the sampled region) the spots that lie between lit and dark."""
+    """Shadow transitions for the truth lights of these indices, which must lie inside the sampled region."""
     captured = luminance(pixel_colors(samples, truth.inside))
     weights = SphericalBarycentric().weights(samples.directions, truth.directions[lights])
     found = []
@@ -74,7 +74,7 @@ def find_shadow_transitions(samples: Samples, truth: GroundTruth, lights: NDArra
 
 
 def histogram(spots: list[ShadowTransition], colors: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Shares (30,) of all spots that colours (truth lights, pixels, 3) put into each bin of the scale."""
+    """Histogram (30,), as shares, of all decided pixels of colors (truth lights, pixels, 3) on the scale."""
     counts = np.zeros(len(HISTOGRAM_EDGES) - 1)
     for between in spots:
         scale = between.scale(luminance(colors[between.light]))
@@ -83,7 +83,7 @@ def histogram(spots: list[ShadowTransition], colors: NDArray[np.float32]) -> NDA
 
 
 def mid_tone_share(spots: list[ShadowTransition], colors: NDArray[np.float32]) -> float:
-    """Share of all spots at which colours (truth lights, pixels, 3) show a mid-tone; 0 if there are no spots."""
+    """Share of mid-tones among all decided pixels of colors (truth lights, pixels, 3); 0 if there are none."""
     total = sum(int(between.decided.sum()) for between in spots)
     mid = sum(int(between.mid_tones(luminance(colors[between.light])).sum()) for between in spots)
     return mid / max(total, 1)
@@ -92,7 +92,7 @@ def mid_tone_share(spots: list[ShadowTransition], colors: NDArray[np.float32]) -
 def ghost_pixels(
     between: ShadowTransition, colors: NDArray[np.float32], truth: NDArray[np.float32]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Pixels inside (pixels,) that colours (pixels, 3) show as mid-tones: those truly dark, and those truly lit."""
+    """Mid-tone pixels (pixels,) of colors (pixels, 3) that are dark in truth, and those that are lit in truth."""
     seen, known = between.mid_tones(luminance(colors)), between.scale(luminance(truth))
     dark, lit = np.zeros(len(seen), bool), np.zeros(len(seen), bool)
     dark[between.decided] = known <= MID_TONE_RANGE[0]
@@ -103,6 +103,6 @@ def ghost_pixels(
 def clearest_ghosts(
     spots: list[ShadowTransition], colors: NDArray[np.float32], truth: NDArray[np.float32]
 ) -> ShadowTransition | None:
-    """Where colours (truth lights, pixels, 3) show most ghosts, of dark and of lit spots; None if they show none."""
+    """The transition where colors (truth lights, pixels, 3) show most ghosts of both kinds; None if there are none."""
     counts = [min(int(part.sum()) for part in ghost_pixels(s, colors[s.light], truth[s.light])) for s in spots]
     return spots[int(np.argmax(counts))] if counts and max(counts) > 0 else None

@@ -1,4 +1,4 @@
-"""A reflectance field whose truth is known: one-light pictures from directions all round."""
+"""Ground truth of a reflectance field: one-light pictures from directions all around."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ SAME_DIRECTION_DEG = 0.1
 
 @dataclass(frozen=True)
 class GroundTruth:
-    """One-light pictures that a field is compared with, at their own directions.
+    """True one-light pictures at arbitrary directions.
 
-    Every texel of the 64 × 32 light map belongs to the truth light nearest to it, so that weights and light are shared
-    out among lights that lie anyhow. Lights at all texel centres, as in thesis 7, get their own texel each.
+    Every texel of the 64 × 32 light map is assigned to the nearest truth light, which gets its weight and its light.
+    Lights at all texel centers, as in thesis 7, get one texel each.
 
     Attributes:
         samples: the pictures.
@@ -80,7 +80,7 @@ class GroundTruth:
 
 
 def pixel_colors(samples: Samples, inside: NDArray[np.intp]) -> NDArray[np.float32]:
-    """The pictures' colours (lights, pixels, 3) at row-major indices `inside`."""
+    """The pictures' colors (lights, pixels, 3) at row-major indices `inside`."""
     return samples.pictures.reshape(len(samples.pictures), -1, 3)[:, inside]
 
 
@@ -100,13 +100,13 @@ def sampled_region(directions: NDArray[np.float64], queries: NDArray[np.float64]
 
 
 def not_captured(directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which unit vectors (count, 3) are none of the captured ones (lights, 3): (count,)."""
+    """Which unit vectors (count, 3) differ from all captured ones (lights, 3): (count,)."""
     nearest = (queries @ directions.T).max(axis=1)
     return np.asarray(nearest < np.cos(np.radians(SAME_DIRECTION_DEG)))
 
 
 def subsample_lights(samples: Samples, within_deg: float | None = None, every: int = 1) -> Samples:
-    """Every so many-th of the lights that are at most `within_deg` from the camera's axis, as a hand can hold a flash.
+    """Every N-th (`every`) of the lights that are at most `within_deg` from the camera's axis, in reach of a hand.
 
     Raises:
         LightsError: fewer than four are left.

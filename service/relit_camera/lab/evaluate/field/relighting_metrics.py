@@ -1,4 +1,4 @@
-"""Figures of a field against its truth (thesis 7)."""
+"""Error metrics of a reflectance field against its truth (thesis 7)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Colors = NDArray[np.float32]
 
 
 MAX_DB = 100.0
-"""PSNR of equal pictures, and of what differs by less: so that means stay finite."""
+"""Largest PSNR that is returned, also for equal pictures, so that means stay finite."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ class RelitComparison:
 
 
 def finite_psnr(picture: Colors, truth: Colors, matte: Mask | None = None, peak: float | None = None) -> float:
-    """PSNR in dB as `base.images.image_quality` defines it, `MAX_DB` at most; see there."""
+    """PSNR in dB as defined by `base.images.image_quality.psnr`, at most `MAX_DB`."""
     return min(psnr(picture, truth, matte, peak), MAX_DB)
 
 
 def squared_distances(colors: Colors, truth: Colors) -> NDArray[np.float64]:
-    """Σ over R, G, B of the squared difference of colours (lights, pixels, 3): (lights, pixels)."""
+    """Σ over R, G, B of the squared difference of colors (lights, pixels, 3): (lights, pixels)."""
     difference = np.asarray(colors, np.float64) - truth
     return np.asarray(np.einsum("lpc,lpc->lp", difference, difference))
 
@@ -74,7 +74,7 @@ def psnr_per_light(colors: Colors, truth: Colors, lights: NDArray[np.intp]) -> N
 def compare_under_environments(
     colors: Colors, truth: GroundTruth, environments: Mapping[str, LightMap]
 ) -> dict[str, RelitComparison]:
-    """The person under each environment, light that the truth has no pictures for left out of both."""
+    """Comparison under each environment; light from directions without true pictures is left out of both sides."""
     pictures = {}
     for name, light_map in environments.items():
         light = truth.irradiance(light_map)
@@ -85,8 +85,8 @@ def compare_under_environments(
 
 
 def compare_relit(truth: GroundTruth, seen: Colors, expected: Colors) -> RelitComparison:
-    """Colours (pixels, 3) of the pixels inside, as pictures with their figures."""
-    # Shown and judged alike: the brightest half percent of the truth is white.
+    """Colors (pixels, 3) of the pixels inside, as pictures with their figures."""
+    # Pictures and metrics use the same scale: the truth's 99.5th percentile is white.
     peak = float(np.percentile(expected, 99.5)) or 1.0
     shown = [uint8_from_linear(truth.picture(colors / np.float32(peak))) for colors in (seen, expected)]
     quality = finite_psnr(seen[:, None], expected[:, None])

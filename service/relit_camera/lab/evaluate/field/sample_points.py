@@ -1,4 +1,4 @@
-"""Spots of the person whose reflectance maps are shown."""
+"""Sample points: pixels of the person whose reflectance maps are shown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FACE_POINTS = {
     "temple": (139, 139, 0.0),
     "under the chin": (152, 17, 0.3),
 }
-"""Name → landmark a of mesh478, landmark b, and how far to go on from b through a, in their distance."""
+"""Name → landmarks a and b of mesh478, and a factor f; the point is a + f (a - b)."""
 _FALLBACK_POINTS = {
     "upper left": (0.3, 0.3),
     "upper right": (0.7, 0.3),
@@ -53,7 +53,7 @@ def face_sample_points(landmarks: Mapping[str, Points], matte: Mask) -> list[Sam
 
 
 def parse_sample_point(text: str, matte: Mask) -> SamplePoint:
-    """A spot from `NAME=X,Y`.
+    """Parse a sample point from `NAME=X,Y`.
 
     Raises:
         InputError: not in that form, or outside of the person.

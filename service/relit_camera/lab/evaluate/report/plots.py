@@ -30,9 +30,9 @@ _SERIES_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e
 _LINE_STYLES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
 """Each next one begins when the colors are used up."""
 _MARKED_POINTS = 80
-"""Lines of at most so many points show each point."""
+"""Largest number of points of a line at which each point is marked."""
 _LEGEND_COLUMN_FROM = 6
-"""From so many series on, the legend is a column beside the plot."""
+"""Number of series from which the legend is a column beside the plot."""
 _UNKNOWN_COLOR = "#56606e"
 """Where a heat map has no value."""
 _RASTER_DPI = 110

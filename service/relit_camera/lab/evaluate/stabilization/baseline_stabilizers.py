@@ -1,4 +1,4 @@
-"""The ways to follow a face that thesis 4.2 tried: each takes squares about it to rigid transforms."""
+"""Baseline stabilizers of thesis 4.2: each finds rigid transforms of a face in a sequence of face crops."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from relit_camera.capture.film.stabilization.corner_tracking import TRACKED_RADI
 
 GrayImages = NDArray[np.uint8]
 Stabilizer = Callable[[GrayImages, FaceCircle], "list[RigidTransform | None]"]
-"""Squares (count, side, side) and the face's circle in the first → the transform, about the square's centre, that takes
+"""Squares (count, side, side) and the face's circle in the first → the transform, about the square's center, that takes
 each to one of them; None where it is not found."""
 
 _TOLERANCE_PX = 1.5
 _GRID_PX = 6
 _TEMPLATE_PX, _SEARCHED_PX = 32, 12
-"""Side of the patches (the thesis tries 16 to 64), and how far they are looked for."""
+"""Side of the patches (the thesis tries 16 to 64), and the search distance."""
 
 
 def dense_flow(squares: GrayImages, circle: FaceCircle) -> list[RigidTransform | None]:
-    """Flow of all pixels from an anchor, the brightest: lit from in front (4.2.1; flow of Kroeger et al. 2016)."""
+    """Dense flow from the brightest frame, which is lit from the front (4.2.1; flow of Kroeger et al. 2016)."""
     anchor = squares[squares.mean(axis=(1, 2)).argmax()]
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     place = np.arange(0, len(anchor), _GRID_PX)
@@ -42,10 +42,10 @@ def dense_flow(squares: GrayImages, circle: FaceCircle) -> list[RigidTransform |
 
 
 def template_matching(squares: GrayImages, circle: FaceCircle) -> list[RigidTransform | None]:
-    """Patches about corners looked for from each picture to the next, whose light is alike (4.2.4)."""
+    """Patches around corners, matched from each frame to the next, whose light is similar (4.2.4)."""
     mask = np.zeros_like(squares[0])
-    centre, radius = (round(circle.x), round(circle.y)), round(circle.radius * TRACKED_RADIUS_SHARE)
-    cv2.circle(mask, centre, radius, 255, -1)
+    center, radius = (round(circle.x), round(circle.y)), round(circle.radius * TRACKED_RADIUS_SHARE)
+    cv2.circle(mask, center, radius, 255, -1)
     found = cv2.goodFeaturesToTrack(squares[0], 60, 0.01, _TEMPLATE_PX / 4, mask=mask)
     corners = np.zeros((0, 2), np.float32) if found is None else np.asarray(found[:, 0] + np.float32(0.5), np.float32)
     transforms: list[RigidTransform | None] = [RigidTransform()]
@@ -62,7 +62,7 @@ def template_matching(squares: GrayImages, circle: FaceCircle) -> list[RigidTran
 
 
 def sparse_flow(squares: GrayImages, circle: FaceCircle) -> list[RigidTransform | None]:
-    """Corners followed from each picture to the next by Lucas and Kanade's way (4.2.6)."""
+    """Corners tracked from each frame to the next by the Lucas-Kanade method (4.2.6)."""
     contrasts = [local_contrast(square.astype(np.float32) / 255) for square in squares]
     tracker = CornerTracker(contrasts[0], circle, from_reference=False)
     matches = [tracker.track(contrast) for contrast in contrasts]
@@ -79,7 +79,7 @@ BASELINE_STABILIZERS: Mapping[str, Stabilizer] = {
 def register_landmarks(landmarks: Sequence[Points], size: tuple[int, int]) -> list[RigidTransform | None]:
     """Landmarks (count, 2) of each frame, (0, 2) where there is no face, to the first ones seen (4.2.5).
 
-    The transforms are about the centre of a picture of `size`.
+    The transforms are about the center of a picture of `size`.
     """
     known = next((points for points in landmarks if len(points)), None)
     if known is None:
@@ -95,7 +95,7 @@ def _fit_transform(
 
 
 def _match_template(before: GrayImages, square: GrayImages, point: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Where the patch about a point (2,) is now, to a part of a pixel; NaN where it leaves the square."""
+    """Subpixel position (2,) in `square` of the patch around a point of `before`; NaN outside the square."""
     left, top = (int(value) for value in np.round(point - _TEMPLATE_PX / 2))
     reach = _TEMPLATE_PX + _SEARCHED_PX
     if min(left, top) < _SEARCHED_PX or max(left, top) + reach > len(square):
@@ -109,7 +109,7 @@ def _match_template(before: GrayImages, square: GrayImages, point: NDArray[np.fl
 
 
 def _subpixel_peak(values: NDArray[np.float32], place: int) -> float:
-    """Where a parabola through the highest of some values and its neighbours is highest."""
+    """Position of the vertex of a parabola through the highest value, at `place`, and its neighbors."""
     if not 0 < place < len(values) - 1:
         return float(place)
     before, here, after = (float(value) for value in values[place - 1 : place + 2])

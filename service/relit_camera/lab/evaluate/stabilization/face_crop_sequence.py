@@ -1,4 +1,4 @@
-"""What ways to follow a face are given of a capture's bright and dark frames: squares about it, and its landmarks."""
+"""Input of the stabilizers: crops around the face, and its landmarks, in a capture's bright and dark frames."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from relit_camera.face.face_state import Tracker
 from relit_camera.lab.evaluate.stabilization.baseline_stabilizers import GrayImages
 
 _CROP_RADII = 2.0
-"""Of the squares, in radii of the face: how far a head may go."""
+"""Half the side of the crops, in radii of the face; the head must stay inside."""
 _MAX_FACE_RADIUS_PX = 128.0
-"""A larger face is scaled down to this."""
+"""Largest radius of the face; larger faces are scaled down to it."""
 
 
 @dataclass(frozen=True, eq=False)
 class FaceCropSequence:
-    """The bright and dark frames of a capture.
+    """Crops of the bright and dark frames of a capture.
 
     Attributes:
         index: (count,) growing, of the frames.
-        bright: (count,) which of them are.
-        squares: (count, side, side) uint8 grey, all cut at the same place.
+        bright: (count,) which of them are bright; the others are dark.
+        squares: (count, side, side) uint8 gray crops, all at the same place.
         landmarks: of each frame's face, in the video's pixels; (0, 2) where there is none, and without a tracker.
-        window, circle: of the squares and of the face, in a picture so many times (`scale`) as large as the video's.
-        scale: see there.
+        window, circle: of the crops and of the face, in pixels of the scaled video.
+        scale: size of the scaled video relative to the video.
     """
 
     index: NDArray[np.intp]
@@ -52,7 +52,7 @@ class FaceCropSequence:
         return self.circle.moved(-self.window.left, -self.window.top)
 
     def in_video(self, transform: RigidTransform | None) -> RigidTransform | None:
-        """A transform about a square's centre as one about the centre of the video's picture."""
+        """A transform about a square's center as one about the center of the video's picture."""
         return transform and self.window.in_picture(transform).scaled(1 / self.scale)
 
 
@@ -65,8 +65,8 @@ def read_face_crops(
         path: the video.
         flashes: what its frames are.
         circle: of the face, in the video's pixels.
-        tracker: of landmarks; it sees every frame, as it is made to.
-        progress: called with the number of frames looked at.
+        tracker: of landmarks; it is run on every frame, in order.
+        progress: called with the number of frames read.
 
     Raises:
         VideoError: the video cannot be read.
@@ -81,11 +81,11 @@ def read_face_crops(
             state = tracker.track(frame) if tracker else None
             kind = flashes.frames[frame.index].kind
             if kind in (FrameClass.BRIGHT, FrameClass.DARK):
-                grey = cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY)
-                picture = cv2.resize(grey, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+                gray = cv2.cvtColor(frame.image, cv2.COLOR_RGB2GRAY)
+                picture = cv2.resize(gray, size, interpolation=cv2.INTER_AREA).astype(np.float32)
                 index.append(frame.index)
                 bright.append(kind is FrameClass.BRIGHT)
-                squares.append(np.clip(window.cut(picture, RigidTransform()), 0, 255).astype(np.uint8))
+                squares.append(np.clip(window.crop(picture, RigidTransform()), 0, 255).astype(np.uint8))
                 landmarks.append(state.landmarks if state else np.zeros((0, 2), np.float32))
             progress(frame.index + 1)
     return FaceCropSequence(np.array(index), np.array(bright), np.stack(squares), landmarks, window, small, scale)

@@ -1,6 +1,6 @@
-"""How well a face is followed through a rendered capture: the ways of thesis 4.2 beside ours, against the truth.
+"""Accuracy of face stabilization in a rendered capture: baselines of thesis 4.2 and our method against the truth.
 
-What ways to follow a face leave of its motion, as a report for people, as text and as JSON.
+Reports are written as HTML, text and JSON.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ _TRACKERS = ("mesh", "openseeface")
 
 @dataclass(frozen=True, eq=False)
 class StabilizationErrors:
-    """What a way to follow the face leaves of the head's motion in the bright frames.
+    """Errors of one stabilizer: the head motion that its transforms leave in the bright frames.
 
     Attributes:
         method: its name.
-        seen: the frames that it looks at. Between dark ones their transforms are interpolated by time.
+        seen: the frames that it uses. Between dark ones the transforms are interpolated by time.
         rotation_deg: (bright,) found minus true, mean taken out: which frame is the reference does not matter.
         translation_px: (bright, 2) the same.
         lost: frames in which it found no face; they keep the last transform.
@@ -63,7 +63,7 @@ class StabilizationErrors:
 
 @dataclass(frozen=True, eq=False)
 class StabilizationReport:
-    """All ways on one video.
+    """Errors of all stabilizers on one video.
 
     Attributes:
         index: (bright,) of the frames that are compared.
@@ -79,7 +79,7 @@ class StabilizationReport:
 def compare_stabilization(
     video: Path, truth: Path, progress: Callable[[str, int], None] = lambda what, frames: None
 ) -> StabilizationReport:
-    """Follow the face in every way, and compare the transforms of the bright frames with the truth.
+    """Run every stabilizer, and compare the transforms of the bright frames with the truth.
 
     Args:
         video: a rendered capture.
@@ -111,7 +111,7 @@ def compare_stabilization(
             times_s = flashes.times_s[film.index[chosen]]
             every = interpolate_transforms(flashes.times_s[bright], times_s, _fill_forward(found))
             errors.append(_errors_against_truth(method, kind, every, true_rows, found.count(None)))
-    ours = stabilize_film(video, flashes, circle, progress=partial(progress, "Stabilising"))
+    ours = stabilize_film(video, flashes, circle, progress=partial(progress, "Stabilizing"))
     every = [ours.transforms[index] for index in bright]
     errors.append(_errors_against_truth(OUR_METHOD, "both", every, true_rows, len(ours.lost)))
     return StabilizationReport(bright, errors, left_out)
@@ -128,7 +128,7 @@ def _stabilize_with(
 
 
 def _fill_forward(transforms: Sequence[RigidTransform | None]) -> list[RigidTransform]:
-    """Transforms, those missing filled with the last one before; with none at the beginning."""
+    """Transforms with missing ones replaced by the last known one, or by the identity at the beginning."""
     filled: list[RigidTransform] = []
     for transform in transforms:
         filled.append(transform or (filled[-1] if filled else RigidTransform()))
@@ -144,7 +144,7 @@ def _errors_against_truth(
 
 
 def _open_landmark_tracker() -> tuple[Tracker | None, dict[str, str]]:
-    """The best tracker of landmarks that is installed; or none, and why."""
+    """The best installed landmark tracker; or None, and the reason by method name."""
     why = ""
     for name in _TRACKERS:
         try:
@@ -182,16 +182,16 @@ def stabilization_page(report: StabilizationReport, title: str) -> str:
 
 def _blocks(report: StabilizationReport) -> Iterator[Block]:
     yield Paragraph(
-        f"A capture was rendered, so that the head's motion is known. In its {len(report.index)} bright frames, what "
-        "is left of it after the transform that each way finds. Ways that look at the bright frames see another light "
-        "in each; those that look at the dark ones see one light, and interpolate by time. The thesis's choice is "
-        "sparse flow through the dark frames."
+        f"A capture was rendered, so that the head's motion is known. The errors are the motion that the transforms of "
+        f"each method leave in its {len(report.index)} bright frames. Methods that use the bright frames see a "
+        "different light in each; those that use the dark ones see one light, and interpolate by time. The thesis "
+        "chooses sparse flow through the dark frames."
     )
     rows = [[_method_label(each), *_figures(each).values()] for each in report.errors]
     yield table(
-        ["way", "translation RMS, px", "largest", "rotation RMS, degrees", "largest", "frames lost"],
+        ["method", "translation RMS, px", "largest", "rotation RMS, degrees", "largest", "frames lost"],
         rows,
-        "Smaller is better. A constant is taken out: which frame the others are taken to does not matter.",
+        "Smaller is better. The mean is removed, so that the choice of the reference frame does not matter.",
         digits=3,
         better="smaller",
     )

@@ -1,4 +1,4 @@
-"""How a head moves in a video, read from any of the files that tell it: a track, a replay's report, a truth."""
+"""Head motion in a video, read from a track, a replay's report or a truth.json, and its error."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class HeadMotion:
 
 @dataclass(frozen=True)
 class PoseError:
-    """A measured pose against the true one, a constant offset taken out: neutral is what each calls so.
+    """Error of a measured head pose, without the constant offset, since the neutral pose is a convention.
 
     Attributes:
         frames: that both have.
@@ -73,7 +73,7 @@ def read_head_motion(path: Path) -> HeadMotion:
     """
     cure = "give a track, a replay's report, or a truth.json, whose frames have a pose"
     document = read_json_record(path, _MotionFile, cure, TrackError)
-    # A truth knows a pose where nobody can see it.
+    # A truth.json has poses for frames in which the face is not visible, too.
     frames = [frame if frame.found else _Frame() for frame in document.frames]
     poses = [frame.pose or frame.pose_deg for frame in frames]
     angles = [(pose.yaw, pose.pitch, pose.roll) if pose else (np.nan,) * 3 for pose in poses]
@@ -117,7 +117,7 @@ def pose_error(measured: HeadMotion, truth: HeadMotion) -> PoseError:
 def second_difference_rms(values: NDArray[np.float64]) -> float:
     """RMS over frames of x[t+1] − 2 x[t] + x[t−1] of values (frames, ...), NaN left out; NaN for under three frames.
 
-    Steady motion has none; what is left is acceleration, and jitter, which has most of it.
+    It is zero for uniform motion, small for acceleration and large for jitter.
     """
     second = np.diff(values, 2, axis=0)
     known = second[np.isfinite(second)]

@@ -1,7 +1,4 @@
-"""A relit video against the ground-truth relit video of the same motion.
-
-A relit video's evaluation as a report for people, as text and as JSON.
-"""
+"""Accuracy of a relit video against the ground-truth relit video of the same motion; reports as HTML, text, JSON."""
 
 from __future__ import annotations
 
@@ -29,16 +26,16 @@ from relit_camera.lab.evaluate.video.head_motion_error import HeadMotion, PoseEr
 SHADING_BLUR_SIGMA = 0.04
 """Sigma of the blur, as a share of the picture's width, after which light is compared and features hardly are."""
 REPORT_FRAMES = 6
-"""Frames shown in the report, about so many."""
+"""Approximate number of frames shown in the report."""
 _NO_PERSON = (np.nan,) * 6
-"""The figures of a frame with nobody in it."""
+"""The figures of a frame without a person."""
 
 
 @dataclass(frozen=True)
 class LightConsistency:
-    """How the light in a relit video follows the truth, frame by frame; PSNR inside the matte, in linear light.
+    """Comparison of a relit video's light with the truth, by frame; PSNR inside the matte, in linear light.
 
-    Frames whose matte is empty, nobody being there, have NaN.
+    Frames with an empty matte have NaN.
 
     Attributes:
         psnr_db: (frames,) as it is.
@@ -64,7 +61,7 @@ class LightConsistency:
 
     @property
     def true_flicker(self) -> float:
-        """The same of the truth: what the motion itself brings."""
+        """RMS second difference of the truth's brightness, as a share of its mean: the part due to the motion."""
         return _flicker(self.true_brightness)
 
 
@@ -74,8 +71,8 @@ def compare_videos(
     """Compare two videos of the same frames, both shown through the project's display curve.
 
     Args:
-        relit: what was made.
-        truth: what is so.
+        relit: the video to judge.
+        truth: the ground-truth video.
         matte: a video whose pixels brighter than half are the person; without one the whole frame counts.
         progress: called with the frames done.
 
@@ -138,7 +135,7 @@ def _least_squares_gain(seen: NDArray[np.float32], known: NDArray[np.float32]) -
 
 
 def _blurred(picture: LinearImage, mask: NDArray[np.float32]) -> LinearImage:
-    """A mean over the surroundings that lie inside the mask."""
+    """Gaussian blur of a picture within a mask."""
     sigma = SHADING_BLUR_SIGMA * picture.shape[1]
     weight = cv2.GaussianBlur(mask, (0, 0), sigma)
     blurred = cv2.GaussianBlur(picture * mask[..., None], (0, 0), sigma)
@@ -150,7 +147,7 @@ ANGLES = ("yaw", "pitch", "roll")
 
 @dataclass(frozen=True)
 class VideoReport:
-    """What is known of a relit video.
+    """Result of a relit video's evaluation.
 
     Attributes:
         light: against the truth.
@@ -173,7 +170,7 @@ class VideoReport:
 
 
 def video_json(report: VideoReport) -> dict[str, object]:
-    """The figures; `null` for what was not given, and for what the frames are too few to tell."""
+    """The figures for JSON; None for what was not given, and for what too few frames cannot tell."""
     light, pose = report.light, report.pose
     return {
         "frames": len(light.psnr_db),
@@ -304,7 +301,7 @@ def _pose(report: VideoReport) -> Iterator[Block]:
 
 
 def _landmark_jitter(motion: HeadMotion | None) -> float | None:
-    """Of both coordinates together, pixels; None where there are no landmarks."""
+    """RMS second difference of landmark positions, pixels; None where there are no landmarks."""
     if motion is None or not motion.landmarks.shape[1]:
         return None
     return second_difference_rms(motion.landmarks) * float(np.sqrt(2))

@@ -1,0 +1,48 @@
+"""Material is made once in a test run."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from tests.made_once import FOLDER_VARIABLE, made_once, run_folder
+
+
+@pytest.fixture(autouse=True)
+def own_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+
+
+def test_who_asks_at_the_same_time_waits_for_the_one_that_is_made() -> None:
+    made, found = list[Path](), list[Path]()
+    started = threading.Barrier(3)
+
+    def make(path: Path) -> None:
+        made.append(path)
+        path.mkdir()
+        (path / "inside.txt").write_text("whole")
+
+    def ask() -> None:
+        started.wait(10)
+        found.append(made_once("some folder", make))
+
+    threads = [threading.Thread(target=ask) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(10)
+    assert len(made) == 1
+    assert found == [run_folder() / "some folder"] * 3
+    assert (found[0] / "inside.txt").read_text() == "whole"
+
+
+def test_what_failed_half_way_is_made_anew() -> None:
+    def fail(path: Path) -> None:
+        path.write_text("half")
+        raise OSError("no more space")
+
+    with pytest.raises(OSError, match="no more space"):
+        made_once("file.txt", fail)
+    assert made_once("file.txt", lambda path: path.write_text("whole")).read_text() == "whole"
