@@ -10,7 +10,7 @@ from platformdirs import user_data_path
 
 from relit_camera.base.errors import InputError, PanoramaError
 from relit_camera.base.images.image_files import encode_display, write_linear
-from relit_camera.base.named_files import FileVersion, NamedFiles, file_version
+from relit_camera.base.storage.named_files import FileVersion, NamedFiles, file_version
 from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_camera.light.environment_panorama import (
     PANORAMA_SUFFIXES,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.named_files import NamedFiles
+from relit_camera.base.storage.named_files import NamedFiles
 from relit_camera.subject.subject import Subject, SubjectMetadata
 from relit_camera.subject.subject_file import SUFFIX, read_metadata, read_neutral, read_subject
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from relit_camera.base.named_files import NAME_PATTERN, require_portable_name
+from relit_camera.base.storage.named_files import NAME_PATTERN, require_portable_name
 
 ColorChannel = Annotated[float, Field(ge=0, le=100)]
 LinearRgb = tuple[ColorChannel, ColorChannel, ColorChannel]

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from relit_camera.base.config.look import Look
 from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml
 from relit_camera.base.errors import InputError
-from relit_camera.base.named_files import NamedFiles
+from relit_camera.base.storage.named_files import NamedFiles
 
 PRESET_SUFFIX = ".yaml"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from relit_camera.base.images.image_files import LDR_SUFFIXES, decode_display, encode_display, read_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.images.resize import shrink
-from relit_camera.base.named_files import NamedFiles
+from relit_camera.base.storage.named_files import NamedFiles
 
 MAX_SIDE_PX = 3840
 """A stored picture is scaled down to this: no output is larger."""

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from relit_camera.base.errors import InputError, NotFoundError, StorageError
-from relit_camera.base.named_files import NamedFiles, file_version, is_valid_name
+from relit_camera.base.storage.named_files import NamedFiles, file_version, is_valid_name
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from relit_camera.base.errors import InputError, NotFoundError, StorageError
-from relit_camera.base.storage import atomic_path, make_folder
+from relit_camera.base.storage.atomic_files import atomic_path, make_folder
 
 NAME_PATTERN = r"^[A-Za-z0-9]([A-Za-z0-9 _.-]{0,62}[A-Za-z0-9_-])?$"
 """What names are made of: letters, digits, space, dot, dash and underscore; a letter or digit first, and no dot or
