@@ -17,7 +17,7 @@ from relit_camera.base.config.settings import RelitSettings, TrackerSettings
 from relit_camera.base.images.contact_sheet import contact_sheet
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.live.scene.scene_controller import SceneController
 
 ENVIRONMENTS = ("studio", "window", "sunset", "night-street", "party", "overcast")

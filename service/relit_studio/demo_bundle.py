@@ -12,7 +12,7 @@ import cv2
 from relit_camera.app.demo import demo_files
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.image_types import Mask
-from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.capture.picture_import import import_samples
 from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD
 from relit_camera.capture.subject_builder import build_subject

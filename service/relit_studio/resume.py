@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from relit_camera.base.errors import InputError
-from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 
 
 def keep_settings(folder: Path, name: str, settings: Mapping[str, object]) -> None:

@@ -13,7 +13,7 @@ from relit_camera.base.images.image_files import encode_display, read_display
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.rotations import Angles
-from relit_camera.base.storage import write_atomic
+from relit_camera.base.storage.atomic_files import write_atomic
 from tests.replay.case import Case, CaseError, Colours, Pictures, Pose
 from tests.replay.play import Played
 

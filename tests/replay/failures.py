@@ -10,7 +10,7 @@ from pathlib import Path
 from relit_camera.base.images.contact_sheet import contact_sheet
 from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage import write_atomic
+from relit_camera.base.storage.atomic_files import write_atomic
 from tests.replay.case import Case
 from tests.replay.expectations import expected_picture
 from tests.replay.materials import ROOT

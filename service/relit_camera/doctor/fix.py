@@ -16,7 +16,7 @@ from platformdirs import user_config_path
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import StorageError
 from relit_camera.base.models.model_store import models_folder
-from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.doctor.camera_access import AccessCheck, groups_to_join
 from relit_camera.doctor.host import Host
 from relit_camera.doctor.kernel_module import needs_module, root_commands

@@ -15,7 +15,7 @@ from safetensors import SafetensorError, safe_open
 
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage import write_tensors
+from relit_camera.base.storage.atomic_files import write_tensors
 from relit_camera.subject.compression.local_basis import LocalBasis, global_basis
 from relit_camera.subject.compression.webp_packing import decode_basis, encode_basis
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata

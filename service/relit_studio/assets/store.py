@@ -10,7 +10,7 @@ import platformdirs
 
 from relit_camera.base.errors import NotFoundError
 from relit_camera.base.models.model_download import sha256_of
-from relit_camera.base.storage import atomic_path, make_folder, storage_error
+from relit_camera.base.storage.atomic_files import atomic_path, make_folder, storage_error
 from relit_studio.assets.manifest import AssetFile, manifest
 
 _TIMEOUT_S = 30.0

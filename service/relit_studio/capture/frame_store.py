@@ -11,7 +11,7 @@ from typing import Any
 
 from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_studio.camera_simulation import Gains
 
 

@@ -10,7 +10,7 @@ import av
 import numpy as np
 
 from relit_camera.base.images.image_types import DisplayImage, check_image
-from relit_camera.base.storage import atomic_path, storage_error
+from relit_camera.base.storage.atomic_files import atomic_path, storage_error
 from relit_camera.base.video.video_writer import rational_rate
 
 

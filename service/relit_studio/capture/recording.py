@@ -10,7 +10,7 @@ import numpy as np
 from relit_camera.base.images.contact_sheet import contact_sheet
 from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_studio.camera_simulation import Gains
 from relit_studio.capture.capture_scene import Scene

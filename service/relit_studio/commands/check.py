@@ -12,7 +12,7 @@ from rich.table import Table
 from relit_camera.base.images.image_files import read_display
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.rotations import Angles
-from relit_camera.base.storage import write_atomic
+from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.cli.arguments import parse_numbers
 from relit_camera.face.tracking.face_detector import FaceDetector
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker

@@ -9,7 +9,7 @@ import typer
 
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.rotations import Angles
-from relit_camera.base.storage import atomic_path
+from relit_camera.base.storage.atomic_files import atomic_path
 from relit_studio.camera import Camera
 from relit_studio.commands.options import (
     Environment,

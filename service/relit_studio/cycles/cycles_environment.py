@@ -11,7 +11,7 @@ from pathlib import Path
 from filelock import FileLock
 
 from relit_camera.base.errors import DeviceError
-from relit_camera.base.storage import make_folder
+from relit_camera.base.storage.atomic_files import make_folder
 from relit_studio.assets.store import cache_folder
 
 BPY = "4.5.15"

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.storage import atomic_path, make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import atomic_path, make_folder, write_atomic
 from relit_studio.camera import Camera
 
 JOB_FILE = "job.json"

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_files import write_display
-from relit_camera.base.storage import make_folder
+from relit_camera.base.storage.atomic_files import make_folder
 from relit_studio.assets.store import cache_folder
 from relit_studio.cycles.accessory_objects import extra_materials, extra_objects, extra_shape
 from relit_studio.cycles.job import Material, Mesh, Scene, Shape, Strands

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask
-from relit_camera.base.storage import write_atomic
+from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.face.tracking.track_recording import TrackRecorder
 from relit_studio.assets.manifest import manifest

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from relit_camera.base.storage import make_folder
+from relit_camera.base.storage.atomic_files import make_folder
 from relit_studio.camera import Camera
 from relit_studio.cycles.job import Picture, Quality
 from relit_studio.cycles.runner import render

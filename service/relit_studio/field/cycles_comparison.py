@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.base.storage import write_atomic
+from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.light.directions import texel_directions
 from relit_studio.camera import Camera
 from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene

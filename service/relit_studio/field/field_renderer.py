@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_files import write_display
-from relit_camera.base.storage import atomic_path, write_atomic
+from relit_camera.base.storage.atomic_files import atomic_path, write_atomic
 from relit_camera.light.directions import fibonacci_directions
 from relit_studio.assets.manifest import manifest
 from relit_studio.camera import Camera

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from relit_camera.base.images.image_files import write_display, write_linear
 from relit_camera.base.images.image_types import LinearImage, Mask
-from relit_camera.base.storage import atomic_path, write_atomic
+from relit_camera.base.storage.atomic_files import atomic_path, write_atomic
 from relit_camera.light.directions import texel_directions
 from relit_studio.field.solver_gloss import gloss_albedo, glossy
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces

@@ -28,7 +28,7 @@ from relit_camera.base.errors import RelitError, StorageError
 from relit_camera.base.images.contact_sheet import contact_sheet
 from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage import make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_studio.mannequin.distant_lights import room

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from relit_camera.base.images.image_files import write_display, write_linear
-from relit_camera.base.storage import write_atomic
+from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.light.directions import texel_directions
 from relit_studio.mannequin.figure import Posture
 from relit_studio.mannequin.mannequin_camera import Camera

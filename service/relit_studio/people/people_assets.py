@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage import atomic_path, make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import atomic_path, make_folder, write_atomic
 from relit_studio.assets.store import asset, cache_folder
 from relit_studio.people.face_model import FaceModel, read_face_model
 from relit_studio.people.geometry import Floats, Indices

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from relit_camera.base.errors import StorageError
-from relit_camera.base.storage import atomic_path, remove_unfinished_files, write_atomic
+from relit_camera.base.storage.atomic_files import atomic_path, remove_unfinished_files, write_atomic
 
 WRITER = """
 import sys, time

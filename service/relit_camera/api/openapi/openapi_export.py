@@ -8,7 +8,7 @@ from pathlib import Path
 
 from relit_camera.api.app import create_app_without_camera
 from relit_camera.base.errors import RelitError
-from relit_camera.base.storage import write_atomic
+from relit_camera.base.storage.atomic_files import write_atomic
 
 DEFAULT_PATH = Path("docs/openapi.json")
 

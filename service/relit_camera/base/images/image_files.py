@@ -21,7 +21,7 @@ from relit_camera.base.images.image_limits import (
     require_readable_size,
 )
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
-from relit_camera.base.storage import atomic_path, write_atomic
+from relit_camera.base.storage.atomic_files import atomic_path, write_atomic
 
 LDR_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff"})
 

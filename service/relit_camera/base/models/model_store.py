@@ -20,7 +20,7 @@ from filelock import FileLock, Timeout
 from relit_camera.base.errors import ModelError, NotFoundError, StorageError
 from relit_camera.base.models import model_download
 from relit_camera.base.models.model_manifest import Manifest, PublicModel, public_manifest
-from relit_camera.base.storage import write_atomic
+from relit_camera.base.storage.atomic_files import write_atomic
 
 FOLDER_VARIABLE = "RELIT_MODELS_DIR"
 _LOCK_TIMEOUT_S = 300.0

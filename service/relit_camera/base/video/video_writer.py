@@ -14,7 +14,7 @@ from av.video.reformatter import ColorRange, VideoReformatter
 
 from relit_camera.base.errors import ImageError, StorageError, VideoError
 from relit_camera.base.images.image_types import DisplayImage, check_image
-from relit_camera.base.storage import atomic_path, storage_error
+from relit_camera.base.storage.atomic_files import atomic_path, storage_error
 from relit_camera.base.video.video_decoding import ACCURATE_INTERPOLATION, BT709, MAX_SIDE, MIN_SIDE
 
 VIDEO_SUFFIXES = frozenset({".mp4", ".mkv", ".mov"})

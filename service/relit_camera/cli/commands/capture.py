@@ -141,7 +141,7 @@ def build(
     from functools import partial
 
     from relit_camera.base.images.color import parse_gamma
-    from relit_camera.base.storage import atomic_path
+    from relit_camera.base.storage.atomic_files import atomic_path
     from relit_camera.capture.film.ball.sphere_projection import BallOutline
     from relit_camera.capture.film.face_circle import FaceCircle
     from relit_camera.capture.film.pipeline.capture_options import CaptureOptions

@@ -153,7 +153,7 @@ def _advance(progress: Progress, task: TaskID, done: int, total: int) -> None:
 @contextmanager
 def _report_file(out: Path | None) -> Iterator[Path | None]:
     """Open the report's file before the work, so that a report that cannot be made or written fails at once."""
-    from relit_camera.base.storage import atomic_path
+    from relit_camera.base.storage.atomic_files import atomic_path
     from relit_camera.lab.evaluate.report.html_page import require_report_packages
 
     if out:

@@ -39,7 +39,7 @@ def replay(
     from relit_camera.base.images.contact_sheet import contact_sheet as draw_sheet
     from relit_camera.base.images.image_files import encode_display
     from relit_camera.base.images.image_types import DisplayImage
-    from relit_camera.base.storage import atomic_path
+    from relit_camera.base.storage.atomic_files import atomic_path
     from relit_camera.base.threads import limit_threads
     from relit_camera.base.video.video_readers import probe_video
     from relit_camera.cli.arguments import load_command_settings, parse_background, parse_lighting, parse_mode

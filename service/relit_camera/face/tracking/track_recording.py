@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from relit_camera.base.errors import NotFoundError, TrackError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.rotations import angles_from_rotation, rotation_from_angles
-from relit_camera.base.storage import write_atomic
+from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.head_pose import HeadPose, guess_focal
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme

@@ -19,7 +19,7 @@ from relit_camera.base.images.image_types import DisplayImage, Frame, Mask
 from relit_camera.base.images.resize import resize_to_fill
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
-from relit_camera.base.storage import atomic_path
+from relit_camera.base.storage.atomic_files import atomic_path
 
 LANDSCAPE_MODEL = "selfie_landscape"
 SQUARE_MODEL = "selfie_square"

@@ -22,7 +22,7 @@ from safetensors import SafetensorError, safe_open
 from relit_camera import __version__
 from relit_camera.base.errors import InputError, StorageError
 from relit_camera.base.models.model_store import ModelState, ModelStore
-from relit_camera.base.storage import make_folder, storage_error, write_tensors
+from relit_camera.base.storage.atomic_files import make_folder, storage_error, write_tensors
 from relit_camera.base.video.video_decoding import open_stream
 from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
 from relit_camera.capture.reflectance.samples import Samples
