@@ -9,24 +9,24 @@ from relit_camera.base.errors import ModelError
 from relit_camera.face.tracking.face_detector import FaceDetector, intersection_over_union, is_same_face
 
 
-def test_overlap_is_intersection_over_union():
+def test_overlap_is_intersection_over_union() -> None:
     assert intersection_over_union((0, 0, 10, 10), (0, 0, 10, 10)) == 1
     assert intersection_over_union((0, 0, 10, 10), (5, 0, 10, 10)) == pytest.approx(1 / 3)
     assert intersection_over_union((0, 0, 10, 10), (20, 0, 10, 10)) == 0
     assert intersection_over_union((0, 0, 0, 0), (0, 0, 0, 0)) == 0
 
 
-def test_a_face_that_moved_a_little_is_the_same():
+def test_a_face_that_moved_a_little_is_the_same() -> None:
     assert is_same_face((0, 0, 10, 10), (3, 3, 11, 11))
     assert not is_same_face((0, 0, 10, 10), (9, 9, 10, 10))
 
 
-def test_a_missing_model_names_its_cure(tmp_path: Path):
+def test_a_missing_model_names_its_cure(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="relit models pull"):
         FaceDetector(tmp_path / "none.onnx")
 
 
-def test_a_damaged_model_names_its_cure(tmp_path: Path):
+def test_a_damaged_model_names_its_cure(tmp_path: Path) -> None:
     broken = tmp_path / "broken.onnx"
     broken.write_bytes(b"no model at all")
     with pytest.raises(ModelError, match=r"broken\.onnx is damaged"):
@@ -34,12 +34,12 @@ def test_a_damaged_model_names_its_cure(tmp_path: Path):
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 500), (500, 3), (64, 48)])
-def test_pictures_of_any_size_are_searched(face_models: Path, size: tuple[int, int]):
+def test_pictures_of_any_size_are_searched(face_models: Path, size: tuple[int, int]) -> None:
     detector = FaceDetector(face_models / "face_detector_yunet.onnx")
     assert detector.detect(np.full((size[1], size[0], 3), 90, np.uint8)) is None
 
 
-def test_the_face_near_the_last_one_is_preferred_to_the_larger(face_models: Path, portrait: np.ndarray):
+def test_the_face_near_the_last_one_is_preferred_to_the_larger(face_models: Path, portrait: np.ndarray) -> None:
     height, width = portrait.shape[:2]
     small = portrait[::2, ::2]
     both = np.zeros((height, width + small.shape[1], 3), np.uint8)

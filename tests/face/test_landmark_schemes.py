@@ -28,13 +28,13 @@ def mirror(scheme: LandmarkScheme, indices: tuple[int, ...]) -> list[int]:
     return distances.argmin(axis=1).tolist()
 
 
-def test_counts():
+def test_counts() -> None:
     assert landmark_scheme("mesh478").count == 478
     assert landmark_scheme("openseeface66").count == 66
     assert len(set(VERTICES_66)) == 66
 
 
-def test_the_mesh_is_the_canonical_face_and_two_irises():
+def test_the_mesh_is_the_canonical_face_and_two_irises() -> None:
     scheme = landmark_scheme("mesh478")
     np.testing.assert_array_equal(scheme.canonical[:468], canonical_face().vertices)
     for eye in (scheme.right_eye, scheme.left_eye):
@@ -46,7 +46,7 @@ def test_the_mesh_is_the_canonical_face_and_two_irises():
         assert np.linalg.norm(right - left) == pytest.approx(1.17)  # 11.7 mm
 
 
-def test_left_mirrors_right(scheme: LandmarkScheme):
+def test_left_mirrors_right(scheme: LandmarkScheme) -> None:
     right, left = scheme.right_eye, scheme.left_eye
     assert mirror(scheme, (right.outer, right.inner)) == [left.outer, left.inner]
     assert mirror(scheme, right.lids) == list(left.lids)
@@ -59,7 +59,7 @@ def test_left_mirrors_right(scheme: LandmarkScheme):
     assert set(mirror(scheme, scheme.oval)) == set(scheme.oval)
 
 
-def test_parts_are_where_they_belong(scheme: LandmarkScheme):
+def test_parts_are_where_they_belong(scheme: LandmarkScheme) -> None:
     points = scheme.canonical
     assert points[scheme.right_eye.outer, 0] < points[scheme.right_eye.inner, 0] < 0
     assert points[list(scheme.right_brow), 1].min() > points[list(scheme.right_eye.lids), 1].max()
@@ -68,7 +68,7 @@ def test_parts_are_where_they_belong(scheme: LandmarkScheme):
         assert (points[list(upper), 1] > points[list(lower), 1]).all()
 
 
-def test_the_oval_runs_clockwise_around_the_lips_and_eyes(scheme: LandmarkScheme):
+def test_the_oval_runs_clockwise_around_the_lips_and_eyes(scheme: LandmarkScheme) -> None:
     outline = front_view(scheme)[list(scheme.oval)]
     x, y = outline[:, 0], outline[:, 1]
     area = (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2
@@ -78,7 +78,7 @@ def test_the_oval_runs_clockwise_around_the_lips_and_eyes(scheme: LandmarkScheme
     assert (inside.max(axis=0) < outline.max(axis=0)).all()
 
 
-def test_openings_measure_the_gap(scheme: LandmarkScheme):
+def test_openings_measure_the_gap(scheme: LandmarkScheme) -> None:
     landmarks = front_view(scheme)
     right, left = scheme.eyes_opening(landmarks)
     assert right == pytest.approx(left, rel=1e-4)
@@ -92,24 +92,24 @@ def test_openings_measure_the_gap(scheme: LandmarkScheme):
     assert scheme.mouth_opening(opened) == pytest.approx(0.4, rel=1e-4)
 
 
-def test_openings_do_not_depend_on_the_size_of_the_picture(scheme: LandmarkScheme):
+def test_openings_do_not_depend_on_the_size_of_the_picture(scheme: LandmarkScheme) -> None:
     small, large = front_view(scheme, 2.0), front_view(scheme, 40.0)
     assert scheme.mouth_opening(small) == pytest.approx(scheme.mouth_opening(large), rel=1e-3)
     assert scheme.eyes_opening(small) == pytest.approx(scheme.eyes_opening(large), rel=1e-3)
 
 
-def test_points_in_one_place_have_no_opening(scheme: LandmarkScheme):
+def test_points_in_one_place_have_no_opening(scheme: LandmarkScheme) -> None:
     nothing = np.zeros((scheme.count, 2), np.float32)
     assert scheme.mouth_opening(nothing) == 0
     assert scheme.eyes_opening(nothing) == (0, 0)
 
 
-def test_eye_centres_are_right_then_left(scheme: LandmarkScheme):
+def test_eye_centres_are_right_then_left(scheme: LandmarkScheme) -> None:
     right, left = scheme.eye_centers(front_view(scheme))
     assert right[0] < left[0]
     assert right[1] == pytest.approx(left[1])
 
 
-def test_an_unknown_scheme_is_named():
+def test_an_unknown_scheme_is_named() -> None:
     with pytest.raises(NotFoundError, match=r"'ibug68'.*mesh478"):
         landmark_scheme("ibug68")
