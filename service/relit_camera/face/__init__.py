@@ -1,1 +1,1 @@
-"""Frame → face state: detector, landmarks, head pose, smoothing. Trackers stand behind one interface."""
+"""Faces: tracking in frames, landmarks and head pose, and smooth motion relative to a neutral face."""

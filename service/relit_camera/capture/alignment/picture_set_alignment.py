@@ -54,8 +54,8 @@ class AlignmentTunables:
         min_lit_pixels: fewer such pixels give no gain.
         max_shift_share: largest shift as a share of the longer side; someone who keeps still moves less.
         min_side_px: in smaller pictures motion cannot be measured.
-        min_improvement: share of the misfit that alignment must remove. It removes 8 to 75 % from photographed sets and 2 % at
-            most from rendered ones, which need none: there it takes shading for motion.
+        min_improvement: share of the misfit that alignment must remove. It removes 8 to 75 % from photographed sets,
+            2 % at most from rendered ones, which need none: there it takes shading for motion.
         judged_min_z: z of the lights by which that is judged: shading within 75° of the camera is predicted well.
     """
 

@@ -1,0 +1,1 @@
+"""Trackers: face detector, landmark networks, the tracking loop, and recorded tracks."""
