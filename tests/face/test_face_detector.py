@@ -9,14 +9,14 @@ from relit_camera.base.errors import ModelError
 from relit_camera.face.tracking.face_detector import FaceDetector, intersection_over_union, is_same_face
 
 
-def test_overlap_is_intersection_over_union():
+def test_overlap_is_intersection_over_union() -> None:
     assert intersection_over_union((0, 0, 10, 10), (0, 0, 10, 10)) == 1
     assert intersection_over_union((0, 0, 10, 10), (5, 0, 10, 10)) == pytest.approx(1 / 3)
     assert intersection_over_union((0, 0, 10, 10), (20, 0, 10, 10)) == 0
     assert intersection_over_union((0, 0, 0, 0), (0, 0, 0, 0)) == 0
 
 
-def test_a_face_that_moved_a_little_is_the_same():
+def test_a_face_that_moved_a_little_is_the_same() -> None:
     assert is_same_face((0, 0, 10, 10), (3, 3, 11, 11))
     assert not is_same_face((0, 0, 10, 10), (9, 9, 10, 10))
 

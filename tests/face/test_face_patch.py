@@ -29,17 +29,17 @@ def test_a_jump_or_another_picture_is_a_cut(change: dict[str, float]):
     assert not FacePatch(scene(), POINTS).matches(scene(**change))  # type: ignore[arg-type]
 
 
-def test_only_the_faces_place_counts():
+def test_only_the_faces_place_counts() -> None:
     other = scene(seed=1)
     other[40:160, 50:150] = scene()[40:160, 50:150]
     assert FacePatch(scene(), POINTS).matches(other)
 
 
-def test_a_flat_picture_and_points_in_one_place_are_no_trouble():
+def test_a_flat_picture_and_points_in_one_place_are_no_trouble() -> None:
     flat = np.full((SIZE, SIZE, 3), 90, np.uint8)
     assert FacePatch(flat, POINTS).matches(flat)
     assert FacePatch(scene(), np.zeros((5, 2), np.float32)).matches(scene())
 
 
-def test_it_keeps_the_points():
+def test_it_keeps_the_points() -> None:
     assert FacePatch(scene(), POINTS).points is POINTS

@@ -28,13 +28,13 @@ def mirror(scheme: LandmarkScheme, indices: tuple[int, ...]) -> list[int]:
     return distances.argmin(axis=1).tolist()
 
 
-def test_counts():
+def test_counts() -> None:
     assert landmark_scheme("mesh478").count == 478
     assert landmark_scheme("openseeface66").count == 66
     assert len(set(VERTICES_66)) == 66
 
 
-def test_the_mesh_is_the_canonical_face_and_two_irises():
+def test_the_mesh_is_the_canonical_face_and_two_irises() -> None:
     scheme = landmark_scheme("mesh478")
     np.testing.assert_array_equal(scheme.canonical[:468], canonical_face().vertices)
     for eye in (scheme.right_eye, scheme.left_eye):
@@ -110,6 +110,6 @@ def test_eye_centres_are_right_then_left(scheme: LandmarkScheme):
     assert right[1] == pytest.approx(left[1])
 
 
-def test_an_unknown_scheme_is_named():
+def test_an_unknown_scheme_is_named() -> None:
     with pytest.raises(NotFoundError, match=r"'ibug68'.*mesh478"):
         landmark_scheme("ibug68")

@@ -87,7 +87,7 @@ class Rig:
         return state.status, float(np.linalg.norm(state.landmarks - self.world.points, axis=1).mean() / EYE_SPAN)
 
 
-def test_it_measures_what_it_finds():
+def test_it_measures_what_it_finds() -> None:
     rig = Rig()
     state = rig.tracker.track(Frame(IMAGE, 0, 0.0, 0.0))
     assert state.status is FaceStatus.FOUND
@@ -101,14 +101,14 @@ def test_it_measures_what_it_finds():
     assert state.confidence == pytest.approx(0.99)
 
 
-def test_the_detector_is_asked_to_begin_and_then_every_few_frames():
+def test_the_detector_is_asked_to_begin_and_then_every_few_frames() -> None:
     rig = Rig(check_every=5)
     for _ in range(11):
         assert rig.step() == (FaceStatus.FOUND, 0)
     assert rig.detector.calls == 3
 
 
-def test_no_face_is_lost_and_searched_in_every_frame():
+def test_no_face_is_lost_and_searched_in_every_frame() -> None:
     rig = Rig()
     rig.world.points = None
     for _ in range(3):
@@ -119,14 +119,14 @@ def test_no_face_is_lost_and_searched_in_every_frame():
     assert rig.step() == (FaceStatus.FOUND, 0)
 
 
-def test_a_face_that_goes_is_lost_at_once():
+def test_a_face_that_goes_is_lost_at_once() -> None:
     rig = Rig()
     rig.step()
     rig.world.points = None
     assert rig.step()[0] is FaceStatus.LOST
 
 
-def test_after_a_large_motion_it_looks_twice_and_has_it_checked():
+def test_after_a_large_motion_it_looks_twice_and_has_it_checked() -> None:
     rig = Rig()
     rig.step()
     reads, calls = rig.network.reads, rig.detector.calls
@@ -136,7 +136,7 @@ def test_after_a_large_motion_it_looks_twice_and_has_it_checked():
     assert rig.detector.calls == calls + 1
 
 
-def test_a_mesh_that_slipped_is_seeded_anew_although_it_is_sure():
+def test_a_mesh_that_slipped_is_seeded_anew_although_it_is_sure() -> None:
     rig = Rig(check_every=3)
     rig.step()
     rig.world.points = FACE + np.array([0, 0.8 * EYE_SPAN], np.float32)
@@ -144,7 +144,7 @@ def test_a_mesh_that_slipped_is_seeded_anew_although_it_is_sure():
     assert errors[-1] == 0
 
 
-def test_after_a_cut_the_face_is_found_in_the_same_frame_wherever_it_is():
+def test_after_a_cut_the_face_is_found_in_the_same_frame_wherever_it_is() -> None:
     noise = np.random.default_rng(0).integers(0, 256, (2, *IMAGE.shape)).astype(np.uint8)
     rig = Rig(check_every=100)
     rig.step(noise[0])
@@ -154,7 +154,7 @@ def test_after_a_cut_the_face_is_found_in_the_same_frame_wherever_it_is():
     assert rig.step(noise[0]) == (FaceStatus.FOUND, 0)
 
 
-def test_another_face_is_taken_over_only_when_the_first_stays_away():
+def test_another_face_is_taken_over_only_when_the_first_stays_away() -> None:
     rig = Rig(check_every=1)
     rig.step()
     other = FACE + np.array([4 * EYE_SPAN, 0], np.float32)
@@ -167,7 +167,7 @@ def test_another_face_is_taken_over_only_when_the_first_stays_away():
     assert rig.step() == (FaceStatus.FOUND, 0)
 
 
-def test_a_face_the_detector_cannot_see_is_uncertain_and_lost_after_a_second():
+def test_a_face_the_detector_cannot_see_is_uncertain_and_lost_after_a_second() -> None:
     rig = Rig(check_every=5)
     rig.step()
     rig.world.detectable = False
@@ -179,7 +179,7 @@ def test_a_face_the_detector_cannot_see_is_uncertain_and_lost_after_a_second():
     assert states[10].confidence == pytest.approx(0.99 / 2)
 
 
-def test_a_detector_that_sees_again_restores_trust():
+def test_a_detector_that_sees_again_restores_trust() -> None:
     rig = Rig(check_every=2)
     rig.step()
     rig.world.detectable = False
@@ -188,7 +188,7 @@ def test_a_detector_that_sees_again_restores_trust():
     assert rig.step()[0] is FaceStatus.FOUND
 
 
-def test_reset_searches_anew():
+def test_reset_searches_anew() -> None:
     rig = Rig()
     rig.step()
     rig.tracker.reset()
@@ -197,7 +197,7 @@ def test_reset_searches_anew():
     assert rig.detector.calls == calls + 1
 
 
-def test_eyes_are_not_compared_under_a_large_roll():
+def test_eyes_are_not_compared_under_a_large_roll() -> None:
     rig = Rig(check_every=1)
     rolled = face(roll=60, at=(0, 0, -80)).landmarks
     rig.world.points = rolled

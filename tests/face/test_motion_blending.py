@@ -55,7 +55,7 @@ def test_a_change_amid_a_change_makes_no_jump(kind: type[MotionTransition]):
     assert yaw(ease(motion(40), "c", 0.3)) == pytest.approx(before)
 
 
-def test_a_crossfade_stays_between_however_fast_the_target_moves():
+def test_a_crossfade_stays_between_however_fast_the_target_moves() -> None:
     ease = Crossfade(0.5)
     ease(zero_motion(COUNT), "lost", 0.0)
     values = [yaw(ease(motion(-40 + 150 * step / 30), "found", 0.1 + step / 30)) for step in range(16)]
@@ -63,7 +63,7 @@ def test_a_crossfade_stays_between_however_fast_the_target_moves():
     assert min(values) >= -40
 
 
-def test_an_offset_fade_moves_with_the_target():
+def test_an_offset_fade_moves_with_the_target() -> None:
     ease = Inertialization(0.5)
     ease(motion(10), "old", 0.0)
     assert yaw(ease(motion(4), "new", 0.0)) == pytest.approx(10)
@@ -71,7 +71,7 @@ def test_an_offset_fade_moves_with_the_target():
     assert yaw(ease(motion(12), "new", 0.01)) == pytest.approx(18, abs=0.1)
 
 
-def test_an_earlier_time_ends_the_easing():
+def test_an_earlier_time_ends_the_easing() -> None:
     ease = Crossfade(0.5)
     ease(motion(30), "a", 5.0)
     ease(motion(0), "b", 5.1)

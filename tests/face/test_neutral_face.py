@@ -29,7 +29,7 @@ def mouth_gap(neutral: NeutralFace) -> float:
 CLOSED_GAP = mouth_gap(NeutralFace(SCHEME.canonical, face().pose))  # type: ignore[arg-type]
 
 
-def test_a_calm_face_is_its_own_neutral_after_a_second():
+def test_a_calm_face_is_its_own_neutral_after_a_second() -> None:
     neutral, taken = feed(NeutralFaceFinder(), [face(3, 2, 1, at=(1, 2, -45))] * 60)
     assert neutral is not None
     assert taken == pytest.approx(RATE, abs=2)
@@ -38,7 +38,7 @@ def test_a_calm_face_is_its_own_neutral_after_a_second():
     np.testing.assert_allclose(neutral.pose.translation, (1, 2, -45))
 
 
-def test_speech_and_blinks_do_not_get_into_it():
+def test_speech_and_blinks_do_not_get_into_it() -> None:
     talking = [face(points=open_mouth(SCHEME, gap)) for gap in (1.0, 1.5, 0.0, 0.8)] * 10
     blinking = [face(points=shut_eyes(SCHEME))] * 4
     neutral, _ = feed(NeutralFaceFinder(), talking[:8] + blinking + talking)
@@ -48,7 +48,7 @@ def test_speech_and_blinks_do_not_get_into_it():
     assert (neutral.points[list(lids[0]), 1] > neutral.points[list(lids[1]), 1] + 0.3).all()
 
 
-def test_an_outlier_does_not_move_it():
+def test_an_outlier_does_not_move_it() -> None:
     wild = face(15, -15, 10, at=(9, 9, -80))
     neutral, _ = feed(NeutralFaceFinder(), [face(), face(), wild] * 20)
     assert neutral is not None
@@ -56,12 +56,12 @@ def test_an_outlier_does_not_move_it():
     np.testing.assert_allclose(neutral.pose.translation, (0, 0, -50), atol=0.5)
 
 
-def test_uncertain_and_lost_states_are_never_taken():
+def test_uncertain_and_lost_states_are_never_taken() -> None:
     assert feed(NeutralFaceFinder(), [face(status=FaceStatus.UNCERTAIN)] * 200)[0] is None
     assert feed(NeutralFaceFinder(any_pose=True), [face(status=FaceStatus.UNCERTAIN)] * 200)[0] is None
 
 
-def test_a_turned_head_is_waited_for_but_not_forever():
+def test_a_turned_head_is_waited_for_but_not_forever() -> None:
     frontal_again, _ = feed(NeutralFaceFinder(), [face(35)] * 45 + [face(2)] * 45)
     assert frontal_again is not None
     assert angles_from_rotation(frontal_again.pose.rotation).yaw == pytest.approx(2)
@@ -71,7 +71,7 @@ def test_a_turned_head_is_waited_for_but_not_forever():
     assert taken / RATE == pytest.approx(4.0, abs=0.2)
 
 
-def test_as_is_takes_the_next_ten_frames_however_they_look():
+def test_as_is_takes_the_next_ten_frames_however_they_look() -> None:
     neutral, taken = feed(NeutralFaceFinder(any_pose=True), [face(35)] * 30)
     assert neutral is not None
     assert taken == 10

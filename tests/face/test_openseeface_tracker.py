@@ -40,7 +40,7 @@ def maps_of(row: int, column: int, down: float, right: float, peak: float = 0.9)
     return maps
 
 
-def test_decoding_follows_the_formula():
+def test_decoding_follows_the_formula() -> None:
     points, peaks = decode_heat_maps(maps_of(row=9, column=18, down=-0.02, right=0.03))
     np.testing.assert_allclose(points[:, 0], 223 * (18 / 27 + 0.03) + 0.5, atol=1e-3)
     np.testing.assert_allclose(points[:, 1], 223 * (9 / 27 - 0.02) + 0.5, atol=1e-3)
@@ -49,7 +49,7 @@ def test_decoding_follows_the_formula():
     assert points.dtype == np.float32
 
 
-def test_each_point_has_its_own_maps():
+def test_each_point_has_its_own_maps() -> None:
     maps = maps_of(5, 5, 0, 0)
     maps[7, 20, 10] = 1.0
     maps[66 + 7, 20, 10] = maps[132 + 7, 20, 10] = 0.5
@@ -58,13 +58,13 @@ def test_each_point_has_its_own_maps():
     np.testing.assert_allclose(points[8], 223 * 5 / 27 + 0.5, atol=1e-3)
 
 
-def test_saturated_offsets_stay_finite():
+def test_saturated_offsets_stay_finite() -> None:
     maps = maps_of(5, 5, 0, 0)
     maps[66:] = np.where(np.arange(132)[:, None, None] % 2, 0.0, 1.0)
     assert np.isfinite(decode_heat_maps(maps)[0]).all()
 
 
-def test_reading_normalises_and_maps_back():
+def test_reading_normalises_and_maps_back() -> None:
     net, session = network(maps_of(row=0, column=27, down=0, right=0, peak=0.7))
     crop = net.crop_from_detection(Detection((100, 50, 100, 80), np.zeros((2, 2), np.float32), 0.9))
     reading = net.read(np.full((200, 300, 3), [255, 128, 0], np.uint8), crop)
@@ -79,7 +79,7 @@ def test_reading_normalises_and_maps_back():
     assert net.blendshapes(reading.points) == {}
 
 
-def test_the_crop_from_points_is_upright():
+def test_the_crop_from_points_is_upright() -> None:
     net, _ = network(maps_of(0, 0, 0, 0))
     points = face(roll=30).landmarks
     crop = net.crop_from_points(points)

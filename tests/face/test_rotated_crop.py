@@ -23,20 +23,20 @@ def test_a_cut_shows_what_lies_at_its_positions(angle: float):
     np.testing.assert_allclose(seen, expected, atol=0.6)
 
 
-def test_the_middle_and_corners_of_an_upright_crop():
+def test_the_middle_and_corners_of_an_upright_crop() -> None:
     crop = Crop(center=(50.0, 40.0), width=20.0, height=10.0)
     corners = np.array([[0, 0], [100, 100], [50, 50]], np.float32)
     np.testing.assert_allclose(crop.to_picture(corners, 100, 100), [[40, 35], [60, 45], [50, 40]])
 
 
-def test_the_angle_is_clockwise_in_the_picture():
+def test_the_angle_is_clockwise_in_the_picture() -> None:
     crop = Crop(center=(0.0, 0.0), width=2.0, height=2.0, angle=np.pi / 2)
     np.testing.assert_allclose(crop.to_picture(np.array([[2, 1]], np.float32), 2, 2), [[0, 1]], atol=1e-6)
 
 
-def test_beyond_the_picture_is_black():
+def test_beyond_the_picture_is_black() -> None:
     assert (Crop(center=(-500.0, -500.0), width=20.0, height=20.0).cut(ramp(), 8, 8) == 0).all()
 
 
-def test_bounds():
+def test_bounds() -> None:
     assert bounding_box(np.array([[1, 5], [4, 2], [3, 9]], np.float32)) == (1, 2, 3, 7)
