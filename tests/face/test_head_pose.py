@@ -28,23 +28,23 @@ def nose_and_eyes(head: HeadPose) -> np.ndarray:
     return project(scheme.canonical, head, SIZE)[[NOSE_TIP, RIGHT_EYE, LEFT_EYE]]
 
 
-def test_projection_of_one_worked_point():
+def test_projection_of_one_worked_point() -> None:
     # 1 cm right, 2 cm up, 50 cm ahead at 500 px: 10 px right of and 20 px above the middle.
     at = project(np.array([[1.0, 2.0, 0.0]]), pose(at=np.array([0, 0, -50.0]), focal=500), SIZE)
     np.testing.assert_allclose(at, [[330, 220]])
 
 
-def test_yaw_turns_the_nose_to_the_right_of_the_picture():
+def test_yaw_turns_the_nose_to_the_right_of_the_picture() -> None:
     (nose, right, left), (nose_before, *_) = nose_and_eyes(pose(yaw=20)), nose_and_eyes(pose())
     assert nose[0] > nose_before[0] + 10
     assert left[1] == pytest.approx(right[1], abs=3)
 
 
-def test_pitch_turns_the_nose_down():
+def test_pitch_turns_the_nose_down() -> None:
     assert nose_and_eyes(pose(pitch=20))[0, 1] > nose_and_eyes(pose())[0, 1] + 10
 
 
-def test_roll_lifts_the_right_side_of_the_picture():
+def test_roll_lifts_the_right_side_of_the_picture() -> None:
     _, right, left = nose_and_eyes(pose(roll=20))
     assert left[0] > right[0]
     assert left[1] < right[1] - 10
@@ -90,7 +90,7 @@ def test_any_pose_in_view_comes_back(yaw: float, pitch: float, roll: float, x: f
     assert np.degrees((found.rotation.inv() * truth.rotation).magnitude()) < 0.1
 
 
-def test_a_given_focal_length_sets_the_distance():
+def test_a_given_focal_length_sets_the_distance() -> None:
     scheme = landmark_scheme("mesh478")
     truth = pose(yaw=15, at=np.array([0.0, 0.0, -90.0]), focal=1100)
     found = fit_pose(project(scheme.canonical, truth, SIZE), scheme, SIZE, focal_px=1100)
@@ -126,5 +126,5 @@ def test_a_moved_landmark_moves_its_point_in_the_picture_plane(scheme: LandmarkS
     np.testing.assert_allclose(change, np.stack([3.2 * depth / 640, 3.2 * depth / 640, 0 * depth], 1), atol=1e-4)
 
 
-def test_the_guessed_focal_length_is_the_longer_side():
+def test_the_guessed_focal_length_is_the_longer_side() -> None:
     assert guess_focal((640, 480)) == guess_focal((480, 640)) == 640.0

@@ -61,7 +61,7 @@ def test_the_crop_levels_the_eyes_and_holds_the_face(roll: float):
     np.testing.assert_allclose((inside.min(axis=0) + inside.max(axis=0)) / 2, 128, atol=0.1)
 
 
-def test_the_crop_from_a_detection_is_turned_by_its_eyes():
+def test_the_crop_from_a_detection_is_turned_by_its_eyes() -> None:
     detection = Detection((100, 60, 80, 100), np.array([[120, 100], [160, 140]], np.float32), 0.9)
     crop = network()[0].crop_from_detection(detection)
     assert crop.center == (140, 110)
@@ -69,7 +69,7 @@ def test_the_crop_from_a_detection_is_turned_by_its_eyes():
     assert np.degrees(crop.angle) == pytest.approx(45)
 
 
-def test_reading_feeds_rgb_in_0_to_1_and_maps_back():
+def test_reading_feeds_rgb_in_0_to_1_and_maps_back() -> None:
     net, mesh = network()
     crop = net.crop_from_detection(Detection((100, 60, 80, 100), np.array([[1, 0], [2, 0]], np.float32), 0.9))
     reading = net.read(np.full((400, 400, 3), [255, 51, 0], np.uint8), crop)
@@ -80,7 +80,7 @@ def test_reading_feeds_rgb_in_0_to_1_and_maps_back():
     assert reading.confidence == pytest.approx(1 / (1 + np.exp(-2)))
 
 
-def test_blendshapes_take_their_points_and_give_their_names():
+def test_blendshapes_take_their_points_and_give_their_names() -> None:
     assert (len(BLENDSHAPE_POINTS), len(BLENDSHAPE_NAMES)) == (146, 52)
     assert list(BLENDSHAPE_POINTS) == sorted(set(BLENDSHAPE_POINTS))
     fake = FakeBlendshapes()

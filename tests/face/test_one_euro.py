@@ -36,7 +36,7 @@ class ReferenceOneEuro:
         return self.filtered
 
 
-def test_it_is_the_filter_of_the_paper():
+def test_it_is_the_filter_of_the_paper() -> None:
     values = np.cumsum(np.random.default_rng(3).normal(0, 1, 80))
     reference = ReferenceOneEuro(1.2, 0.3, 0.8)
     ours = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1.2, beta=0.3, speed_cutoff_hz=0.8))
@@ -45,13 +45,13 @@ def test_it_is_the_filter_of_the_paper():
         assert got[0] == pytest.approx(reference(value), abs=1e-9)
 
 
-def test_a_constant_passes_unchanged():
+def test_a_constant_passes_unchanged() -> None:
     smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1.0, beta=0.1))
     for index in range(5):
         np.testing.assert_allclose(smooth(np.array([[1.0, 2.0]]), index / RATE), [[1, 2]])
 
 
-def test_a_quick_move_is_followed_quicker_than_a_slow_one():
+def test_a_quick_move_is_followed_quicker_than_a_slow_one() -> None:
     def lag(speed: float) -> float:
         smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1.0, beta=0.5))
         for index in range(60):
@@ -62,7 +62,7 @@ def test_a_quick_move_is_followed_quicker_than_a_slow_one():
     assert lag(20.0) < lag(1.0) / 4
 
 
-def test_a_vector_is_filtered_alike_in_every_direction():
+def test_a_vector_is_filtered_alike_in_every_direction() -> None:
     settings = OneEuroParameters(min_cutoff_hz=1.0, beta=0.5, dead_band=0.1)
     along, across = OneEuroFilter(settings), OneEuroFilter(settings)
     turn = rotation_from_angles(30, 20, 10)
@@ -71,7 +71,7 @@ def test_a_vector_is_filtered_alike_in_every_direction():
         np.testing.assert_allclose(turn.apply(along(step, time_s)), across(turn.apply(step), time_s), atol=1e-9)
 
 
-def test_each_vector_has_its_own_settings():
+def test_each_vector_has_its_own_settings() -> None:
     cutoffs = np.array([[1.0], [8.0]])
     both = OneEuroFilter(OneEuroParameters(min_cutoff_hz=cutoffs))
     for index, value in enumerate(np.random.default_rng(2).normal(0, 1, 20)):
@@ -83,14 +83,14 @@ def test_each_vector_has_its_own_settings():
     assert out[0] != pytest.approx(expected[0])
 
 
-def test_within_the_dead_band_the_output_is_exactly_still():
+def test_within_the_dead_band_the_output_is_exactly_still() -> None:
     smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=2.0, beta=0.1, dead_band=0.5))
     noise = np.random.default_rng(5).normal(0, 0.1, (300, 4, 2))
     outputs = [smooth(step, index / RATE) for index, step in enumerate(noise)]
     assert all(np.array_equal(output, outputs[0]) for output in outputs)
 
 
-def test_leaving_the_dead_band_makes_no_step():
+def test_leaving_the_dead_band_makes_no_step() -> None:
     band = 0.5
     banded = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1000.0, dead_band=band))
     outputs = np.array([banded(np.array([0.01 * index]), index / RATE)[0] for index in range(400)])
@@ -101,13 +101,13 @@ def test_leaving_the_dead_band_makes_no_step():
     assert outputs[-1] == pytest.approx(3.99, abs=1.1 * band)
 
 
-def test_a_fast_move_leaves_the_dead_band_behind():
+def test_a_fast_move_leaves_the_dead_band_behind() -> None:
     banded = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1000.0, dead_band=0.5))
     banded(np.array([0.0]), 0.0)
     assert banded(np.array([10.0]), 1 / RATE)[0] == pytest.approx(10, abs=0.1)
 
 
-def test_noise_widens_the_dead_band():
+def test_noise_widens_the_dead_band() -> None:
     smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1000.0, dead_band=0.1))
     smooth(np.zeros((2, 1)), 0.0, noise=5.0)
     moved = smooth(np.full((2, 1), 0.4), 0.1, noise=np.array([[5.0], [1.0]]))
@@ -115,14 +115,14 @@ def test_noise_widens_the_dead_band():
     assert moved[1, 0] == pytest.approx(0.4, abs=0.01)
 
 
-def test_time_that_stands_still_changes_nothing_and_time_that_goes_back_begins_anew():
+def test_time_that_stands_still_changes_nothing_and_time_that_goes_back_begins_anew() -> None:
     smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=1.0))
     smooth(np.array([0.0]), 1.0)
     assert smooth(np.array([5.0]), 1.0)[0] == 0
     assert smooth(np.array([7.0]), 0.0)[0] == 7
 
 
-def test_reset_forgets():
+def test_reset_forgets() -> None:
     smooth = OneEuroFilter(OneEuroParameters(min_cutoff_hz=0.1))
     smooth(np.array([0.0]), 0.0)
     smooth.reset()
@@ -140,7 +140,7 @@ def test_a_turn_about_one_axis_is_filtered_as_its_angle(axis: int):
         assert turned[axis] == pytest.approx(numbers(np.array([angle]), index / RATE)[0], abs=1e-6)
 
 
-def test_a_turn_goes_the_short_way():
+def test_a_turn_goes_the_short_way() -> None:
     smooth = RotationOneEuroFilter(OneEuroParameters(min_cutoff_hz=1.0))
     smooth(rotation_from_angles(179), 0.0)
     assert abs(angles_from_rotation(smooth(rotation_from_angles(-179), 1 / RATE)).yaw) > 178.9

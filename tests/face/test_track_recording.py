@@ -80,7 +80,7 @@ def test_the_file_says_what_it_promises(track_path: Path):
     assert lost["pose"] is None
 
 
-def test_the_share_of_frames_with_a_face():
+def test_the_share_of_frames_with_a_face() -> None:
     recorder = TrackRecorder(NamedTracker(), SIZE, 30.0)
     assert recorder.found_fraction == 0
     for state in STATES:
@@ -167,7 +167,7 @@ def test_a_missing_file_and_a_folder(tmp_path: Path):
         read_track(tmp_path)
 
 
-def test_recorded_needs_a_path():
+def test_recorded_needs_a_path() -> None:
     with pytest.raises(TrackError, match="recorded:PATH"):
         open_tracker("recorded")
 
@@ -177,6 +177,6 @@ def test_pictures_of_another_size_are_refused(track_path: Path):
         open_tracker(f"recorded:{track_path}").track(frame(0, (320, 240)))
 
 
-def test_an_unknown_tracker_names_those_there_are():
+def test_an_unknown_tracker_names_those_there_are() -> None:
     with pytest.raises(NotFoundError, match=r"'eyes'; there are: .*mesh.*openseeface.*recorded"):
         open_tracker("eyes")

@@ -1,7 +1,7 @@
 """Head and environment rotations as scipy `Rotation`.
 
 Angles are intrinsic Y-X-Z in degrees, right-handed: yaw > 0 turns the nose to the picture's right, pitch > 0 turns it
-down, roll > 0 lifts the picture's right side. A head rotation takes head-frame vectors to room-frame vectors. Worked
+down, roll > 0 lifts the picture's right side. A head rotation takes head-frame vectors to world-frame vectors. Worked
 point: yaw 90° takes the nose (0, 0, 1) to (1, 0, 0).
 """
 

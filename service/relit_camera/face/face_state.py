@@ -1,4 +1,4 @@
-"""What a tracker says of one frame."""
+"""The state of one face in one frame, and the protocol of the trackers that measure it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from relit_camera.face.head_pose import HeadPose
 
 
 class FaceStatus(StrEnum):
-    """How far a face state can be trusted."""
+    """Reliability of a face state."""
 
     FOUND = "found"
     UNCERTAIN = "uncertain"
-    """Landmarks are there, but the detector disagrees or confidence is low."""
+    """There are landmarks, but the detector disagrees or confidence is low."""
     LOST = "lost"
 
 
@@ -29,7 +29,7 @@ class FaceState:
     Attributes:
         status: found, uncertain or lost. When lost, every other field is empty.
         confidence: 0..1.
-        scheme: name of the landmark scheme (see `face.landmarks.landmark_schemes`): how many points and what each is.
+        scheme: name of the landmark scheme (see `face.landmarks.landmark_schemes`): the points' number and meaning.
         landmarks: (count, 2) float32 pixels, pixel centres at integers + ½; (0, 2) when lost.
         pose: head pose relative to the camera; None when lost.
         eyes: opening of the subject's right and left eye, lid gap over eye width (about 0.3 open, under 0.1 shut).

@@ -1,7 +1,7 @@
-"""Head pose: a rigid fit of the canonical face to landmarks, and the way between pixels and head-space points.
+"""Head pose: the rigid fit of the canonical face to landmarks, and projection between pixels and head-space points.
 
-Axes and projection are those of `face.face_state.HeadPose`. OpenCV's camera looks along +Z with Y down, so its frame is
-ours turned by 180° about X: x_cv = (x, −y, −z).
+Axes and projection are those of `HeadPose`. OpenCV's camera looks along +Z with Y down, so its frame is ours rotated by
+180° about X: x_cv = (x, −y, −z).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
 
 @dataclass(frozen=True)
 class HeadPose:
-    """Where the head is: camera_from_head, x_camera = rotation · x_head + translation.
+    """Pose of the head, camera_from_head: x_camera = rotation · x_head + translation.
 
     Axes of both frames: X right in the picture, Y up, Z toward the camera; the camera is at the origin, so a visible
     head has translation z < 0. Projection: x_px = cx + focal_px · X / −Z, y_px = cy − focal_px · Y / −Z about the
@@ -44,7 +44,7 @@ _CV_FROM_OURS = np.array([1.0, -1.0, -1.0])
 
 
 def guess_focal(size: tuple[int, int]) -> float:
-    """Focal length in pixels of a usual webcam: its longer side sees 53 degrees. `size` is (width, height)."""
+    """Focal length in pixels of a typical webcam, whose longer side spans 53 degrees. `size` is (width, height)."""
     return float(max(size))
 
 
@@ -54,7 +54,7 @@ def fit_pose(
     """Fit the scheme's rigid points to `landmarks` (count, 2); None where no head before the camera fits.
 
     SQPnP (Terzakis and Lourakis 2020) finds the global minimum of an algebraic error, Levenberg-Marquardt refines it
-    to the least squares in pixels. It has no memory, so a bad frame cannot spoil the next one.
+    to the least squares in pixels. It is stateless, so a bad frame does not affect the next.
 
     Args:
         landmarks: (count, 2) float32 pixels, pixel centres at integers + ½.
@@ -74,12 +74,12 @@ def fit_pose(
         if not found:
             return None
         turn, shift = cv2.solvePnPRefineLM(model, pixels, camera, None, turn, shift)
-    except cv2.error:  # OpenCV's answer to points that span nothing
+    except cv2.error:  # OpenCV raises it for degenerate points
         return None
     translation = shift.ravel() * _CV_FROM_OURS
     if not (np.isfinite(translation).all() and np.isfinite(turn).all() and translation[2] < 0):
         return None
-    # The rotation vector is an axis, and turns with the frame.
+    # The rotation vector transforms like any vector.
     return HeadPose(Rotation.from_rotvec(turn.ravel() * _CV_FROM_OURS), translation, focal)
 
 
@@ -93,9 +93,9 @@ def project(points: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]) 
 
 
 def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: tuple[int, int]) -> NDArray[np.float64]:
-    """Head-space points (count, 3) in centimetres: each landmark's ray met at its canonical point's depth.
+    """Head-space points (count, 3) in centimetres: each landmark's ray at the depth of its canonical point.
 
-    So depth is the mean face's, and what a landmark says beyond that lies in the picture plane. The inverse of
+    The depth is that of the mean face; deviations from it are measured in the picture plane only. The inverse of
     `project` for points at those depths.
     """
     camera_from_head = pose.rotation.as_matrix()

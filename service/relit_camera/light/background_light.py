@@ -1,9 +1,9 @@
-"""Light from the virtual background: an environment guessed from a picture that is seen behind the person.
+"""Light from the virtual background: an environment guessed from the picture behind the person.
 
-A heuristic, and an honest one: a picture shows the light behind the person, never what lights the face from the front.
-The picture is placed where it is seen, its edges are drawn out round the sphere, softer with distance, and the half of
-the room that nobody sees is taken to mirror the half that is seen, very soft. So a bright window at the viewer's left
-lights the left rim, sharply, and the left of the face, softly. Thesis Fig. 1.1 is the motive.
+This is a heuristic: the picture shows the light behind the person, never what lights the face from the front. The
+picture is placed where it is seen, its edges are extended around the sphere, more blurred with distance, and the unseen
+half of the scene is assumed to mirror the seen half, strongly blurred. So a bright window at the viewer's left lights
+the left rim sharply and the left of the face softly (compare Fig. 1.1 of the thesis).
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from relit_camera.light.environment_panorama import Panorama
 from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 
 BACKGROUND_HEIGHT_DEG = 35.0
-"""How high an environment is seen behind the person, in degrees."""
+"""Vertical angle, in degrees, that the background picture covers."""
 
 _HEIGHT, _WIDTH = 256, 512
 _WORKING_ROWS = 96
-"""Rows that the picture is shrunk to: about twice what it covers on the sphere."""
+"""Rows to which the picture is shrunk: about twice those it covers on the sphere."""
 _MAX_BLUR_SIGMA = 0.35
 """Sigma, in picture heights, of the softest copy; it is reached `_MAX_BLUR_AT_DEG` degrees outside the picture."""
 _MAX_BLUR_AT_DEG = 70.0
 _BLUR_LEVELS = 6
 _HIGHLIGHT_BOOST = 7.0
-"""A clipped highlight is taken to be up to 1 + 7 times, three stops, as bright as white."""
+"""A clipped highlight is assumed to be up to 1 + 7 times as bright as white (three stops)."""
 _MAX_CLIPPED_FRACTION = 0.25
 """Where more than this share of the picture is clipped, it is a white wall or an overexposed sky: no boost."""
 _MAX_SEAM_RATIO = 4.0

@@ -1,7 +1,4 @@
-"""Panorama files: light from all sides, as a latitude-longitude picture.
-
-An environment: light from all sides under a name.
-"""
+"""Panoramas and environments: light from all sides, read from latitude-longitude picture files."""
 
 from __future__ import annotations
 
@@ -20,11 +17,11 @@ from relit_camera.light.panorama_axes import Axes, between_map_and_picture_axes
 
 PANORAMA_SUFFIXES = frozenset({".hdr", ".exr", ".png", ".jpg", ".jpeg"})
 MAX_PANORAMA_PIXELS = 1 << 25
-"""8192x4096. Some environments are kept in memory, as float32: 400 MB each at that size."""
+"""8192 × 4096. Several environments are kept in memory as float32: 400 MB each at that size."""
 _MAX_RADIANCE = 1e9
-"""Radiance above this is no light (the sun is 3e4 to 1e5 times the sky) and would overflow sums in float32."""
+"""Larger radiance is implausible (the sun is 3e4 to 1e5 times the sky) and would overflow sums in float32."""
 _NEGATIVE_TOLERANCE = 1e-6
-"""Negative values down to this share of the maximum are rounding of the program that wrote the file, and become 0."""
+"""Negative values down to this share of the maximum are rounding errors of the writing program: set to 0."""
 _CLIPPED_LEVEL = 0.99
 """Linear value from which an 8-bit picture counts as clipped: codes 254 and 255, since JPEG wobbles by one."""
 
@@ -36,7 +33,7 @@ class Panorama:
     Attributes:
         radiance: float32 (h, 2h, 3), linear RGB, non-negative, in map axes (row 0 up, the middle toward the camera).
         clipped_fraction: share of the sphere where an LDR picture is clipped at white; 0 for HDR.
-        notes: what a person should know about it, one sentence each.
+        notes: remarks for the user, one sentence each.
     """
 
     radiance: NDArray[np.float32]
@@ -79,7 +76,7 @@ def panorama_from_radiance(radiance: NDArray[np.float32], name: str = "panorama"
 
 
 def require_panorama_suffix(suffix: str, name: str) -> None:
-    """Check that a file of this suffix can be a panorama; `name` is what the file is called to a person.
+    """Check that a file of this suffix can be a panorama; `name` is the file's name in the message.
 
     Raises:
         PanoramaError: it cannot.
@@ -126,7 +123,7 @@ def _to_map_axes(image: NDArray[np.float32], axes: Axes, name: str) -> NDArray[n
 
 
 def _require_usable_radiance(image: NDArray[np.float32], name: str) -> NDArray[np.float32]:
-    """The image, rounding below 0 cut; PanoramaError where it cannot be light."""
+    """The image with rounding errors below 0 clamped; PanoramaError where it cannot be radiance."""
     cure = "export it again from the program that made it"
     usable = np.isfinite(image) & (np.abs(image) <= _MAX_RADIANCE)
     if not usable.all():
@@ -158,13 +155,13 @@ def _clipped_note(fraction: float) -> str:
 
 @dataclass(frozen=True)
 class Environment:
-    """Light from all sides.
+    """Light from all sides under a name.
 
     Attributes:
-        name: what it is stored as, or the path it was read from.
-        panorama: at the file's resolution, to be seen as a background.
-        light_map: the same, resampled to (32, 64, 3), to light with.
-        notes: what a person should know about it, one sentence each.
+        name: name in the store, or the path it was read from.
+        panorama: at the file's resolution, to show as a background.
+        light_map: resampled to (32, 64, 3), to light with.
+        notes: remarks for the user, one sentence each.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The scale at which the light of an environment is shown."""
+"""Automatic exposure: the scale at which pictures under an environment's light are shown."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from relit_camera.base.images.color import LUMINANCE
 from relit_camera.light.light_map import LightMap, irradiance, total
 
 WHITE_BALL_LUMINANCE = 0.8
-"""What a white diffuse ball reads, in luminance, at the point that faces the camera."""
+"""Displayed luminance of a white diffuse ball at the point that faces the camera."""
 _MIN_FRONT_FRACTION = 0.2
 """Least share of the mean over the ball's whole surface that its facing point is taken to receive."""
 

@@ -32,10 +32,10 @@ def _overlap_weights(edges_in: NDArray[np.float64], edges_out: NDArray[np.float6
 
 
 def resample_by_area(radiance: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
-    """A spherical map (height, width, 3) of one of any size (h, w, 3), both covering the whole sphere.
+    """A latitude-longitude map (height, width, 3) resampled from one of any size (h, w, 3).
 
-    Each texel is the mean over its solid angle, texels of the input taken as flat: Σ E·ω is kept to rounding. Solid
-    angle is the product of widths in θ and in sin φ, so rows and columns are weighed one after the other.
+    Each texel is the mean over its solid angle of piecewise constant input, so Σ E·ω is kept to rounding. Solid angle
+    is the product of widths in θ and in sin φ, so rows and columns are averaged in turn.
     """
     rows_in, columns_in = radiance.shape[:2]
     rows = _overlap_weights(*(-np.cos(np.linspace(0, np.pi, n + 1)) for n in (rows_in, height)))

@@ -22,16 +22,17 @@ from relit_camera.light.directions import MAP_HEIGHT, MAP_WIDTH, texel_solid_ang
 Floats32 = NDArray[np.float32]
 
 POLE_PADDED_ROWS = MAP_HEIGHT + 2
-"""Rows of an extended map: each pole's row becomes two, its mean at the pole and a mixture with the next near it."""
+"""Rows of a padded map: each polar row becomes two, its mean at the pole and a mixture with the next row near it."""
 _POLE_MIX = 0.4
-"""Share of the next row in that mixture, and its place in sin φ on the way there: it is where a lamp in row 0, or one
-splatted near the pole, is displaced least (within a degree). Any share conserves energy."""
+"""Share of the next row in that mixture, and its relative position in sin φ. With this value a lamp in row 0, or one
+splatted near the pole, is displaced least (within a degree). Any value conserves energy."""
 _POLES = ((0, 1, 0, 1), (-1, -2, -1, -2))
-"""Of both poles: extended rows at and near the pole, map rows at and next to it."""
+"""For each pole: padded rows at and near the pole, map rows at and next to it."""
 
 
 @lru_cache(maxsize=1)
 def _knots() -> NDArray[np.float64]:
+    """Values of sin φ at the padded map's rows (34,), from the top down."""
     elevation = np.pi * (0.5 - (np.arange(MAP_HEIGHT) + 0.5) / MAP_HEIGHT)
     rows = np.sin(elevation) / np.cos(np.pi / (2 * MAP_HEIGHT))
     near = 1 - _POLE_MIX * (1 - rows[1])
@@ -43,7 +44,7 @@ def _theta_blur() -> Floats32:
     """Circulant matrices (32, 64, 64), one a row: symmetric, doubly stochastic, the identity near the equator."""
     height = np.pi / MAP_HEIGHT
     colatitude = height * (np.arange(MAP_HEIGHT) + 0.5)
-    # Row 0 by its outer edge, where most of its weight lies: its middle would spread a lamp over a third of the circle.
+    # Row 0 by its outer edge, where most of its weight lies: its center would spread a lamp over a third of the circle.
     half_width = 1 / np.maximum(np.sin(colatitude), np.sin(height))
     step = np.arange(MAP_WIDTH)
     distance = np.minimum(step, MAP_WIDTH - step)
@@ -53,7 +54,7 @@ def _theta_blur() -> Floats32:
 
 
 def padded_positions(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Floats32, Floats32]:
-    """Continuous (row, column) on an extended map of unit vectors given by components of one shape (...).
+    """Continuous (row, column) on a padded map of unit vectors given by components of one shape (...).
 
     Rows lie in [0, 33]; columns in [½, 64½], column 0 being a copy of column 64: bilinear interpolation never leaves
     the map.
@@ -64,7 +65,7 @@ def padded_positions(x: ArrayLike, y: ArrayLike, z: ArrayLike) -> tuple[Floats32
 
 
 def pad_poles(light_map: Floats32) -> Floats32:
-    """Map (34, 66, 3) to interpolate bilinearly at `padded_positions`, of a light map (32, 64, 3)."""
+    """The padded map (34, 66, 3) of a light map (32, 64, 3), to interpolate bilinearly at `padded_positions`."""
     smooth = np.matmul(_theta_blur(), light_map)
     extended = np.empty((POLE_PADDED_ROWS, MAP_WIDTH + 2, 3), np.float32)
     inner = extended[:, 1:-1]
@@ -88,7 +89,7 @@ def splat(direction: NDArray[np.float64], energy: NDArray[np.float64]) -> NDArra
     extended = np.zeros((POLE_PADDED_ROWS, MAP_WIDTH))
     for row_step, row_weight in ((0, 1 - down), (1, down)):
         for column_step, column_weight in ((0, 1 - right), (1, right)):
-            # Extended columns count from 1.
+            # Columns of the padded map count from 1.
             index = (top + row_step) * MAP_WIDTH + (left + column_step - 1) % MAP_WIDTH
             extended += np.bincount(index, energy * row_weight * column_weight, extended.size).reshape(extended.shape)
     folded = np.zeros((MAP_HEIGHT, MAP_WIDTH))

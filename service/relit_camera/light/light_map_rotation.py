@@ -14,18 +14,18 @@ from relit_camera.light.light_map import LightMap, total
 from relit_camera.light.light_map_interpolation import pad_poles, padded_positions
 
 _SUBSAMPLES = 6
-"""Samples a texel in φ, and in θ at the equator: a rotated one-texel lamp keeps its energy within 0.6 %."""
+"""Samples per texel in φ, and in θ at the equator: a rotated one-texel lamp keeps its energy within 0.6 %."""
 _SMALL_ANGLE = np.radians(1.0)
-"""Below this angle a rotation is blended with the unrotated map, so that it ends in the identity without a jump; light
-then lags by at most a quarter of it."""
+"""Below this angle a rotation is blended with the unrotated map, so that small rotations approach the
+identity without a jump; the light then lags by a quarter of this angle at most."""
 
 
 @lru_cache(maxsize=1)
 def _rotation_samples() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Directions (3, count · 64) that sample the texels, and the weights (32, count) which average them.
+    """Directions (3, count · 64) that sample the texels, and the weights (32, count) that average them.
 
     Strips even in φ, weighed by solid angle; fewer samples along θ where texels are narrow; every other strip is
-    shifted by half a step, which keeps the samples apart from the rows of whatever is sampled.
+    shifted by half a step, so that samples do not line up with the texels that they sample.
     """
     angles, weights = [], []
     for row in range(MAP_HEIGHT):
@@ -49,13 +49,12 @@ def _rotation_samples() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 
 def rotate_light_map(light_map: LightMap, rotation: Rotation) -> LightMap:
-    """The light map seen from a rotated frame: E_out(l) = E_in(R·l), radiance stays non-negative.
+    """The light map in a rotated frame: E_out(l) = E_in(R·l); radiance stays non-negative.
 
-    For a head turned by R in the room (head-frame vectors to room-frame vectors) it is the light in the head's frame.
-    Every texel averages samples of the conserving interpolation in `light.light_map_rotation`, so a constant map stays
-    constant, a
-    lamp keeps its energy within 1 % wherever it stands and goes, and the whole map, per channel, exactly. The identity
-    returns the input.
+    For a head rotated by R (head-frame vectors to world-frame vectors) this is the light in the head's frame. Every
+    texel averages samples of the energy-conserving interpolation (`light.light_map_interpolation`), so a constant map
+    stays constant, a lamp keeps its energy within 1 % in any direction, and the whole map keeps it exactly in each
+    channel. The identity returns a copy of the input.
     """
     angle = float(rotation.magnitude())
     if angle == 0.0:

@@ -1,7 +1,4 @@
-"""Round lamps at infinity.
-
-The light that falls on the face in the room.
-"""
+"""The light on the face: an environment, turned and in its saturation, plus round lamps at infinity."""
 
 from __future__ import annotations
 
@@ -21,14 +18,15 @@ from relit_camera.light.light_map_rotation import rotate_light_map
 
 _POINTS_PER_STERADIAN = 1600
 _MIN_POINTS = 64
+"""A lamp's disc has so many points by its solid angle, but at least these."""
 
 
 def lamp_light_map(lamps: Sequence[Lamp]) -> LightMap:
-    """The light map of `lamps`: discs of even radiance, each giving its intensity times its colour.
+    """The light map of `lamps`: discs of uniform radiance, each with its intensity times its color.
 
-    A lamp's intensity is the irradiance Σ E·ω·max(0, n·l) on a surface that faces it. The disc is made of points spread
-    evenly and splatted by energy, so that it moves smoothly however small it is; one smaller than a texel is about a
-    texel wide.
+    A lamp's intensity is the irradiance Σ E·ω·max(0, n·l) on a surface that faces it. The disc consists of evenly
+    spread points that are splatted by energy, so it moves smoothly however small it is; one smaller than a texel comes
+    out about a texel wide.
     """
     light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
     for lamp in lamps:
@@ -65,8 +63,8 @@ def _fibonacci_cap(count: int, height: float) -> NDArray[np.float64]:
 def scene_light_map(environment: Environment | None, lighting: Lighting) -> LightMap:
     """The environment turned by the lighting's angles, with its lamps added, in the lighting's saturation.
 
-    E_room(l) = E_map(R⁻¹·l): yaw > 0 moves a frontal light to the picture's right. Saturation moves every texel, lamps
-    included, toward or away from its luminance; what would fall below 0 is cut. Exposure is not applied.
+    E_scene(l) = E_map(R⁻¹·l): yaw > 0 moves a frontal light to the picture's right. Saturation moves every texel, lamps
+    included, toward or away from its luminance; negative values are clamped to 0. Exposure is not applied.
     """
     light = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
     if environment is not None:
@@ -75,6 +73,6 @@ def scene_light_map(environment: Environment | None, lighting: Lighting) -> Ligh
     if lighting.lamps:
         light += lamp_light_map(lighting.lamps)
     if lighting.saturation != 1:
-        grey = luminance(light)[..., None]
-        light = np.maximum(0, grey + np.float32(lighting.saturation) * (light - grey))
+        gray = luminance(light)[..., None]
+        light = np.maximum(0, gray + np.float32(lighting.saturation) * (light - gray))
     return light

@@ -45,7 +45,7 @@ def off(pictures, still):
     return float(np.sqrt(np.mean(np.square(pictures - still)[:, disc() > 0])))
 
 
-def test_motions_and_strengths_are_found():
+def test_motions_and_strengths_are_found() -> None:
     moves, strobes, pictures, still = scene()
     found = align_samples(pictures, DIRECTIONS, disc())
     left = transforms_to_array(found.transforms) - transforms_to_array(
@@ -66,14 +66,14 @@ def test_motions_and_strengths_are_found():
     assert off(aligned.pictures, still) < 0.5 * off(pictures, still)
 
 
-def test_a_set_that_lies_well_is_left_alone():
+def test_a_set_that_lies_well_is_left_alone() -> None:
     _, _, _, still = scene()
     found = align_samples(still, DIRECTIONS, disc())
     assert np.abs(transforms_to_array(found.transforms)).max() < 0.2
     assert found.gains == pytest.approx(1, abs=0.02)
 
 
-def test_corrupt_pictures_are_named():
+def test_corrupt_pictures_are_named() -> None:
     _, _, pictures, still = scene()
     broken = pictures.copy()
     broken[BLACK] = 0.002
@@ -89,7 +89,7 @@ def test_corrupt_pictures_are_named():
     assert off(aligned.pictures, still[found.kept]) < 0.5 * off(pictures, still)
 
 
-def test_of_pictures_that_do_not_belong_together_nothing_is_made():
+def test_of_pictures_that_do_not_belong_together_nothing_is_made() -> None:
     pictures = np.zeros((9, *SIZE[::-1], 3), np.float32)
     pictures[:] = coloured(texture() * shading(0, 0))
     pictures[1:4] = 0
@@ -99,7 +99,7 @@ def test_of_pictures_that_do_not_belong_together_nothing_is_made():
         align_samples(pictures, directions, disc()).samples(samples)
 
 
-def test_light_from_behind_keeps_its_strength():
+def test_light_from_behind_keeps_its_strength() -> None:
     behind = np.array([direction_from_degrees(150, 10), direction_from_degrees(-140, 20)])
     _, _, _, still = scene()
     pictures = np.concatenate([still, 0.02 * still[:2]])
@@ -123,7 +123,7 @@ def test_one_picture_is_aligned_to_its_prediction(strength):
         assert off(apply_alignment(picture, transform, gain)[None], still[index][None]) < 0.02
 
 
-def test_large_pictures_are_measured_at_a_smaller_size(monkeypatch):
+def test_large_pictures_are_measured_at_a_smaller_size(monkeypatch: pytest.MonkeyPatch) -> None:
     smaller = replace(picture_set_alignment.TUNABLES, largest_side_px=140)
     monkeypatch.setattr(picture_set_alignment, "TUNABLES", smaller)
     _, _, pictures, still = scene()
@@ -131,7 +131,7 @@ def test_large_pictures_are_measured_at_a_smaller_size(monkeypatch):
     assert off(found.pictures(pictures), still) < 0.55 * off(pictures, still)
 
 
-def test_the_model_predicts_what_follows_its_law():
+def test_the_model_predicts_what_follows_its_law() -> None:
     _, _, _, still = scene()
     predicted = predict_pictures(still, DIRECTIONS, disc())
     error = np.abs(predicted - still[..., 0])[:, disc() > 0]

@@ -27,18 +27,18 @@ def some_points(count=30, seed=0):
     return np.random.default_rng(seed).uniform(0, 200, (count, 2))
 
 
-def test_a_turn_is_about_the_centre_and_counter_clockwise():
+def test_a_turn_is_about_the_centre_and_counter_clockwise() -> None:
     right_of_centre = np.array([[60.0, 20.0]])
     np.testing.assert_allclose(RigidTransform(90).apply(right_of_centre, (80, 40)), [[40, 0]], atol=1e-12)
     np.testing.assert_allclose(RigidTransform(0, 5, 2).apply(right_of_centre, (80, 40)), [[65, 22]])
 
 
-def test_points_go_where_the_complex_plane_says():
+def test_points_go_where_the_complex_plane_says() -> None:
     points = some_points()
     np.testing.assert_allclose(TURNED.apply(points, SIZE), in_complex_plane(TURNED, points, SIZE))
 
 
-def test_back_and_forth():
+def test_back_and_forth() -> None:
     points = some_points()
     there = TURNED.apply(points, SIZE)
     np.testing.assert_allclose(TURNED.inverse().apply(there, SIZE), points)
@@ -46,19 +46,19 @@ def test_back_and_forth():
     np.testing.assert_allclose(TURNED.then(other).apply(points, SIZE), other.apply(there, SIZE))
 
 
-def test_in_a_picture_twice_as_large():
+def test_in_a_picture_twice_as_large() -> None:
     points = some_points()
     large = TURNED.scaled(2).apply(2 * points, (2 * SIZE[0], 2 * SIZE[1]))
     np.testing.assert_allclose(large, 2 * TURNED.apply(points, SIZE))
 
 
-def test_a_fit_finds_the_transform():
+def test_a_fit_finds_the_transform() -> None:
     points = some_points()
     found = fit_rigid_transform(points, TURNED.apply(points, SIZE), SIZE)
     np.testing.assert_allclose(transforms_to_array([found]), transforms_to_array([TURNED]), atol=1e-9)
 
 
-def test_a_fit_is_the_least_squares_one():
+def test_a_fit_is_the_least_squares_one() -> None:
     points, noise = some_points(), np.random.default_rng(5).normal(0, 2, (30, 2))
     targets = TURNED.apply(points, SIZE) + noise
 
@@ -70,7 +70,7 @@ def test_a_fit_is_the_least_squares_one():
         assert misfit(best + step) > misfit(best)
 
 
-def test_outliers_do_not_count():
+def test_outliers_do_not_count() -> None:
     points = some_points(60)
     targets = TURNED.apply(points, SIZE)
     targets[::4] += np.random.default_rng(6).uniform(8, 30, (15, 2))
@@ -80,7 +80,7 @@ def test_outliers_do_not_count():
     assert fit_rigid_transform_ransac(points[:3], targets[:3], SIZE, 1.0) is None
 
 
-def test_a_picture_is_moved_as_points_are():
+def test_a_picture_is_moved_as_points_are() -> None:
     picture = texture()
     expected = moved(picture, Move(TURNED.rotation_deg, TURNED.x, TURNED.y))
     inner = (slice(30, -30), slice(30, -30))
@@ -90,7 +90,7 @@ def test_a_picture_is_moved_as_points_are():
     np.testing.assert_allclose(colour[..., 1], warp_to_reference(picture, TURNED), atol=1e-6)
 
 
-def test_between_times():
+def test_between_times() -> None:
     known = [RigidTransform(0, 0, 0), RigidTransform(2, 4, -6)]
     found = interpolate_transforms(np.array([1.0, 1.5, 3.0]), np.array([1.0, 3.0]), known)
     np.testing.assert_allclose(transforms_to_array(found), [[0, 0, 0], [0.5, 1, -1.5], [2, 4, -6]])
@@ -99,7 +99,7 @@ def test_between_times():
     assert interpolate_transforms(np.array([0.0, 9.0]), np.array([1.0]), known[1:]) == known[1:] * 2
 
 
-def test_beyond_the_times_known_it_goes_on_as_it_went():
+def test_beyond_the_times_known_it_goes_on_as_it_went() -> None:
     known_s = np.arange(1.0, 3.01, 0.1)
     known = [RigidTransform(time, 2 * time, -time) for time in known_s]
     found = interpolate_transforms(np.array([0.8, 3.3]), known_s, known)

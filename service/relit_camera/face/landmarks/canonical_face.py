@@ -1,6 +1,6 @@
-"""The canonical face: a mean head shape in head axes, the common ground of every landmark scheme.
+"""The canonical face: a mean head shape in head axes, on which landmark schemes are defined.
 
-It is MediaPipe's `canonical_face_model.obj` (Apache-2.0, its licence lies beside it). Its axes are ours as they are:
+It is MediaPipe's `canonical_face_model.obj` (Apache-2.0, its licence lies beside it). Its axes are the project's:
 centimetres, X right in the picture for a person who faces the camera, Y up, Z toward the camera. So the subject's right
 eye, whose outer corner is vertex 33, has x < 0: it is at the left of an unmirrored picture.
 """

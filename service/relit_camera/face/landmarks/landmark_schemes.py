@@ -1,6 +1,4 @@
-"""What a landmark scheme says of its points. "Right" and "left" are the subject's.
-
-Landmark schemes: how many points a tracker gives, what each one is, and where it lies on the canonical face.
+"""Landmark schemes: the number of points a tracker gives, their meaning, and their positions on the canonical face.
 
 "Right" and "left" are the subject's: the right eye is at the left of an unmirrored picture.
 
@@ -46,7 +44,7 @@ class EyeLandmarks:
 
 @dataclass(frozen=True, eq=False)
 class LandmarkScheme:
-    """A landmark scheme.
+    """A landmark scheme: its points by meaning, as indices.
 
     Attributes:
         name: as in `FaceState.scheme`.
@@ -55,7 +53,7 @@ class LandmarkScheme:
         right_eye, left_eye: the eyes.
         right_brow, left_brow: beginning at the outer end of the upper edge.
         upper_lip_outer, lower_lip_outer: from the right to the left mouth corner, corners included.
-        upper_lip_inner, lower_lip_inner: the same of the inner edge; same length, each over its partner.
+        upper_lip_inner, lower_lip_inner: of the inner edge, of equal length, point by point above each other.
         lip_gap: (upper, lower) inner points near the middle whose distance is the mouth's opening.
         oval: outline of the face, clockwise in the picture, starting at the top.
     """
@@ -76,7 +74,7 @@ class LandmarkScheme:
 
     @property
     def count(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return len(self.canonical)
 
     @property

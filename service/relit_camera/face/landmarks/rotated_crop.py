@@ -1,4 +1,4 @@
-"""Cutting a turned rectangle out of a picture, for networks that want the face upright and of one size."""
+"""Rotated crops: rectangles sampled from a picture, for networks that need the face upright and of fixed size."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from relit_camera.base.images.image_types import DisplayImage, Points
 
 @dataclass(frozen=True)
 class Crop:
-    """A rectangle in a picture.
+    """A rectangle in a picture, which may be rotated.
 
     Attributes:
         center: (x, y) pixels, pixel centres at integers + ½.
@@ -48,6 +48,6 @@ class Crop:
 
 
 def bounding_box(points: Points) -> tuple[float, float, float, float]:
-    """Give the box x, y, width, height around points (count, 2)."""
+    """The bounding box x, y, width, height of points (count, 2)."""
     low, high = points.min(axis=0), points.max(axis=0)
     return float(low[0]), float(low[1]), float(high[0] - low[0]), float(high[1] - low[1])

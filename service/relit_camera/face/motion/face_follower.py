@@ -20,57 +20,57 @@ from relit_camera.face.head_pose import HeadPose, project, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 from relit_camera.face.motion.motion_blending import Crossfade, Inertialization, RelativeMotion, zero_motion
 from relit_camera.face.motion.neutral_face import NeutralFace, NeutralFaceFinder, is_frontal
-from relit_camera.face.motion.one_euro_filter import OneEuroFilter, OneEuroParameters, RotationOneEuroFilter
+from relit_camera.face.motion.one_euro_filter import (
+    FACE_SMOOTHING,
+    OneEuroFilter,
+    OneEuroParameters,
+    RotationOneEuroFilter,
+)
 
-_REENTRY_FRACTION = 0.9
-_LOW_NOISE_EYE_SPAN_PX = 120.0
-_LOW_NOISE_DEPTH_CM = 8.0
-ROTATION_SMOOTHING = OneEuroParameters(min_cutoff_hz=1.5, beta=0.8, dead_band=0.25, speed_cutoff_hz=2.5)
-TRANSLATION_SMOOTHING = OneEuroParameters(min_cutoff_hz=1.5, beta=4.0, dead_band=0.02, speed_cutoff_hz=2.5)
-EXPRESSION_SMOOTHING = OneEuroParameters(min_cutoff_hz=1.5, beta=5.0, dead_band=0.02, speed_cutoff_hz=2.5)
-FAST_EXPRESSION_SMOOTHING = OneEuroParameters(min_cutoff_hz=4.0, beta=12.0, dead_band=0.02, speed_cutoff_hz=2.5)
+REENTRY_FRACTION = 0.9
+"""A head that was out of reach is followed again within this fraction of the reach, so that it does not flicker."""
 
 
 @dataclass(frozen=True)
 class FaceFollowerSettings:
-    """How a face is followed.
+    """Settings of a face follower.
 
     Attributes:
-        reach_yaw_deg: turning further than this from neutral is out of reach: the motion eases to neutral.
-        reach_pitch_deg: the same for nodding.
+        reach_yaw_deg: a head turned further than this from neutral is out of reach: the motion eases to neutral.
+        reach_pitch_deg: the same for pitch.
         ease_s: how long easing to neutral and back takes.
         rotation: smoothing of the head's rotation, in degrees.
         translation: smoothing of the head's position, in centimetres, each axis for itself.
         expression: smoothing of the head-space points, in centimetres.
-        quick_expression: the same for eyes and lips, so that blinks and speech keep their speed.
+        fast_expression: smoothing of the head-space points of eyes and lips, in centimetres.
     """
 
     reach_yaw_deg: float = 40.0
     reach_pitch_deg: float = 30.0
     ease_s: float = 0.5
-    rotation: OneEuroParameters = ROTATION_SMOOTHING
-    translation: OneEuroParameters = TRANSLATION_SMOOTHING
-    expression: OneEuroParameters = EXPRESSION_SMOOTHING
-    quick_expression: OneEuroParameters = FAST_EXPRESSION_SMOOTHING
+    rotation: OneEuroParameters = FACE_SMOOTHING.rotation
+    translation: OneEuroParameters = FACE_SMOOTHING.translation
+    expression: OneEuroParameters = FACE_SMOOTHING.expression
+    fast_expression: OneEuroParameters = FACE_SMOOTHING.fast_expression
 
 
 @dataclass(frozen=True, eq=False)
 class FaceMotion:
-    """A face's motion in one frame, smoothed.
+    """Smoothed motion of a face in one frame.
 
-    Relative to neutral and eased, for what is driven by the face: `rotation`, `translation`, `expression` and
-    `presence`. With neutral pose (R0, t0) the eased pose is rotation · R0 and t0 + translation. In the live picture,
-    for what is laid over it: `landmarks` and `pose`; after a loss they stay where the face was last seen.
+    `rotation`, `translation`, `expression` and `presence` are relative to the neutral face and eased; they drive the
+    reenactor and the light. With neutral pose (R0, t0) the eased pose is rotation · R0 and t0 + translation.
+    `landmarks` and `pose` are those in the live picture; after a loss they keep their last values.
 
     Attributes:
         status: of the frame.
         presence: 1 while the face is followed, 0 at neutral because it is lost or out of reach, eased between.
-        rotation: takes head-frame vectors to room-frame vectors, identity at neutral.
+        rotation: takes head-frame vectors to world-frame vectors, identity at neutral.
         translation: (3,) float64 centimetres relative to neutral, camera axes.
         expression: (count, 3) float64 centimetres: head-space points minus the neutral ones.
         landmarks: (count, 2) float32 pixels; (0, 2) before the first face.
         pose: camera_from_head; None before the first face.
-        neutral: what the motion is relative to; None before the first face.
+        neutral: the neutral face; None before the first face.
     """
 
     status: FaceStatus
@@ -89,7 +89,7 @@ class FaceMotion:
 
 
 class FaceFollower:
-    """Follows the states of one tracker. `reset_neutral` may be called from another thread, the rest may not."""
+    """Turns the states of one tracker into smooth motion. Only `reset_neutral` may be called from another thread."""
 
     def __init__(self, scheme: str, settings: FaceFollowerSettings | None = None) -> None:
         """Follow landmarks of this scheme.
@@ -114,14 +114,13 @@ class FaceFollower:
         self._jumps_back = 0
 
     def reset_neutral(self) -> None:
-        """Take the neutral face anew from the next ten confident frames; until then the old one holds."""
+        """Measure the neutral face anew from the next ten confident frames; until then the old one remains in use."""
         self._finder = NeutralFaceFinder(any_pose=True)
 
     def follow(self, state: FaceState, size: tuple[int, int], time_s: float) -> FaceMotion:
-        """Take the next state of a picture of `size` (width, height) at `time_s`.
+        """The motion after the next state, of a picture of `size` (width, height) at `time_s` of the source's clock.
 
-        The time is in seconds on the source's clock. Where it goes back, as in a file that loops, the motion is eased
-        from the end to the beginning.
+        Where the time goes back, as in a file that loops, the motion is eased from the end to the beginning.
 
         Raises:
             TrackError: the state has another landmark scheme.
@@ -153,8 +152,8 @@ class FaceFollower:
             raise TrackError(f"landmarks are of scheme '{state.scheme}', not '{self._scheme.name}'")
         raw_points = unproject(state.landmarks, state.pose, self._scheme, size)
         self._update_neutral(state, raw_points, time_s)
-        # Landmarks err by a share of a pixel whatever the face's size: on a small face that is more of a head.
-        noise = max(1.0, _LOW_NOISE_EYE_SPAN_PX / self._scheme.eye_span(state.landmarks))
+        # Landmarks err by a fraction of a pixel whatever the face's size: relative to a small face that is more.
+        noise = max(1.0, FACE_SMOOTHING.low_noise_eye_span_px / self._scheme.eye_span(state.landmarks))
         points, self._pose = self._smoother(raw_points, state.pose, time_s, noise)
         self._landmarks = project(points, self._pose, size)
         if self._neutral is not None:
@@ -170,16 +169,16 @@ class FaceFollower:
         finder = self._finder
         found = finder.add(state, points, time_s) if finder else None
         if found is None and self._neutral is None and state.pose is not None and is_frontal(state.pose):
-            found = NeutralFace(points, state.pose)  # makes do until the finder has seen enough
+            found = NeutralFace(points, state.pose)  # provisional, until the finder has enough frames
         if found is not None:
             self._neutral = found
             self._neutrals += 1
-            if self._finder is finder:  # nobody asked for another one meanwhile
+            if self._finder is finder:  # no other reset was requested meanwhile
                 self._finder = None
 
     def _is_in_reach(self) -> bool:
-        """Whether the head is turned little enough; who left must come a little further back."""
-        share = 1.0 if self._followed else _REENTRY_FRACTION
+        """Whether the head's rotation is within reach, with hysteresis: to re-enter it must be clearly inside."""
+        share = 1.0 if self._followed else REENTRY_FRACTION
         yaw, pitch, _ = angles_from_rotation(self._target.rotation)
         return abs(yaw) <= share * self._settings.reach_yaw_deg and abs(pitch) <= share * self._settings.reach_pitch_deg
 
@@ -192,20 +191,20 @@ class FaceFollower:
 
 
 class _FaceSmoother:
-    """One-Euro filters on the pose and on the head-space points, which keep apart what the head and the face do."""
+    """One-Euro filters on the pose and on the head-space points, so that head and face are smoothed apart."""
 
     def __init__(self, scheme: LandmarkScheme, settings: FaceFollowerSettings) -> None:
-        quick = np.zeros((scheme.count, 1), dtype=bool)
-        quick[[*scheme.eyes, *scheme.lips]] = True
-        calm, lively = settings.expression, settings.quick_expression
+        fast_points = np.zeros((scheme.count, 1), dtype=bool)
+        fast_points[[*scheme.eyes, *scheme.lips]] = True
+        slow, fast = settings.expression, settings.fast_expression
         self._rotation = RotationOneEuroFilter(settings.rotation)
         self._translation = OneEuroFilter(settings.translation)
         self._points = OneEuroFilter(
             OneEuroParameters(
-                min_cutoff_hz=np.where(quick, lively.min_cutoff_hz, calm.min_cutoff_hz),
-                beta=np.where(quick, lively.beta, calm.beta),
-                dead_band=np.where(quick, lively.dead_band, calm.dead_band),
-                speed_cutoff_hz=calm.speed_cutoff_hz,
+                min_cutoff_hz=np.where(fast_points, fast.min_cutoff_hz, slow.min_cutoff_hz),
+                beta=np.where(fast_points, fast.beta, slow.beta),
+                dead_band=np.where(fast_points, fast.dead_band, slow.dead_band),
+                speed_cutoff_hz=slow.speed_cutoff_hz,
             )
         )
 
@@ -220,8 +219,8 @@ class _FaceSmoother:
     ) -> tuple[NDArray[np.float64], HeadPose]:
         """Smooth head-space points (count, 3) and the pose, `noise` times as noisy as those of a near face."""
         rotation = self._rotation(pose.rotation, time_s, noise)
-        # Depth comes from the face's size alone: it errs by more than the position across, and the more the further.
-        depth_noise = max(1.0, -pose.translation[2] / _LOW_NOISE_DEPTH_CM)
+        # Depth follows from the face's size alone: its error exceeds that of the position across and grows with depth.
+        depth_noise = max(1.0, -pose.translation[2] / FACE_SMOOTHING.low_noise_depth_cm)
         axes_noise = noise * np.array([[1.0], [1.0], [depth_noise]])
         translation = self._translation(pose.translation[:, None], time_s, axes_noise)[:, 0]
         return self._points(points, time_s, noise), HeadPose(rotation, translation, pose.focal_px)

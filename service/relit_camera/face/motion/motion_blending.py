@@ -1,4 +1,4 @@
-"""Changing what is followed without a jump."""
+"""Blending between motions without a jump: when a face is lost, comes back, or gets another neutral face."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class RelativeMotion:
     """A head's motion relative to its neutral pose.
 
     Attributes:
-        rotation: takes head-frame vectors to room-frame vectors.
+        rotation: takes head-frame vectors to world-frame vectors.
         translation: (3,) float64 centimetres, camera axes.
         expression: (count, 3) float64 centimetres in head space.
     """
@@ -27,7 +27,7 @@ class RelativeMotion:
     expression: NDArray[np.float64]
 
     def toward(self, other: RelativeMotion, share: float) -> RelativeMotion:
-        """Go `share` of the way to `other`, the rotation by the shortest way."""
+        """The motion a fraction `share` of the way to `other`, the rotation along the shortest path."""
         way = (other.rotation * self.rotation.inv()).as_rotvec()
         return RelativeMotion(
             Rotation.from_rotvec(share * way) * self.rotation,
@@ -36,7 +36,7 @@ class RelativeMotion:
         )
 
     def relative_to(self, other: RelativeMotion) -> RelativeMotion:
-        """Give what takes `other` to this motion."""
+        """The motion that takes `other` to this one."""
         return RelativeMotion(
             self.rotation * other.rotation.inv(),
             self.translation - other.translation,
@@ -44,7 +44,7 @@ class RelativeMotion:
         )
 
     def after(self, other: RelativeMotion) -> RelativeMotion:
-        """Do this motion on top of `other`: the inverse of `relative_to`."""
+        """The sum of `other` and this motion: the inverse of `relative_to`."""
         return RelativeMotion(
             self.rotation * other.rotation,
             self.translation + other.translation,
@@ -53,12 +53,12 @@ class RelativeMotion:
 
 
 def zero_motion(count: int) -> RelativeMotion:
-    """Give the motion of a neutral face of `count` points."""
+    """The motion of a neutral face of `count` points: none."""
     return RelativeMotion(Rotation.identity(), np.zeros(3), np.zeros((count, 3)))
 
 
 class MotionTransition(ABC):
-    """Gives its target, except for `duration_s` after the target was exchanged for another (another `key`)."""
+    """Passes its target through, and blends for `duration_s` after the target changes to one with another `key`."""
 
     def __init__(self, duration_s: float) -> None:
         self._duration_s = duration_s
@@ -68,7 +68,7 @@ class MotionTransition(ABC):
         self._changed_s = 0.0
 
     def __call__(self, target: RelativeMotion, key: object, time_s: float) -> RelativeMotion:
-        """Give the eased motion at `time_s` seconds."""
+        """The blended motion at `time_s` seconds."""
         if self._output is not None and key != self._key:
             self._kept, self._changed_s = self._keep(self._output, target), time_s
         self._key = key
@@ -80,17 +80,17 @@ class MotionTransition(ABC):
 
     @abstractmethod
     def _keep(self, output: RelativeMotion, target: RelativeMotion) -> RelativeMotion:
-        """Choose what to keep of the old output when the target is exchanged."""
+        """What to keep of the old output when the target changes."""
 
     @abstractmethod
     def _blend(self, kept: RelativeMotion, target: RelativeMotion, share: float) -> RelativeMotion:
-        """Blend what was kept with the target, all target at `share` 1."""
+        """The blend of what was kept with the target; the target alone at `share` 1."""
 
 
 class Crossfade(MotionTransition):
-    """From where the old output stood: for a face that is lost, comes back or turns out of reach.
+    """Blends from the old output, held constant: for a face that is lost, comes back or turns out of reach.
 
-    It never leaves the way between the two, however fast the target moves.
+    The result stays between the two, however fast the target moves.
     """
 
     def _keep(self, output: RelativeMotion, target: RelativeMotion) -> RelativeMotion:
@@ -101,9 +101,9 @@ class Crossfade(MotionTransition):
 
 
 class Inertialization(MotionTransition):
-    """Fades the distance to the old output: for a new neutral face, under which the head moves on as before.
+    """Fades out the offset from the old output: for a new neutral face, while the head moves on.
 
-    It is the "inertialization" of games (Bollo, GDC 2018).
+    Known as inertialization in games (Bollo, GDC 2018).
     """
 
     def _keep(self, output: RelativeMotion, target: RelativeMotion) -> RelativeMotion:

@@ -1,4 +1,4 @@
-"""The neutral face: what a live face is measured against."""
+"""The neutral face, relative to which motion is measured, and how it is found in the first frames."""
 
 from __future__ import annotations
 
@@ -12,16 +12,32 @@ from relit_camera.base.rotations import angles_from_rotation
 from relit_camera.face.face_state import FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose
 
-_MIN_FRAMES = 10
-_WINDOW_S = 1.0
-_FRONTAL_DEG = 20.0
-_FRONTAL_TIMEOUT_S = 3.0
-_OPEN_EYE_FRACTION = 0.75
+
+@dataclass(frozen=True)
+class NeutralFaceTunables:
+    """Constants of the search for the neutral face (docs/trackers.md).
+
+    Attributes:
+        frames: number of frames whose median is the neutral face.
+        window_s: duration over which candidates are collected.
+        frontal_deg: largest angle about any axis of a near-frontal head.
+        frontal_timeout_s: time after which frames count however the head is turned.
+        open_eye_fraction: of the median eye opening, below which the eyes blink.
+    """
+
+    frames: int = 10
+    window_s: float = 1.0
+    frontal_deg: float = 20.0
+    frontal_timeout_s: float = 3.0
+    open_eye_fraction: float = 0.75
+
+
+TUNABLES = NeutralFaceTunables()
 
 
 @dataclass(frozen=True, eq=False)
 class NeutralFace:
-    """A face at rest.
+    """A face with neutral expression and pose.
 
     Attributes:
         points: (count, 3) float64 head-space centimetres of the scheme's points.
@@ -42,50 +58,50 @@ class _Sample:
 
 def is_frontal(pose: HeadPose) -> bool:
     """Whether a head looks roughly into the camera."""
-    return max(abs(angle) for angle in angles_from_rotation(pose.rotation)) < _FRONTAL_DEG
+    return max(abs(angle) for angle in angles_from_rotation(pose.rotation)) < TUNABLES.frontal_deg
 
 
 class NeutralFaceFinder:
     """Finds the neutral face among the first confident, near-frontal frames.
 
-    It looks at a second of them, leaves out blinks, takes the ten calmest (mouth shut, head straight) and their median:
-    who talks, blinks or moves while the camera starts is still measured against a face at rest. Who sits aside and
-    never looks into the camera is taken as he is after three seconds.
+    It collects a second of them, drops blinks, selects the ten least active (mouth shut, head straight) and takes their
+    median, so that talking, blinking or moving while the camera starts does no harm. Somebody who never looks into the
+    camera is accepted as turned after three seconds.
     """
 
     def __init__(self, any_pose: bool = False) -> None:
-        """Begin. `any_pose` takes the next ten frames however the head is turned: the person asked for this pose."""
+        """`any_pose`: accept the next ten frames however the head is turned, because the user chose this pose."""
         self._any_pose = any_pose
         self._samples: list[_Sample] = []
         self._first_seen_s: float | None = None
 
     def add(self, state: FaceState, points: NDArray[np.float64], time_s: float) -> NeutralFace | None:
-        """Look at a frame's state and its head-space points; give the neutral face once it is found.
+        """Add a frame's state and its head-space points; returns the neutral face once it is found.
 
-        Uncertain and lost states are passed over.
+        Uncertain and lost states are ignored.
         """
         if state.status is not FaceStatus.FOUND or state.pose is None:
             return None
         if self._first_seen_s is None or time_s < self._first_seen_s:
             self._first_seen_s = time_s
         waited = time_s - self._first_seen_s
-        if self._any_pose or waited > _FRONTAL_TIMEOUT_S or is_frontal(state.pose):
+        if self._any_pose or waited > TUNABLES.frontal_timeout_s or is_frontal(state.pose):
             self._samples.append(_Sample(time_s, NeutralFace(points, state.pose), sum(state.eyes) / 2, state.mouth))
-        if len(self._samples) < _MIN_FRAMES:
+        if len(self._samples) < TUNABLES.frames:
             return None
-        if not self._any_pose and time_s - self._samples[0].time_s < _WINDOW_S:
+        if not self._any_pose and time_s - self._samples[0].time_s < TUNABLES.window_s:
             return None
         return _median([sample.neutral for sample in _least_active(self._samples)])
 
 
 def _least_active(samples: list[_Sample]) -> list[_Sample]:
-    usual = float(np.median([sample.eyes for sample in samples]))
-    awake = [sample for sample in samples if sample.eyes >= _OPEN_EYE_FRACTION * usual]
-    return sorted(awake, key=_activity)[:_MIN_FRAMES]
+    typical = float(np.median([sample.eyes for sample in samples]))
+    open_eyed = [sample for sample in samples if sample.eyes >= TUNABLES.open_eye_fraction * typical]
+    return sorted(open_eyed, key=_activity)[: TUNABLES.frames]
 
 
 def _activity(sample: _Sample) -> float:
-    # Ten degrees weigh as much as a mouth that speaks. Pitch says nothing: cameras stand above or below the eyes.
+    # Ten degrees weigh as much as a speaking mouth. Pitch does not count: cameras stand above or below the eyes.
     yaw, _, roll = angles_from_rotation(sample.neutral.pose.rotation)
     return sample.mouth + (abs(yaw) + abs(roll)) / 100
 
@@ -94,5 +110,5 @@ def _median(faces: list[NeutralFace]) -> NeutralFace:
     points = np.median([face.points for face in faces], axis=0)
     translation = np.median([face.pose.translation for face in faces], axis=0)
     mean = Rotation.concatenate([face.pose.rotation for face in faces]).mean()
-    aside = np.median([(mean.inv() * face.pose.rotation).as_rotvec() for face in faces], axis=0)
-    return NeutralFace(points, HeadPose(mean * Rotation.from_rotvec(aside), translation, faces[-1].pose.focal_px))
+    deviation = np.median([(mean.inv() * face.pose.rotation).as_rotvec() for face in faces], axis=0)
+    return NeutralFace(points, HeadPose(mean * Rotation.from_rotvec(deviation), translation, faces[-1].pose.focal_px))

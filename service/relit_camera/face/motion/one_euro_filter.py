@@ -1,9 +1,11 @@
-"""The One-Euro filter (Casiez, Roussel and Vogel, CHI 2012) on vectors and on rotations, with a soft dead band.
+"""The One-Euro filter (Casiez, Roussel and Vogel, CHI 2012) on vectors and rotations, with a soft dead band.
 
-A low-pass whose cutoff rises with speed: `cutoff = min_cutoff + beta * speed`, so a still person does not tremble and a
-moving one is not late. What is left of the noise stops at the dead band: the output rests while the filtered value
-stays within the band around it, so a still person is exactly still. It leaves the band without a step: the share of
-the way that it takes grows from 0 at the band's edge to all of it at twice the band.
+The constants for pose and expression are `FaceSmoothing`.
+
+A low-pass filter whose cutoff rises with speed, `cutoff = min_cutoff + beta * speed`: little jitter at rest, little
+delay in motion. The dead band removes the remaining jitter: the output is constant while the filtered value stays
+within the band around it. It leaves the band without a step: the fraction of the difference that the output follows
+grows from 0 at the edge of the band to 1 at twice the band.
 """
 
 from __future__ import annotations
@@ -25,9 +27,9 @@ class OneEuroParameters:
     """Settings of a One-Euro filter; each a number, or an array (..., 1) with a value for each vector.
 
     Attributes:
-        min_cutoff_hz: cutoff at rest; lower is calmer.
-        beta: hertz of cutoff for each unit of speed (the value's unit a second); higher is quicker.
-        dead_band: radius, in the value's unit, within which the output rests.
+        min_cutoff_hz: cutoff at rest; lower means less jitter.
+        beta: hertz of cutoff per unit of speed (the value's unit per second); higher means less delay.
+        dead_band: radius, in the value's unit, within which the output is constant.
         speed_cutoff_hz: cutoff of the low-pass on the speed.
     """
 
@@ -35,6 +37,36 @@ class OneEuroParameters:
     beta: float | NDArray[np.float64] = 0.0
     dead_band: float | NDArray[np.float64] = 0.0
     speed_cutoff_hz: float = 1.0
+
+
+@dataclass(frozen=True)
+class FaceSmoothing:
+    """Smoothing of pose and expression, chosen on tracked videos of still and of talking people (docs/trackers.md).
+
+    `tests/face/test_face_follower.py` and `relit evaluate video --pose` measure what it leaves of jitter and delay.
+
+    Attributes:
+        rotation: of the head's rotation, in degrees.
+        translation: of the head's position, in centimetres, each axis for itself.
+        expression: of the head-space points, in centimetres.
+        fast_expression: of the head-space points of eyes and lips, so that blinks and speech keep their speed.
+        low_noise_eye_span_px: distance of the outer eye corners from which landmarks have the least noise; on smaller
+            faces dead bands grow in proportion.
+        low_noise_depth_cm: depth up to which the error of depth equals that of the position across; beyond it the
+            depth's dead band grows in proportion.
+    """
+
+    rotation: OneEuroParameters = OneEuroParameters(min_cutoff_hz=1.5, beta=0.8, dead_band=0.25, speed_cutoff_hz=2.5)
+    translation: OneEuroParameters = OneEuroParameters(min_cutoff_hz=1.5, beta=4.0, dead_band=0.02, speed_cutoff_hz=2.5)
+    expression: OneEuroParameters = OneEuroParameters(min_cutoff_hz=1.5, beta=5.0, dead_band=0.02, speed_cutoff_hz=2.5)
+    fast_expression: OneEuroParameters = OneEuroParameters(
+        min_cutoff_hz=4.0, beta=12.0, dead_band=0.02, speed_cutoff_hz=2.5
+    )
+    low_noise_eye_span_px: float = 120.0
+    low_noise_depth_cm: float = 8.0
+
+
+FACE_SMOOTHING = FaceSmoothing()
 
 
 class _OneEuro(ABC, Generic[Value]):
@@ -79,15 +111,15 @@ class _OneEuro(ABC, Generic[Value]):
 
     @abstractmethod
     def _between(self, start: Value, end: Value) -> Vectors:
-        """Measure the way from `start` to `end`."""
+        """The difference vector from `start` to `end`."""
 
     @abstractmethod
     def _moved(self, start: Value, way: Vectors) -> Value:
-        """Go `way` from `start`."""
+        """`start` moved by the difference `way`."""
 
 
 class OneEuroFilter(_OneEuro[Vectors]):
-    """Filters arrays (..., d) of vectors. For numbers that move apart from each other give them as (..., 1)."""
+    """Filters arrays (..., d) of vectors. Independent numbers are given as vectors (..., 1)."""
 
     def _between(self, start: Vectors, end: Vectors) -> Vectors:
         return end - start
@@ -111,6 +143,6 @@ def _norm(vectors: Vectors) -> Vectors:
 
 
 def _low_pass_gain(cutoff_hz: ArrayLike, step_s: float) -> Vectors:
-    """Share of the new value in a first-order low-pass."""
-    turns = 2 * np.pi * np.asarray(cutoff_hz, dtype=np.float64) * step_s
-    return np.asarray(turns / (turns + 1))
+    """Weight of the new value in a first-order low-pass filter."""
+    radians = 2 * np.pi * np.asarray(cutoff_hz, dtype=np.float64) * step_s
+    return np.asarray(radians / (radians + 1))

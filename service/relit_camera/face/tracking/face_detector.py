@@ -1,4 +1,4 @@
-"""Finding a face in a whole picture with YuNet (Wu et al. 2023), through OpenCV."""
+"""Face detection in a whole picture with YuNet (Wu et al. 2023), through OpenCV."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ _LOG_ERRORS = 2
 
 @dataclass(frozen=True, eq=False)
 class Detection:
-    """A face as the detector sees it: good for seeds and checks, too coarse and jumpy for more.
+    """A detected face: accurate enough to start and check landmarks, too coarse and unsteady for more.
 
     Attributes:
-        box: around the face, brow to chin.
+        box: around the face, from the brows to the chin.
         eyes: (2, 2) centre of the subject's right and left eye in pixels; wrong from about 45° of roll.
         score: 0..1.
     """
@@ -84,7 +84,7 @@ def is_same_face(first: Box, second: Box) -> bool:
 
 @contextmanager
 def _quiet_opencv() -> Iterator[None]:
-    # OpenCV 5 warns that its new graph engine has no targets, which nobody asked for. It also moved these functions.
+    # OpenCV 5 warns about its graph engine, which is not used here; it also moved these functions.
     logging = getattr(cv2.utils, "logging", cv2)
     level = logging.getLogLevel()
     logging.setLogLevel(_LOG_ERRORS)

@@ -1,9 +1,8 @@
-"""Noticing that a picture is suddenly another where the face was: a jump, a cut, a file that begins anew.
+"""The tracking loop: initialized by the face detector, continued by a landmark network, checked by the detector.
 
-The loop of every tracker of ours: seed from the detector, follow the landmarks, check them now and then.
-
-A landmark network is fast and precise, but it answers "a face" for wherever it sits on one: after a jump it may follow
-the forehead at full confidence. So the detector, slower and coarser, looks over its shoulder every few frames.
+A landmark network is fast and precise, but its confidence says only that it sees a face: after a jump it may stay on
+the forehead at full confidence. So the detector, slower and coarser, checks it every few frames, and at once after a
+cut: `FacePatch` notices that the picture has suddenly changed where the face was.
 """
 
 from __future__ import annotations
@@ -22,51 +21,72 @@ from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
 from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
 from relit_camera.face.tracking.face_detector import Detection, FaceDetector, is_same_face
 
-_PATCH_SIDE = 24
-_MIN_CORRELATION = 0.65
-"""Between frames of talking and turning people the correlation stays above 0.67 but for 12 frames a second with quick
-turns (0.60); after a jump of half an eye distance it is under 0.65 nearly always."""
+
+@dataclass(frozen=True)
+class TrackingTunables:
+    """Thresholds of the tracking loop (docs/trackers.md, Why there is a detector behind the landmarks).
+
+    Attributes:
+        patch_side_px: side of the thumbnail by which cuts are detected.
+        min_correlation: of that thumbnail with the next frame. Between frames of talking and turning people it stays
+            above 0.67, except at 12 frames a second with quick turns (0.60); after a jump of half an eye distance it is
+            nearly always below 0.65.
+        max_eye_offset: largest distance between the detector's eyes and the landmarks', in eye distances.
+        max_detector_roll_deg: roll beyond which the detector's eyes are unreliable and overlapping boxes decide.
+        large_motion: motion between frames, in eye spans, after which the crop is placed anew and checked.
+        checks_before_other_face: failed checks after which a face elsewhere is taken over.
+        checks_before_lost: failed checks after which the face is lost.
+    """
+
+    patch_side_px: int = 24
+    min_correlation: float = 0.65
+    max_eye_offset: float = 0.35
+    max_detector_roll_deg: float = 30.0
+    large_motion: float = 0.25
+    checks_before_other_face: int = 8
+    checks_before_lost: int = 30
+
+
+TUNABLES = TrackingTunables()
 
 
 class FacePatch:
-    """Where the face was in one frame, and how the picture looked there.
+    """The landmarks of one frame, and a thumbnail of the picture around them.
 
     Attributes:
         points: (count, 2) float32 landmarks.
     """
 
     def __init__(self, image: DisplayImage, points: Points) -> None:
-        """Look at the upright box around the landmarks."""
+        """Take a thumbnail of the upright box around the landmarks."""
         self.points = points
         x, y, width, height = bounding_box(points)
         self._crop = Crop((x + width / 2, y + height / 2), max(width, 1.0), max(height, 1.0))
-        self._pixels = self._look(image)
+        self._pixels = self._thumbnail(image)
 
     def matches(self, image: DisplayImage) -> bool:
-        """Whether the next frame looks alike at the same place."""
-        norms = float(np.linalg.norm(self._pixels) * np.linalg.norm(now := self._look(image)))
-        return float(self._pixels @ now) >= _MIN_CORRELATION * norms
+        """Whether the next frame correlates with the thumbnail at the same place."""
+        norms = float(np.linalg.norm(self._pixels) * np.linalg.norm(now := self._thumbnail(image)))
+        return float(self._pixels @ now) >= TUNABLES.min_correlation * norms
 
-    def _look(self, image: DisplayImage) -> NDArray[np.float32]:
+    def _thumbnail(self, image: DisplayImage) -> NDArray[np.float32]:
         """The thumbnail's luma without its mean."""
-        luma = self._crop.cut(image, _PATCH_SIDE, _PATCH_SIDE).astype(np.float32).mean(axis=2).ravel()
+        luma = (
+            self._crop.cut(image, TUNABLES.patch_side_px, TUNABLES.patch_side_px)
+            .astype(np.float32)
+            .mean(axis=2)
+            .ravel()
+        )
         return np.asarray(luma - luma.mean(), dtype=np.float32)
-
-
-_MAX_EYE_OFFSET = 0.35
-_MAX_DETECTOR_ROLL_DEG = 30.0
-_LARGE_MOTION = 0.25
-_CHECKS_BEFORE_OTHER_FACE = 8
-_CHECKS_BEFORE_LOST = 30
 
 
 @dataclass(frozen=True, eq=False)
 class LandmarkPrediction:
-    """What a landmark network says of one crop.
+    """Landmarks that a network predicts in one crop, with its confidence.
 
     Attributes:
         points: (count, 2) float32 pixels of the picture.
-        confidence: 0..1 that there is a face.
+        confidence: 0..1, of there being a face.
     """
 
     points: Points
@@ -117,7 +137,7 @@ class LandmarkTracker:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the face: the next frame is searched whole."""
+        """Forget the face: the next frame is searched by the detector."""
         self._last: FacePatch | None = None
         self._frames_since_check = 0
         self._failed_checks = 0
@@ -157,16 +177,16 @@ class LandmarkTracker:
         return FaceStatus.FOUND, reading
 
     def _track_from_previous(self, image: DisplayImage, last: Points) -> LandmarkPrediction | None:
-        """Read round the last points; None where there is no face."""
+        """Read a crop around the last points; None where there is no face."""
         reading = self._network.read(image, self._network.crop_from_points(last))
         if reading.confidence >= self._network.threshold and self._moved_far(last, reading.points):
-            # The crop was off by so much that the points are: look again from where they are now, and have it checked.
+            # The crop no longer fits: read again around the new points, and let the detector check them.
             self._frames_since_check = self._check_every
             reading = self._network.read(image, self._network.crop_from_points(reading.points))
         return reading if reading.confidence >= self._network.threshold else None
 
     def _start(self, image: DisplayImage, detection: Detection) -> tuple[FaceStatus, LandmarkPrediction | None]:
-        """Read round a detection, twice: its box is coarse."""
+        """Read a crop around a detection, then one around the points found: the detection's box is coarse."""
         first = self._network.read(image, self._network.crop_from_detection(detection))
         reading = self._network.read(image, self._network.crop_from_points(first.points))
         self._frames_since_check = 0
@@ -177,9 +197,9 @@ class LandmarkTracker:
     def _check(
         self, image: DisplayImage, reading: LandmarkPrediction, cut: bool
     ) -> tuple[FaceStatus, LandmarkPrediction | None]:
-        """Compare a reading with the detector; start anew where they disagree.
+        """Compare a reading with the detector, and start anew where they disagree.
 
-        After a `cut`, where the picture is suddenly another, a face elsewhere is the one to follow.
+        After a `cut` a face that is detected elsewhere is tracked at once.
         """
         self._frames_since_check = 0
         box = bounding_box(reading.points)
@@ -187,9 +207,9 @@ class LandmarkTracker:
         if detection is None or not is_same_face(detection.box, box):
             # The detector misses profiles, so this alone is no proof that the face is gone.
             status, kept = self._judge(reading, agrees=False)
-            if detection and (cut or self._failed_checks > _CHECKS_BEFORE_OTHER_FACE):
+            if detection and (cut or self._failed_checks > TUNABLES.checks_before_other_face):
                 return self._start(image, detection)
-            return (status, kept) if self._failed_checks <= _CHECKS_BEFORE_LOST else (FaceStatus.LOST, None)
+            return (status, kept) if self._failed_checks <= TUNABLES.checks_before_lost else (FaceStatus.LOST, None)
         if self._agrees(reading, detection):
             return self._judge(reading, agrees=True)
         return self._start(image, detection)
@@ -201,13 +221,13 @@ class LandmarkTracker:
     def _agrees(self, reading: LandmarkPrediction, detection: Detection) -> bool:
         eyes = self._network.scheme.eye_centers(reading.points)
         across = eyes[1] - eyes[0]
-        if abs(np.degrees(np.arctan2(across[1], across[0]))) > _MAX_DETECTOR_ROLL_DEG:
+        if abs(np.degrees(np.arctan2(across[1], across[0]))) > TUNABLES.max_detector_roll_deg:
             return is_same_face(detection.box, bounding_box(reading.points))
         # In profile the eyes lie close together: there the face's height is the better yardstick.
         unit = max(float(np.linalg.norm(across)), 0.25 * detection.box[3])
-        return float(np.linalg.norm(eyes.mean(axis=0) - detection.eyes.mean(axis=0))) <= _MAX_EYE_OFFSET * unit
+        return float(np.linalg.norm(eyes.mean(axis=0) - detection.eyes.mean(axis=0))) <= TUNABLES.max_eye_offset * unit
 
     def _moved_far(self, before: Points, now: Points) -> bool:
         scheme = self._network.scheme
         motion = scheme.eye_centers(now).mean(axis=0) - scheme.eye_centers(before).mean(axis=0)
-        return float(np.linalg.norm(motion)) > _LARGE_MOTION * scheme.eye_span(now)
+        return float(np.linalg.norm(motion)) > TUNABLES.large_motion * scheme.eye_span(now)

@@ -1,6 +1,6 @@
-"""Which points the blendshape network takes, and what its scores are called.
+"""The tracker `mesh`: the 478-point face mesh of MediaPipe's face landmarker, with irises and blendshapes.
 
-The tracker `mesh`: the 478-point face mesh of MediaPipe's face landmarker, with irises and blendshapes.
+The tables hold the points that the blendshape network takes, and the names of its scores.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""The file of `relit track`: what a tracker said of every frame of a video, as JSON that plays back exactly.
+"""Recorded tracks: the JSON file of `relit track`, a tracker's states for every frame of a video, and its playback.
 
 Angles are degrees and positions centimetres, relative to the camera; landmarks are pixels with pixel centres at
 integers + ½ (see `face.face_state`).
 
-The tracker `recorded:PATH`: plays back a `relit track` file, so that nothing need be downloaded.
+The tracker `recorded:PATH` plays such a file back exactly, without any model.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from relit_camera.face.tracking.trackers import TrackerOptions
 
 VERSION: Literal[1] = 1
 MAX_BYTES = 512 << 20
-"""Of a file: some 20 minutes. Read, it takes several times that in memory."""
+"""Largest track file, about 20 minutes; in memory it takes several times as much."""
 
 Positive = Annotated[float, Field(gt=0)]
 Pixels = Annotated[int, Field(gt=0, le=16384)]
@@ -77,7 +77,7 @@ class Track(_Record):
 
     version: Literal[1] = VERSION
     tracker: str
-    """Name of the tracker that made it."""
+    """Name of the tracker that recorded it."""
     scheme: str
     """Landmark scheme: how many points and what each is."""
     size: tuple[Pixels, Pixels]
@@ -99,7 +99,7 @@ class Track(_Record):
         return self
 
     def state(self, index: int) -> FaceState:
-        """Give the face state of frame `index`, counted round again beyond the end."""
+        """The face state of frame `index`, which wraps around at the end."""
         frame = self.frames[index % len(self.frames)]
         if not frame.found or frame.pose is None or frame.translation is None:
             return LOST
@@ -202,7 +202,7 @@ def _frame_from_state(state: FaceState, time_s: float) -> TrackFrame:
 
 
 class RecordedTracker:
-    """Answers with the recorded state of the frame's index; beyond the end it begins again, as a looped file does."""
+    """The tracker `recorded`: returns the recorded state of the frame's index, which wraps around at the end."""
 
     name = "recorded"
 

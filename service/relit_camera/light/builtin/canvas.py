@@ -1,4 +1,4 @@
-"""The canvas that the built-in environments are painted on, and the strokes they share.
+"""The canvas on which the built-in environments are painted, and the painting operations they share.
 
 A canvas has viewer axes (`light.panorama_axes`), row 0 up. `bearing` is the angle from its middle to the right, in
 degrees; what lights the face from the front is at bearings beyond ±90.
