@@ -30,8 +30,8 @@ import yaml
 
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.errors import RelitError
-from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
-from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environments.environment_store import EnvironmentStore
 from relit_camera.live.scene.background_store import BackgroundStore
 from relit_camera.subject.subject_file import read_subject, write_subject
 from relit_camera.subject.subject_store import SubjectStore

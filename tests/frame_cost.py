@@ -22,10 +22,10 @@ import numpy as np
 from relit_camera.app.camera_service import CameraService
 from relit_camera.app.demo import demo_files
 from relit_camera.app.wiring import make_tracker
+from relit_camera.base.concurrency.threads import freeze_gc, limit_threads
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
-from relit_camera.base.threads import freeze_gc, limit_threads
 from relit_camera.devices.sinks.sink import NullSink
 from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.live.scene.scene_controller import SceneController

@@ -28,7 +28,7 @@ from relit_camera.base.models.model_manifest import public_manifest
 from relit_camera.capture import lights_file, subject_landmarks
 from relit_camera.cli.main import app
 from relit_camera.face.tracking import track_recording
-from relit_camera.light.environment_panorama import MAX_PANORAMA_PIXELS
+from relit_camera.light.environments.environment_panorama import MAX_PANORAMA_PIXELS
 from relit_camera.live.compositing import matting
 from relit_camera.live.scene.background_store import MAX_SIDE_PX as MAX_BACKGROUND_SIDE_PX
 from relit_camera.live.status.camera_status import DegradationCode

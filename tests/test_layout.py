@@ -14,11 +14,8 @@ MAX_LINES = 400
 ONE_A_COMMAND = {"cli/commands"}
 """Folders that hold one module for each command line command, however many there are."""
 SHARED_NAMES = {"__init__", "__main__", "main"}
-SAME_WORD = {
-    "subject": {"subject/subject.py", "cli/commands/subject.py"},
-    "head_crop": {"capture/film/lamp/head_crop.py", "live/reenactment/onnx_network/head_crop.py"},
-}
-"""Modules of the same name that are both rightly called so: of a command and what it is about, of two kinds of crop."""
+SAME_WORD = {"subject": {"subject/subject.py", "cli/commands/subject.py"}}
+"""Modules of the same name that are both rightly called so: a command and what it is about."""
 
 OLD_CLASSES = frozenset(
     """
@@ -52,6 +49,7 @@ def entries(folder: Path) -> list[str]:
     return sorted(
         path.name
         for path in folder.iterdir()
+        if path != PACKAGE / "plugins.py"  # not a topic: what plug-ins import, from everywhere
         if (path.suffix == ".py" and path.name != "__init__.py") or (path / "__init__.py").exists()
     )
 

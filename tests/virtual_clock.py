@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 
 class VirtualClock:
-    """Implements `base.clock.Clock`. Time passes only while somebody waits, in the thread that waits.
+    """Implements `base.concurrency.clock.Clock`. Time passes only while somebody waits, in the thread that waits.
 
     What happens meanwhile is scheduled beforehand by `at`, or by actions that were. So the code under test runs in the
     test's own thread, and every run is the same.

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
 from tests.api.api_client import Client, check_problem, decoded_picture, hdr, png
 from tests.api.fake_camera import FakeCamera
 

@@ -16,7 +16,7 @@ from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.face.face_state import LOST, FaceState, Tracker
-from relit_camera.light.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.scene.scene import Scene
 from tests.small_camera import SteadyTracker, small_subject

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from relit_camera.base.newest_slot import NewestSlot
+from relit_camera.base.concurrency.newest_slot import NewestSlot
 from tests.virtual_clock import VirtualClock
 
 LONG_S = 60.0

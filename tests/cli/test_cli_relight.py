@@ -18,7 +18,7 @@ from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.capture.lights_file import read_lights
 from relit_camera.capture.reflectance.method_registry import open_method
 from relit_camera.light.directions import texel_directions, texel_solid_angles
-from relit_camera.light.environment_panorama import read_panorama
+from relit_camera.light.environments.environment_panorama import read_panorama
 from relit_camera.live.compositing.environment_view import EnvironmentView
 from tests.cli.relit_command import Answer, Material, call
 from tests.replay.materials import subject_file

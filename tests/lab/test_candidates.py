@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import NotFoundError
 from relit_camera.capture.reflectance import method_registry as methods
-from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.directional_light import bilinear_map_lookup
+from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.lab.evaluate.field.candidates import BLACK_RING_METHOD, method_candidates, subject_candidate

@@ -15,7 +15,7 @@ from relit_camera.lab.evaluate.field.field_report import field_json, field_page,
 from relit_camera.lab.evaluate.field.ghost_shadows import find_shadow_transitions, mid_tone_share
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
 from relit_camera.lab.evaluate.field.sample_points import SamplePoint, face_sample_points, parse_sample_point
-from relit_camera.light.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from tests.lab.html_outline import Outline
 from tests.lab.lit_sphere import cap, grid, shadowed
 

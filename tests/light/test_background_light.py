@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
-from relit_camera.light.background_light import panorama_from_background
-from relit_camera.light.builtin.builtin_environments import builtin_environment
 from relit_camera.light.directions import direction_from_degrees, map_position_from_direction
+from relit_camera.light.environments.background_light import panorama_from_background
+from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.light.light_map import irradiance, resample_to_light_map
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.color import LUMINANCE
-from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
-from relit_camera.light.builtin.canvas import bearings, directions
 from relit_camera.light.directions import direction_from_degrees, texel_directions
-from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.environments.builtin.canvas import bearings, directions
+from relit_camera.light.environments.environment_store import EnvironmentStore
+from relit_camera.light.environments.panorama_axes import between_map_and_viewer_axes
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map import irradiance, total
-from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 
 
 def reading(name: str, azimuth: float, elevation: float = 10) -> np.ndarray:

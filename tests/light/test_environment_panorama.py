@@ -13,9 +13,9 @@ import pytest
 
 from relit_camera.base.errors import PanoramaError
 from relit_camera.base.images.color import srgb_decode
-from relit_camera.light import environment_panorama as panorama_module
 from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.environment_panorama import panorama_from_radiance, read_panorama
+from relit_camera.light.environments import environment_panorama as panorama_module
+from relit_camera.light.environments.environment_panorama import panorama_from_radiance, read_panorama
 from relit_camera.light.light_map import irradiance, resample_to_light_map, total
 
 SHARED_MAPS = [

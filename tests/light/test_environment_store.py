@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import InputError, NotFoundError, PanoramaError, StorageError
-from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
-from relit_camera.light.environment_panorama import read_panorama
-from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environments.environment_panorama import read_panorama
+from relit_camera.light.environments.environment_store import EnvironmentStore
 from relit_camera.light.light_map import total
 
 

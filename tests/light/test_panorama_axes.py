@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from relit_camera.light.directions import texel_directions
-from relit_camera.light.panorama_axes import between_map_and_picture_axes, between_map_and_viewer_axes
+from relit_camera.light.environments.panorama_axes import between_map_and_picture_axes, between_map_and_viewer_axes
 
 HEIGHT, WIDTH = 16, 32
 

@@ -8,7 +8,7 @@ import pytest
 from relit_camera.base.config.look import Lamp, Lighting
 from relit_camera.base.images.color import luminance
 from relit_camera.light.directions import direction_from_degrees, texel_directions, texel_solid_angles
-from relit_camera.light.environment_panorama import Environment, Panorama, environment_from_panorama
+from relit_camera.light.environments.environment_panorama import Environment, Panorama, environment_from_panorama
 from relit_camera.light.light_map import LightMap, total
 from relit_camera.light.scene_light import lamp_light_map, scene_light_map
 

@@ -18,7 +18,7 @@ from relit_camera.base.errors import LightsError
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.rotations import Angles
 from relit_camera.base.video.video_readers import VideoReader
-from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.environments.environment_store import EnvironmentStore
 from relit_studio.capture.capture_scene import Scene, Timing, dimmed
 from relit_studio.capture.captured_person import to_rest
 from relit_studio.capture.field_person import FieldPerson

@@ -12,7 +12,7 @@ from relit_camera.base.rotations import Angles
 from relit_camera.face.head_pose import fit_pose, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.tracking.track_recording import TrackRecorder, read_track
-from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.environments.environment_store import EnvironmentStore
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map import irradiance
 from relit_studio.camera import Camera

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.light.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_studio.camera import Camera
 from relit_studio.capture.field_person import FieldPerson
 from relit_studio.field.field_renderer import FieldSettings, field_description

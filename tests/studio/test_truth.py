@@ -10,8 +10,8 @@ import pytest
 from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.capture.picture_import import import_samples
-from relit_camera.light.builtin.builtin_environments import builtin_environment
 from relit_camera.light.directions import texel_directions
+from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_studio.mannequin.__main__ import main
 from relit_studio.mannequin.driving_clip import CLIP_SIZE, render_clip

@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_quality import psnr
-from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
+from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
+from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import SharpVisibilityInterpolation
 from relit_camera.capture.reflectance.samples import Samples
-from relit_camera.capture.reflectance.shadow_aware_interpolation import SharpVisibilityInterpolation
-from relit_camera.light.builtin.builtin_environments import builtin_environment
 from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.environment_panorama import read_panorama
+from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.environment_panorama import read_panorama
 from relit_camera.light.light_map import LightMap, resample_to_light_map
 from relit_camera.subject.compression.accuracy_target import DARK_LIGHT_FRACTION, CompressionTarget
 from relit_camera.subject.compression.field_compression import CompressedField, compress_field

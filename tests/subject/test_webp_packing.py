@@ -13,7 +13,7 @@ from safetensors.numpy import load_file, save_file
 from relit_camera.base.errors import InputError, SubjectError
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.capture.subject_builder import build_subject
-from relit_camera.light.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.subject.compression.webp_packing import decode_basis, encode_basis, light_psnrs_db, pack_subject
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.subject import Subject

@@ -13,7 +13,7 @@ from functools import partial
 
 from relit_camera import __version__
 from relit_camera.app.wiring import make_pipeline
-from relit_camera.base.clock import SYSTEM_CLOCK
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import StorageError
 from relit_camera.base.images.image_types import DisplayImage

@@ -25,11 +25,11 @@ from relit_camera.app.config_reload import apply_edited_settings
 from relit_camera.app.startup_checks import check_before_devices
 from relit_camera.app.systemd import notify_systemd
 from relit_camera.app.wiring import make_tracker
+from relit_camera.base.concurrency.threads import freeze_gc, limit_threads
 from relit_camera.base.config.config_watcher import watch_config
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
 from relit_camera.base.errors import RelitError
 from relit_camera.base.storage.atomic_files import remove_unfinished_files
-from relit_camera.base.threads import freeze_gc, limit_threads
 from relit_camera.devices.on_demand.on_demand_source import OnDemandController
 from relit_camera.devices.sinks.sink import Sink
 from relit_camera.devices.sinks.sink_factory import open_sink, published_label

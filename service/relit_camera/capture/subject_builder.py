@@ -15,8 +15,8 @@ from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD, open_method
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.capture.subject_landmarks import find_landmarks
-from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_camera.light.directions import texel_directions, texel_solid_angles
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.compression.field_compression import CompressedField, compress_field
 from relit_camera.subject.subject import HORIZON_STEP_RAD, Subject, SubjectMetadata

@@ -11,7 +11,7 @@ from relit_camera.base.config.look import Lamp, Lighting
 from relit_camera.base.images.color import luminance, rgb_from_kelvin
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.light.directions import MAP_HEIGHT, MAP_WIDTH
-from relit_camera.light.environment_panorama import Environment
+from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.light_map import LightMap, irradiance
 from relit_camera.light.light_map_interpolation import splat
 from relit_camera.light.light_map_rotation import rotate_light_map

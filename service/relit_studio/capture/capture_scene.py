@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import LinearImage
-from relit_camera.light.environment_panorama import Environment
+from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.exposure import WHITE_BALL_LUMINANCE, auto_exposure_scale
 from relit_camera.light.light_map import LightMap
 from relit_studio.capture.ball_reflection import Room, room_in_balls, torch_in_ball

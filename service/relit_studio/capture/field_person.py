@@ -22,8 +22,8 @@ from relit_camera.base.errors import LightsError
 from relit_camera.base.images.color import Gamma
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.capture.picture_import import import_samples
-from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.delaunay_triangulation import spherical_barycentric, spherical_delaunay
+from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
 from relit_camera.light.directions import texel_directions, texel_solid_angles
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map

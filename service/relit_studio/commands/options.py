@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from relit_camera.cli.progress import progress_bar
-from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.environments.environment_store import EnvironmentStore
 from relit_studio.cycles.job import Quality
 from relit_studio.drive.painted_rooms import ROOMS, paint_room
 from relit_studio.drive.room import Room

@@ -7,10 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from relit_camera.base.easing import smoothstep
-from relit_camera.light.builtin import window
-from relit_camera.light.builtin.canvas import Canvas, bearings, blend_over, color, panel_mask
-from relit_camera.light.environment_panorama import Environment, environment_from_panorama, panorama_from_radiance
-from relit_camera.light.panorama_axes import between_map_and_viewer_axes
+from relit_camera.light.environments.builtin import window
+from relit_camera.light.environments.builtin.canvas import Canvas, bearings, blend_over, color, panel_mask
+from relit_camera.light.environments.environment_panorama import (
+    Environment,
+    environment_from_panorama,
+    panorama_from_radiance,
+)
+from relit_camera.light.environments.panorama_axes import between_map_and_viewer_axes
 
 
 def _soft() -> Canvas:

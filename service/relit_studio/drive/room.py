@@ -12,7 +12,7 @@ from relit_camera.base.images.image_files import write_linear
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
 from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
 from relit_camera.base.rotations import rotation_from_angles
-from relit_camera.light.environment_panorama import Environment
+from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.compositing.alpha_compositing import over, unpremultiply

@@ -30,7 +30,7 @@ from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.base.video.video_readers import VideoReader
-from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_studio.mannequin.distant_lights import room
 from relit_studio.mannequin.driving_clip import CLIP_SIZE, write_clip
 from relit_studio.mannequin.mannequin_field import write_field

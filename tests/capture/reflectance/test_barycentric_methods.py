@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import LightsError, NotFoundError
-from relit_camera.capture.reflectance.barycentric_methods import PlanarBarycentric, SphericalBarycentric
 from relit_camera.capture.reflectance.delaunay_triangulation import spherical_barycentric
-from relit_camera.capture.reflectance.linear_methods import Nearest
 from relit_camera.capture.reflectance.method_registry import LinearMethod, method_names, open_method
+from relit_camera.capture.reflectance.methods.barycentric_methods import PlanarBarycentric, SphericalBarycentric
+from relit_camera.capture.reflectance.methods.linear_methods import Nearest
 from relit_camera.light.directions import (
     direction_from_degrees,
     direction_from_spherical,

@@ -10,25 +10,25 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import LightsError
 from relit_camera.capture.lights_file import MIN_LIGHTS
-from relit_camera.capture.reflectance.appearance_field import (
-    KERNEL_CANDIDATES,
-    AppearanceMethod,
-    choose_kernel,
-    residual_weights,
-)
-from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
-from relit_camera.capture.reflectance.blend import Blend, choose_model_share
-from relit_camera.capture.reflectance.gaussian_process import Kernel
-from relit_camera.capture.reflectance.linear_methods import RadialBasis
 from relit_camera.capture.reflectance.method_registry import (
     DEFAULT_METHOD,
     ReflectanceMethod,
     factored_field,
     open_method,
 )
+from relit_camera.capture.reflectance.methods.appearance_field import (
+    KERNEL_CANDIDATES,
+    AppearanceMethod,
+    choose_kernel,
+    residual_weights,
+)
+from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
+from relit_camera.capture.reflectance.methods.blend import Blend, choose_model_share
+from relit_camera.capture.reflectance.methods.gaussian_process import Kernel
+from relit_camera.capture.reflectance.methods.linear_methods import RadialBasis
+from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import ThesisMethod
 from relit_camera.capture.reflectance.sampled_region import region_coverage
 from relit_camera.capture.reflectance.samples import Samples
-from relit_camera.capture.reflectance.shadow_aware_interpolation import ThesisMethod
 from relit_camera.light.directions import direction_from_degrees
 from relit_camera.subject.reflectance_field import ExactField, texel_vectors
 from tests.lab.lit_sphere import cap, lambert, shadowed

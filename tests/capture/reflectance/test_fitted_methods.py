@@ -7,9 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 from relit_camera.base.errors import LightsError
-from relit_camera.capture.reflectance.gaussian_process import GaussianProcess, Kernel, fit_kernel
-from relit_camera.capture.reflectance.linear_methods import PolynomialTextureMap, RadialBasis, SphericalHarmonics
 from relit_camera.capture.reflectance.method_registry import LinearMethod
+from relit_camera.capture.reflectance.methods.gaussian_process import GaussianProcess, Kernel, fit_kernel
+from relit_camera.capture.reflectance.methods.linear_methods import (
+    PolynomialTextureMap,
+    RadialBasis,
+    SphericalHarmonics,
+)
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.light.directions import direction_from_degrees, fibonacci_directions
 from relit_camera.light.spherical_harmonics import basis

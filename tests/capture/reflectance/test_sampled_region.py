@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
+from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.sampled_region import (
     boundary_lights,
     region_coverage,

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from relit_camera.capture.geometry.horizon_map import HorizonMap, compute_horizon_map
 from relit_camera.capture.geometry.shape_estimation import Geometry
-from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.method_registry import ReflectanceMethod
-from relit_camera.capture.reflectance.samples import Samples
-from relit_camera.capture.reflectance.shadow_aware_interpolation import (
+from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
+from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import (
     LightAdaptation,
     SharpVisibilityInterpolation,
     ThesisMethod,
@@ -22,6 +21,7 @@ from relit_camera.capture.reflectance.shadow_aware_interpolation import (
     interpolate_with_adaptation,
     smoothed_visibility,
 )
+from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.capture.reflectance.triangle_field import TriangleCorners
 from relit_camera.light.directions import direction_from_degrees
 from relit_camera.subject.reflectance_field import ExactField, texel_vectors

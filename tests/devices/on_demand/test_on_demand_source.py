@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import ConfigError, DeviceError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.devices.on_demand.on_demand_source import RETRY_S, DemandMonitor, OnDemandController, OnDemandSource

@@ -14,7 +14,11 @@ from relit_camera.base.config.look import (
 )
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.resize import crop_to_fill
-from relit_camera.light.environment_panorama import Environment, environment_from_panorama, panorama_from_radiance
+from relit_camera.light.environments.environment_panorama import (
+    Environment,
+    environment_from_panorama,
+    panorama_from_radiance,
+)
 from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
     BackgroundRequest,

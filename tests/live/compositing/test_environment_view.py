@@ -11,7 +11,7 @@ from relit_camera.base.images.color import luminance
 from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.light.directions import direction_from_degrees, texel_directions
-from relit_camera.light.environment_panorama import Panorama, read_panorama
+from relit_camera.light.environments.environment_panorama import Panorama, read_panorama
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map import irradiance, resample_to_light_map
 from relit_camera.live.compositing.environment_view import EnvironmentView

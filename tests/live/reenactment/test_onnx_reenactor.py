@@ -21,7 +21,7 @@ from relit_camera.face.head_pose import project
 from relit_camera.face.landmarks.rotated_crop import Crop
 from relit_camera.live.reenactment.control_points import NECK_PIVOT
 from relit_camera.live.reenactment.motion_transfer import rotate_about
-from relit_camera.live.reenactment.onnx_network.head_crop import crop_square, head_crop, tracked_head_crop
+from relit_camera.live.reenactment.onnx_network.driving_head_crop import crop_square, head_crop, tracked_head_crop
 from relit_camera.live.reenactment.onnx_network.onnx_contract import ReenactorNetwork, identity_grid
 from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, open_reenactor
 from relit_camera.live.reenactment.source_image import Cutout

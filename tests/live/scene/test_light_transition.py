@@ -9,8 +9,8 @@ import pytest
 
 from relit_camera.base.config.look import Lamp, Lighting, Look
 from relit_camera.base.images.color import luminance
-from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
-from relit_camera.light.environment_panorama import Environment
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.light_map import LightMap, irradiance
 from relit_camera.live.scene.light_transition import LightTransition, display_light
 from relit_camera.live.scene.scene import Scene

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from relit_camera.base.clock import Clock
+from relit_camera.base.concurrency.clock import Clock
 from relit_camera.base.config.look import Look
 from relit_camera.base.errors import PipelineHangError, TrackError
 from relit_camera.base.images.image_types import Frame

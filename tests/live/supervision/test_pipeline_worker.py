@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from relit_camera.base.clock import SYSTEM_CLOCK
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK
 from relit_camera.base.config.look import Look
 from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import Frame

@@ -17,9 +17,9 @@ from relit_camera.api.schemas import EnvironmentDetails, EnvironmentItem
 from relit_camera.base.config.look import ImageBackground, StoredName
 from relit_camera.base.errors import ConflictError
 from relit_camera.base.images.image_files import encode_display
-from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
-from relit_camera.light.environment_store import RESERVED_NAMES
-from relit_camera.light.environment_thumbnail import thumbnail_image
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environments.environment_store import RESERVED_NAMES
+from relit_camera.light.environments.environment_thumbnail import thumbnail_image
 
 router = APIRouter(prefix="/environments", tags=["environments"])
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import LinearImage, Mask
-from relit_camera.base.threads import worker_pool
 
 Floats = NDArray[np.float32]
 

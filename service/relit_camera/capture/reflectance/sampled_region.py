@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.delaunay_triangulation import spherical_delaunay
+from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.samples import Samples
 
 RING_DISTANCE_DEG = 25.0

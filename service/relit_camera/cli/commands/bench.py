@@ -28,16 +28,16 @@ def bench(
     import json
 
     from relit_camera.app.wiring import make_tracker, session_options
+    from relit_camera.base.concurrency.threads import freeze_gc, limit_threads
     from relit_camera.base.config.look import Look
     from relit_camera.base.errors import NotFoundError
-    from relit_camera.base.threads import freeze_gc, limit_threads
     from relit_camera.cli.arguments import load_command_settings, parse_mode, parse_size
     from relit_camera.devices.sources.source_factory import open_source
     from relit_camera.lab.bench.live_benchmark import SyntheticTracker, benchmark_live
     from relit_camera.lab.bench.machine_info import machine_info
     from relit_camera.lab.bench.relighting_benchmark import benchmark_gpu_transfer, benchmark_relighting
     from relit_camera.lab.bench.synthetic_subject import synthetic_subject
-    from relit_camera.light.environment_panorama import read_panorama
+    from relit_camera.light.environments.environment_panorama import read_panorama
     from relit_camera.light.light_map import resample_to_light_map
     from relit_camera.live.scene.scene_controller import SceneController
     from relit_camera.subject.subject_store import SubjectStore

@@ -73,8 +73,8 @@ def field(
     from relit_camera.lab.evaluate.field.field_report import field_json, field_page, field_text
     from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, sampled_region, subsample_lights
     from relit_camera.lab.evaluate.field.sample_points import face_sample_points, parse_sample_point
-    from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES
-    from relit_camera.light.environment_store import EnvironmentStore
+    from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+    from relit_camera.light.environments.environment_store import EnvironmentStore
     from relit_camera.subject.subject_store import SubjectStore
 
     if (film_report is None) != (film_truth is None):

@@ -32,7 +32,7 @@ def relight(
     from relit_camera.capture.reflectance.directional_light import relight_from_direction
     from relit_camera.cli.arguments import load_command_settings, parse_numbers
     from relit_camera.light.directions import direction_from_degrees
-    from relit_camera.light.environment_store import EnvironmentStore
+    from relit_camera.light.environments.environment_store import EnvironmentStore
     from relit_camera.light.exposure import auto_exposure_scale
     from relit_camera.light.light_map_rotation import rotate_light_map as rotate_map
     from relit_camera.subject.relighting.basis_relighter import BasisRelighter

@@ -35,12 +35,12 @@ def replay(
 
     from relit_camera.app.video_replay import replay as run_replay
     from relit_camera.app.wiring import make_pipeline, make_tracker
+    from relit_camera.base.concurrency.threads import limit_threads
     from relit_camera.base.config.look import Look
     from relit_camera.base.images.contact_sheet import contact_sheet as draw_sheet
     from relit_camera.base.images.image_files import encode_display
     from relit_camera.base.images.image_types import DisplayImage
     from relit_camera.base.storage.atomic_files import atomic_path
-    from relit_camera.base.threads import limit_threads
     from relit_camera.base.video.video_readers import probe_video
     from relit_camera.cli.arguments import load_command_settings, parse_background, parse_lighting, parse_mode
     from relit_camera.cli.progress import progress_bar

@@ -53,7 +53,7 @@ def pack(
 
     from relit_camera.base.images.image_quality import psnr
     from relit_camera.cli.arguments import load_command_settings
-    from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+    from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
     from relit_camera.subject.compression.webp_packing import light_psnrs_db, pack_subject
     from relit_camera.subject.relighting.basis_relighter import BasisRelighter
     from relit_camera.subject.subject_file import read_subject, write_subject

@@ -19,8 +19,8 @@ def track(
 ) -> None:
     """Follow the face in a video and write, per frame, its pose, landmarks, eyes and mouth."""
     from relit_camera.app.wiring import make_tracker
+    from relit_camera.base.concurrency.threads import limit_threads
     from relit_camera.base.errors import VideoError
-    from relit_camera.base.threads import limit_threads
     from relit_camera.base.video.video_readers import VideoReader
     from relit_camera.cli.arguments import load_command_settings
     from relit_camera.cli.progress import progress_bar

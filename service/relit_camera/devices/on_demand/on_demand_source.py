@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 
-from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import ConfigError, DeviceError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.devices.on_demand.reader_detection import ReaderMonitor

@@ -15,7 +15,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import UnsupportedByDriverError
 from relit_camera.devices.device_users import PROC, find_device_users
 from relit_camera.devices.v4l2 import query_has_readers

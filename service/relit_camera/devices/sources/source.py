@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from relit_camera.base.concurrency.newest_slot import NewestSlot
 from relit_camera.base.errors import IllegalTransitionError
 from relit_camera.base.images.image_types import Frame
-from relit_camera.base.newest_slot import NewestSlot
 
 
 class SourceState(StrEnum):

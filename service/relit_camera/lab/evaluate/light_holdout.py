@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from relit_camera.base.errors import ConfigError, LightsError
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.capture.alignment.picture_set_alignment import align_samples, align_to_prediction, apply_alignment
-from relit_camera.capture.reflectance.appearance_field import AppearanceMethod
 from relit_camera.capture.reflectance.method_registry import method_names
+from relit_camera.capture.reflectance.methods.appearance_field import AppearanceMethod
 from relit_camera.capture.reflectance.sampled_region import boundary_lights
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.candidates import method_candidates

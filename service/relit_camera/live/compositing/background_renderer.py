@@ -27,7 +27,7 @@ from relit_camera.base.images.image_types import DisplayImage, Mask
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.base.images.tone_mapping import inverse_tone_curve, tone_curve
 from relit_camera.base.rotations import rotation_from_angles
-from relit_camera.light.environment_panorama import Environment, Panorama
+from relit_camera.light.environments.environment_panorama import Environment, Panorama
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.scene_light import scene_light_map
 from relit_camera.live.compositing.environment_view import BLUR_SIGMA, EnvironmentView

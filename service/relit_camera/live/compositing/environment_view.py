@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.light.directions import map_position_from_direction
-from relit_camera.light.environment_panorama import Panorama
+from relit_camera.light.environments.environment_panorama import Panorama
 
 RADIANCE_TO_DISPLAY = np.pi
 """What a picture shows of radiance 1. The unit of relit pictures is a white wall under irradiance 1, whose radiance is

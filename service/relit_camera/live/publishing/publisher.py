@@ -7,9 +7,9 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.concurrency.newest_slot import NewestSlot
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.newest_slot import NewestSlot
 from relit_camera.devices.sinks.sink import Sink
 from relit_camera.live.publishing.pacing import Pacer
 from relit_camera.live.status.camera_status import FrameCounts, Percentiles

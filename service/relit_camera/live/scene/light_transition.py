@@ -6,7 +6,7 @@ import numpy as np
 
 from relit_camera.base.config.look import Lighting
 from relit_camera.base.easing import ease_out_cubic
-from relit_camera.light.environment_panorama import Environment
+from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.scene_light import scene_light_map

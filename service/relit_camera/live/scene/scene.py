@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from relit_camera.base.config.look import Look
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.light.environment_panorama import Environment
+from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.subject.subject import Subject
 
 

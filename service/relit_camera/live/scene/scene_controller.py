@@ -15,12 +15,12 @@ from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import InputError, NotFoundError
 from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.light.background_light import panorama_from_background
-from relit_camera.light.environment_panorama import Environment
-from relit_camera.light.environment_store import EnvironmentStore
+from relit_camera.light.environments.background_light import panorama_from_background
+from relit_camera.light.environments.environment_panorama import Environment
+from relit_camera.light.environments.environment_store import EnvironmentStore
+from relit_camera.light.environments.panorama_axes import between_map_and_viewer_axes
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map import resample_to_light_map
-from relit_camera.light.panorama_axes import between_map_and_viewer_axes
 from relit_camera.live.scene.background_store import BackgroundStore
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject

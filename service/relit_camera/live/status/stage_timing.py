@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.live.status.camera_status import Percentiles
 
 WINDOW_LENGTH = 300

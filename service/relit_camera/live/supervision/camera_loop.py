@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import DeviceError
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.devices.sources.source import Source, SourceState

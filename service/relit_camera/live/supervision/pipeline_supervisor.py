@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import PipelineHangError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.live.pipeline import Pipeline, RenderedFrame

@@ -6,9 +6,9 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 
-from relit_camera.base.clock import Clock
+from relit_camera.base.concurrency.clock import Clock
+from relit_camera.base.concurrency.newest_slot import NewestSlot
 from relit_camera.base.images.image_types import Frame
-from relit_camera.base.newest_slot import NewestSlot
 from relit_camera.live.pipeline import Pipeline, RenderedFrame, RenderTask
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.supervision.pipeline_health import (

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import Mask
-from relit_camera.base.threads import worker_pool
 from relit_camera.subject.compression.accuracy_target import DARK_LIGHT_FRACTION
 from relit_camera.subject.compression.local_basis import LocalBasis
 from relit_camera.subject.reflectance_field import TEXELS

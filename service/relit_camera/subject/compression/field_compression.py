@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.image_types import Mask
-from relit_camera.base.threads import worker_pool
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.compression.compression_quality import (
     CompressionQuality,

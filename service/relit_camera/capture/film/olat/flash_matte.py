@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import LinearImage, Mask
-from relit_camera.base.threads import worker_pool
 
 
 @dataclass(frozen=True)

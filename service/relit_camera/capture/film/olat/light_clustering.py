@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 
+from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.image_types import Mask
-from relit_camera.base.threads import worker_pool
 from relit_camera.capture.film.olat.flash_strength import FlashStrengths
 from relit_camera.capture.film.olat.near_field import distant_light_factor
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.color import luminance
-from relit_camera.capture.reflectance.barycentric_methods import SphericalBarycentric
+from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, pixel_colors
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import LightsError
 from relit_camera.capture.lights_file import MIN_LIGHTS
-from relit_camera.capture.reflectance.barycentric_methods import PlanarBarycentric, SphericalBarycentric
+from relit_camera.capture.reflectance.methods.barycentric_methods import PlanarBarycentric, SphericalBarycentric
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.light.directions import texel_directions, texel_solid_angles
 from relit_camera.light.light_map import LightMap

@@ -21,7 +21,7 @@ from relit_camera.face.landmarks.rotated_crop import Crop
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.first_order_reenactor import fade_flow_at_border
 from relit_camera.live.reenactment.motion_transfer import split_body_motion
-from relit_camera.live.reenactment.onnx_network.head_crop import DrivingCrops, crop_square, head_crop
+from relit_camera.live.reenactment.onnx_network.driving_head_crop import DrivingCrops, crop_square, head_crop
 from relit_camera.live.reenactment.onnx_network.onnx_contract import NetworkOutput, ReenactorNetwork, identity_grid
 from relit_camera.live.reenactment.reenactor import ReenactorContext, WarpedLayer, WarpTask
 from relit_camera.live.reenactment.source_image import Cutout

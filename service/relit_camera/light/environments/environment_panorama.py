@@ -12,8 +12,8 @@ from relit_camera.base.errors import ImageError, PanoramaError
 from relit_camera.base.images.image_files import read_linear
 from relit_camera.base.images.image_limits import image_size_from_header
 from relit_camera.light.directions import texel_solid_angles
+from relit_camera.light.environments.panorama_axes import Axes, between_map_and_picture_axes
 from relit_camera.light.light_map import LightMap, resample_by_area, resample_to_light_map
-from relit_camera.light.panorama_axes import Axes, between_map_and_picture_axes
 
 PANORAMA_SUFFIXES = frozenset({".hdr", ".exr", ".png", ".jpg", ".jpeg"})
 MAX_PANORAMA_PIXELS = 1 << 25

@@ -16,8 +16,8 @@ from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.images.resize import shrink
 from relit_camera.light.directions import texel_directions
-from relit_camera.light.environment_panorama import Panorama
-from relit_camera.light.panorama_axes import between_map_and_viewer_axes
+from relit_camera.light.environments.environment_panorama import Panorama
+from relit_camera.light.environments.panorama_axes import between_map_and_viewer_axes
 
 BACKGROUND_HEIGHT_DEG = 35.0
 """Vertical angle, in degrees, that the background picture covers."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from relit_camera.base.easing import smoothstep
-from relit_camera.light.builtin.canvas import (
+from relit_camera.light.environments.builtin.canvas import (
     Canvas,
     add_bokeh_disc,
     angle_from,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import Generic, TypeVar
 
-from relit_camera.base.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 
 T = TypeVar("T")
 

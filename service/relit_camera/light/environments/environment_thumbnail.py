@@ -8,8 +8,8 @@ import numpy as np
 from relit_camera.base.images.color import luminance, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.environment_panorama import Panorama
-from relit_camera.light.panorama_axes import between_map_and_picture_axes
+from relit_camera.light.environments.environment_panorama import Panorama
+from relit_camera.light.environments.panorama_axes import between_map_and_picture_axes
 
 THUMBNAIL_SIZE = (256, 128)
 """Width and height in pixels."""

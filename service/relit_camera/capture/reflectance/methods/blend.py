@@ -8,9 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.capture.reflectance.appearance_field import VALIDATION_PIXELS, AppearanceField, AppearanceMethod
-from relit_camera.capture.reflectance.linear_methods import RadialBasis
 from relit_camera.capture.reflectance.method_registry import factored_field
+from relit_camera.capture.reflectance.methods.appearance_field import (
+    VALIDATION_PIXELS,
+    AppearanceField,
+    AppearanceMethod,
+)
+from relit_camera.capture.reflectance.methods.linear_methods import RadialBasis
 from relit_camera.capture.reflectance.sampled_region import boundary_lights, region_coverage
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.subject.reflectance_field import FactoredField, texel_vectors

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from relit_camera.base.threads import worker_pool
+from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.capture.reflectance.appearance_model import (
     SPECULAR_TERMS,
     TERM_COUNT,
@@ -19,7 +19,7 @@ from relit_camera.capture.reflectance.appearance_model import (
     fit_appearance,
     specular_prior,
 )
-from relit_camera.capture.reflectance.gaussian_process import Kernel
+from relit_camera.capture.reflectance.methods.gaussian_process import Kernel
 from relit_camera.capture.reflectance.sampled_region import region_coverage
 from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.subject.reflectance_field import texel_vectors

@@ -6,9 +6,13 @@ from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
 
-from relit_camera.light.builtin.canvas import Canvas
-from relit_camera.light.environment_panorama import Environment, environment_from_panorama, panorama_from_radiance
-from relit_camera.light.panorama_axes import between_map_and_viewer_axes
+from relit_camera.light.environments.builtin.canvas import Canvas
+from relit_camera.light.environments.environment_panorama import (
+    Environment,
+    environment_from_panorama,
+    panorama_from_radiance,
+)
+from relit_camera.light.environments.panorama_axes import between_map_and_viewer_axes
 
 BUILTIN_NAMES = ("studio", "window", "sunset", "night-street", "party", "overcast")
 
@@ -22,5 +26,7 @@ def builtin_environment(name: str) -> Environment:
     """
     if name not in BUILTIN_NAMES:
         raise KeyError(name)
-    paint: Callable[[], Canvas] = import_module(f"relit_camera.light.builtin.{name.replace('-', '_')}").paint
+    paint: Callable[[], Canvas] = import_module(
+        f"relit_camera.light.environments.builtin.{name.replace('-', '_')}"
+    ).paint
     return environment_from_panorama(name, panorama_from_radiance(between_map_and_viewer_axes(paint()), name))

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from relit_camera.base.easing import smoothstep
-from relit_camera.light.builtin.canvas import Canvas, blend_over, blur, color, color_ramp, directions, fractal_noise
+from relit_camera.light.environments.builtin.canvas import (
+    Canvas,
+    blend_over,
+    blur,
+    color,
+    color_ramp,
+    directions,
+    fractal_noise,
+)
 
 LEFT, RIGHT, BACK, FRONT, FLOOR, CEILING = -2.3, 2.9, -4.6, 3.4, -1.25, 1.75
 """Walls of the room in metres from the head, in the project's axes."""

@@ -11,16 +11,16 @@ from platformdirs import user_data_path
 from relit_camera.base.errors import InputError, PanoramaError
 from relit_camera.base.images.image_files import encode_display, write_linear
 from relit_camera.base.storage.named_files import FileVersion, NamedFiles, file_version
-from relit_camera.light.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
-from relit_camera.light.environment_panorama import (
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.environments.environment_panorama import (
     PANORAMA_SUFFIXES,
     Environment,
     environment_from_panorama,
     read_panorama,
     require_panorama_suffix,
 )
-from relit_camera.light.environment_thumbnail import thumbnail_image
-from relit_camera.light.panorama_axes import Axes, between_map_and_picture_axes
+from relit_camera.light.environments.environment_thumbnail import thumbnail_image
+from relit_camera.light.environments.panorama_axes import Axes, between_map_and_picture_axes
 
 RESERVED_NAMES = frozenset({*BUILTIN_NAMES, "background"})
 """Names that no file may have: the built-in ones, and `background`, which means the light of the virtual background."""

@@ -1,7 +1,7 @@
 """The canvas on which the built-in environments are painted, and the painting operations they share.
 
-A canvas has viewer axes (`light.panorama_axes`), row 0 up. `bearing` is the angle from its middle to the right, in
-degrees; what lights the face from the front is at bearings beyond ±90.
+A canvas has viewer axes (`light.environments.panorama_axes`), row 0 up. `bearing` is the angle from its middle to the
+right, in degrees; what lights the face from the front is at bearings beyond ±90.
 """
 
 from __future__ import annotations

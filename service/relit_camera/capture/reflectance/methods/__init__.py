@@ -1,0 +1,1 @@
+"""The reflectance methods, each chosen by name: interpolations, fitted functions, the appearance model, their blend."""
