@@ -156,7 +156,7 @@ def test_auto_is_numpy_where_there_is_no_gpu(
 ) -> None:
     monkeypatch.setattr(onnxruntime, "get_available_providers", lambda: ["CPUExecutionProvider"])
     monkeypatch.setattr(onnxruntime, "InferenceSession", pytest.fail)  # no graph is made in vain
-    caplog.set_level("DEBUG")
+    caplog.set_level("DEBUG", "relit_camera")
     chosen = open_relighter("auto", sphere)
     assert (chosen.name, chosen.provider) == ("basis", "numpy")
     assert "the subject is relit by basis on numpy" in caplog.text
@@ -168,7 +168,7 @@ def test_auto_is_the_graph_where_a_gpu_is_proven_to_run_it(
     sphere: Subject, coloured_light: np.ndarray, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     pretend_cuda(monkeypatch, {"cuda": 20, "cpu": 1})
-    caplog.set_level("INFO")
+    caplog.set_level("INFO", "relit_camera")
     chosen = open_relighter("auto", sphere)
     assert (chosen.name, chosen.provider) == ("onnx-basis", "cuda")
     assert "the subject is relit by onnx-basis on cuda" in caplog.text
