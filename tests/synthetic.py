@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.color import srgb_encode
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 
 
 def fibonacci_directions(count: int, lowest_z: float = -1.0) -> NDArray[np.float64]:
@@ -52,15 +52,15 @@ def render_sphere(
     return np.repeat((shade * inside).astype(np.float32)[..., None], 3, axis=2)
 
 
-def sphere_samples(count: int = 300, size: int = 32, lowest_z: float = -1.0) -> Samples:
+def sphere_samples(count: int = 300, size: int = 32, lowest_z: float = -1.0) -> OlatSamples:
     """One-light pictures of the sphere, without colour."""
     directions = fibonacci_directions(count, lowest_z)
     pictures = np.stack([render_sphere(light, size) for light in directions])
     matte = sphere_surface(size)[1].astype(np.float32)
-    return Samples(pictures, directions, matte)
+    return OlatSamples(pictures, directions, matte)
 
 
-def write_lights(folder: Path, samples: Samples, suffix: str = ".png") -> Path:
+def write_lights(folder: Path, samples: OlatSamples, suffix: str = ".png") -> Path:
     """Write samples as sRGB pictures with a matte and a lights.lp; returns the .lp."""
     folder.mkdir(parents=True, exist_ok=True)
     lines = [str(len(samples.directions))]

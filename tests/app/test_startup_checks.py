@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from relit_camera.app.serve import run_camera
+from relit_camera.app.run_camera import run_camera
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
 from relit_camera.base.errors import DeviceError, RelitError
 from relit_camera.devices.sinks.sink import Sink

@@ -11,7 +11,7 @@ import pytest
 from relit_camera.base.errors import ImageError, LightsError
 from relit_camera.capture.lights_file import read_lights
 from relit_camera.capture.picture_import import import_samples
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from tests.synthetic import sphere_samples, write_lights
 
 
@@ -84,7 +84,7 @@ def test_a_matte_of_another_size_is_refused(lights: Path) -> None:
 def test_pictures_too_small_for_a_subject_are_refused(tmp_path: Path, size: tuple[int, int]) -> None:
     made = sphere_samples(30, 24)
     height, width = size
-    cut = Samples(made.pictures[:, :height, :width], made.directions, made.matte[:height, :width])
+    cut = OlatSamples(made.pictures[:, :height, :width], made.directions, made.matte[:height, :width])
     with pytest.raises(LightsError, match=f"000.png is {width}x{height}, a subject has 8 to 8192 pixels a side; give"):
         import_samples(write_lights(tmp_path, cut))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.subject.subject import HORIZON_STEP_RAD, Subject
 from tests.lab.lit_sphere import cap, shadowed
@@ -15,16 +15,16 @@ SIZE = 40
 
 
 @pytest.fixture(scope="module")
-def samples() -> Samples:
+def samples() -> OlatSamples:
     return shadowed(cap(50, 60), SIZE)
 
 
 @pytest.fixture(scope="module")
-def subject(samples: Samples) -> Subject:
+def subject(samples: OlatSamples) -> Subject:
     return build_subject(samples, "barycentric", "ball", landmarks={})
 
 
-def test_the_shape_is_in_the_subject_whatever_the_method(samples: Samples, subject: Subject) -> None:
+def test_the_shape_is_in_the_subject_whatever_the_method(samples: OlatSamples, subject: Subject) -> None:
     truth, inside = sphere_surface(SIZE)
     assert subject.normals is not None
     assert subject.albedo is not None
@@ -40,7 +40,7 @@ def test_the_shape_is_in_the_subject_whatever_the_method(samples: Samples, subje
     assert subject.normals.dtype == subject.albedo.dtype == np.float16
 
 
-def test_horizons_come_back_within_half_a_step(samples: Samples, subject: Subject) -> None:
+def test_horizons_come_back_within_half_a_step(samples: OlatSamples, subject: Subject) -> None:
     assert subject.horizons is not None
     assert subject.horizons.dtype == np.uint8
     heights = subject.horizons * HORIZON_STEP_RAD - np.pi / 2
@@ -62,7 +62,7 @@ def test_the_header_says_what_was_reached(subject: Subject) -> None:
     assert 0 < meta.bytes_share < 1
 
 
-def test_the_shape_can_be_left_out(samples: Samples) -> None:
+def test_the_shape_can_be_left_out(samples: OlatSamples) -> None:
     told: list[tuple[int, int]] = []
     subject = build_subject(
         samples,

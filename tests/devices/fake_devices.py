@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.devices.video_devices import DeviceTree
+from relit_camera.devices.device_discovery import DeviceFolders
 
 
-class FakeTree(DeviceTree):
+class FakeTree(DeviceFolders):
     """Sysfs and /dev under one folder; devices come and go by method."""
 
     def __init__(self, root: Path) -> None:

@@ -38,10 +38,10 @@ def test_this_process_is_no_holder(tmp_path):
 
 
 def test_the_command_relit_is_known_by_its_arguments():
-    assert DeviceUser(1, "python3", ("/opt/venv/bin/python3", "/opt/venv/bin/relit", "run")).is_relit
-    assert DeviceUser(1, "relit", ("/usr/bin/relit",)).is_relit
-    assert not DeviceUser(1, "vim", ("vim", "notes", "relit")).is_relit
-    assert not DeviceUser(1, "python3").is_relit
+    assert DeviceUser(1, "python3", ("/opt/venv/bin/python3", "/opt/venv/bin/relit", "run")).is_relit_camera
+    assert DeviceUser(1, "relit", ("/usr/bin/relit",)).is_relit_camera
+    assert not DeviceUser(1, "vim", ("vim", "notes", "relit")).is_relit_camera
+    assert not DeviceUser(1, "python3").is_relit_camera
 
 
 def test_without_proc_nobody_is_seen(tmp_path):

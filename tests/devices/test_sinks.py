@@ -12,7 +12,8 @@ import pytest
 from relit_camera.base.config.settings import OutputSettings
 from relit_camera.base.errors import DeviceError, ImageError, InputError, StorageError, VideoError
 from relit_camera.base.video.video_readers import VideoReader
-from relit_camera.devices import v4l2, v4l2loopback
+from relit_camera.devices import v4l2, v4l2loopback_output
+from relit_camera.devices.device_discovery import DeviceFolders
 from relit_camera.devices.device_users import DeviceUser
 from relit_camera.devices.sinks import virtual_camera_sink as camera_module
 from relit_camera.devices.sinks.sink import NullSink, SinkInfo
@@ -20,7 +21,6 @@ from relit_camera.devices.sinks.sink_factory import open_sink, published_label
 from relit_camera.devices.sinks.video_file_sink import VideoFileSink
 from relit_camera.devices.sinks.virtual_camera_sink import VirtualCameraSink
 from relit_camera.devices.sources.pattern_source import draw_pattern, read_number
-from relit_camera.devices.video_devices import DeviceTree
 from tests.devices.fake_devices import FakeTree
 
 SIZE = (320, 180)
@@ -103,7 +103,7 @@ def test_odd_sizes_are_refused(tree):
 
 def test_a_missing_camera_comes_with_its_command(tmp_path):
     with pytest.raises(DeviceError, match=r"not loaded; run: .*exclusive_caps=1 card_label=\"Relit Camera\""):
-        VirtualCameraSink(SIZE, 30, tree=DeviceTree(tmp_path, tmp_path), open_output=Opener())
+        VirtualCameraSink(SIZE, 30, tree=DeviceFolders(tmp_path, tmp_path), open_output=Opener())
 
 
 @pytest.mark.parametrize(
@@ -232,7 +232,7 @@ CAPTURE, OUTPUT, NEITHER = 0x05200001, 0x05200002, 0x05200000
 def test_a_device_is_written_to_as_i420(tree, monkeypatch):
     FakeDevice(monkeypatch, OUTPUT)
     node = str(tree.dev / "video10")
-    device = v4l2loopback.LoopbackDevice(SIZE, node)
+    device = v4l2loopback_output.LoopbackDevice(SIZE, node)
     image = draw_pattern(SIZE, 5)
     device.send(image)
     device.close()
@@ -247,7 +247,7 @@ def test_a_device_is_written_to_as_i420(tree, monkeypatch):
 @pytest.mark.parametrize("refuses", [False, True])
 def test_a_device_says_which_size_it_kept(tree, monkeypatch, refuses):
     FakeDevice(monkeypatch, OUTPUT, kept=(640, 360, b"YU12"), refuses=refuses)
-    with contextlib.closing(v4l2loopback.LoopbackDevice(SIZE, str(tree.dev / "video10"))) as device:
+    with contextlib.closing(v4l2loopback_output.LoopbackDevice(SIZE, str(tree.dev / "video10"))) as device:
         assert device.size == (640, 360)
 
 
@@ -262,7 +262,7 @@ def test_a_device_that_is_not_free_is_let_go_at_once(tree, monkeypatch, capabili
     FakeDevice(monkeypatch, capabilities, kept)
     before = len(list(Path("/proc/self/fd").iterdir()))
     with pytest.raises(OSError, match=message) as raised:
-        v4l2loopback.LoopbackDevice(SIZE, str(tree.dev / "video10"))
+        v4l2loopback_output.LoopbackDevice(SIZE, str(tree.dev / "video10"))
     assert raised.value.errno == errno.EBUSY
     assert len(list(Path("/proc/self/fd").iterdir())) == before
 
@@ -279,7 +279,7 @@ def test_a_write_that_fails_is_told_and_the_device_opened_anew(tree, monkeypatch
         return len(data) - 1
 
     with monkeypatch.context() as faulty:
-        faulty.setattr(v4l2loopback.os, "write", write)
+        faulty.setattr(v4l2loopback_output.os, "write", write)
         for number in range(3):
             with pytest.raises(DeviceError, match=r"video10 takes no pictures: .*(No such device|bytes were taken)"):
                 sink.write(draw_pattern(SIZE, number))
@@ -299,9 +299,9 @@ def test_a_write_that_fails_is_told_and_the_device_opened_anew(tree, monkeypatch
 def test_only_a_stuck_device_is_revived(tmp_path, monkeypatch, capabilities, state, revived):
     tree = FakeTree(tmp_path)
     node = tree.add_loopback(10, "Relit Camera", state=state)
-    monkeypatch.setattr(v4l2loopback.sys, "platform", "linux")
+    monkeypatch.setattr(v4l2loopback_output.sys, "platform", "linux")
     device = FakeDevice(monkeypatch, capabilities)
-    assert v4l2loopback.reset_stuck_device(node, tree) is revived
+    assert v4l2loopback_output.reset_stuck_device(node, tree) is revived
     assert (v4l2.VIDIOC_STREAMON in device.calls) is revived
 
 
@@ -309,16 +309,16 @@ def test_only_a_stuck_device_is_revived(tmp_path, monkeypatch, capabilities, sta
 def test_a_stuck_device_is_revived_beside_readers_only(tmp_path, monkeypatch, is_reader):
     tree = FakeTree(tmp_path)
     node = tree.add_loopback(10, "Relit Camera")
-    monkeypatch.setattr(v4l2loopback.sys, "platform", "linux")
-    monkeypatch.setattr(v4l2loopback, "find_device_users", lambda _: [DeviceUser(7, "program")])
-    monkeypatch.setattr(v4l2loopback, "has_mapped_buffers", lambda user, _: is_reader)
+    monkeypatch.setattr(v4l2loopback_output.sys, "platform", "linux")
+    monkeypatch.setattr(v4l2loopback_output, "find_device_users", lambda _: [DeviceUser(7, "program")])
+    monkeypatch.setattr(v4l2loopback_output, "has_mapped_buffers", lambda user, _: is_reader)
     FakeDevice(monkeypatch, CAPTURE)
-    assert v4l2loopback.reset_stuck_device(node, tree) is is_reader
+    assert v4l2loopback_output.reset_stuck_device(node, tree) is is_reader
 
 
 def test_what_is_no_video_device_is_left_alone(tree):
-    assert v4l2loopback.reset_stuck_device(str(tree.dev / "video10"), tree) is False
-    assert v4l2loopback.reset_stuck_device(str(tree.dev / "video99"), tree) is False
+    assert v4l2loopback_output.reset_stuck_device(str(tree.dev / "video10"), tree) is False
+    assert v4l2loopback_output.reset_stuck_device(str(tree.dev / "video99"), tree) is False
 
 
 def test_a_file_keeps_the_times_of_publishing(tmp_path, monkeypatch):

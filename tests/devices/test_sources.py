@@ -10,12 +10,12 @@ from relit_camera.base.config.settings import SourceSettings
 from relit_camera.base.errors import DeviceError, IllegalTransitionError, ImageError, InputError, VideoError
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
+from relit_camera.devices.device_discovery import DeviceFolders
 from relit_camera.devices.sources.pattern_source import draw_pattern, pattern_source, read_number
 from relit_camera.devices.sources.playback_source import PlaybackSource
 from relit_camera.devices.sources.source import TRANSITIONS, SourceInfo, SourceState, SourceStateMachine
 from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.devices.sources.webcam_source import BACKOFF_S, WebcamSource, stall_timeout
-from relit_camera.devices.video_devices import DeviceTree
 from tests.devices.fake_devices import FakeCapture, FakeTree
 from tests.small_camera import WAIT_S, wait_until
 
@@ -256,7 +256,7 @@ def test_unknown_sources_say_what_there_is(tmp_path):
     with pytest.raises(VideoError, match=r"no file .*gone\.mp4; check the path"):
         open_source(settings(tmp_path / "gone.mp4"), tree=tree)
     with pytest.raises(DeviceError, match="there is no webcam;"):
-        open_source(settings("webcam"), tree=DeviceTree(tmp_path / "none", tmp_path / "none"))
+        open_source(settings("webcam"), tree=DeviceFolders(tmp_path / "none", tmp_path / "none"))
     broken = tmp_path / "broken.png"
     broken.write_bytes(b"no picture")
     with pytest.raises(ImageError, match=r"broken\.png"):

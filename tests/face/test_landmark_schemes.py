@@ -38,11 +38,11 @@ def test_the_mesh_is_the_canonical_face_and_two_irises() -> None:
     scheme = landmark_scheme("mesh478")
     np.testing.assert_array_equal(scheme.canonical[:468], canonical_face().vertices)
     for eye in (scheme.right_eye, scheme.left_eye):
-        centre, right, upper, left, lower = scheme.canonical[list(eye.iris)]
+        center, right, upper, left, lower = scheme.canonical[list(eye.iris)]
         corners = scheme.canonical[[eye.outer, eye.inner]]
-        np.testing.assert_allclose(centre[:2], corners.mean(axis=0)[:2])
-        assert right[0] > centre[0] > left[0]
-        assert upper[1] > centre[1] > lower[1]
+        np.testing.assert_allclose(center[:2], corners.mean(axis=0)[:2])
+        assert right[0] > center[0] > left[0]
+        assert upper[1] > center[1] > lower[1]
         assert np.linalg.norm(right - left) == pytest.approx(1.17)  # 11.7 mm
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.capture.geometry.horizon_map import HorizonMap, compute_horizon_map
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import texel_directions
 from tests.synthetic import render_sphere, sphere_surface
 
@@ -15,27 +15,27 @@ WALL, WALL_HIGH = 1.6, 1.5
 """Its x, and the z up to which it stands, in the ball's radii from the ball's middle."""
 
 
-def lambert(directions: NDArray[np.float64], size: int = SIZE) -> Samples:
+def lambert(directions: NDArray[np.float64], size: int = SIZE) -> OlatSamples:
     """max(0, n·l), no shadow of anything: the field is known in every direction."""
     normals, inside = sphere_surface(size)
     shade = np.maximum(np.einsum("hwc,lc->lhw", normals, directions), 0) * inside
-    return Samples(np.repeat(shade[..., None], 3, axis=3).astype(np.float32), directions, inside.astype(np.float32))
+    return OlatSamples(np.repeat(shade[..., None], 3, axis=3).astype(np.float32), directions, inside.astype(np.float32))
 
 
-def shadowed(directions: NDArray[np.float64], size: int = 48) -> Samples:
+def shadowed(directions: NDArray[np.float64], size: int = 48) -> OlatSamples:
     """With the small ball's sharp shadow."""
     pictures = np.stack([render_sphere(light, size) for light in directions])
-    return Samples(pictures, directions, sphere_surface(size)[1].astype(np.float32))
+    return OlatSamples(pictures, directions, sphere_surface(size)[1].astype(np.float32))
 
 
-def walled(directions: NDArray[np.float64], size: int = 48) -> Samples:
+def walled(directions: NDArray[np.float64], size: int = 48) -> OlatSamples:
     """With the sharp shadow of a wall at its right that stands before the picture's plane and is not in the picture."""
     spots, _ = sphere_surface(size)
     bare = lambert(directions, size)
     right, _, toward = directions.T[..., None, None]
     with np.errstate(divide="ignore"):
         lit = (right <= 0) | (spots[..., 2] + (WALL - spots[..., 0]) * toward / right > WALL_HIGH)
-    return Samples(bare.pictures * lit[..., None].astype(np.float32), directions, bare.matte)
+    return OlatSamples(bare.pictures * lit[..., None].astype(np.float32), directions, bare.matte)
 
 
 def wall_horizon(size: int = 48, sectors: int = 32) -> HorizonMap:

@@ -12,7 +12,7 @@ from relit_camera.base.errors import NotFoundError
 from relit_camera.capture.reflectance import method_registry as methods
 from relit_camera.capture.reflectance.directional_light import bilinear_map_lookup
 from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.lab.evaluate.field.candidates import BLACK_RING_METHOD, method_candidates, subject_candidate
 from relit_camera.light.directions import direction_from_spherical
@@ -25,7 +25,7 @@ INSIDE = np.flatnonzero(lambert(cap(4, 50)).matte.ravel() > 0.5)
 class TexelsOnly:
     """Barycentric, but known at texels alone, as a method of somebody else's may be."""
 
-    def build(self, samples: Samples) -> TexelField:
+    def build(self, samples: OlatSamples) -> TexelField:
         return TexelField(SphericalBarycentric().build(samples))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import InputError
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.lab.evaluate.field.candidates import Candidate
 from relit_camera.lab.evaluate.field.captured_ground_truth import crop_like_capture, scale_to_truth
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
@@ -31,7 +31,7 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
 def test_a_point_of_the_field_is_where_the_film_shows_it(files: tuple[Path, Path]) -> None:
     x, y = np.meshgrid(np.arange(100) + 0.5, np.arange(80) + 0.5)
     blob = np.exp(-((x - 45) ** 2 + (y - 28) ** 2) / 18).astype(np.float32)
-    field = Samples(np.repeat(blob[None, ..., None], 3, axis=3), np.array([[0.0, 0.0, 1.0]]), np.ones_like(blob))
+    field = OlatSamples(np.repeat(blob[None, ..., None], 3, axis=3), np.array([[0.0, 0.0, 1.0]]), np.ones_like(blob))
     seen = crop_like_capture(field, *files)
     assert seen.pictures.shape == (1, 40, 40, 3)
     row, column = np.unravel_index(seen.pictures[0, ..., 0].argmax(), (40, 40))
@@ -42,7 +42,7 @@ def test_a_point_of_the_field_is_where_the_film_shows_it(files: tuple[Path, Path
 
 def test_files_of_two_films_are_refused(files: tuple[Path, Path]) -> None:
     files[1].write_text(json.dumps({"frames": [{"head": {"to_rest": {"rotation_deg": 0, "translation_px": [0, 0]}}}]}))
-    field = Samples(np.zeros((1, 8, 10, 3), np.float32), np.array([[0.0, 0.0, 1.0]]), np.ones((8, 10), np.float32))
+    field = OlatSamples(np.zeros((1, 8, 10, 3), np.float32), np.array([[0.0, 0.0, 1.0]]), np.ones((8, 10), np.float32))
     with pytest.raises(InputError, match="tells of frame 1, which"):
         crop_like_capture(field, *files)
 

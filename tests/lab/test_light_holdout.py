@@ -9,8 +9,8 @@ import pytest
 
 from relit_camera.base.errors import ConfigError, LightsError
 from relit_camera.capture.reflectance.method_registry import method_names
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import boundary_lights
-from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.candidates import BLACK_RING_METHOD
 from relit_camera.lab.evaluate.field.ground_truth import select_lights
 from relit_camera.lab.evaluate.light_holdout import (
@@ -66,7 +66,7 @@ def test_flashes_of_varying_strength_and_small_motions_are_undone_by_one_transfo
     gains = np.random.default_rng(3).uniform(0.8, 1.25, len(samples.directions)).astype(np.float32)
     uneven = samples.pictures * gains[:, None, None, None]
     result = evaluate_hold_out(
-        "ball", Samples(uneven, samples.directions, samples.matte), 4, ["barycentric", "nearest"]
+        "ball", OlatSamples(uneven, samples.directions, samples.matte), 4, ["barycentric", "nearest"]
     )
     even = evaluate_hold_out("ball", samples, 4, ["barycentric", "nearest"])
     for found, best in zip(result.scores, even.scores, strict=True):
@@ -89,7 +89,7 @@ def test_pictures_that_no_light_could_make_are_neither_used_nor_asked_for() -> N
     samples = lambert(cap(70, 60), 40)
     pictures = samples.pictures.copy()
     pictures[[0, 4]] = 0
-    result = evaluate_hold_out("ball", Samples(pictures, samples.directions, samples.matte), 4, ["barycentric"])
+    result = evaluate_hold_out("ball", OlatSamples(pictures, samples.directions, samples.matte), 4, ["barycentric"])
     assert set(result.rejected) == {0, 4}
     assert not {0, 4} & set(result.left_out)
     assert "picture 4 rejected" in holdout_text([result])

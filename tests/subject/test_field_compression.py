@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import SharpVisibilityInterpolation
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.light.environments.environment_panorama import read_panorama
@@ -47,7 +47,7 @@ class Counted:
 
 
 @pytest.fixture(scope="module")
-def samples() -> Samples:
+def samples() -> OlatSamples:
     """A ball with a sharp shadow, coloured at random."""
     made = shadowed(cap(60, 60), SIZE)
     albedo = np.random.default_rng(0).uniform(0.2, 1, (SIZE, SIZE, 3)).astype(np.float32)
@@ -55,13 +55,13 @@ def samples() -> Samples:
 
 
 @pytest.fixture(scope="module")
-def dense(samples: Samples) -> NDArray[np.float32]:
+def dense(samples: OlatSamples) -> NDArray[np.float32]:
     """The field (pixels, 2048, 3): hard shadow edges, no sum of few pictures."""
     return SharpVisibilityInterpolation().build(samples).dense(0, SIZE**2)
 
 
 @pytest.fixture(scope="module")
-def found(samples: Samples) -> CompressedField:
+def found(samples: OlatSamples) -> CompressedField:
     return compress_field(SharpVisibilityInterpolation().build(samples), samples.pictures, samples.matte, TARGET)
 
 
@@ -70,7 +70,7 @@ def picture(colours: NDArray) -> NDArray[np.float32]:
 
 
 def test_every_texel_and_light_comes_back_as_asked(
-    samples: Samples, dense: NDArray[np.float32], found: CompressedField
+    samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField
 ) -> None:
     rows = rows_by_hand(found.basis, SIZE**2)
     restored = (rows @ found.coefficients).transpose(0, 2, 1)
@@ -88,7 +88,7 @@ def test_every_texel_and_light_comes_back_as_asked(
     assert found.quality.light_db == pytest.approx(min(each), abs=0.1)
 
 
-def psnr_under(light_map: LightMap, samples: Samples, dense: NDArray[np.float32], found: CompressedField) -> float:
+def psnr_under(light_map: LightMap, samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField) -> float:
     weighted = (light_map * texel_solid_angles()[..., None]).reshape(TEXELS, 3)
     restored = np.einsum(
         "pcg,gl,lc->pc", rows_by_hand(found.basis, SIZE**2), found.coefficients, weighted, optimize=True
@@ -97,14 +97,14 @@ def psnr_under(light_map: LightMap, samples: Samples, dense: NDArray[np.float32]
     return psnr(picture(restored), picture(expected), samples.matte)
 
 
-def test_the_worst_map_is_told(samples: Samples, dense: NDArray[np.float32], found: CompressedField) -> None:
+def test_the_worst_map_is_told(samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField) -> None:
     reached = psnr_under(MAP, samples, dense, found)
     assert found.quality.map_db == pytest.approx(reached, abs=0.1)
     assert reached > 45
 
 
 def test_real_places_that_it_was_not_tried_on_come_back(
-    shared: Path, samples: Samples, dense: NDArray[np.float32], found: CompressedField
+    shared: Path, samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField
 ) -> None:
     """Suns, soft boxes, a single bright pixel."""
     files = sorted((shared / "light").glob("*.hdr"))
@@ -114,13 +114,13 @@ def test_real_places_that_it_was_not_tried_on_come_back(
     assert min(reached.values()) > 45, reached
 
 
-def test_it_is_small_and_black_outside(samples: Samples, found: CompressedField) -> None:
+def test_it_is_small_and_black_outside(samples: OlatSamples, found: CompressedField) -> None:
     kept = found.basis.nbytes + found.coefficients.nbytes + found.light_coefficients.nbytes
     assert found.quality.bytes_share == pytest.approx(kept / (SIZE**2 * 3 * TEXELS * 4))
     assert not rows_by_hand(found.basis, SIZE**2)[samples.matte.ravel() == 0].any()
 
 
-def test_more_is_kept_where_more_is_asked(samples: Samples, found: CompressedField) -> None:
+def test_more_is_kept_where_more_is_asked(samples: OlatSamples, found: CompressedField) -> None:
     better = compress_field(
         SharpVisibilityInterpolation().build(samples), samples.pictures, samples.matte, CompressionTarget(50, 53)
     )
@@ -129,7 +129,7 @@ def test_more_is_kept_where_more_is_asked(samples: Samples, found: CompressedFie
     assert better.quality.map_db is None
 
 
-def test_a_field_of_low_rank_needs_no_more_components_than_it_has(samples: Samples) -> None:
+def test_a_field_of_low_rank_needs_no_more_components_than_it_has(samples: OlatSamples) -> None:
     """Barycentric weights: no more independent answers than lights."""
     counted = Counted(SphericalBarycentric().build(samples))
     low = compress_field(counted, samples.pictures, samples.matte)
@@ -139,7 +139,7 @@ def test_a_field_of_low_rank_needs_no_more_components_than_it_has(samples: Sampl
     assert max(counted.asked) <= TILE_WIDTH
 
 
-def test_progress_runs_to_the_end(samples: Samples) -> None:
+def test_progress_runs_to_the_end(samples: OlatSamples) -> None:
     told: list[tuple[int, int]] = []
     compress_field(
         SphericalBarycentric().build(samples),

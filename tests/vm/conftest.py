@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from relit_camera.devices.video_devices import modprobe_command
+from relit_camera.devices.device_discovery import modprobe_command
 from tests.vm.machine import Machine, what_is_missing
 from tests.vm.program import program_disk
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import cv2
 
-from relit_camera.devices.video_devices import modprobe_command
+from relit_camera.devices.device_discovery import modprobe_command
 from tests.vm.camera import running
 from tests.vm.machine import GUEST_PROGRAM, Machine
 from tests.vm.program import program_disk

@@ -12,7 +12,7 @@ from relit_camera.base.images.color import Gamma
 from relit_camera.base.images.image_files import read_linear, read_mask
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.lights_file import read_lights
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.subject.subject import MAX_SIDE_PX, MIN_SIDE_PX
 
 MATTE_NAME = "matte.png"
@@ -20,7 +20,7 @@ MATTE_NAME = "matte.png"
 
 def import_samples(
     lights: Path, gamma: Gamma = "srgb", progress: Callable[[int, int], None] = lambda done, total: None
-) -> Samples:
+) -> OlatSamples:
     """Read the pictures that an .lp file names, and matte.png beside it; without a matte all of the picture counts.
 
     Args:
@@ -54,7 +54,7 @@ def import_samples(
         what = f"all pictures of {lights} are black where {MATTE_NAME} is white"
         raise LightsError(what, f"white must mark the person: check {MATTE_NAME}")
     directions = np.stack([light.direction for light in listed])
-    return Samples(pictures, directions, matte)
+    return OlatSamples(pictures, directions, matte)
 
 
 def _matte(path: Path, shape: tuple[int, ...]) -> Mask:

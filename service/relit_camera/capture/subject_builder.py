@@ -13,7 +13,7 @@ from relit_camera.base.images.color import Gamma, luminance, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask, Points
 from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD, open_method
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.subject_landmarks import find_landmarks
 from relit_camera.light.directions import texel_directions, texel_solid_angles
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
@@ -28,7 +28,7 @@ TYPICAL_SKIN_LUMINANCE = 0.36
 
 
 def build_subject(
-    samples: Samples,
+    samples: OlatSamples,
     method: str,
     source: str,
     gamma: Gamma = "srgb",
@@ -111,7 +111,7 @@ def frontal_picture(field: CompressedField, matte: Mask) -> LinearImage:
     return field.basis.at(amounts[:, None], np.arange(matte.size)).reshape(*matte.shape, 3)
 
 
-def over_black(samples: Samples) -> bool:
+def over_black(samples: OlatSamples) -> bool:
     """Whether everything outside the matte is black (below 0.02) in every frame."""
     outside = samples.matte == 0
     return bool(outside.any() and samples.pictures[:, outside].max() < 0.02)

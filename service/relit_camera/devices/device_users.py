@@ -25,12 +25,12 @@ class DeviceUser:
     command: tuple[str, ...] = ()
 
     @property
-    def is_relit(self) -> bool:
+    def is_relit_camera(self) -> bool:
         """Whether it is the command `relit`."""
         return any(Path(part).name == "relit" for part in self.command[:2])
 
     def __str__(self) -> str:
-        return f"{'relit' if self.is_relit else self.name} (process {self.pid})"
+        return f"{'relit' if self.is_relit_camera else self.name} (process {self.pid})"
 
 
 def find_device_users(node: str, proc: Path = PROC) -> list[DeviceUser]:

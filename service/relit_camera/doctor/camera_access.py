@@ -9,9 +9,9 @@ from pathlib import Path
 
 from relit_camera.base.config.settings import OutputSettings, SourceSettings
 from relit_camera.base.errors import DeviceError
-from relit_camera.devices.video_devices import (
+from relit_camera.devices.device_discovery import (
     VIRTUAL_CAMERA_LABEL,
-    DeviceTree,
+    DeviceFolders,
     find_virtual_camera,
     find_webcam,
     list_virtual_cameras,
@@ -47,7 +47,7 @@ def check_webcam(
             topic, f"{webcam.name} at {webcam.node} may only be read by group {group}", _join_group_cure(group)
         )
     users = host.find_device_users(webcam.node)
-    foreign = [str(user) for user in users if not user.is_relit]
+    foreign = [str(user) for user in users if not user.is_relit_camera]
     if foreign:
         who = f"{webcam.name} at {webcam.node} is in use by {', '.join(foreign)}"
         return warning(topic, who, "close it there: a webcam serves one program at a time")
@@ -97,7 +97,7 @@ def check_virtual_camera(settings: OutputSettings, host: Host, access: AccessChe
     return ok(topic, f"'{camera.label}' at {camera.node}{use}")
 
 
-def _exclusive_caps(tree: DeviceTree) -> list[bool]:
+def _exclusive_caps(tree: DeviceFolders) -> list[bool]:
     """The module's parameter for each of its devices, in their order; empty where the module does not show it."""
     text = tree.read(tree.sys / "module" / "v4l2loopback" / "parameters" / "exclusive_caps")
     return [value.strip() in ("Y", "1") for value in text.split(",")] if text else []
@@ -114,7 +114,7 @@ def _join_group_cure(group: str) -> str:
     return JOIN_GROUP_CURE.format(group=group)
 
 
-def groups_to_join(tree: DeviceTree, access: AccessCheck = os.access) -> tuple[str, ...]:
+def groups_to_join(tree: DeviceFolders, access: AccessCheck = os.access) -> tuple[str, ...]:
     """The groups that own video devices which this user may not use."""
     nodes = [str(tree.dev / folder.name) for folder in tree.nodes]
     denied = [node for node in nodes if Path(node).exists() and not access(node, os.R_OK | os.W_OK)]

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, DeviceFolders
 from relit_camera.devices.device_users import DeviceUser, find_device_users
-from relit_camera.devices.video_devices import SYSTEM_TREE, DeviceTree
 
 SECURE_BOOT_VARIABLE = "sys/firmware/efi/efivars/SecureBoot-8be4df61-93ca-11d2-aa0d-00e098032b8c"
 KERNEL_MODULE = "v4l2loopback"
@@ -28,7 +28,7 @@ class Host:
     """
 
     root: Path = Path("/")
-    tree: DeviceTree = SYSTEM_TREE
+    tree: DeviceFolders = SYSTEM_FOLDERS
     release: str = field(default_factory=platform.release)
     is_linux: bool = field(default_factory=lambda: platform.system() == "Linux")
     find_device_users: Callable[[str], list[DeviceUser]] = find_device_users

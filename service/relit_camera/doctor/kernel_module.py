@@ -8,7 +8,7 @@ from __future__ import annotations
 import shlex
 
 from relit_camera.base.config.settings import OutputSettings
-from relit_camera.devices.video_devices import list_virtual_cameras, modprobe_command, module_options
+from relit_camera.devices.device_discovery import list_virtual_cameras, modprobe_command, module_options
 from relit_camera.doctor.host import KERNEL_MODULE, Host
 from relit_camera.doctor.report import Finding, ok, problem, warning
 

@@ -9,7 +9,7 @@ from relit_camera.capture.alignment import picture_set_alignment
 from relit_camera.capture.alignment.outlier_pictures import predict_pictures
 from relit_camera.capture.alignment.picture_set_alignment import align_samples, align_to_prediction, apply_alignment
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, transforms_to_array
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import direction_from_degrees
 from tests.capture.film.moving_face_film import CIRCLE, SIZE, moved, shading, texture, wandering
 
@@ -61,7 +61,7 @@ def test_motions_and_strengths_are_found() -> None:
     assert np.median(found.gains) == pytest.approx(1)
     assert found.rejected == {}
     assert found.correlation.min() > 0.9
-    aligned = found.samples(Samples(pictures, DIRECTIONS, disc()))
+    aligned = found.samples(OlatSamples(pictures, DIRECTIONS, disc()))
     assert aligned.pictures.dtype == np.float32
     assert off(aligned.pictures, still) < 0.5 * off(pictures, still)
 
@@ -84,7 +84,7 @@ def test_corrupt_pictures_are_named() -> None:
     assert found.rejected[BLACK].startswith("black")
     assert found.rejected[TORN].startswith("torn")
     assert found.rejected[FOREIGN].startswith("unlike")
-    aligned = found.samples(Samples(broken, DIRECTIONS, disc()))
+    aligned = found.samples(OlatSamples(broken, DIRECTIONS, disc()))
     np.testing.assert_array_equal(aligned.directions, DIRECTIONS[found.kept])
     assert off(aligned.pictures, still[found.kept]) < 0.5 * off(pictures, still)
 
@@ -94,7 +94,7 @@ def test_of_pictures_that_do_not_belong_together_nothing_is_made() -> None:
     pictures[:] = coloured(texture() * shading(0, 0))
     pictures[1:4] = 0
     directions = DIRECTIONS[[10, 9, 11, 4, 16, 17, 18, 3, 2]]
-    samples = Samples(pictures, directions, disc())
+    samples = OlatSamples(pictures, directions, disc())
     with pytest.raises(LightsError, match="only 6 of 9 pictures fit together; give pictures of one thing"):
         align_samples(pictures, directions, disc()).samples(samples)
 

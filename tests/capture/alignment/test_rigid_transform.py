@@ -17,10 +17,10 @@ TURNED = RigidTransform(3.0, 4.0, -2.5)
 
 def in_complex_plane(transform, points, size):
     """The same transform, worked out another way: turns are products, up is the imaginary axis."""
-    centre = np.array(size) / 2
-    z = (points[:, 0] - centre[0]) - 1j * (points[:, 1] - centre[1])
+    center = np.array(size) / 2
+    z = (points[:, 0] - center[0]) - 1j * (points[:, 1] - center[1])
     z = z * np.exp(1j * np.radians(transform.rotation_deg)) + transform.x - 1j * transform.y
-    return np.stack([z.real + centre[0], centre[1] - z.imag], axis=1)
+    return np.stack([z.real + center[0], center[1] - z.imag], axis=1)
 
 
 def some_points(count=30, seed=0):
@@ -107,11 +107,11 @@ def test_beyond_the_times_known_it_goes_on_as_it_went() -> None:
 
 
 @pytest.mark.parametrize("centre", [(100.0, 120.0), (30.0, 200.0)])
-def test_about_another_centre(centre):
+def test_about_another_centre(center):
     from relit_camera.capture.film.face_circle import FaceCircle
     from relit_camera.capture.film.stabilization.face_crops import CropWindow
 
-    window = CropWindow.about(FaceCircle(*centre, 20), 1.5, SIZE)
+    window = CropWindow.about(FaceCircle(*center, 20), 1.5, SIZE)
     points = some_points()
     inside = TURNED.apply(points - (window.left, window.top), (window.side, window.side)) + (window.left, window.top)
     np.testing.assert_allclose(window.in_picture(TURNED).apply(points, SIZE), inside)

@@ -27,8 +27,8 @@ from relit_camera.capture.reflectance.methods.blend import Blend, choose_model_s
 from relit_camera.capture.reflectance.methods.gaussian_process import Kernel
 from relit_camera.capture.reflectance.methods.linear_methods import RadialBasis
 from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import ThesisMethod
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import region_coverage
-from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.light.directions import direction_from_degrees
 from relit_camera.subject.reflectance_field import ExactField, texel_vectors
 from tests.lab.lit_sphere import cap, lambert, shadowed
@@ -39,7 +39,7 @@ BETWEEN = cap(50, 45)
 
 
 @pytest.fixture(scope="module")
-def samples() -> Samples:
+def samples() -> OlatSamples:
     return shadowed(CAPTURED, SIZE)
 
 
@@ -48,11 +48,11 @@ def truth() -> NDArray[np.float32]:
     return shadowed(BETWEEN, SIZE).pictures.reshape(len(BETWEEN), -1, 3)
 
 
-def inside(samples: Samples) -> NDArray[np.intp]:
+def inside(samples: OlatSamples) -> NDArray[np.intp]:
     return np.flatnonzero(samples.matte.ravel() > 0.5)
 
 
-def error(method: ReflectanceMethod, samples: Samples, truth: NDArray[np.float32]) -> float:
+def error(method: ReflectanceMethod, samples: OlatSamples, truth: NDArray[np.float32]) -> float:
     field = method.build(samples)
     assert isinstance(field, ExactField)
     pixels = inside(samples)
@@ -65,7 +65,7 @@ def test_the_default_is_the_blend() -> None:
 
 
 def test_of_what_casts_a_shadow_and_is_not_in_the_picture_interpolation_knows_no_more(
-    samples: Samples, truth: NDArray
+    samples: OlatSamples, truth: NDArray
 ) -> None:
     plain, thesis = error(SphericalBarycentric(), samples, truth), error(ThesisMethod(), samples, truth)
     assert error(AppearanceMethod(), samples, truth) < 0.95 * plain
@@ -81,7 +81,7 @@ def test_of_what_is_in_the_picture_they_know_much_more() -> None:
 
 @pytest.mark.parametrize(("method", "off"), [(AppearanceMethod(), 0.03), (Blend(), 0.06)], ids=["model", "blend"])
 def test_a_captured_direction_nearly_returns_its_own_picture(
-    method: ReflectanceMethod, off: float, samples: Samples
+    method: ReflectanceMethod, off: float, samples: OlatSamples
 ) -> None:
     field = method.build(samples)
     assert isinstance(field, ExactField)
@@ -91,7 +91,7 @@ def test_a_captured_direction_nearly_returns_its_own_picture(
 
 
 @pytest.mark.parametrize("method", [AppearanceMethod(), Blend()], ids=["model", "blend"])
-def test_texels_are_exact_directions_and_blocks_are_pixels(method: ReflectanceMethod, samples: Samples) -> None:
+def test_texels_are_exact_directions_and_blocks_are_pixels(method: ReflectanceMethod, samples: OlatSamples) -> None:
     field = method.build(samples)
     assert isinstance(field, ExactField)
     assert field.size == (SIZE, SIZE)
@@ -111,7 +111,7 @@ def test_beyond_the_sampled_region_the_blend_is_the_model_and_goes_on() -> None:
     assert np.sqrt(np.mean((found - truth) ** 2)) < 0.25 * np.sqrt(np.mean(truth**2))
 
 
-def test_inside_the_region_the_blend_is_the_mean_of_its_parts(samples: Samples) -> None:
+def test_inside_the_region_the_blend_is_the_mean_of_its_parts(samples: OlatSamples) -> None:
     pixels = inside(samples)[:50]
     field = Blend().build(samples)
     assert 0 < field.share < 1
@@ -159,7 +159,7 @@ def test_directions_that_span_no_region_are_refused(method: ReflectanceMethod) -
         method.build(lambert(line))
 
 
-def test_a_factored_field_is_not_what_the_blend_is(samples: Samples) -> None:
+def test_a_factored_field_is_not_what_the_blend_is(samples: OlatSamples) -> None:
     """The blend decides pixel by pixel: no set of weights makes it of the captured pictures."""
     pixels = inside(samples)
     blend = Blend().build(samples).at(BETWEEN, pixels).reshape(len(BETWEEN), -1)

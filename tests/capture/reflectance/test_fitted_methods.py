@@ -14,14 +14,14 @@ from relit_camera.capture.reflectance.methods.linear_methods import (
     RadialBasis,
     SphericalHarmonics,
 )
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import direction_from_degrees, fibonacci_directions
 from relit_camera.light.spherical_harmonics import basis
 from tests.lab.lit_sphere import cap, lambert, shadowed
 
 CAPTURED = cap(90, 60)
 INSIDE = cap(40, 45)
-KERNEL = Kernel(reach=1.0, noise=1e-3)
+KERNEL = Kernel(length_scale=1.0, noise=1e-3)
 METHODS = [PolynomialTextureMap(), SphericalHarmonics(), RadialBasis(), KERNEL]
 
 
@@ -94,20 +94,20 @@ def test_directions_without_extent_are_refused(method: LinearMethod) -> None:
         method.weights(circle, INSIDE)
 
 
-def drawn(reach: float, noise: float, count: int = 400) -> Samples:
+def drawn(reach: float, noise: float, count: int = 400) -> OlatSamples:
     """Pictures whose pixels are draws of a known process, without a matte's holes."""
     covariance = Kernel(reach, noise).covariance(CAPTURED, CAPTURED) + noise * np.eye(len(CAPTURED))
     rng = np.random.default_rng(7)
     values = np.linalg.cholesky(covariance) @ rng.standard_normal((len(CAPTURED), count * 3))
     side = int(np.sqrt(count))
     pictures = values.reshape(len(CAPTURED), side, side, 3).astype(np.float32)
-    return Samples(pictures, CAPTURED, np.ones((side, side), np.float32))
+    return OlatSamples(pictures, CAPTURED, np.ones((side, side), np.float32))
 
 
 @pytest.mark.parametrize(("reach", "noise"), [(0.5, 0.01), (1.2, 0.1)])
 def test_the_kernel_is_learned_from_the_pictures(reach: float, noise: float) -> None:
     found = fit_kernel(drawn(reach, noise))
-    assert found.reach == pytest.approx(reach, rel=0.2)
+    assert found.length_scale == pytest.approx(reach, rel=0.2)
     assert found.noise == pytest.approx(noise, rel=0.3)
 
 
@@ -116,7 +116,7 @@ def test_noise_outside_of_the_matte_does_not_matter() -> None:
     dirty = samples.pictures + (samples.matte == 0)[..., None] * np.random.default_rng(0).random(
         samples.pictures.shape, np.float32
     )
-    assert fit_kernel(Samples(dirty, CAPTURED, samples.matte)) == fit_kernel(samples)
+    assert fit_kernel(OlatSamples(dirty, CAPTURED, samples.matte)) == fit_kernel(samples)
 
 
 def test_a_process_predicts_shadows_better_than_three_neighbours_do() -> None:

@@ -21,8 +21,8 @@ from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import 
     interpolate_with_adaptation,
     smoothed_visibility,
 )
-from relit_camera.capture.reflectance.samples import Samples
-from relit_camera.capture.reflectance.triangle_field import TriangleCorners
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
+from relit_camera.capture.reflectance.triangle_field import TriangleVertices
 from relit_camera.light.directions import direction_from_degrees
 from relit_camera.subject.reflectance_field import ExactField, texel_vectors
 from tests.lab.lit_sphere import cap, lambert, shadowed, wall_horizon, walled
@@ -34,7 +34,7 @@ SIZE = 32
 
 
 @pytest.fixture(scope="module")
-def samples() -> Samples:
+def samples() -> OlatSamples:
     return shadowed(CAPTURED, SIZE)
 
 
@@ -51,7 +51,7 @@ def flat(normal: NDArray[np.float64], size: int = 2) -> Geometry:
 
 
 @pytest.mark.parametrize("method", METHODS, ids=each)
-def test_a_captured_direction_returns_its_own_picture(method: ReflectanceMethod, samples: Samples) -> None:
+def test_a_captured_direction_returns_its_own_picture(method: ReflectanceMethod, samples: OlatSamples) -> None:
     field = method.build(samples)
     assert isinstance(field, ExactField)
     pixels = np.flatnonzero(samples.matte.ravel())
@@ -60,7 +60,7 @@ def test_a_captured_direction_returns_its_own_picture(method: ReflectanceMethod,
 
 
 @pytest.mark.parametrize("method", METHODS, ids=each)
-def test_texels_are_answered_as_directions_and_nothing_outside(method: ReflectanceMethod, samples: Samples) -> None:
+def test_texels_are_answered_as_directions_and_nothing_outside(method: ReflectanceMethod, samples: OlatSamples) -> None:
     field = method.build(samples)
     start, stop = SIZE * 10 + 12, SIZE * 10 + 20
     dense = field.dense(start, stop)
@@ -120,7 +120,7 @@ def test_where_the_shape_is_known_a_shadow_ends_where_it_should() -> None:
     depth[:, 24:] = 30
     horizon = HorizonMap(compute_horizon_map(depth).heights[100:101, :24])
     shape = replace(plain, normals=plain.normals[:1], horizon=horizon)
-    samples = Samples(before_a_wall(captured), captured, np.ones((1, 24), np.float32), shape)
+    samples = OlatSamples(before_a_wall(captured), captured, np.ones((1, 24), np.float32), shape)
     # At the wall's very foot horizons leave what is near to the normal.
     pixels = np.arange(21)
     truth = before_a_wall(between)[:, 0, pixels, 0]
@@ -134,7 +134,7 @@ def test_adaptation_is_exact_for_a_matte_surface() -> None:
     normal = np.array([0.3, 0.2, 0.933])
     cosines = np.maximum(CAPTURED @ normal, 0)
     pictures = np.broadcast_to(cosines[:, None, None, None], (len(CAPTURED), 2, 2, 3)).astype(np.float32)
-    given = Samples(pictures, CAPTURED, np.ones((2, 2), np.float32), flat(normal))
+    given = OlatSamples(pictures, CAPTURED, np.ones((2, 2), np.float32), flat(normal))
     between = cap(30, 40)
     wanted = between @ normal
     seen = LightAdaptation().build(given).at(between, np.arange(4))[:, 0, 0]
@@ -145,12 +145,12 @@ def test_adaptation_is_exact_for_a_matte_surface() -> None:
 
 def triangle(
     weights: tuple[float, float, float], colors: tuple[float, float, float], cosines: tuple[float, float, float]
-) -> TriangleCorners:
+) -> TriangleVertices:
     """One pixel, one query in one triangle; the normal is set so that the corners have these cosine factors."""
     lights = direction_from_degrees([0, 40, 0], [0, 0, 40])
     normal = np.linalg.solve(lights, cosines)
     query = np.array(weights) @ lights
-    return TriangleCorners(
+    return TriangleVertices(
         lights=lights,
         queries=query[None] / np.linalg.norm(query),
         triangles=np.array([[0, 1, 2]]),
@@ -199,7 +199,7 @@ def test_light_from_behind_the_surface_never_makes_it_brighter() -> None:
     assert 0 <= seen.max() < 0.2
 
 
-def seen_as(corners: TriangleCorners, at_corners: tuple[float, float, float], here: float) -> float:
+def seen_as(corners: TriangleVertices, at_corners: tuple[float, float, float], here: float) -> float:
     visibility = np.array(at_corners, np.float32)[None, :, None], np.array([[here]], np.float32)
     colors = interpolate_by_visibility(corners, visibility, lambda w, c: (w[:, :, None] * c.colors).sum(axis=1))
     return float(colors[0, 0, 0])
@@ -221,7 +221,7 @@ def test_the_rule_of_visibility_by_hand() -> None:
     assert seen_as(corners, (0, 0.5, 1), 1) == pytest.approx((lit + 0.9) / 2, rel=1e-5)
 
 
-def test_smoothing_is_the_mean_over_nine_texels(samples: Samples) -> None:
+def test_smoothing_is_the_mean_over_nine_texels(samples: OlatSamples) -> None:
     pixel = np.array([SIZE * 14 + 20])
     sharp = samples.geometry.visible(texel_vectors(), pixel)[0].reshape(32, 64).astype(float)
     smooth = smoothed_visibility(samples.geometry, texel_vectors(), pixel)[0].reshape(32, 64)
@@ -229,7 +229,7 @@ def test_smoothing_is_the_mean_over_nine_texels(samples: Samples) -> None:
     np.testing.assert_allclose(smooth[1:-1], box[1:-1], atol=1e-6)
 
 
-def test_the_thesis_fades_over_the_black_ring(samples: Samples) -> None:
+def test_the_thesis_fades_over_the_black_ring(samples: OlatSamples) -> None:
     pixel = np.array([SIZE * 20 + 10])
     seen = ThesisMethod().build(samples).at(direction_from_degrees([0, 58, 72, 90], [0, 0, 0, 0]), pixel)[:, 0, 0]
     assert seen[0] > seen[1] > seen[2] > 0 == seen[3]

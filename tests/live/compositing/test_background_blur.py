@@ -24,12 +24,12 @@ def room_with_person(person_colour: int) -> MattedFrame:
 def test_nothing_of_the_person_bleeds_into_the_room(strength: float) -> None:
     """Whatever the person looks like, the blurred room is the same: white or black makes hardly a difference."""
     white, black = (linear_from_uint8(blur_background(room_with_person(colour), strength)) for colour in (255, 0))
-    outside = room_with_person(0).person == 0
+    outside = room_with_person(0).matte == 0
     assert np.abs(white - black)[outside].max() < 0.04
 
 
 def test_an_even_room_stays_even() -> None:
-    person = room_with_person(0).person
+    person = room_with_person(0).matte
     even = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     result = blur_background(MattedFrame(over(np.full_like(even, 30), person, even), person), 0.4)
     assert np.abs(result[person < 0.5].astype(int) - 90).max() <= 2

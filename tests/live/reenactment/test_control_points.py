@@ -80,7 +80,7 @@ def test_open_lids_act_where_they_are(points: ControlPoints) -> None:
     apart[upper] += 2 * points.radius[upper, None] * UP
     apart[lower] -= 2 * points.radius[lower, None] * UP
     influence = points.influence(apart, UP)
-    np.testing.assert_array_equal(influence.centre, influence.target)
+    np.testing.assert_array_equal(influence.center, influence.target)
     np.testing.assert_array_equal(influence.target, apart)
     np.testing.assert_allclose(influence.strength, (points.unit / points.radius) ** 2)
 

@@ -40,7 +40,7 @@ def flow_at(
 
 def formula(source: np.ndarray, influence: Influence, radius: np.ndarray, grid: np.ndarray):
     """Σ_k w_k(x) (s_k + A_k (x − t_k)) / Σ w − x, and a still background, as models/first_order_motion says."""
-    s, t, c, x = (points / UNIT for points in (source, influence.target, influence.centre, grid))
+    s, t, c, x = (points / UNIT for points in (source, influence.target, influence.center, grid))
     r = radius / UNIT
     affine = []
     for i in range(len(s)):

@@ -17,10 +17,10 @@ from relit_camera.plugins import (
     InputError,
     LightMap,
     LinearImage,
+    OlatSamples,
     ReenactorContext,
     ReflectanceField,
     RelighterOptions,
-    Samples,
     SinkInfo,
     SinkOptions,
     SourceInfo,
@@ -64,7 +64,7 @@ class NearestLight:
         nearest = np.argmax(directions @ queries.T, axis=0)
         return (np.arange(len(directions))[:, None] == nearest).astype(np.float32)
 
-    def build(self, samples: Samples) -> ReflectanceField:
+    def build(self, samples: OlatSamples) -> ReflectanceField:
         field: FactoredField = factored_field(self, samples)
         return field
 

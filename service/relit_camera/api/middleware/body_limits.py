@@ -16,7 +16,7 @@ MAX_UPLOAD_BYTES = 64 << 20
 MAX_UPLOAD_FORM_BYTES = MAX_UPLOAD_BYTES + (1 << 16)
 """A file and the form around it."""
 MAX_JSON_BYTES = 1 << 20
-ENDLESS_PATHS = ("/api/v1/events", "/api/v1/preview.mjpg")
+STREAMING_PATHS = ("/api/v1/events", "/api/v1/preview.mjpg")
 """Paths whose answers do not end: a HEAD request would wait for ever."""
 
 
@@ -71,7 +71,7 @@ class HeadRequestMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
-        if scope["type"] != "http" or scope["method"] != "HEAD" or scope["path"] in ENDLESS_PATHS:
+        if scope["type"] != "http" or scope["method"] != "HEAD" or scope["path"] in STREAMING_PATHS:
             await self.app(scope, receive, send)
             return
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.geometry.photometric_stereo import photometric_stereo
-from relit_camera.capture.reflectance.appearance_model import appearance_terms, fit_appearance, half_directions
+from relit_camera.capture.reflectance.appearance_model import appearance_terms, fit_appearance, half_vectors
 
 Floats = NDArray[np.float32]
 
@@ -64,7 +64,7 @@ def predict_pictures(
     inside = np.flatnonzero(matte.ravel() > 0)
     values = luminance(pictures).reshape(lights, -1)
     normals = photometric_stereo(pictures, directions, matte).normals.reshape(-1, 3)
-    toward, half = (each.astype(np.float32) for each in (directions, half_directions(directions)))
+    toward, half = (each.astype(np.float32) for each in (directions, half_vectors(directions)))
     bright = float(np.percentile(values[:, inside[:: max(1, len(inside) // 4096)]], 99))
     predicted = np.zeros((lights, height * width), np.float32)
     for start in range(0, len(inside), _BLOCK):

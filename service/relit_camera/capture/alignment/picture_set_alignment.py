@@ -30,7 +30,7 @@ from relit_camera.capture.alignment.template_alignment import (
     visible_detail,
     without_border,
 )
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 
 Floats = NDArray[np.float32]
 
@@ -102,7 +102,7 @@ class Alignment:
         moved = zip(pictures, self.transforms, self.gains.tolist(), strict=True)
         return np.stack([apply_alignment(*each) for each in moved])
 
-    def samples(self, samples: Samples) -> Samples:
+    def samples(self, samples: OlatSamples) -> OlatSamples:
         """The samples that this alignment was estimated from, aligned, without the rejected ones.
 
         Raises:
@@ -111,7 +111,7 @@ class Alignment:
         if len(self.kept) < MIN_PICTURES:
             what = f"only {len(self.kept)} of {len(self.gains)} pictures fit together"
             raise LightsError(what, "give pictures of one thing that keeps still, and the directions of their lights")
-        return Samples(self.pictures(samples.pictures)[self.kept], samples.directions[self.kept], samples.matte)
+        return OlatSamples(self.pictures(samples.pictures)[self.kept], samples.directions[self.kept], samples.matte)
 
 
 def align_samples(
@@ -220,15 +220,15 @@ class AlignmentResult:
 
     Attributes:
         samples: to build from.
-        told: what was done and which pictures were left out, a line each, for people.
+        messages: what was done and which pictures were left out, a line each, for people.
     """
 
-    samples: Samples
-    told: Sequence[str]
+    samples: OlatSamples
+    messages: Sequence[str]
 
 
 def align_if_better(
-    samples: Samples,
+    samples: OlatSamples,
     names: Sequence[str],
     wanted: bool | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -264,11 +264,11 @@ def align_if_better(
         return AlignmentResult(found.samples(samples), [f"{done}: {_described(found, samples.directions)}", *left_out])
     done = "pictures left as they are, they lie well"
     if found.rejected:
-        samples = Samples(samples.pictures[found.kept], samples.directions[found.kept], samples.matte)
+        samples = OlatSamples(samples.pictures[found.kept], samples.directions[found.kept], samples.matte)
     return AlignmentResult(samples, [done, *left_out])
 
 
-def _is_better(found: Alignment, samples: Samples) -> bool:
+def _is_better(found: Alignment, samples: OlatSamples) -> bool:
     """Whether the kept pictures fit the appearance model clearly better after alignment."""
     small, matte, scale = downscale_for_alignment(samples.pictures, samples.matte)
     aligned = replace(found, transforms=tuple(each.scaled(scale) for each in found.transforms)).pictures(small)

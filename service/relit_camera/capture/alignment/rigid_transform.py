@@ -39,8 +39,8 @@ class RigidTransform:
         """The (2, 3) matrix that maps points (x, y, 1) of a picture of this size, pixel centers at integers + ½."""
         cosine, sine = np.cos(np.radians(self.rotation_deg)), np.sin(np.radians(self.rotation_deg))
         turn = np.array([[cosine, sine], [-sine, cosine]])  # y goes down
-        centre = np.array(size) / 2
-        return np.concatenate([turn, (centre - turn @ centre + (self.x, self.y))[:, None]], axis=1)
+        center = np.array(size) / 2
+        return np.concatenate([turn, (center - turn @ center + (self.x, self.y))[:, None]], axis=1)
 
     def apply(self, points: NDArray, size: Size) -> Floats:
         """Points (count, 2) of the frame, mapped to the reference."""

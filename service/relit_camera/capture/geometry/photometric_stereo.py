@@ -91,8 +91,8 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
     noise = TUNABLES.noise * float(np.percentile(luminance(flat[:, inside[:: max(1, len(inside) // 4096)]]), 99))
 
     def solve(block: NDArray[np.intp]) -> None:
-        colours = flat[:, block]
-        values = np.ascontiguousarray(luminance(colours).T)
+        colors = flat[:, block]
+        values = np.ascontiguousarray(luminance(colors).T)
         scaled, weights, error_deg = _fit(values, toward, noise)
         length = np.linalg.norm(scaled, axis=1, keepdims=True)
         known = length[:, 0] > 0
@@ -101,7 +101,7 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
         cosine = np.maximum(normals[block] @ toward.T, 0)
         shares = weights * cosine
         albedo[block] = (
-            np.einsum("pl,lpc->pc", shares, colours) / np.maximum(np.einsum("pl,pl->p", shares, cosine), 1e-6)[:, None]
+            np.einsum("pl,lpc->pc", shares, colors) / np.maximum(np.einsum("pl,pl->p", shares, cosine), 1e-6)[:, None]
         )
         arrived = np.clip(values / np.maximum(length * cosine, 1e-6), 0, 1)
         arrived[(cosine < TUNABLES.oblique_cosine) | ~known[:, None]] = np.nan

@@ -70,7 +70,7 @@ class AppearanceTunables:
 TUNABLES = AppearanceTunables()
 
 
-def appearance_terms(cosines: Floats, half_cosines: Floats, margins: Floats, toward_camera: Floats) -> Floats:
+def appearance_terms(cosines: Floats, half_vector_cosines: Floats, margins: Floats, toward_camera: Floats) -> Floats:
     """The five terms (pixels, TERM_COUNT, count) of pixels under lights.
 
     Highlights are Blinn's lobes (1977) with Schlick's Fresnel factor (1994) and the visibility factor of Kelemen
@@ -78,7 +78,7 @@ def appearance_terms(cosines: Floats, half_cosines: Floats, margins: Floats, tow
 
     Args:
         cosines: (pixels, count) of normal and light.
-        half_cosines: (pixels, count) of normal and the direction halfway from light to camera.
+        half_vector_cosines: (pixels, count) of normal and the direction halfway from light to camera.
         margins: (pixels, count) radians of the light above the pixel's horizon.
         toward_camera: (count,) cosine of light and camera.
     """
@@ -88,7 +88,7 @@ def appearance_terms(cosines: Floats, half_cosines: Floats, margins: Floats, tow
     fresnel = 1 + (1 / TUNABLES.normal_incidence_reflectance - 1) * (1 - half_way) ** 5
     highlight = lit * (fresnel / np.maximum(half_way, TUNABLES.grazing_cosine) ** 2)
     angle = np.arccos(np.clip(toward_camera, -1, 1))
-    sheen, shine = _lobes(np.maximum(half_cosines, 0))
+    sheen, shine = _lobes(np.maximum(half_vector_cosines, 0))
     terms = np.empty((len(cosines), TERM_COUNT, cosines.shape[1]), np.float32)
     terms[:, 0] = lit
     terms[:, 1] = visible * np.square(np.maximum((cosines + TUNABLES.wrap) / (1 + TUNABLES.wrap), 0))
@@ -115,7 +115,7 @@ def _lobes(cosines: Floats) -> tuple[Floats, Floats]:
     return sheen, sheen * np.square(np.square(sheen))
 
 
-def half_directions(directions: NDArray[np.float64]) -> NDArray[np.float64]:
+def half_vectors(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Unit vectors (count, 3) halfway between those toward lights (count, 3) and the one toward the camera."""
     halves = directions + np.array([0.0, 0.0, 1.0])
     # For a light straight behind the person there is none; that light is hidden anyway.
@@ -126,7 +126,7 @@ def distant_terms(geometry: Geometry, directions: NDArray[np.float64], pixels: N
     """The terms (pixels, TERM_COUNT, count) of row-major pixels of a shape under distant lights (count, 3)."""
     return appearance_terms(
         geometry.cosines(directions, pixels),
-        geometry.cosines(half_directions(directions), pixels),
+        geometry.cosines(half_vectors(directions), pixels),
         geometry.horizon.margins(directions, pixels),
         directions[:, 2].astype(np.float32),
     )

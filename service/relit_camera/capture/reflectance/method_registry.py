@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import NotFoundError
 from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.subject.reflectance_field import FactoredField, ReflectanceField
 
 DEFAULT_METHOD = "blend"
@@ -24,7 +24,7 @@ DEFAULT_METHOD = "blend"
 class ReflectanceMethod(Protocol):
     """Builds a reflectance field from samples."""
 
-    def build(self, samples: Samples) -> ReflectanceField:
+    def build(self, samples: OlatSamples) -> ReflectanceField:
         """The field.
 
         Raises:
@@ -53,7 +53,7 @@ class LinearMethod(Protocol):
         ...
 
 
-def factored_field(method: LinearMethod, samples: Samples) -> FactoredField:
+def factored_field(method: LinearMethod, samples: OlatSamples) -> FactoredField:
     """The field of a linear method (thesis 5.1, 5.2)."""
     return FactoredField(samples.pictures, samples.directions, partial(method.weights, samples.directions))
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from relit_camera.capture.reflectance.delaunay_triangulation import spherical_delaunay
 from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 
 RING_DISTANCE_DEG = 25.0
 """Distance of the ring from the region's boundary; the thesis gives no figure. Beyond the ring the field is black."""
@@ -49,7 +49,7 @@ def ring_directions(directions: NDArray[np.float64], distance_deg: float = RING_
     return np.asarray(ring[length > 1e-6])
 
 
-def with_black_ring(samples: Samples, distance_deg: float = RING_DISTANCE_DEG) -> Samples:
+def with_black_ring(samples: OlatSamples, distance_deg: float = RING_DISTANCE_DEG) -> OlatSamples:
     """The samples plus black ones on the ring, so that the field fades there instead of ending.
 
     Estimate `geometry` from the samples without the ring: its black pictures are no shadows.

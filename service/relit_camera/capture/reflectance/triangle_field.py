@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.reflectance.delaunay_triangulation import TriangleLookup, find_triangles
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.subject.reflectance_field import texel_vectors
 
 Values = NDArray[np.float32]
@@ -21,7 +21,7 @@ BLOCK = 1 << 17
 
 
 @dataclass(frozen=True)
-class TriangleCorners:
+class TriangleVertices:
     """Query directions, the triangle of captured lights around each, and a block of pixels.
 
     Attributes:
@@ -42,7 +42,7 @@ class TriangleCorners:
     geometry: Geometry
     pixels: NDArray[np.intp]
 
-    def only(self, chosen: NDArray[np.bool_]) -> TriangleCorners:
+    def only(self, chosen: NDArray[np.bool_]) -> TriangleVertices:
         """The same for the queries chosen by a mask (count,)."""
         return replace(
             self,
@@ -62,7 +62,7 @@ class TriangleCorners:
         return function(self.lights, self.pixels).T[self.triangles], function(self.queries, self.pixels).T
 
 
-CornerMix = Callable[[TriangleCorners], Values]
+VertexMix = Callable[[TriangleVertices], Values]
 """A function that gives the colors (count, channels, pixels) of the queries."""
 
 
@@ -82,8 +82,8 @@ class TriangleField:
         mix: gives the colors of queries from those of their corners.
     """
 
-    samples: Samples
-    mix: CornerMix
+    samples: OlatSamples
+    mix: VertexMix
 
     @property
     def size(self) -> tuple[int, int]:
@@ -110,7 +110,7 @@ class TriangleField:
         step = max(1, BLOCK // max(1, len(found.covered)))
         for start in range(0, len(pixels), step):
             block = pixels[start : start + step]
-            corners = TriangleCorners(
+            corners = TriangleVertices(
                 lights=lights,
                 queries=directions[found.covered],
                 triangles=found.corners,

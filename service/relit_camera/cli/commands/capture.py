@@ -72,7 +72,7 @@ def import_lights(
             progress=lambda done, total: progress.update(building, completed=done, total=total),
         )
     write_subject(out, subject)
-    for line in aligned.told:
+    for line in aligned.messages:
         typer.echo(line)
     meta = subject.metadata
     typer.echo(

@@ -27,7 +27,7 @@ def demo(
     from relit_camera.app.camera_service import CameraService
     from relit_camera.app.demo import demo_files
     from relit_camera.app.demo.tour import DemoRunner, tour_at
-    from relit_camera.app.serve import run_camera
+    from relit_camera.app.run_camera import run_camera
     from relit_camera.base.config.settings import OutputSettings
     from relit_camera.base.errors import DeviceError, ModelError
     from relit_camera.base.models.model_store import model_path

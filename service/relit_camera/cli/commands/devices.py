@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from relit_camera.devices.video_devices import (
+from relit_camera.devices.device_discovery import (
     VirtualCamera,
     Webcam,
     list_virtual_cameras,

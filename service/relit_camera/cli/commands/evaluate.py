@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
     from relit_camera.base.images.image_types import Mask
-    from relit_camera.capture.reflectance.samples import Samples
+    from relit_camera.capture.reflectance.olat_samples import OlatSamples
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -96,7 +96,7 @@ def field(
             points = None if film_report else read_landmarks(true_lights.parent / "landmarks.json", required=False)
             spots = face_sample_points(points or find_landmarks(neutral_picture(frontal, matte)), matte)
         lights = _lights_file(Path(subject_or_lights))
-        samples: Samples | None = None
+        samples: OlatSamples | None = None
         if lights.suffix.lower() == ".lp":
             samples = subsample_lights(_samples(lights, gamma), within_deg, every)
             _check_size(lights, samples.matte, matte)
@@ -136,7 +136,7 @@ def _check_size(name: Path, matte: Mask, truth: Mask) -> None:
         raise LightsError(f"{name} is {sizes}", "give a truth of the same person at the same size")
 
 
-def _samples(path: Path, gamma: str) -> Samples:
+def _samples(path: Path, gamma: str) -> OlatSamples:
     from relit_camera.base.images.color import parse_gamma
     from relit_camera.capture.picture_import import import_samples
     from relit_camera.cli.progress import progress_bar

@@ -28,7 +28,7 @@ def run(
     """Run the camera until it is told to stop (Ctrl-C or SIGTERM)."""
     from functools import partial
 
-    from relit_camera.app.serve import run_camera
+    from relit_camera.app.run_camera import run_camera
     from relit_camera.base.config.settings_loader import config_path, load_settings
     from relit_camera.cli.arguments import load_command_settings, parse_mode, parse_size
 

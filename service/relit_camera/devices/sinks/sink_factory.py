@@ -14,10 +14,10 @@ from relit_camera.base.config.settings import OutputSettings
 from relit_camera.base.errors import InputError
 from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
 from relit_camera.base.video.video_writer import VIDEO_SUFFIXES
+from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, DeviceFolders, list_virtual_cameras
 from relit_camera.devices.sinks.sink import NullSink, Sink
 from relit_camera.devices.sinks.video_file_sink import VideoFileSink
 from relit_camera.devices.sinks.virtual_camera_sink import VirtualCameraSink
-from relit_camera.devices.video_devices import SYSTEM_TREE, DeviceTree, list_virtual_cameras
 
 
 @dataclass(frozen=True)
@@ -36,13 +36,13 @@ class SinkOptions:
     size: tuple[int, int]
     fps: float
     label: str
-    tree: DeviceTree = SYSTEM_TREE
+    tree: DeviceFolders = SYSTEM_FOLDERS
 
 
 SINKS: PluginGroup[Callable[[SinkOptions], Sink]] = PluginGroup("relit_camera.sinks", "sink")
 
 
-def open_sink(settings: OutputSettings, tree: DeviceTree = SYSTEM_TREE) -> Sink:
+def open_sink(settings: OutputSettings, tree: DeviceFolders = SYSTEM_FOLDERS) -> Sink:
     """Open the sink that `settings.sink` names.
 
     In this order: a plug-in (`NAME` or `NAME:ARGUMENT`; `camera` and `null` are of them), the node of a virtual camera
@@ -88,13 +88,13 @@ def open_null(options: SinkOptions) -> Sink:
     return NullSink(options.size)
 
 
-def published_label(settings: OutputSettings, tree: DeviceTree = SYSTEM_TREE) -> str:
+def published_label(settings: OutputSettings, tree: DeviceFolders = SYSTEM_FOLDERS) -> str:
     """Name the virtual camera that will be published to, which must not be taken as source: it would film itself."""
     labels = {camera.node: camera.label for camera in list_virtual_cameras(tree)}
     return labels.get(_node(settings.sink, tree), settings.label)
 
 
-def _node(text: str, tree: DeviceTree) -> str:
+def _node(text: str, tree: DeviceFolders) -> str:
     """The device file that is named, itself or by a link of udev's; empty where none is."""
     path = Path(text).resolve()
     return str(path) if path.parent == tree.dev and re.fullmatch(r"video\d+", path.name) else ""

@@ -13,16 +13,16 @@ import numpy as np
 from relit_camera.base.errors import DeviceError, InputError
 from relit_camera.base.images.image_types import DisplayImage, check_image
 from relit_camera.base.images.resize import crop_to_fill
-from relit_camera.devices.device_lock import DeviceLock
-from relit_camera.devices.sinks.sink import SinkInfo
-from relit_camera.devices.v4l2loopback import LoopbackDevice, reset_stuck_device
-from relit_camera.devices.video_devices import (
-    SYSTEM_TREE,
+from relit_camera.devices.device_discovery import (
+    SYSTEM_FOLDERS,
     VIRTUAL_CAMERA_LABEL,
-    DeviceTree,
+    DeviceFolders,
     find_virtual_camera,
     modprobe_command,
 )
+from relit_camera.devices.device_lock import DeviceLock
+from relit_camera.devices.sinks.sink import SinkInfo
+from relit_camera.devices.v4l2loopback_output import LoopbackDevice, reset_stuck_device
 
 
 class VirtualCameraOutput(Protocol):
@@ -64,7 +64,7 @@ class VirtualCameraSink:
         label: str = VIRTUAL_CAMERA_LABEL,
         *,
         device: str | None = None,
-        tree: DeviceTree = SYSTEM_TREE,
+        tree: DeviceFolders = SYSTEM_FOLDERS,
         open_output: OpenOutput | None = None,
     ) -> None:
         """Open the device.
@@ -84,7 +84,7 @@ class VirtualCameraSink:
         if size[0] % 2 or size[1] % 2:
             raise InputError(f"a virtual camera cannot be {size[0]}x{size[1]}", "use an even width and height")
         self._size, self._fps, self._label, self._device, self._tree = size, fps, label, device, tree
-        self._by_node = sys.platform.startswith("linux") or tree is not SYSTEM_TREE
+        self._by_node = sys.platform.startswith("linux") or tree is not SYSTEM_FOLDERS
         self._open_output = open_output or (_open_loopback if self._by_node else _PyVirtualCam)
         self._output: VirtualCameraOutput | None = None
         self._info = SinkInfo("camera", "", size)

@@ -13,11 +13,11 @@ from relit_camera.base.config.settings import SourceSettings
 from relit_camera.base.errors import DeviceError, VideoError
 from relit_camera.base.images.image_files import LDR_SUFFIXES
 from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
+from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, VIRTUAL_CAMERA_LABEL, DeviceFolders
 from relit_camera.devices.sources.pattern_source import pattern_source
 from relit_camera.devices.sources.playback_source import file_source, image_source
 from relit_camera.devices.sources.source import Source
 from relit_camera.devices.sources.webcam_source import WebcamSource
-from relit_camera.devices.video_devices import SYSTEM_TREE, VIRTUAL_CAMERA_LABEL, DeviceTree
 
 
 @dataclass(frozen=True)
@@ -36,14 +36,14 @@ class SourceOptions:
     size: tuple[int, int]
     fps: float
     own_label: str = VIRTUAL_CAMERA_LABEL
-    tree: DeviceTree = SYSTEM_TREE
+    tree: DeviceFolders = SYSTEM_FOLDERS
 
 
 SOURCES: PluginGroup[Callable[[SourceOptions], Source]] = PluginGroup("relit_camera.sources", "source")
 
 
 def open_source(
-    settings: SourceSettings, *, own_label: str = VIRTUAL_CAMERA_LABEL, tree: DeviceTree = SYSTEM_TREE
+    settings: SourceSettings, *, own_label: str = VIRTUAL_CAMERA_LABEL, tree: DeviceFolders = SYSTEM_FOLDERS
 ) -> Source:
     """Make the source that `settings.source` names.
 

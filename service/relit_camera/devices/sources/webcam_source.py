@@ -14,8 +14,8 @@ import numpy as np
 
 from relit_camera.base.errors import DeviceError, RelitError
 from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, VIRTUAL_CAMERA_LABEL, DeviceFolders, find_webcam
 from relit_camera.devices.sources.source import SourceInfo, SourceState, ThreadedSource
-from relit_camera.devices.video_devices import SYSTEM_TREE, VIRTUAL_CAMERA_LABEL, DeviceTree, find_webcam
 
 MIN_STALL_TIMEOUT_S = 2.0
 
@@ -49,7 +49,7 @@ class WebcamSource(ThreadedSource):
         size: tuple[int, int],
         fps: float,
         *,
-        tree: DeviceTree = SYSTEM_TREE,
+        tree: DeviceFolders = SYSTEM_FOLDERS,
         own_label: str = VIRTUAL_CAMERA_LABEL,
         open_capture: Callable[[str, tuple[int, int], float], OpenCvCapture] | None = None,
         stall_timeout_s: float | None = None,

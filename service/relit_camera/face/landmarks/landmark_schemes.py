@@ -211,9 +211,9 @@ def _openseeface66() -> LandmarkScheme:
 def _iris_points(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """(5, 3) centre and ring of an iris looking ahead, between the two eye corners (2, 3)."""
     # The cornea bulges before the line between the corners by about its own radius.
-    centre = corners.mean(axis=0) + np.array([0.0, 0.0, IRIS_RADIUS_CM])
+    center = corners.mean(axis=0) + np.array([0.0, 0.0, IRIS_RADIUS_CM])
     ring = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
-    return np.asarray(centre + IRIS_RADIUS_CM * ring)
+    return np.asarray(center + IRIS_RADIUS_CM * ring)
 
 
 def _read_only(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import Points
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.face.head_pose import HeadPose, guess_focal, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
@@ -38,7 +38,7 @@ def synthetic_subject(width: int = 150, height: int = 200) -> Subject:
         pictures[index] = albedo * (facing + 0.02) + gloss
     matte = np.ones((height, width), dtype=np.float32)
     return build_subject(
-        Samples(pictures, directions, matte),
+        OlatSamples(pictures, directions, matte),
         "barycentric",
         "generated",
         landmarks={LANDMARK_SCHEME: _mean_face(width, height)},

@@ -13,8 +13,8 @@ from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.capture.alignment.picture_set_alignment import align_samples, align_to_prediction, apply_alignment
 from relit_camera.capture.reflectance.method_registry import method_names
 from relit_camera.capture.reflectance.methods.appearance_field import AppearanceMethod
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import boundary_lights
-from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.lab.evaluate.field.candidates import method_candidates
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, select_lights
 from relit_camera.lab.evaluate.field.map_pictures import labeled_grid
@@ -96,7 +96,7 @@ def interior_lights(directions: NDArray[np.float64]) -> NDArray[np.intp]:
 
 def evaluate_hold_out(
     name: str,
-    samples: Samples,
+    samples: OlatSamples,
     every: int,
     methods: Sequence[str] = (),
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -155,7 +155,7 @@ def evaluate_hold_out(
     )
 
 
-def aligned_truth(kept: Samples, pictures: Colors, directions: NDArray[np.float64]) -> Colors:
+def aligned_truth(kept: OlatSamples, pictures: Colors, directions: NDArray[np.float64]) -> Colors:
     """Left-out pictures (some, height, width, 3), aligned to the appearance model of the kept ones by motion and gain.
 
     A method's own prediction, or a mean of them, would favour methods that are wrong in the same way: interpolation is

@@ -32,9 +32,9 @@ def unpremultiply(premultiplied: LinearImage, alpha: Mask) -> LinearImage:
     Where alpha is 0 there is no colour to find: it stays as it is.
     """
     edge = _partial_pixels(alpha)
-    colours = premultiplied.copy()
-    colours.reshape(-1, 3)[edge] = _at(premultiplied, edge) / _at(alpha[..., np.newaxis], edge)
-    return colours
+    colors = premultiplied.copy()
+    colors.reshape(-1, 3)[edge] = _at(premultiplied, edge) / _at(alpha[..., np.newaxis], edge)
+    return colors
 
 
 def over(foreground: DisplayImage, alpha: Mask, background: DisplayImage, at: tuple[int, int] = (0, 0)) -> DisplayImage:

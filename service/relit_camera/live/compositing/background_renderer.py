@@ -47,11 +47,11 @@ class MattedFrame:
 
     Attributes:
         image: uint8 sRGB (height, width, 3).
-        person: alpha of the person, (height, width) of the image.
+        matte: alpha of the person, (height, width) of the image.
     """
 
     image: DisplayImage
-    person: Mask
+    matte: Mask
 
 
 def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
@@ -60,14 +60,14 @@ def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     Normalised convolution: the person's pixels have no weight, so nothing of them bleeds into the room around them, and
     behind them the room is continued (Knutsson and Westin 1993).
     """
-    height, width = matted.person.shape
+    height, width = matted.matte.shape
     sigma = BLUR_SIGMA * strength * height
     reduce = int(np.clip(sigma / _WORKING_SIGMA, *_REDUCTION_RANGE))
     size = (max(1, width // reduce), max(1, height // reduce))
     # Averaged as light: of codes, small lamps would come out too dark.
     light = cv2.resize(linear_from_uint8(matted.image), size, interpolation=cv2.INTER_AREA)
     # So high a power that a pixel counts only when it is all but surely room.
-    weight = ((1 - cv2.resize(matted.person, size, interpolation=cv2.INTER_AREA)) ** 16)[..., np.newaxis]
+    weight = ((1 - cv2.resize(matted.matte, size, interpolation=cv2.INTER_AREA)) ** 16)[..., np.newaxis]
     # Averaging r pixels to one and enlarging linearly blurs too, with a variance of r²/12 + r²/6.
     working_sigma = max((sigma / reduce) ** 2 - 1 / 4, 0.01) ** 0.5
     weighted = cv2.GaussianBlur(np.dstack([light * weight, weight]), (0, 0), working_sigma)

@@ -161,12 +161,12 @@ def ratio_confidence(matte: Mask) -> Mask:
 
 def fit_similarity(points: NDArray[np.float64], onto: NDArray[np.floating]) -> NDArray[np.float64]:
     """The rotation, scale and shift (2, 3) that bring `points` (count, 2) nearest to `onto` in least squares."""
-    centre, goal = points.mean(axis=0), onto.mean(axis=0)
+    center, goal = points.mean(axis=0), onto.mean(axis=0)
     # As complex numbers a similarity is one factor, and least squares a quotient.
-    p, q = (points - centre) @ [1, 1j], (onto - goal) @ [1, 1j]
+    p, q = (points - center) @ [1, 1j], (onto - goal) @ [1, 1j]
     factor = np.vdot(p, q) / max(np.vdot(p, p).real, 1e-12)
     turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
-    return np.column_stack([turn, goal - turn @ centre])
+    return np.column_stack([turn, goal - turn @ center])
 
 
 def extrapolate_ratio(warped: NDArray[np.float32]) -> LinearImage:

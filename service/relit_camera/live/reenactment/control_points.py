@@ -69,7 +69,7 @@ class ControlPoints:
         eyeball. So each acts from its own side of the slit: its Gaussian is centred aside, as strong at the slit as
         before. Lids and lips that would cross meet in the middle. An iris behind shut lids moves nothing.
         """
-        target, centre = target.copy(), target.copy()
+        target, center = target.copy(), target.copy()
         strength = (self.unit / self.radius) ** 2
         upper, lower = self.pairs.T
         gap = (target[upper] - target[lower]) @ up
@@ -78,13 +78,13 @@ class ControlPoints:
         target[lower] += crossing
         for side, sign in ((upper, 1.0), (lower, -1.0)):
             closeness = np.clip(1 - gap / (2 * self.radius[side]), 0, 1)
-            centre[side] = target[side] + (sign * SLIT_OFFSET * closeness * self.radius[side])[:, None] * up
+            center[side] = target[side] + (sign * SLIT_OFFSET * closeness * self.radius[side])[:, None] * up
             strength[side] *= np.exp((SLIT_OFFSET * closeness) ** 2 / 2)
         before = np.linalg.norm(self.source[upper] - self.source[lower], axis=1)
         for iris, rows in self.irises:
             if len(iris) and gap[rows].mean() < 0.5 * before[rows].mean():
                 strength[iris] = 0
-        return Influence(target, centre, strength)
+        return Influence(target, center, strength)
 
 
 def control_points(face: SourceFace, anchors: NDArray[np.float64]) -> ControlPoints:
@@ -156,14 +156,14 @@ def skull_outline(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
 
     The outline of a round head does not turn with it: it follows the skull's centre, its size and its roll only.
     """
-    centre, above = project(np.stack([SKULL_CENTER, SKULL_CENTER + [0, CROWN_OFFSET_CM, 0]]), pose, size)
+    center, above = project(np.stack([SKULL_CENTER, SKULL_CENTER + [0, CROWN_OFFSET_CM, 0]]), pose, size)
     depth = pose.depth_of(SKULL_CENTER)
-    up = (above - centre) / max(float(np.linalg.norm(above - centre)), 1e-6)
+    up = (above - center) / max(float(np.linalg.norm(above - center)), 1e-6)
     right = np.array([-up[1], up[0]])
     # From one temple over the crown to the other: below are face and neck.
     angle = np.linspace(-0.12, np.pi + 0.12, 13)
     rings = [np.outer(a * np.cos(angle), right) + np.outer(b * np.sin(angle), up) for a, b in SKULL_RADII]
-    return np.asarray(centre + np.vstack(rings) * (pose.focal_px / max(depth, 1.0)))
+    return np.asarray(center + np.vstack(rings) * (pose.focal_px / max(depth, 1.0)))
 
 
 def shoulder_anchors(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:

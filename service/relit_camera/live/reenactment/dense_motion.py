@@ -19,12 +19,12 @@ class Influence:
 
     Attributes:
         target: (count, 2) float64 source pixels, where each must lie.
-        centre: (count, 2) float64 source pixels, the middle of its Gaussian.
+        center: (count, 2) float64 source pixels, the middle of its Gaussian.
         strength: (count,) float64, its weight there; 0 is no influence.
     """
 
     target: NDArray[np.float64]
-    centre: NDArray[np.float64]
+    center: NDArray[np.float64]
     strength: NDArray[np.float64]
 
 
@@ -87,7 +87,7 @@ class DenseMotion:
             {
                 "source": scaled(source),
                 "target": scaled(influence.target),
-                "centre": scaled(influence.centre),
+                "centre": scaled(influence.center),
                 "radius": (radius / unit).astype(np.float32)[:, None],
                 "strength": influence.strength.astype(np.float32)[:, None],
                 "grid": scaled(np.vstack([region.grid for region in regions])),

@@ -63,7 +63,7 @@ class Worker(Protocol):
         ...
 
 
-class StartsWorkers(Protocol):
+class WorkerFactory(Protocol):
     """Starts a worker; the arguments are those of `PipelineWorker`."""
 
     def __call__(
@@ -114,7 +114,7 @@ class PipelineSupervisor:
         on_trouble: Callable[[Exception | None], None],
         limits: HealthLimits = DEFAULT_LIMITS,
         clock: Clock = SYSTEM_CLOCK,
-        start_worker: StartsWorkers = PipelineWorker,
+        start_worker: WorkerFactory = PipelineWorker,
     ) -> None:
         """Set up; the first frame starts a worker.
 

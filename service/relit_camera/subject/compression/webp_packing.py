@@ -119,8 +119,8 @@ def decode_basis(encoded: NDArray[np.uint8], shape: tuple[int, int, int, int]) -
             picture = cv2.imdecode(np.array(encoded), cv2.IMREAD_UNCHANGED)
     if picture is None or picture.shape != (down * height, across * width, 3):
         raise SubjectError("its principal pictures cannot be decoded", "restore the file from a copy")
-    coloured = cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
-    tiled = coloured.reshape(down, height, across, width, 3).transpose(4, 0, 2, 1, 3)
+    colored = cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
+    tiled = colored.reshape(down, height, across, width, 3).transpose(4, 0, 2, 1, 3)
     codes = tiled.reshape(3, across * down, height, width)[:, :components]
     rooted = (np.arange(256, dtype=np.float32) - 128) / 127
     return np.ascontiguousarray((np.sign(rooted) * rooted**2).astype(np.float16)[codes])

@@ -61,10 +61,10 @@ def basis_graph(subject: Subject) -> bytes:
         helper.make_node("Concat", [*columns, "nothing"], ["places"], axis=1),
         helper.make_node("Gather", ["places", "place_of_pixel"], ["picture"], axis=1),
     ]
-    return _serialised(nodes, constants, subject.matte.size)
+    return _serialized(nodes, constants, subject.matte.size)
 
 
-def _serialised(nodes: list[NodeProto], constants: dict[str, NDArray], pixels: int) -> bytes:
+def _serialized(nodes: list[NodeProto], constants: dict[str, NDArray], pixels: int) -> bytes:
     from onnx import TensorProto, helper, numpy_helper
 
     graph = helper.make_graph(
@@ -75,8 +75,8 @@ def _serialised(nodes: list[NodeProto], constants: dict[str, NDArray], pixels: i
         [numpy_helper.from_array(np.ascontiguousarray(value), name) for name, value in constants.items()],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
-    serialised: bytes = model.SerializeToString()
-    return serialised
+    serialized: bytes = model.SerializeToString()
+    return serialized
 
 
 class OnnxBasisRelighter:

@@ -18,7 +18,7 @@ from relit_camera.capture.film.ball.ball_detection import (
     detect_balls,
     find_balls,
 )
-from relit_camera.capture.film.ball.scene_sample import sample_scene
+from relit_camera.capture.film.ball.frame_sample import sample_frames
 from relit_camera.capture.film.ball.specular_highlight import Highlight
 from relit_camera.capture.film.ball.sphere_projection import BallOutline, DistantView
 from relit_camera.capture.film.focal_length import focal_length_from_option, typical_focal_length
@@ -64,7 +64,7 @@ def frames() -> list[LinearImage]:
 
 
 def test_a_ball_among_other_round_things(frames: list[LinearImage]) -> None:
-    (ball,) = find_balls(sample_scene(with_decoys(frames)), GIVEN)
+    (ball,) = find_balls(sample_frames(with_decoys(frames)), GIVEN)
     center, radius = off(ball.outline, SCENE.outline())
     assert center < 0.02
     assert radius < 0.02
@@ -76,7 +76,7 @@ def test_a_ball_among_other_round_things(frames: list[LinearImage]) -> None:
 def test_other_round_things_are_no_balls(frames: list[LinearImage]) -> None:
     plain = np.full_like(frames[0], 0.06)
     with pytest.raises(CaptureError, match="no mirror ball was found") as refusal:
-        find_balls(sample_scene(with_decoys([plain] * 10)), GIVEN)
+        find_balls(sample_frames(with_decoys([plain] * 10)), GIVEN)
     assert "--ball X,Y,RADIUS" in refusal.value.cure
 
 
@@ -85,7 +85,7 @@ def test_two_balls() -> None:
     pairs = zip(film(SCENE), film(left), strict=True)
     half = SCENE.size[0] // 2
     frames = [np.concatenate([b[:, :half], a[:, half:]], axis=1) for a, b in pairs]
-    found = detect_balls(sample_scene(frames), GIVEN, 2)
+    found = detect_balls(sample_frames(frames), GIVEN, 2)
     assert len(found) == 2
     for ball, scene in zip(sorted(found, key=lambda ball: ball.outline.x), (left, SCENE), strict=True):
         assert max(off(ball.outline, scene.outline())) < 0.03
@@ -94,7 +94,7 @@ def test_two_balls() -> None:
 def test_cut_off_by_the_edge() -> None:
     scene = MirrorScene(center=np.array([29.5, 5.0, -60.0]), radius_cm=6.0, noise=0.002)
     with pytest.raises(CaptureError, match="cut off by the picture's right edge"):
-        find_balls(sample_scene(film(scene)), GIVEN)
+        find_balls(sample_frames(film(scene)), GIVEN)
 
 
 def test_over_exposed(frames: list[LinearImage]) -> None:
@@ -103,16 +103,16 @@ def test_over_exposed(frames: list[LinearImage]) -> None:
     for frame in white:
         cv2.circle(frame, (round(x), round(y)), round(radius), (1.0, 1.0, 1.0), -1, cv2.LINE_AA)
     with pytest.raises(CaptureError, match="over-exposed"):
-        find_balls(sample_scene(white), GIVEN)
+        find_balls(sample_frames(white), GIVEN)
 
 
 def test_a_given_circle_is_taken_as_it_is(frames: list[LinearImage]) -> None:
     given = BallOutline(*SCENE.outline())
-    ball = ball_from_outline(sample_scene(frames), given, GIVEN)
+    ball = ball_from_outline(sample_frames(frames), given, GIVEN)
     assert ball.outline == given
     assert ball.glints == pytest.approx(0.5)
     with pytest.raises(CaptureError, match="cut off by the picture's top edge"):
-        ball_from_outline(sample_scene(frames), BallOutline(100, 3, 20), GIVEN)
+        ball_from_outline(sample_frames(frames), BallOutline(100, 3, 20), GIVEN)
 
 
 def test_a_second_ball_that_is_missing_beside_a_given_one_is_refused(frames: list[LinearImage]) -> None:
@@ -120,14 +120,14 @@ def test_a_second_ball_that_is_missing_beside_a_given_one_is_refused(frames: lis
     with pytest.raises(
         CaptureError, match=rf"only one mirror ball was found, at {given.x:.0f}, {given.y:.0f}, not two"
     ):
-        find_balls(sample_scene(frames), GIVEN, 2, [given])
+        find_balls(sample_frames(frames), GIVEN, 2, [given])
 
 
 def test_the_outline_corrects_the_focal_length() -> None:
     scene = MirrorScene(size=(320, 400), center=np.array([17.0, 26.0, -60.0]), radius_cm=6.5, noise=0.002)
     guess = typical_focal_length(scene.size)
     assert abs(guess.pixels / scene.focal_px - 1) > 0.2
-    (ball,) = find_balls(sample_scene(film(scene)), guess)
+    (ball,) = find_balls(sample_frames(film(scene)), guess)
     assert abs(ball.focal.pixels / scene.focal_px - 1) < 0.12
     assert ball.focal.error < 0.15
     assert "corrected by the ball's outline" in ball.focal.source
@@ -138,7 +138,7 @@ def test_a_sample_is_small_and_always_the_same() -> None:
         for index in range(300):
             yield np.full((90, 1600, 3), index / 300, np.float32)
 
-    once, again = sample_scene(stream()), sample_scene(stream())
+    once, again = sample_frames(stream()), sample_frames(stream())
     assert once.codes.shape == (48, 72, 1280)
     assert once.scale == pytest.approx(0.8)
     np.testing.assert_array_equal(once.codes, again.codes)
@@ -150,10 +150,10 @@ def test_a_sample_is_small_and_always_the_same() -> None:
 
 def test_frames_that_do_not_fit() -> None:
     with pytest.raises(CaptureError, match="no frame"):
-        sample_scene([])
+        sample_frames([])
     small, large = (np.zeros((height, 80, 3), np.float32) for height in (60, 90))
     with pytest.raises(CaptureError, match="frame 1 is 80x90 instead of 80x60"):
-        sample_scene([small, large])
+        sample_frames([small, large])
 
 
 # Photographs: twelve lights, a glint drawn out into a streak, a smaller second highlight, a limb that nearly vanishes.
@@ -173,7 +173,7 @@ def published(shared: Path, photographs: list[LinearImage]) -> tuple[float, floa
 
 @pytest.fixture(scope="module")
 def found(photographs: list[LinearImage]) -> DetectedBall:
-    sample = sample_scene(photographs)
+    sample = sample_frames(photographs)
     return find_balls(sample, typical_focal_length(sample.size))[0]
 
 

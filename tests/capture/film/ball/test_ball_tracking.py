@@ -13,7 +13,7 @@ from relit_camera.capture.film.ball.ball_tracking import (
     find_episodes,
     outline_at_frame,
 )
-from relit_camera.capture.film.ball.scene_sample import sample_scene
+from relit_camera.capture.film.ball.frame_sample import sample_frames
 from relit_camera.capture.film.ball.sphere_projection import BallOutline
 from tests.capture.film.ball.mirror_scene import MirrorScene, hand_path
 
@@ -36,7 +36,7 @@ def frames() -> list[LinearImage]:
 
 
 def test_hidden_and_moved_frames_are_episodes(frames: list[LinearImage]) -> None:
-    tracker = BallTracker(sample_scene(frames), OUTLINE)
+    tracker = BallTracker(sample_frames(frames), OUTLINE)
     found = find_episodes([tracker.observe(index, frame) for index, frame in enumerate(frames)], OUTLINE.radius)
     assert [(episode.kind, episode.first, episode.last) for episode in found] == [("hidden", 12, 15), ("moved", 16, 21)]
     scale = SCENE.focal_px / -SCENE.center[2]
@@ -45,7 +45,7 @@ def test_hidden_and_moved_frames_are_episodes(frames: list[LinearImage]) -> None
 
 
 def test_a_ball_that_stays_has_no_episodes(frames: list[LinearImage]) -> None:
-    tracker = BallTracker(sample_scene(frames[:12]), OUTLINE)
+    tracker = BallTracker(sample_frames(frames[:12]), OUTLINE)
     observations = [tracker.observe(index, frame) for index, frame in enumerate(frames[:12])]
     assert find_episodes(observations, OUTLINE.radius) == []
     assert max(np.hypot(each.dx, each.dy) for each in observations) < 0.4

@@ -20,7 +20,7 @@ from relit_camera.capture.film.pipeline.checkpoint import (
     CheckpointFolder,
     input_fingerprint,
 )
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from tests.capture.film.generated_film import write_film
 
 OPTIONS = CaptureOptions(ball=BallOutline(1.5, 2, 3), face=FaceCircle(4, 5, 6))
@@ -34,7 +34,7 @@ def found() -> Checkpoint:
     # Fortran's order: what is written is in C's.
     matte = np.asfortranarray(rng.uniform(size=(4, 5)).astype(np.float32))
     return Checkpoint(
-        Samples(pictures, directions, matte), {"warnings": ["é"], "focal_px": 0.1 + 0.2, "list": [1, None]}
+        OlatSamples(pictures, directions, matte), {"warnings": ["é"], "focal_px": 0.1 + 0.2, "list": [1, None]}
     )
 
 

@@ -11,10 +11,10 @@ from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.ball.ball_tracking import ObservedBall
 from relit_camera.capture.film.ball.specular_highlight import Highlight, NoHighlight
 from relit_camera.capture.film.face_circle import FaceCircle
+from relit_camera.capture.film.lamp.capture_layout import estimate_capture_layout, eye_distance_from_face
 from relit_camera.capture.film.lamp.lamp_localization import LampPositions, locate_lamps
-from relit_camera.capture.film.lamp.scene_layout import estimate_scene_layout, eye_distance_from_face
 from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
-from relit_camera.capture.film.pipeline.capture_report import Findings
+from relit_camera.capture.film.pipeline.capture_report import CaptureFindings
 from relit_camera.capture.film.pipeline.film_capture import CaptureResult, build_samples
 from tests.capture.film.ball.mirror_scene import degrees_between
 from tests.capture.film.generated_film import FOCAL_PX, HEAD, PX_PER_CM, Film, with_ball, write_film
@@ -31,14 +31,14 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> CaptureResult:
 
 
 @pytest.fixture(scope="module")
-def findings(built: CaptureResult) -> Findings:
+def findings(built: CaptureResult) -> CaptureFindings:
     return built.findings
 
 
-def located(findings: Findings, *balls: ObservedBall) -> LampPositions:
+def located(findings: CaptureFindings, *balls: ObservedBall) -> LampPositions:
     """The lamps by these balls alone."""
     circle = findings.motion.circle
-    layout = estimate_scene_layout(
+    layout = estimate_capture_layout(
         [ball.view for ball in balls], (circle.x, circle.y), eye_distance_from_face(circle.radius)
     )
     times_s = findings.flashes.times_s
@@ -62,13 +62,13 @@ def test_the_lamps_distance_is_measured(built: CaptureResult) -> None:
     assert np.std(np.log(ratio)) < 0.06
 
 
-def test_the_direction_is_better_than_by_either_ball(findings: Findings) -> None:
+def test_the_direction_is_better_than_by_either_ball(findings: CaptureFindings) -> None:
     both = off_deg(findings.lamps).mean()
     for alone in findings.balls:
         assert both < 0.7 * off_deg(located(findings, alone)).mean()
 
 
-def test_where_one_ball_shows_the_lamp_its_distance_is_interpolated(findings: Findings) -> None:
+def test_where_one_ball_shows_the_lamp_its_distance_is_interpolated(findings: CaptureFindings) -> None:
     whole = findings.lamps
     first, second = findings.balls
     gone = set(whole.index[10:13].tolist())
@@ -81,7 +81,7 @@ def test_where_one_ball_shows_the_lamp_its_distance_is_interpolated(findings: Fi
     assert (lamps.distances.error[changed] > whole.distances.error[changed]).all()
 
 
-def test_a_frame_in_which_they_show_different_things_is_left_out(findings: Findings) -> None:
+def test_a_frame_in_which_they_show_different_things_is_left_out(findings: CaptureFindings) -> None:
     first, second = findings.balls
     index = int(findings.lamps.index[20])
     other = second.highlights[index - 24]
@@ -117,7 +117,7 @@ def test_balls_that_disagree_cause_warnings(built: CaptureResult) -> None:
     assert not any("balls" in warning for warning in findings.warnings)
 
 
-def test_circles_that_are_no_balls_of_one_size_are_refused(findings: Findings) -> None:
+def test_circles_that_are_no_balls_of_one_size_are_refused(findings: CaptureFindings) -> None:
     first, second = findings.balls
     small = replace(second.found.outline, radius=second.found.outline.radius / 2)
     wrong = replace(second, view=second.view.with_outline(small))

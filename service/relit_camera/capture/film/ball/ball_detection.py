@@ -20,8 +20,8 @@ from relit_camera.capture.film.ball.circle_detection import (
     circle_candidates,
     fit_outline_to_edges,
 )
+from relit_camera.capture.film.ball.frame_sample import EdgeMap, FrameSample, edge_map
 from relit_camera.capture.film.ball.mirror_outline import fit_mirror_outline
-from relit_camera.capture.film.ball.scene_sample import EdgeMap, SceneSample, edge_map
 from relit_camera.capture.film.ball.specular_highlight import Highlight, find_highlight
 from relit_camera.capture.film.ball.sphere_projection import BallOutline, DistantView
 from relit_camera.capture.film.focal_length import FocalLength
@@ -91,7 +91,7 @@ class DetectedBall:
 class HighlightVisibility:
     """How often a circle of the scene shows a small bright place that the scene without the lamp does not have."""
 
-    def __init__(self, sample: SceneSample) -> None:
+    def __init__(self, sample: FrameSample) -> None:
         """Take the scene without the lamp from the darker pictures, pixel by pixel."""
         shape = sample.codes.shape[1:]
         self._factor = min(1.0, _TUNABLES.max_side_px / max(shape))
@@ -122,7 +122,7 @@ class HighlightVisibility:
 
 
 def find_balls(
-    sample: SceneSample, focal: FocalLength, count: int = 1, given: Sequence[BallOutline] = ()
+    sample: FrameSample, focal: FocalLength, count: int = 1, given: Sequence[BallOutline] = ()
 ) -> list[DetectedBall]:
     """The mirror balls of a film: those given, then those found, the clearest first.
 
@@ -153,7 +153,7 @@ def find_balls(
     return balls
 
 
-def ball_from_outline(sample: SceneSample, given: BallOutline, focal: FocalLength) -> DetectedBall:
+def ball_from_outline(sample: FrameSample, given: BallOutline, focal: FocalLength) -> DetectedBall:
     """A ball whose outline is given in pixels of the frames, taken as it is.
 
     Raises:
@@ -164,7 +164,7 @@ def ball_from_outline(sample: SceneSample, given: BallOutline, focal: FocalLengt
     return DetectedBall(given, None, HighlightVisibility(sample).share(circle), focal)
 
 
-def detect_balls(sample: SceneSample, focal: FocalLength, count: int) -> list[DetectedBall]:
+def detect_balls(sample: FrameSample, focal: FocalLength, count: int) -> list[DetectedBall]:
     """At most `count` mirror balls that do not overlap, at least one, the most significant first.
 
     The focal length that the first outline corrects is used in measuring the next.
@@ -194,7 +194,7 @@ def detect_balls(sample: SceneSample, focal: FocalLength, count: int) -> list[De
 
 
 def _measure(
-    sample: SceneSample, rough: BallOutline, visibility: HighlightVisibility, focal: FocalLength
+    sample: FrameSample, rough: BallOutline, visibility: HighlightVisibility, focal: FocalLength
 ) -> DetectedBall:
     """A ball with this rough outline in pixels of the sample, its outline and the focal length measured."""
     known = focal.scaled(sample.scale)
@@ -231,7 +231,7 @@ def _significant(fits: list[OutlineFit | None]) -> list[OutlineFit]:
     return kept
 
 
-def _require_whole(outline: BallOutline, sample: SceneSample) -> None:
+def _require_whole(outline: BallOutline, sample: FrameSample) -> None:
     """Check that a ball with this outline, in pixels of the sample, is inside the picture.
 
     Raises:
@@ -254,7 +254,7 @@ def _require_whole(outline: BallOutline, sample: SceneSample) -> None:
         )
 
 
-def _nothing_found(sample: SceneSample, edges: EdgeMap, circles: list[BallOutline]) -> CaptureError:
+def _nothing_found(sample: FrameSample, edges: EdgeMap, circles: list[BallOutline]) -> CaptureError:
     """Why no circle counts as a ball: the clearest one is white all over, or none shows the lamp."""
     median = np.median(sample.codes, axis=0)
     for fit in _significant([fit_outline_to_edges(edges, circle) for circle in circles]):

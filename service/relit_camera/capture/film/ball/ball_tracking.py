@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.color import linear_from_uint8, luminance, uint8_from_linear
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.capture.film.ball.ball_detection import DetectedBall
-from relit_camera.capture.film.ball.scene_sample import Plane, SceneSample
+from relit_camera.capture.film.ball.frame_sample import FrameSample, Plane
 from relit_camera.capture.film.ball.specular_highlight import BallCrops, Highlight, NoHighlight
 from relit_camera.capture.film.ball.sphere_projection import BallOutline, PinholeView
 
@@ -88,7 +88,7 @@ class BallEpisode:
 class BallTracker:
     """Aligns a ball's usual appearance to frames of a film."""
 
-    def __init__(self, sample: SceneSample, outline: BallOutline) -> None:
+    def __init__(self, sample: FrameSample, outline: BallOutline) -> None:
         """Learn the ball's usual appearance.
 
         Args:
@@ -252,7 +252,7 @@ class ObservedBall:
 class BallRecorder:
     """Collects what a ball shows, frame by frame."""
 
-    def __init__(self, found: DetectedBall, sample: SceneSample, view: PinholeView) -> None:
+    def __init__(self, found: DetectedBall, sample: FrameSample, view: PinholeView) -> None:
         """Prepare for a ball.
 
         Args:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.capture.film.ball.scene_sample import EdgeMap
+from relit_camera.capture.film.ball.frame_sample import EdgeMap
 from relit_camera.capture.film.ball.sphere_projection import BallOutline
 
 MIN_RADIUS = 0.025

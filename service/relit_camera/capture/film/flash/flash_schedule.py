@@ -1,6 +1,6 @@
 """When the light was on: its frequency, the moments at which it went on and off, and the schedule made of them.
 
-Films in which nothing blinks are refused here (`require_blinking`).
+Films in which nothing blinks are refused here (`require_flashing`).
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def _local_extremes(level: Floats, interval_s: float, frequency_hz: float) -> tu
     return np.asarray(minimum_filter1d(level, window)), np.asarray(maximum_filter1d(level, window))
 
 
-def require_blinking(level: Floats, interval_s: float, beat: FlashFrequency, edges: FlashEdges) -> None:
+def require_flashing(level: Floats, interval_s: float, beat: FlashFrequency, edges: FlashEdges) -> None:
     """Check that the level goes up and down as that of a blinking light does, often enough.
 
     Args:

@@ -20,7 +20,7 @@ from relit_camera.capture.film.flash.flash_schedule import (
     RollingShutter,
     find_flash_edges,
     find_flash_frequency,
-    require_blinking,
+    require_flashing,
     schedule_from_edges,
 )
 from relit_camera.capture.film.flash.flash_signal import (
@@ -151,7 +151,7 @@ def detect_flashes(brightness: BrightnessGrid, circle: FaceCircle | None = None)
     beat = find_flash_frequency(mean_level(brightness, reached), brightness.times_s)
     signal = extract_flash_signal(brightness, beat.frequency_hz, reached)
     edges = find_flash_edges(signal.level, brightness.times_s, beat.frequency_hz)
-    require_blinking(signal.level, brightness.interval_s, beat, edges)
+    require_flashing(signal.level, brightness.interval_s, beat, edges)
     edges, shutter = fit_rolling_shutter(brightness, signal, edges, beat.frequency_hz)
     schedule = schedule_from_edges(edges)
     flash = schedule.flash_of(brightness.times_s, shutter)

@@ -12,6 +12,7 @@ from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.ball.ball_tracking import ObservedBall
 from relit_camera.capture.film.ball.specular_highlight import Highlight, NoHighlight
 from relit_camera.capture.film.ball.sphere_projection import Vectors
+from relit_camera.capture.film.lamp.capture_layout import CaptureLayout
 from relit_camera.capture.film.lamp.lamp_position import (
     BallHighlight,
     LampDistances,
@@ -21,7 +22,6 @@ from relit_camera.capture.film.lamp.lamp_position import (
     require_lamp_beyond_ball,
     triangulate_lamp,
 )
-from relit_camera.capture.film.lamp.scene_layout import SceneLayout
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -83,7 +83,7 @@ class LampPositions:
 
 
 def locate_lamps(
-    balls: Sequence[ObservedBall], bright: Indices, times_s: Floats, layout: SceneLayout, usual_distance_cm: float
+    balls: Sequence[ObservedBall], bright: Indices, times_s: Floats, layout: CaptureLayout, usual_distance_cm: float
 ) -> LampPositions:
     """Find the lamp in every bright frame in which a ball shows it.
 
@@ -160,7 +160,7 @@ def _distances(
     times_s: Floats,
     frames: Indices,
     triangulated: Mapping[int, LampTriangulation],
-    layout: SceneLayout,
+    layout: CaptureLayout,
     usual_cm: float,
 ) -> LampDistances:
     """Distances of the lamp from the head in these frames: assumed with one ball, measured with two.

@@ -50,18 +50,18 @@ _TUNABLES = MatteTunables()
 
 
 def estimate_flash_matte(
-    pictures: NDArray[np.floating], room: LinearImage, nobody: NDArray[np.bool_] | None = None
+    pictures: NDArray[np.floating], room: LinearImage, excluded: NDArray[np.bool_] | None = None
 ) -> Mask:
     """The person's alpha (height, width), float32 0..1: the largest region that the flash reaches.
 
     Args:
         pictures: (lights, height, width, 3) linear RGB of the flash alone.
         room: (height, width, 3) linear RGB without the flash, in the same unit.
-        nobody: (height, width) mask of places where the person cannot be, as on the mirror ball.
+        excluded: (height, width) mask of places where the person cannot be, as on the mirror ball.
     """
     ratio = flash_ratio(pictures, room)
-    if nobody is not None:
-        ratio[nobody] = 0
+    if excluded is not None:
+        ratio[excluded] = 0
     body = _largest_region(ratio > _threshold(ratio))
     return _soft_edge(body, ratio) if body.any() else np.zeros(ratio.shape, np.float32)
 

@@ -13,13 +13,13 @@ from relit_camera.capture.film.ball.ball_tracking import ObservedBall
 from relit_camera.capture.film.face_localization import LocatedFace
 from relit_camera.capture.film.flash.frame_classification import Flashes, FlashFrame, FrameClass
 from relit_camera.capture.film.focal_length import TAG_ERROR, FocalLength
+from relit_camera.capture.film.lamp.capture_layout import CaptureLayout
 from relit_camera.capture.film.lamp.lamp_localization import LampPositions
 from relit_camera.capture.film.lamp.light_coverage import covered_solid_angle
-from relit_camera.capture.film.lamp.scene_layout import SceneLayout
 from relit_camera.capture.film.olat.camera_gains import FrameGains
 from relit_camera.capture.film.olat.flash_strength import FlashStrengths
 from relit_camera.capture.film.olat.head_crop import HeadCrop
-from relit_camera.capture.film.pipeline.light_observation import UsableFrames
+from relit_camera.capture.film.pipeline.film_measurement import UsableFrames
 from relit_camera.capture.film.stabilization.film_stabilization import Stabilization
 
 REPORT_VERSION = 1
@@ -46,7 +46,7 @@ _OUTLIER_REASON = "its light does not fit the person's shape: the lamp was hidde
 
 
 @dataclass(frozen=True, eq=False)
-class Findings:
+class CaptureFindings:
     """Results of all stages of a capture.
 
     Attributes:
@@ -85,7 +85,7 @@ class Findings:
     focal: FocalLength
     detector_installed: bool
     eyes_px: float | None
-    layout: SceneLayout
+    layout: CaptureLayout
     lamps: LampPositions
     light_distance_cm: float
     crop: HeadCrop

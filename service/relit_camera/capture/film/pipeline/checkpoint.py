@@ -25,7 +25,7 @@ from relit_camera.base.models.model_store import ModelState, ModelStore
 from relit_camera.base.storage.atomic_files import make_folder, storage_error, write_tensors
 from relit_camera.base.video.video_decoding import open_stream
 from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 
 CHECKPOINT_VERSION = 1
 FOLDER_SUFFIX = ".partial"
@@ -44,7 +44,7 @@ class Checkpoint:
         report: of the capture, `Findings.report`.
     """
 
-    samples: Samples
+    samples: OlatSamples
     report: dict[str, Any]
 
 
@@ -137,7 +137,7 @@ class CheckpointFolder:
             tensors = {name: file.get_tensor(name) for name in _TENSORS}
         if int(header["checksum"]) != _checksum(tensors, header["report"]):
             raise ValueError("the checksum is another")
-        return Checkpoint(Samples(**tensors), json.loads(header["report"]))
+        return Checkpoint(OlatSamples(**tensors), json.loads(header["report"]))
 
 
 def _checksum(tensors: Mapping[str, NDArray], report: str) -> int:

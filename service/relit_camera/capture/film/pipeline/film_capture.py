@@ -16,14 +16,14 @@ from relit_camera.base.images.color import Gamma
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.video.video_readers import LinearVideoFrame, LinearVideoReader
 from relit_camera.capture.film.ball.ball_detection import find_balls
-from relit_camera.capture.film.ball.scene_sample import MAX_FRAMES, SceneSample, sample_scene
+from relit_camera.capture.film.ball.frame_sample import MAX_FRAMES, FrameSample, sample_frames
 from relit_camera.capture.film.face_localization import LocatedFace, locate_face, require_face_in_picture
 from relit_camera.capture.film.flash.flash_signal import measure_brightness
 from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass, detect_flashes
 from relit_camera.capture.film.focal_length import known_focal_length
+from relit_camera.capture.film.lamp.capture_layout import estimate_capture_layout, eye_distance_from_face
 from relit_camera.capture.film.lamp.lamp_localization import locate_lamps
 from relit_camera.capture.film.lamp.light_coverage import require_light_coverage
-from relit_camera.capture.film.lamp.scene_layout import estimate_scene_layout, eye_distance_from_face
 from relit_camera.capture.film.olat.camera_gains import require_uniform_gains
 from relit_camera.capture.film.olat.flash_matte import estimate_flash_matte, require_face_in_matte
 from relit_camera.capture.film.olat.flash_strength import (
@@ -44,10 +44,10 @@ from relit_camera.capture.film.olat.olat_pictures import (
     require_size_in_memory,
 )
 from relit_camera.capture.film.pipeline.capture_options import CaptureOptions, Progress, no_progress
-from relit_camera.capture.film.pipeline.capture_report import Findings
-from relit_camera.capture.film.pipeline.light_observation import UsableFrames, observe_light
+from relit_camera.capture.film.pipeline.capture_report import CaptureFindings
+from relit_camera.capture.film.pipeline.film_measurement import UsableFrames, measure_film
 from relit_camera.capture.film.stabilization.film_stabilization import stabilize_film
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.face.tracking.face_detector import FaceDetector
 
 _BALL_REACH = 1.15
@@ -63,8 +63,8 @@ class CaptureResult:
         findings: results of all stages, for the report.
     """
 
-    samples: Samples
-    findings: Findings
+    samples: OlatSamples
+    findings: CaptureFindings
 
 
 def build_samples(
@@ -113,13 +113,13 @@ def build_samples(
         video, options.gamma, only=frozenset(usable.all.tolist()), threads=options.threads
     ) as reader:
         film = _reporting(reader, _reporter(progress, "Looking at the light", total))
-        observed = observe_light(film, usable, flashes, balls, sample, detector)
+        observed = measure_film(film, usable, flashes, balls, sample, detector)
     gains = observed.gains
     require_uniform_gains(gains.spread)
     del sample  # tens of megabytes that no later stage needs
 
     # Lamp: where it was, seen from the head.
-    layout = estimate_scene_layout(
+    layout = estimate_capture_layout(
         [ball.view for ball in observed.balls],
         (motion.circle.x, motion.circle.y),
         observed.eyes_px or eye_distance_from_face(motion.circle.radius),
@@ -167,7 +167,7 @@ def build_samples(
     pictures = merge_lights(olat.pictures, strengths, clusters, matte, near_field=options.near_field)
     means = np.stack([directions[cluster].mean(axis=0) for cluster in clusters])
     means /= np.linalg.norm(means, axis=1, keepdims=True)
-    findings = Findings(
+    findings = CaptureFindings(
         video=video.name,
         size=brightness.size,
         flashes=flashes,
@@ -191,7 +191,7 @@ def build_samples(
         good=good,
         lights=len(clusters),
     )
-    return CaptureResult(Samples(pictures, means, matte), findings)
+    return CaptureResult(OlatSamples(pictures, means, matte), findings)
 
 
 def _reporter(progress: Progress, stage: str, total: int | None = None) -> Callable[[int], None]:
@@ -206,7 +206,7 @@ def _reporting(frames: Iterable[LinearVideoFrame], report: Callable[[int], None]
         report(frame.index + 1)
 
 
-def _sample_frames(video: Path, flashes: Flashes, gamma: Gamma, threads: int) -> SceneSample:
+def _sample_frames(video: Path, flashes: Flashes, gamma: Gamma, threads: int) -> FrameSample:
     """As many dark frames as bright ones, spread over the film."""
     half = MAX_FRAMES // 2
     picked = [
@@ -215,7 +215,7 @@ def _sample_frames(video: Path, flashes: Flashes, gamma: Gamma, threads: int) ->
     ]
     only = frozenset(np.concatenate(picked).tolist())
     with LinearVideoReader(video, gamma, only=only, threads=threads) as reader:
-        return sample_scene(frame.image for frame in reader)
+        return sample_frames(frame.image for frame in reader)
 
 
 def _installed_detector() -> FaceDetector | None:

@@ -14,7 +14,7 @@ from relit_camera.capture.alignment.rigid_transform import RigidTransform, inter
 from relit_camera.capture.film.face_circle import FaceCircle
 from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass
 from relit_camera.capture.film.stabilization.face_crops import crop_faces
-from relit_camera.capture.film.stabilization.refinement import align_bright, align_dark
+from relit_camera.capture.film.stabilization.stabilization_refinement import align_bright, align_dark
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -20,8 +20,8 @@ from relit_camera.capture.reflectance.appearance_model import (
     specular_prior,
 )
 from relit_camera.capture.reflectance.methods.gaussian_process import Kernel
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import region_coverage
-from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.subject.reflectance_field import texel_vectors
 
 Floats = NDArray[np.float32]
@@ -53,7 +53,7 @@ class AppearanceMethod:
     The appearance model extrapolates beyond the sampled region; the residual has mean 0 and fades to 0 there.
     """
 
-    def build(self, samples: Samples) -> AppearanceField:
+    def build(self, samples: OlatSamples) -> AppearanceField:
         """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         region_coverage(samples.directions, samples.directions[:1])
         inside = np.flatnonzero(samples.matte.ravel() > 0)
@@ -72,7 +72,7 @@ class AppearanceField:
         kernel: covariance of the residual over directions.
     """
 
-    samples: Samples
+    samples: OlatSamples
     amounts: Floats
     kernel: Kernel
 
@@ -94,7 +94,7 @@ class AppearanceField:
     def _texel_weights(self) -> Floats:
         return residual_weights(self.kernel, self.samples.directions, texel_vectors())
 
-    def fitted_to(self, samples: Samples, pixels: NDArray[np.intp]) -> AppearanceField:
+    def fitted_to(self, samples: OlatSamples, pixels: NDArray[np.intp]) -> AppearanceField:
         """A field with the same kernel, fitted to other samples of this person at these row-major pixels only."""
         return AppearanceField(samples, _fit(samples, pixels)[0], self.kernel)
 
@@ -140,7 +140,7 @@ def _predicted_residual(weights: Floats, fractions: Floats, residual: Floats) ->
 
 
 def _fit(
-    samples: Samples, pixels: NDArray[np.intp], expected: SpecularEstimate | None = None
+    samples: OlatSamples, pixels: NDArray[np.intp], expected: SpecularEstimate | None = None
 ) -> tuple[Floats, SpecularEstimate]:
     """Amounts (height · width, 3, TERM_COUNT), 0 but at the given pixels, and the specular estimate of those pixels."""
     geometry, bright = samples.geometry, _bright(samples)
@@ -161,25 +161,27 @@ def _fit(
     return amounts, specular
 
 
-def _values(samples: Samples, pixels: NDArray[np.intp]) -> Floats:
+def _values(samples: OlatSamples, pixels: NDArray[np.intp]) -> Floats:
     """Captured values (pixels, 3, lights) of row-major pixels."""
     pictures = samples.pictures.reshape(len(samples.directions), -1, 3)
     return np.ascontiguousarray(pictures[:, pixels].transpose(1, 2, 0))
 
 
-def _bright(samples: Samples) -> float:
+def _bright(samples: OlatSamples) -> float:
     """The 99th percentile of the person's values: the level that counts as bright."""
     inside = np.flatnonzero(samples.matte.ravel() > 0.5)
     some = inside[:: max(1, len(inside) // VALIDATION_PIXELS)]
     return float(np.percentile(samples.pictures.reshape(len(samples.directions), -1, 3)[:, some], 99))
 
 
-def _modelled(samples: Samples, amounts: Floats, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+def _modelled(
+    samples: OlatSamples, amounts: Floats, directions: NDArray[np.float64], pixels: NDArray[np.intp]
+) -> Floats:
     """The appearance (pixels, 3, count) of row-major pixels under unit vectors (count, 3)."""
     return np.asarray(amounts[pixels] @ distant_terms(samples.geometry, directions, pixels))
 
 
-def appearance_residual(samples: Samples, amounts: Floats, pixels: NDArray[np.intp]) -> Floats:
+def appearance_residual(samples: OlatSamples, amounts: Floats, pixels: NDArray[np.intp]) -> Floats:
     """Captured values minus those of the appearance model at row-major pixels: (pixels, 3, lights)."""
     return np.asarray(_values(samples, pixels) - _modelled(samples, amounts, samples.directions, pixels))
 
@@ -200,7 +202,7 @@ def residual_weights(kernel: Kernel, directions: NDArray[np.float64], queries: N
     return np.asarray(cho_solve(cho_factor(known), covariance(queries)), np.float32)
 
 
-def choose_kernel(samples: Samples, pixels: NDArray[np.intp]) -> Kernel:
+def choose_kernel(samples: OlatSamples, pixels: NDArray[np.intp]) -> Kernel:
     """The candidate kernel that best predicts lights left out of both the appearance fit and the residual.
 
     Cross-validation in FOLDS parts, of one light at least, over row-major pixels. The appearance model is fitted anew

@@ -15,7 +15,7 @@ from relit_camera.capture.reflectance.delaunay_triangulation import (
     find_triangles,
 )
 from relit_camera.capture.reflectance.method_registry import factored_field
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import spherical_from_direction
 from relit_camera.subject.reflectance_field import FactoredField
 
@@ -26,7 +26,7 @@ class SphericalBarycentric:
 
     max_gap_deg: float = MAX_GAP_DEG
 
-    def build(self, samples: Samples) -> FactoredField:
+    def build(self, samples: OlatSamples) -> FactoredField:
         """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
@@ -45,7 +45,7 @@ class PlanarBarycentric:
     As in the thesis no triangle crosses the seam behind the subject.
     """
 
-    def build(self, samples: Samples) -> FactoredField:
+    def build(self, samples: OlatSamples) -> FactoredField:
         """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 

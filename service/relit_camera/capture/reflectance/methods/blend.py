@@ -15,8 +15,8 @@ from relit_camera.capture.reflectance.methods.appearance_field import (
     AppearanceMethod,
 )
 from relit_camera.capture.reflectance.methods.linear_methods import RadialBasis
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import boundary_lights, region_coverage
-from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.subject.reflectance_field import FactoredField, texel_vectors
 
 Floats = NDArray[np.float32]
@@ -33,7 +33,7 @@ class Blend:
     exact the model is nearly always right; where they are not, the truth mostly lies between the two.
     """
 
-    def build(self, samples: Samples) -> BlendField:
+    def build(self, samples: OlatSamples) -> BlendField:
         """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         modelled = AppearanceMethod().build(samples)
         smooth = factored_field(RadialBasis(), samples)

@@ -19,8 +19,8 @@ from scipy.interpolate import RBFInterpolator
 
 from relit_camera.base.errors import LightsError
 from relit_camera.capture.reflectance.method_registry import factored_field
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import region_coverage
-from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.light.spherical_harmonics import basis
 from relit_camera.subject.reflectance_field import FactoredField
 
@@ -40,7 +40,7 @@ class Nearest:
 
     max_distance_deg: float = MAX_DISTANCE_DEG
 
-    def build(self, samples: Samples) -> FactoredField:
+    def build(self, samples: OlatSamples) -> FactoredField:
         """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
@@ -61,7 +61,7 @@ class PolynomialTextureMap:
     x and y do not distinguish lights before the subject from those behind, so the latter are left out.
     """
 
-    def build(self, samples: Samples) -> FactoredField:
+    def build(self, samples: OlatSamples) -> FactoredField:
         """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
@@ -92,7 +92,7 @@ class SphericalHarmonics:
 
     degree: int = 3
 
-    def build(self, samples: Samples) -> FactoredField:
+    def build(self, samples: OlatSamples) -> FactoredField:
         """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 
@@ -113,7 +113,7 @@ class RadialBasis:
     The light's cosine with a normal is such a polynomial, so Lambert's law is reproduced.
     """
 
-    def build(self, samples: Samples) -> FactoredField:
+    def build(self, samples: OlatSamples) -> FactoredField:
         """The field; see `ReflectanceMethod.build`."""
         return factored_field(self, samples)
 

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.capture.geometry.shape_estimation import Geometry
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import with_black_ring
-from relit_camera.capture.reflectance.samples import Samples
-from relit_camera.capture.reflectance.triangle_field import TriangleCorners, TriangleField, Values, barycentric_mix
+from relit_camera.capture.reflectance.triangle_field import TriangleField, TriangleVertices, Values, barycentric_mix
 from relit_camera.light.directions import MAP_HEIGHT, MAP_WIDTH, direction_from_spherical, spherical_from_direction
 
-Interpolate = Callable[[Values, TriangleCorners], Values]
+Interpolate = Callable[[Values, TriangleVertices], Values]
 """A function of weights (count, 3, pixels) of the lit corners that gives colors (count, channels, pixels)."""
 GRAZING_COSINE = 0.05
 """Cosine of light and normal below which indirect light prevails: from here down to 0 a growing part of a corner's
@@ -36,11 +36,11 @@ class VisibilityInterpolation:
 
     smooth: bool = True
 
-    def build(self, samples: Samples) -> TriangleField:
+    def build(self, samples: OlatSamples) -> TriangleField:
         """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         return TriangleField(samples, self.mix)
 
-    def mix(self, corners: TriangleCorners) -> Values:
+    def mix(self, corners: TriangleVertices) -> Values:
         """See `triangle_field.CornerMix`."""
         return interpolate_by_visibility(
             corners, visibility_map(corners, self.smooth), lambda w, c: barycentric_mix(w, c.colors)
@@ -54,7 +54,7 @@ class SharpVisibilityInterpolation(VisibilityInterpolation):
     smooth: bool = False
 
 
-def visibility_map(corners: TriangleCorners, smooth: bool) -> tuple[Values, Values]:
+def visibility_map(corners: TriangleVertices, smooth: bool) -> tuple[Values, Values]:
     """Visibility 0..1 of lights from pixels: at the corners (count, 3, pixels) and at the queries (count, pixels)."""
 
     def visibility(directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Values:
@@ -82,7 +82,7 @@ def smoothed_visibility(geometry: Geometry, directions: NDArray[np.float64], pix
 
 
 def interpolate_by_visibility(
-    corners: TriangleCorners, visibility: tuple[Values, Values], lit_colors: Interpolate
+    corners: TriangleVertices, visibility: tuple[Values, Values], lit_colors: Interpolate
 ) -> Values:
     """Colors (count, channels, pixels) by the rule of thesis 5.3.
 
@@ -127,16 +127,16 @@ def _only(weights: Values, chosen: NDArray[np.bool_]) -> Values:
 class LightAdaptation:
     """Method `adaptation`: colors divided by their light's cosine are interpolated, then times the query's."""
 
-    def build(self, samples: Samples) -> TriangleField:
+    def build(self, samples: OlatSamples) -> TriangleField:
         """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         return TriangleField(samples, self.mix)
 
-    def mix(self, corners: TriangleCorners) -> Values:
+    def mix(self, corners: TriangleVertices) -> Values:
         """See `triangle_field.CornerMix`."""
         return interpolate_with_adaptation(np.broadcast_to(corners.weights, corners.cosines[0].shape), corners)
 
 
-def interpolate_with_adaptation(weights: Values, corners: TriangleCorners) -> Values:
+def interpolate_with_adaptation(weights: Values, corners: TriangleVertices) -> Values:
     """Colors (count, channels, pixels) by Eq. 5.1 to 5.3 of the thesis, which are one formula.
 
     Corners behind the surface (a cosine factor of 0 or less) have indirect light only: c_ind, interpolated, of weight
@@ -172,12 +172,12 @@ class ThesisMethod:
     as in 5.6.
     """
 
-    def build(self, samples: Samples) -> TriangleField:
+    def build(self, samples: OlatSamples) -> TriangleField:
         """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         captured = len(samples.directions)
         known = replace(samples, known_geometry=samples.geometry)
 
-        def mix(corners: TriangleCorners) -> Values:
+        def mix(corners: TriangleVertices) -> Values:
             colors = barycentric_mix(corners.weights, corners.colors)
             inside = np.all(corners.triangles < captured, axis=1)
             colors[inside] = self.mix(corners.only(inside))
@@ -185,6 +185,6 @@ class ThesisMethod:
 
         return TriangleField(with_black_ring(known), mix)
 
-    def mix(self, corners: TriangleCorners) -> Values:
+    def mix(self, corners: TriangleVertices) -> Values:
         """See `triangle_field.CornerMix`; between captured lights."""
         return interpolate_by_visibility(corners, visibility_map(corners, smooth=True), interpolate_with_adaptation)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from relit_camera.capture.reflectance.directional_light import bilinear_map_lookup, directional_coefficients
 from relit_camera.capture.reflectance.method_registry import ReflectanceMethod, method_names, open_method
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import with_black_ring
-from relit_camera.capture.reflectance.samples import Samples
 from relit_camera.subject.reflectance_field import ExactField, ReflectanceField
 from relit_camera.subject.subject import Subject
 
@@ -50,7 +50,7 @@ class Candidate:
         return np.ascontiguousarray(self.predict(directions, self.inside[places]).transpose(1, 0, 2))
 
 
-def method_candidates(samples: Samples, inside: NDArray[np.intp], names: Sequence[str] = ()) -> list[Candidate]:
+def method_candidates(samples: OlatSamples, inside: NDArray[np.intp], names: Sequence[str] = ()) -> list[Candidate]:
     """Candidates for the named methods; by default for all installed ones and the baseline with the black ring.
 
     Args:
@@ -74,7 +74,7 @@ def _all_names() -> list[str]:
     return [*installed, BLACK_RING_METHOD] if BASELINE_METHOD in installed else installed
 
 
-def _method_predictor(method: ReflectanceMethod, samples: Samples) -> Predictor:
+def _method_predictor(method: ReflectanceMethod, samples: OlatSamples) -> Predictor:
     """Predictor of a method; its field is built at the first call."""
     field = cache(lambda: method.build(samples))
 

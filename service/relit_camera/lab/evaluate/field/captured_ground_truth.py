@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relit_camera.base.errors import InputError
 from relit_camera.capture.alignment.rigid_transform import RigidTransform
 from relit_camera.capture.film.olat.head_crop import HeadCrop
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.lab.evaluate.field.candidates import Candidate
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
 from relit_camera.lab.evaluate.json_records import Record, read_json_record
@@ -37,7 +37,7 @@ class _Report(Record):
     motion: _Motion
 
 
-def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
+def crop_like_capture(field: OlatSamples, report: Path, truth: Path) -> OlatSamples:
     """Move a field's pictures into the capture's reference frame and crop them as the capture did.
 
     Args:
@@ -60,7 +60,7 @@ def crop_like_capture(field: Samples, report: Path, truth: Path) -> Samples:
     square = HeadCrop(found.square.left, found.square.top, found.square.side, found.square.size, size)
     pictures = np.stack([_cut(picture, square, transform) for picture in field.pictures])
     matte = _cut(np.repeat(field.matte[..., None], 3, axis=2), square, transform)[..., 0]
-    return Samples(pictures, field.directions, np.clip(matte, 0, 1))
+    return OlatSamples(pictures, field.directions, np.clip(matte, 0, 1))
 
 
 def scale_to_truth(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.errors import LightsError
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.lab.evaluate.field.candidates import BASELINE_METHOD, Candidate
 from relit_camera.lab.evaluate.field.ghost_shadows import (
     ShadowTransition,
@@ -129,7 +129,7 @@ class FieldReport:
 def evaluate_field(
     candidates: Sequence[Candidate],
     captured: NDArray[np.float64],
-    captured_samples: Samples | None,
+    captured_samples: OlatSamples | None,
     truth: GroundTruth,
     environments: Mapping[str, LightMap],
     spots: Sequence[SamplePoint],

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import luminance
 from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, pixel_colors
 
 DARK_FRACTION = 0.15
@@ -57,7 +57,9 @@ class ShadowTransition:
         return shown
 
 
-def find_shadow_transitions(samples: Samples, truth: GroundTruth, lights: NDArray[np.intp]) -> list[ShadowTransition]:
+def find_shadow_transitions(
+    samples: OlatSamples, truth: GroundTruth, lights: NDArray[np.intp]
+) -> list[ShadowTransition]:
     """Shadow transitions for the truth lights of these indices, which must lie inside the sampled region."""
     captured = luminance(pixel_colors(samples, truth.inside))
     weights = SphericalBarycentric().weights(samples.directions, truth.directions[lights])

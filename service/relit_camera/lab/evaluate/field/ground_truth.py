@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relit_camera.base.errors import LightsError
 from relit_camera.capture.lights_file import MIN_LIGHTS
 from relit_camera.capture.reflectance.methods.barycentric_methods import PlanarBarycentric, SphericalBarycentric
-from relit_camera.capture.reflectance.samples import Samples
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import texel_directions, texel_solid_angles
 from relit_camera.light.light_map import LightMap
 
@@ -30,7 +30,7 @@ class GroundTruth:
         samples: the pictures.
     """
 
-    samples: Samples
+    samples: OlatSamples
 
     @property
     def directions(self) -> NDArray[np.float64]:
@@ -79,7 +79,7 @@ class GroundTruth:
         return sums
 
 
-def pixel_colors(samples: Samples, inside: NDArray[np.intp]) -> NDArray[np.float32]:
+def pixel_colors(samples: OlatSamples, inside: NDArray[np.intp]) -> NDArray[np.float32]:
     """The pictures' colors (lights, pixels, 3) at row-major indices `inside`."""
     return samples.pictures.reshape(len(samples.pictures), -1, 3)[:, inside]
 
@@ -105,7 +105,7 @@ def not_captured(directions: NDArray[np.float64], queries: NDArray[np.float64]) 
     return np.asarray(nearest < np.cos(np.radians(SAME_DIRECTION_DEG)))
 
 
-def subsample_lights(samples: Samples, within_deg: float | None = None, every: int = 1) -> Samples:
+def subsample_lights(samples: OlatSamples, within_deg: float | None = None, every: int = 1) -> OlatSamples:
     """Every N-th (`every`) of the lights that are at most `within_deg` from the camera's axis, in reach of a hand.
 
     Raises:
@@ -116,7 +116,7 @@ def subsample_lights(samples: Samples, within_deg: float | None = None, every: i
     return select_lights(samples, near[::every])
 
 
-def select_lights(samples: Samples, lights: NDArray[np.intp]) -> Samples:
+def select_lights(samples: OlatSamples, lights: NDArray[np.intp]) -> OlatSamples:
     """The samples of these lights (some,).
 
     Raises:
@@ -124,4 +124,4 @@ def select_lights(samples: Samples, lights: NDArray[np.intp]) -> Samples:
     """
     if len(lights) < MIN_LIGHTS:
         raise LightsError(f"{len(lights)} captured lights are left", f"keep {MIN_LIGHTS} or more")
-    return Samples(samples.pictures[lights], samples.directions[lights], samples.matte)
+    return OlatSamples(samples.pictures[lights], samples.directions[lights], samples.matte)

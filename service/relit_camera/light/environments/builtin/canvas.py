@@ -43,9 +43,9 @@ def color(code: str, strength: float = 1.0) -> NDArray[np.float32]:
     return srgb_decode(np.array(rgb_from_hex(code), np.float32) / 255) * np.float32(strength)
 
 
-def color_ramp(value: NDArray, stops: Sequence[float], colours: list[NDArray[np.float32]]) -> Canvas:
+def color_ramp(value: NDArray, stops: Sequence[float], colors: list[NDArray[np.float32]]) -> Canvas:
     """Colours (..., 3) at `value` (...), linear between rising `stops`."""
-    table = np.array(colours)
+    table = np.array(colors)
     return np.stack([np.interp(value, stops, table[:, k]) for k in range(3)], axis=-1).astype(np.float32)
 
 

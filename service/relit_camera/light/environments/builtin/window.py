@@ -53,8 +53,8 @@ def _daylight(point: Canvas, wall: np.ndarray) -> Canvas:
                for low, high in SIDE_WINDOWS for dy in (-height / 4, height / 4)]  # fmt: skip
     patches.append(((sum(BACK_WINDOW) / 2, middle, BACK), 2, (BACK_WINDOW[1] - BACK_WINDOW[0]) * height))
     total = np.zeros(wall.shape, np.float32)
-    for centre, axis, area in patches:
-        toward = np.array(centre, np.float32) - point
+    for center, axis, area in patches:
+        toward = np.array(center, np.float32) - point
         # Walls face inward and points lie inside, so both cosines are lengths along an axis.
         received = np.abs(np.take_along_axis(toward, wall[..., None], axis=-1)[..., 0]) * np.abs(toward[..., axis])
         total += np.float32(area / np.pi) * received / ((toward**2).sum(axis=-1) + np.float32(area / 2)) ** 2

@@ -74,7 +74,7 @@ class ReenactorNetwork:
         Raises:
             ModelError: as `answer`, or the flow holds displacements, or positions in other units.
         """
-        flow = self.answer(source, source, source).flow
+        flow = self.run(source, source, source).flow
         if flow is None:
             return
         away = float(np.linalg.norm(flow - identity_grid(*flow.shape[:2]), axis=2).mean())
@@ -85,7 +85,7 @@ class ReenactorNetwork:
                 "grid on average; expected are positions in the source from -1 to 1, not displacements or pixels"
             )
 
-    def answer(self, source: CropImage, driving: CropImage, initial: CropImage) -> NetworkOutput:
+    def run(self, source: CropImage, driving: CropImage, initial: CropImage) -> NetworkOutput:
         """Run it on three crops (side, side, 3) uint8 sRGB; `initial` is the driving face at neutral.
 
         Raises:

@@ -76,7 +76,7 @@ class OnnxReenactor:
         driving, initial = self._driver.driving, self._driver.initial
         seen = None if driving is None or initial is None or motion.presence == 0 else (driving, initial)
         # A flow is computed from the source image as it was captured, so at once; a picture from the relit one.
-        flow = self._network.answer(self._source, *seen).flow if seen and self._network.gives_flow else None
+        flow = self._network.run(self._source, *seen).flow if seen and self._network.gives_flow else None
         patches = () if flow is None else (self._patch(flow, motion.presence),)
         positions = self._person.positions(Warp(placed, patches), box)
 
@@ -84,7 +84,7 @@ class OnnxReenactor:
             picture, alpha = self._person.sampled(relit, positions)
             if seen and not self._network.gives_flow:
                 source = crop_square(uint8_from_linear(relit), self._crop, self._network.side)
-                answer = self._network.answer(source, *seen)
+                answer = self._network.run(source, *seen)
                 assert answer.picture is not None
                 affine = output_from_crop(self._crop, answer.picture.shape[:2], placed, box)
                 _blend_prediction(picture, alpha, answer, motion.presence, affine)
@@ -128,10 +128,10 @@ def _blend_prediction(
     size = (picture.shape[1], picture.shape[0])
     cover = _edge_fade_mask(answer.picture.shape[:2])
     own = cover if answer.alpha is None else answer.alpha
-    colours = cv2.warpAffine(srgb_decode(answer.picture), affine, size, borderMode=cv2.BORDER_REPLICATE)
+    colors = cv2.warpAffine(srgb_decode(answer.picture), affine, size, borderMode=cv2.BORDER_REPLICATE)
     masks = cv2.warpAffine(np.dstack([cover, own]), affine, size)
     cover, own = masks[..., 0] * np.float32(share), alpha if answer.alpha is None else masks[..., 1]
-    picture += cover[..., None] * (colours * own[..., None] - picture)
+    picture += cover[..., None] * (colors * own[..., None] - picture)
     alpha += cover * (own - alpha)
 
 

@@ -42,7 +42,7 @@ _EDGES = EdgeTunables()
 
 
 @dataclass(frozen=True, eq=False)
-class SceneSample:
+class FrameSample:
     """Pictures of one scene from one camera position, in the order of the film.
 
     Attributes:
@@ -66,7 +66,7 @@ class SceneSample:
         return np.stack([np.mean([self.luminance(index) for index in group], axis=0) for group in groups])
 
 
-class SceneSampler:
+class FrameSampler:
     """Reservoir sampling of at most `MAX_FRAMES` of a stream of frames (Vitter 1985, algorithm R).
 
     Every frame is kept with the same probability: a fixed step might meet a flashing light always in the same state.
@@ -97,7 +97,7 @@ class SceneSampler:
         if place < MAX_FRAMES:
             self._kept[place : place + 1] = [(index, uint8_from_linear(self._resized(luminance(frame))))]
 
-    def sample(self) -> SceneSample:
+    def sample(self) -> FrameSample:
         """The frames that were kept.
 
         Raises:
@@ -106,7 +106,7 @@ class SceneSampler:
         if not self._kept:
             raise CaptureError("there is no frame to look for a mirror ball in", "give at least one")
         codes = [codes for _, codes in sorted(self._kept, key=lambda pair: pair[0])]
-        return SceneSample(np.stack(codes), self._scale, self._size)
+        return FrameSample(np.stack(codes), self._scale, self._size)
 
     def _resized(self, image: NDArray[np.float32]) -> NDArray[np.float32]:
         if self._scale == 1:
@@ -115,14 +115,14 @@ class SceneSampler:
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
-def sample_scene(frames: Iterable[LinearImage]) -> SceneSample:
-    """Sample a stream of linear RGB frames (height, width, 3) float32; see `SceneSampler`.
+def sample_frames(frames: Iterable[LinearImage]) -> FrameSample:
+    """Sample a stream of linear RGB frames (height, width, 3) float32; see `FrameSampler`.
 
     Raises:
         CaptureError: there is none, or they differ in size.
         ImageError: one is no linear RGB picture.
     """
-    sampler = SceneSampler()
+    sampler = FrameSampler()
     for frame in frames:
         sampler.add(frame)
     return sampler.sample()
@@ -179,7 +179,7 @@ class EdgeMap:
         return np.asarray(cos * cos * parts[0] + 2 * cos * sin * parts[1] + sin * sin * parts[2], np.float32)
 
 
-def edge_map(sample: SceneSample) -> EdgeMap:
+def edge_map(sample: FrameSample) -> EdgeMap:
     """Edges that the pictures of a sample have in common."""
     xx, xy, yy = (np.zeros(sample.codes.shape[1:], np.float32) for _ in range(3))
     window = np.ones((_EDGES.level_window_px, _EDGES.level_window_px), np.uint8)

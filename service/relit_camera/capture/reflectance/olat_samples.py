@@ -13,7 +13,7 @@ from relit_camera.capture.geometry.shape_estimation import Geometry, estimate_ge
 
 
 @dataclass(frozen=True)
-class Samples:
+class OlatSamples:
     """One-light-at-a-time pictures of a person.
 
     Attributes:

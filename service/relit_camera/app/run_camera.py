@@ -40,7 +40,7 @@ from relit_camera.live.status.camera_status import DegradationCode
 
 log = logging.getLogger(__name__)
 
-SideTask = Callable[[CameraService, str], AbstractContextManager[None]]
+CompanionTask = Callable[[CameraService, str], AbstractContextManager[None]]
 """Makes a context that is entered while the camera runs, from the camera and the panel's address."""
 SourceOpener = Callable[[SourceSettings, str], Source]
 """Opens the source of the settings, given the label of the virtual camera that must not be taken as source."""
@@ -49,7 +49,7 @@ SourceOpener = Callable[[SourceSettings, str], Source]
 def run_camera(
     settings: RelitSettings,
     environment: str | None = None,
-    side_task: SideTask | None = None,
+    side_task: CompanionTask | None = None,
     seconds: float | None = None,
     source_for: SourceOpener = lambda settings, own_label: open_source(settings, own_label=own_label),
     sink_for: Callable[[OutputSettings], Sink] = open_sink,

@@ -18,7 +18,7 @@ _FACE_RADIUS_CM = 9.5
 
 
 @dataclass(frozen=True, eq=False)
-class SceneLayout:
+class CaptureLayout:
     """Head and balls, camera axes.
 
     Attributes:
@@ -37,12 +37,12 @@ def eye_distance_from_face(face_radius_px: float) -> float:
     return face_radius_px / _FACE_RADIUS_CM * INTERPUPILLARY_DISTANCE_CM
 
 
-def estimate_scene_layout(
+def estimate_capture_layout(
     balls: Sequence[PinholeView],
     head_px: tuple[float, float],
     eyes_px: float,
     ball_radius_cm: float | None = None,
-) -> SceneLayout:
+) -> CaptureLayout:
     """Place the head by the distance of its eyes, and find the balls' size unless it is known.
 
     A ball of unknown size is taken to be as far from the camera as the head; two of one size, to be so on average.
@@ -63,4 +63,4 @@ def estimate_scene_layout(
         radius_cm = len(radii) / sum(1 / each for each in radii)
     else:
         radius_cm = ball_radius_cm
-    return SceneLayout(np.array([x, y, -depth_cm]), pixels_per_cm, radius_cm)
+    return CaptureLayout(np.array([x, y, -depth_cm]), pixels_per_cm, radius_cm)

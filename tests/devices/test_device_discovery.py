@@ -7,8 +7,8 @@ from typer.testing import CliRunner
 
 from relit_camera.base.errors import DeviceError
 from relit_camera.cli.commands import devices as command
-from relit_camera.devices.video_devices import (
-    DeviceTree,
+from relit_camera.devices.device_discovery import (
+    DeviceFolders,
     VirtualCamera,
     Webcam,
     find_virtual_camera,
@@ -114,7 +114,7 @@ def test_a_missing_virtual_camera_comes_with_its_command(tree, tmp_path):
         'sudo modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=1 card_label="Studio"'
     )
     with pytest.raises(DeviceError, match=r"not loaded; run: sudo modprobe v4l2loopback .*; if it .* `relit doctor`"):
-        find_virtual_camera(DeviceTree(tmp_path / "none", tmp_path / "none"))
+        find_virtual_camera(DeviceFolders(tmp_path / "none", tmp_path / "none"))
 
 
 @pytest.mark.parametrize(
@@ -158,6 +158,6 @@ def test_the_command_speaks_json(monkeypatch, tree):
 
 
 def test_the_command_is_content_with_no_devices(monkeypatch, tmp_path):
-    nothing = DeviceTree(tmp_path / "sys", tmp_path / "dev")
+    nothing = DeviceFolders(tmp_path / "sys", tmp_path / "dev")
     assert "none of ours: run sudo modprobe v4l2loopback" in run(monkeypatch, nothing)
     assert json.loads(run(monkeypatch, nothing, "--json")) == {"webcams": [], "virtual_cameras": []}

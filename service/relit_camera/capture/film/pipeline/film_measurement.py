@@ -12,7 +12,7 @@ from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.video.video_readers import LinearVideoFrame
 from relit_camera.capture.film.ball.ball_detection import DetectedBall
 from relit_camera.capture.film.ball.ball_tracking import BallRecorder, ObservedBall
-from relit_camera.capture.film.ball.scene_sample import SceneSample
+from relit_camera.capture.film.ball.frame_sample import FrameSample
 from relit_camera.capture.film.ball.sphere_projection import PinholeView
 from relit_camera.capture.film.face_localization import median_eye_distance_px
 from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass
@@ -52,7 +52,7 @@ class UsableFrames:
 
 
 @dataclass(frozen=True, eq=False)
-class LightObservation:
+class FilmMeasurements:
     """What the usable frames show of camera and light.
 
     Attributes:
@@ -66,14 +66,14 @@ class LightObservation:
     eyes_px: float | None
 
 
-def observe_light(
+def measure_film(
     film: Iterable[LinearVideoFrame],
     usable: UsableFrames,
     flashes: Flashes,
     balls: Sequence[DetectedBall],
-    sample: SceneSample,
+    sample: FrameSample,
     detector: FaceDetector | None,
-) -> LightObservation:
+) -> FilmMeasurements:
     """Read the usable frames of a film.
 
     Args:
@@ -97,7 +97,7 @@ def observe_light(
             portraits.append(uint8_from_linear(frame.image))
     frames = usable.all
     flash = np.array([flashes.frames[index].flash for index in frames])
-    return LightObservation(
+    return FilmMeasurements(
         estimate_gains(np.stack(cells), flashes.times_s[frames], np.isin(frames, usable.bright), flash),
         tuple(recorder.observed(usable.bright.tolist()) for recorder in recorders),
         median_eye_distance_px(portraits, detector) if detector else None,

@@ -19,7 +19,7 @@ FIRST_WEBCAM = "webcam"
 
 
 @dataclass(frozen=True)
-class DeviceTree:
+class DeviceFolders:
     """The folders in which devices are found; tests use folders of their own.
 
     Attributes:
@@ -45,7 +45,7 @@ class DeviceTree:
             return ""
 
 
-SYSTEM_TREE = DeviceTree()
+SYSTEM_FOLDERS = DeviceFolders()
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class VirtualCamera:
     size: tuple[int, int] | None
 
 
-def list_webcams(tree: DeviceTree = SYSTEM_TREE) -> list[Webcam]:
+def list_webcams(tree: DeviceFolders = SYSTEM_FOLDERS) -> list[Webcam]:
     """All real capture devices, USB ones first, each once though it may have several nodes."""
     links = _links_by_node(tree)
     webcams = []
@@ -96,7 +96,9 @@ def list_webcams(tree: DeviceTree = SYSTEM_TREE) -> list[Webcam]:
     return sorted(webcams, key=lambda webcam: not webcam.id.startswith("usb-"))
 
 
-def list_virtual_cameras(tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CAMERA_LABEL) -> list[VirtualCamera]:
+def list_virtual_cameras(
+    tree: DeviceFolders = SYSTEM_FOLDERS, label: str = VIRTUAL_CAMERA_LABEL
+) -> list[VirtualCamera]:
     """All v4l2loopback devices; the one with this label is marked as the program's own."""
     cameras = []
     for folder in tree.nodes:
@@ -107,7 +109,7 @@ def list_virtual_cameras(tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CA
     return cameras
 
 
-def find_webcam(text: str, tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CAMERA_LABEL) -> Webcam:
+def find_webcam(text: str, tree: DeviceFolders = SYSTEM_FOLDERS, label: str = VIRTUAL_CAMERA_LABEL) -> Webcam:
     """Find a camera by id, name, node or node number; `webcam` is the first one.
 
     Virtual cameras of other programs are found by name or node. The program's own, which has this label, never is: it
@@ -116,7 +118,7 @@ def find_webcam(text: str, tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_
     Raises:
         DeviceError: there is none; the cure lists the cameras.
     """
-    if not sys.platform.startswith("linux") and tree is SYSTEM_TREE:
+    if not sys.platform.startswith("linux") and tree is SYSTEM_FOLDERS:
         return _by_index(text)
     webcams = list_webcams(tree)
     if text == FIRST_WEBCAM and webcams:
@@ -134,7 +136,7 @@ def find_webcam(text: str, tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_
     raise DeviceError(f"there is no webcam '{text}'", f"there are: {known}" if known else "there is none at all")
 
 
-def find_virtual_camera(tree: DeviceTree = SYSTEM_TREE, label: str = VIRTUAL_CAMERA_LABEL) -> VirtualCamera:
+def find_virtual_camera(tree: DeviceFolders = SYSTEM_FOLDERS, label: str = VIRTUAL_CAMERA_LABEL) -> VirtualCamera:
     """Find the v4l2loopback device of that label.
 
     Raises:
@@ -163,7 +165,7 @@ def module_options(label: str = VIRTUAL_CAMERA_LABEL) -> str:
     return f'devices=1 video_nr=10 exclusive_caps=1 card_label="{label}"'
 
 
-def negotiated_size(node: str, tree: DeviceTree = SYSTEM_TREE) -> tuple[int, int] | None:
+def negotiated_size(node: str, tree: DeviceFolders = SYSTEM_FOLDERS) -> tuple[int, int] | None:
     """The present width and height of a loopback device; None while no program publishes to it."""
     text = tree.read(tree.sys / "class" / "video4linux" / Path(node).name / "format")  # such as YU12:640x480@30
     found = re.fullmatch(r".{4}:(\d+)x(\d+)(@.*)?", text)
@@ -174,7 +176,7 @@ def _is_virtual(folder: Path) -> bool:
     return "/devices/virtual/" in folder.resolve().as_posix()
 
 
-def _links_by_node(tree: DeviceTree) -> dict[str, str]:
+def _links_by_node(tree: DeviceFolders) -> dict[str, str]:
     """Stable names by udev: node name → name in /dev/v4l/by-id."""
     return {link.resolve().name: link.name for link in _inside(tree.dev / "v4l" / "by-id", "*")}
 

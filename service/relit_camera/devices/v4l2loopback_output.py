@@ -13,6 +13,7 @@ from pathlib import Path
 
 from relit_camera.base.images.color import rgb_to_i420
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.devices.device_discovery import DeviceFolders
 from relit_camera.devices.device_users import find_device_users, has_mapped_buffers
 from relit_camera.devices.v4l2 import (
     CAP_VIDEO_CAPTURE,
@@ -24,7 +25,6 @@ from relit_camera.devices.v4l2 import (
     set_output_format,
     start_output_stream,
 )
-from relit_camera.devices.video_devices import DeviceTree
 
 
 class LoopbackDevice:
@@ -87,7 +87,7 @@ class LoopbackDevice:
         return set_output_format(self._descriptor, kept)
 
 
-def reset_stuck_device(node: str, tree: DeviceTree) -> bool:
+def reset_stuck_device(node: str, tree: DeviceFolders) -> bool:
     """Make a stuck device writable again; the caller holds its `DeviceLock`. Returns whether it was stuck.
 
     v4l2loopback 0.12 (Debian 12) has a fault: with `exclusive_caps=1` it takes the output capability away at the first
