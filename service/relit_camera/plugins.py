@@ -34,6 +34,7 @@ from relit_camera.base.errors import (
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask, Points
 from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
 from relit_camera.capture.reflectance.method_registry import LinearMethod, ReflectanceMethod, factored_field
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.devices.sinks.sink import Sink, SinkInfo
 from relit_camera.devices.sinks.sink_factory import SinkOptions
 from relit_camera.devices.sources.source import Source, SourceInfo, SourceState, ThreadedSource

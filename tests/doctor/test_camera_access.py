@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import pytest
+
 from relit_camera.base.config.settings import OutputSettings, SourceSettings
+from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.doctor.camera_access import check_virtual_camera, check_webcam, groups_to_join
 from relit_camera.doctor.report import Severity
 from tests.doctor.conftest import C920
@@ -140,3 +143,15 @@ def test_the_groups_to_join_are_those_of_shut_devices(machine):
 def test_another_system_has_obs_studios_camera(tmp_path):
     other = FakeMachine(tmp_path / "mac", is_linux=False)
     expect(check_virtual_camera(OutputSettings(), other.host, everybody_may), Severity.OK, "install OBS Studio")
+
+
+def test_a_plug_in_source_needs_no_webcam(machine: FakeMachine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PluginGroup, "has", lambda self, text: text.startswith("example"))
+    finding = check_webcam(SourceSettings(source="example:77"), machine.host)
+    assert finding.state is Severity.OK
+    assert "not needed: the source is 'example:77'" in finding.seen
+
+
+def test_a_webcam_may_be_named_by_the_plug_in_and_its_id(machine: FakeMachine) -> None:
+    named = check_webcam(SourceSettings(source="webcam:nowhere"), machine.host)
+    assert "'nowhere'" in named.seen

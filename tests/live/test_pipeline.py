@@ -23,6 +23,7 @@ from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.scene.scene import Scene
+from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.relighter import open_relighter
 from tests.small_camera import SIZE, SteadyTracker, difference, grey, small_subject
 
@@ -223,6 +224,16 @@ def test_any_mode_may_find_a_mismatch_and_the_fallback_takes_over_until_the_subj
     assert [(t.what, t.why, t.cure) for t in made.troubles] == [
         ("mode reenact is shown in place of mode ratio", "nobody is there", "come back")
     ]
+    made.process(frame(30), replace(wanted, subject=None))
+    assert [trouble.code for trouble in made.troubles] == [DegradationCode.NO_SUBJECT]
+
+
+def test_a_frame_in_which_a_subject_is_chosen_is_not_shown_unlit() -> None:
+    wanted = scene()
+    scenes = iter([replace(wanted, subject=None), wanted])
+    rendered = pipeline().begin(frame(), lambda: next(scenes))()
+    assert rendered.motion is not None
+    assert difference(rendered.image, pipeline().process(frame(), wanted).image) == 0
 
 
 def test_a_fallback_that_takes_no_face_either_is_an_error() -> None:

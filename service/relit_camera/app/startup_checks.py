@@ -28,5 +28,6 @@ def check_before_devices(settings: RelitSettings) -> None:
     placeholder((settings.output.width, settings.output.height), picture=settings.output.placeholder)
     matting_factory(settings.matte, session_options(settings.inference))
     reenactor, _, file = settings.reenact.reenactor.partition(":")
-    if reenactor == "onnx" and not Path(file).is_file():
-        raise ModelError(f"{file} does not exist", "name the file of an ONNX reenactor (docs/reenactors.md)")
+    if reenactor == "onnx" and not (file and Path(file).expanduser().is_file()):
+        said = f"{file} does not exist" if file else "reenactor onnx needs a network"
+        raise ModelError(said, "name the file of an ONNX reenactor, onnx:FILE (docs/reenactors.md)")

@@ -33,7 +33,7 @@ COMMANDS = {
     "models": ("relit_camera.cli.commands.models", "List, pull and verify the public models."),
     "devices": ("relit_camera.cli.commands.devices", "List cameras and virtual cameras."),
     "config": ("relit_camera.cli.commands.config", "Check and show the configuration."),
-    "bench": ("relit_camera.cli.commands.bench", "Measure relighting and the live chain on this machine."),
+    "bench": ("relit_camera.cli.commands.bench", "Measure relighting and the live pipeline on this machine."),
     "evaluate": (
         "relit_camera.cli.commands.evaluate",
         "Measure fields and relit videos against truth; writes reports.",

@@ -18,11 +18,11 @@ from relit_camera.devices.device_discovery import (
     list_webcams,
     modprobe_command,
 )
+from relit_camera.devices.sources.source_factory import SOURCES
 from relit_camera.doctor.host import Host
 from relit_camera.doctor.report import Finding, ok, problem, problem_from_error, warning
 
 JOIN_GROUP_CURE = 'run: sudo usermod -aG {group} "$USER", and log in again'
-SOURCES_WITHOUT_DEVICE = ("pattern",)
 
 AccessCheck = Callable[[str, int], bool]
 """(path, mode) → whether this user may access it: `os.access`, or a test's own."""
@@ -35,10 +35,12 @@ def check_webcam(
     tree = host.tree
     topic, found = "webcam", list_webcams(tree)
     names = ", ".join(f"{webcam.id} ({webcam.node})" for webcam in found) or "none"
-    if settings.source in SOURCES_WITHOUT_DEVICE or Path(settings.source).expanduser().is_file():
+    name, _, argument = settings.source.partition(":")
+    is_plugin = SOURCES.has(name) and name != "webcam"
+    if is_plugin or Path(settings.source).expanduser().is_file():
         return ok(topic, f"not needed: the source is '{settings.source}'; there are: {names}")
     try:
-        webcam = find_webcam(settings.source, tree, own_label)
+        webcam = find_webcam((name == "webcam" and argument) or settings.source, tree, own_label)
     except DeviceError as error:
         return problem_from_error(topic, error)
     if Path(webcam.node).exists() and not access(webcam.node, os.R_OK | os.W_OK):

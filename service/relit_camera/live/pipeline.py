@@ -136,11 +136,14 @@ class Pipeline:
         """
         motion = self._track(frame) if scene_now().subject else None
         scene = scene_now()
-        if scene.subject is None or motion is None:
+        self._forget_mismatch_of_other(scene.subject)
+        if scene.subject is None:
             self._troubles["subject"] = NO_SUBJECT
             return lambda: self._render_unrelit(frame, scene)
         self._troubles.pop("subject", None)
-        name = self._mode_for(scene.subject, scene.look.mode)
+        if motion is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
+            motion = self._track(frame)
+        name = self._mode_for(scene.look.mode)
         task = self._mode(scene.subject, name).begin(frame, motion, scene)
         if isinstance(task, FaceMismatch):
             self._note_mismatch(scene.subject, name, task)
@@ -157,12 +160,15 @@ class Pipeline:
         live = fit_frame(frame, self._size)
         return RenderedFrame(self._compositor.composite_live(linear_from_display(live.image), live, scene), None, scene)
 
-    def _mode_for(self, subject: Subject, asked: Mode) -> Mode:
+    def _mode_for(self, asked: Mode) -> Mode:
         """The mode asked for, or the fallback where that has found the live face not to be this subject's."""
+        return FALLBACK_MODE if self._mismatch is not None and asked is self._mismatch.found_in else asked
+
+    def _forget_mismatch_of_other(self, subject: Subject | None) -> None:
+        """Drop what was found about the live face and another subject; without a subject nothing holds."""
         if self._mismatch is not None and self._mismatch.subject is not subject:
             self._mismatch = None
             self._troubles.pop("mode", None)
-        return FALLBACK_MODE if self._mismatch is not None and asked is self._mismatch.found_in else asked
 
     def _note_mismatch(self, subject: Subject, name: Mode, mismatch: FaceMismatch) -> None:
         log.warning("mode %s falls back to %s: %s; %s", name, FALLBACK_MODE, mismatch.why, mismatch.cure)

@@ -38,9 +38,7 @@ _TRACKERS = ("mesh", "openseeface")
 
 def check(
     out: Out,
-    people: Annotated[
-        str, typer.Option(help="Names and parse_numbers, with commas between.")
-    ] = "adam,bea,cem,1,2,3,4,5",
+    people: Annotated[str, typer.Option(help="Names and numbers, with commas between.")] = "adam,bea,cem,1,2,3,4,5",
     yaws: Annotated[str, typer.Option(help="Degrees, with commas between.")] = "-45,-30,-15,0,15,30,45",
     pitches: Annotated[str, typer.Option(help="Degrees, with commas between.")] = "0",
     environment: Environment = "soft",

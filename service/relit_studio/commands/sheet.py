@@ -31,7 +31,7 @@ from relit_studio.still import finish_stills
 
 def sheet(
     out: Out,
-    people: Annotated[str, typer.Option(help="Names and parse_numbers, with commas between.")] = "adam,bea,cem",
+    people: Annotated[str, typer.Option(help="Names and numbers, with commas between.")] = "adam,bea,cem",
     expressions: Annotated[str, typer.Option(help="One cell a person and expression.")] = "neutral",
     yaws: Annotated[str, typer.Option(help="Degrees, with commas between; one cell each.")] = "0",
     columns: Annotated[int, typer.Option(min=1, max=24)] = 6,

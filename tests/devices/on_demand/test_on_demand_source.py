@@ -20,6 +20,8 @@ from tests.devices.fake_devices import FakeCapture, FakeTree
 from tests.small_camera import SIZE, difference, grey, running_camera, wait_until
 from tests.virtual_clock import VirtualClock
 
+pytestmark = pytest.mark.real_time
+
 
 class CountingSource:
     """Gives a frame a hundredth of a second; remembers whether it was read and closed."""

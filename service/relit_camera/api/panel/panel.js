@@ -9,14 +9,14 @@ import { choose, degrees, make, percent, slider, stops } from "./widgets.js";
 const PREVIEW_FPS = 24;
 const RETRY_MS = 1000;
 const MODE_HINTS = {
-  reenact: "A relit still moves as you move. The webcam’s picture stays private.",
+  reenact: "Your captured picture, relit, moves as you move. The webcam’s picture stays private.",
   ratio: "The live picture itself, relit. Your own mouth and eyes.",
 };
 const STATES = {
   starting: "Starting…",
   live: "Live",
   searching: "Looking for your face",
-  "standing-in": "Showing a still: see below",
+  "standing-in": "Showing the captured picture at rest: see below",
   waiting: "Waiting for the camera",
   released: "Webcam released until somebody looks",
   frozen: "Frozen",

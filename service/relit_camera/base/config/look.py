@@ -26,7 +26,7 @@ class Mode(StrEnum):
     """How the relit face reaches the picture."""
 
     REENACT = "reenact"
-    """The relit still of the subject, moved as the live face moves. The webcam's picture stays private."""
+    """The subject's source image, relit and moved as the live face moves. The webcam's picture stays private."""
     RATIO = "ratio"
     """The live frame itself, multiplied by the ratio of target light to room light."""
 
@@ -70,7 +70,7 @@ class Lighting(SettingsModel):
     face_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
     background_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
     blend: Annotated[float, Field(ge=0, le=1)] = 1.0
-    """0 the live picture (in reenact, where that stays private, the still as captured), 1 fully relit."""
+    """0 the live picture (in reenact, where that stays private, the source image as captured), 1 fully relit."""
     split: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Before and after, in mode ratio: this share of the picture, from its left, is as filmed, room and all."""
     transition_s: Annotated[float, Field(ge=0, le=60)] = 0.4

@@ -178,9 +178,11 @@ class OnDemandController:
         """Wire the parts; `first` and `make` are `OnDemandSource`'s.
 
         Raises:
-            ConfigError: this system does not tell who reads a virtual camera.
+            ConfigError: this system does not tell who reads a virtual camera, or the sink is of another kind.
         """
         kind = sink.describe().kind
+        if kind not in ("camera", "file", "null"):
+            raise ConfigError(f"source.on_demand: a sink of kind '{kind}' does not tell who reads it", "leave it out")
         self._readers = ReaderMonitor(lambda: sink.describe().id) if kind == "camera" else None
         if self._readers is not None and not sys.platform.startswith("linux"):
             raise ConfigError(

@@ -78,18 +78,19 @@ class StatusBoard:
         with self._lock:
             if error is None:
                 if self._degradations.pop(code, None) is not None:
-                    self.events.publish("recovered", what=PARTS[code])
+                    self.events.publish("recovered", what=PARTS[code], code=str(code))
                 return
             degradation = _degradation(code, error)
-            if self._degradations.get(code) != degradation:
-                self._degradations[code] = degradation
-                log.error(
-                    "%s: %s",
-                    degradation.what,
-                    degradation.why,
-                    exc_info=None if isinstance(error, RelitError) else error,
-                )
-                self.events.publish("degraded", what=degradation.what, why=degradation.why, cure=degradation.cure)
+            if self._degradations.get(code) == degradation:
+                return
+            self._degradations[code] = degradation
+            self.events.publish(
+                "degraded", what=degradation.what, why=degradation.why, cure=degradation.cure, code=str(code)
+            )
+        # Not under the lock: a terminal or journal that does not take the line must not stop status and shutdown.
+        log.error(
+            "%s: %s", degradation.what, degradation.why, exc_info=None if isinstance(error, RelitError) else error
+        )
 
 
 def _degradation(code: DegradationCode, error: Exception) -> Degradation:

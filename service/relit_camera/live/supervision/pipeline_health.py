@@ -254,7 +254,7 @@ def _after_failure(health: PipelineHealth, event: FrameFailed, limits: HealthLim
         retry_at=event.at + limits.retry_s * _backoff(health.failures, limits),
         failed_frame_at=event.begun_at,
         failed_revision=event.scene_revision,
-        restart_due=is_fault and failures % limits.faults_before_restart == 0,
+        restart_due=health.restart_due or (is_fault and failures % limits.faults_before_restart == 0),
     )
     return failed, (ReportFailure(event.error),)
 

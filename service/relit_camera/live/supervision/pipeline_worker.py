@@ -91,15 +91,17 @@ class PipelineWorker:
         return not self._thread.is_alive()
 
     def _run(self) -> None:
-        while not self._closing.is_set():
-            frame = self._newest.get(_POLL_S)
-            if frame is not None:
-                begun_at = self._clock.now()
-                self._post_unless_closed(FrameStarted(self._number, begun_at))
-                self._begin(frame, begun_at)
-                self._post_unless_closed(FrameFinished(self._number))
-        self._renderer.shutdown()
-        self._post(WorkerEnded(self._number))
+        try:
+            while not self._closing.is_set():
+                frame = self._newest.get(_POLL_S)
+                if frame is not None:
+                    begun_at = self._clock.now()
+                    self._post_unless_closed(FrameStarted(self._number, begun_at))
+                    self._begin(frame, begun_at)
+                    self._post_unless_closed(FrameFinished(self._number))
+            self._renderer.shutdown()
+        finally:
+            self._post(WorkerEnded(self._number))  # else a worker that is given up would count as hanging for ever
 
     def _begin(self, frame: Frame, begun_at: float) -> None:
         try:

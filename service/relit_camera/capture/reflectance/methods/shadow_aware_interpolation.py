@@ -41,7 +41,7 @@ class VisibilityInterpolation:
         return TriangleField(samples, self.mix)
 
     def mix(self, corners: TriangleVertices) -> Values:
-        """See `triangle_field.CornerMix`."""
+        """See `triangle_field.VertexMix`."""
         return interpolate_by_visibility(
             corners, visibility_map(corners, self.smooth), lambda w, c: barycentric_mix(w, c.colors)
         )
@@ -132,7 +132,7 @@ class LightAdaptation:
         return TriangleField(samples, self.mix)
 
     def mix(self, corners: TriangleVertices) -> Values:
-        """See `triangle_field.CornerMix`."""
+        """See `triangle_field.VertexMix`."""
         return interpolate_with_adaptation(np.broadcast_to(corners.weights, corners.cosines[0].shape), corners)
 
 
@@ -186,5 +186,5 @@ class ThesisMethod:
         return TriangleField(with_black_ring(known), mix)
 
     def mix(self, corners: TriangleVertices) -> Values:
-        """See `triangle_field.CornerMix`; between captured lights."""
+        """See `triangle_field.VertexMix`; between captured lights."""
         return interpolate_by_visibility(corners, visibility_map(corners, smooth=True), interpolate_with_adaptation)
