@@ -58,8 +58,10 @@ tool-install: setup ## the wheel as users install it, used from an empty home; m
 	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
 pytest: setup ## the tests alone, in two processes, and the share of lines they execute; make pytest PROCESSES=4
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --cov --cov-report=
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --cov --cov-report=
 	$(BIN)/python scripts/coverage_summary.py
+	# By themselves: the emulated machine takes both cores, and tests that hold in real time would not.
+	$(BIN)/python -m pytest tests/vm
 
 coverage: pytest ## the same, and which lines: build/coverage/index.html
 	$(BIN)/coverage html --quiet --directory build/coverage

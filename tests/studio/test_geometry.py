@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from relit_camera.base.easing import smoothstep
 from relit_studio.people.geometry import (
     Similarity,
     areas,
     fit_similarity,
     neighbor_mean,
     scatter,
-    smoothstep,
     triangles_of,
     vertex_normals,
 )

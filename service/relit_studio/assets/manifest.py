@@ -16,7 +16,7 @@ class AssetFile(BaseModel):
     Attributes:
         name: relative to the assets' folder, and to a mirror.
         sha256: of the file as it is used.
-        license: SPDX identifier.
+        licence: SPDX identifier.
         credit: key of the credit line.
         source: page a person can read of it.
         urls: that give the file itself; empty where none does.

@@ -8,17 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from relit_camera.base.easing import smoothstep
 from relit_studio.people.face_model import FaceModel, Part
-from relit_studio.people.geometry import (
-    Floats,
-    SurfacePoints,
-    areas,
-    find_nearest,
-    scatter,
-    smoothstep,
-    unit,
-    vertex_normals,
-)
+from relit_studio.people.geometry import Floats, SurfacePoints, areas, find_nearest, scatter, unit, vertex_normals
 from relit_studio.people.hair_combing import kept_out
 from relit_studio.people.hair_strands import Hairs
 from relit_studio.people.scalp import Obstacle

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from relit_studio.people.geometry import Floats, Indices, find_nearest, smoothstep, unit
+from relit_camera.base.easing import smoothstep
+from relit_studio.people.geometry import Floats, Indices, find_nearest, unit
 
 _OPENING = (0.03, 0.42)
 """Half the opening angle at the front, at the fold and at the edge, radians."""

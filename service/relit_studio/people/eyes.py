@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.rotations import rotation_from_angles
 from relit_studio.people.expressions import Expression
 from relit_studio.people.face_model import CORNEA_MATERIALS, FaceModel, Part
-from relit_studio.people.geometry import Floats, smoothstep, unit, vertices_of
+from relit_studio.people.geometry import Floats, unit, vertices_of
 from relit_studio.people.traits import Traits
 
 _WAYS = ("Out", "In", "Down", "Up")

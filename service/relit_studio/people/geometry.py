@@ -12,12 +12,6 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
-def smoothstep(x: ArrayLike, low: float, high: float) -> Floats:
-    """0 at `low`, 1 at `high` (which may be the smaller), smooth between."""
-    t = np.clip((np.asarray(x, np.float64) - low) / (high - low), 0, 1)
-    return np.asarray(t * t * (3 - 2 * t))
-
-
 def unit(vectors: ArrayLike) -> Floats:
     """Vectors (..., 3) scaled to length 1; zero vectors stay zero."""
     values = np.asarray(vectors, np.float64)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relit_camera.base.easing import smoothstep
 from relit_studio.people.face_model import FaceModel, Part
-from relit_studio.people.geometry import Floats, Indices, smoothstep, unit
+from relit_studio.people.geometry import Floats, Indices, unit
 from relit_studio.people.traits import GlassesTraits, LensShape
 
 _SHAPES: dict[LensShape, tuple[float, float, float]] = {

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from relit_camera.base.easing import smoothstep
 from relit_studio.people import hair_styles
 from relit_studio.people.face_model import FaceModel
-from relit_studio.people.geometry import Floats, smoothstep, unit
+from relit_studio.people.geometry import Floats, unit
 from relit_studio.people.hair_combing import Combing, combed, kept_out, out_of_face
 from relit_studio.people.hair_locks import Curl, Locks, curled, frayed, in_locks
 from relit_studio.people.hair_strands import Hairs, concatenate_hairs

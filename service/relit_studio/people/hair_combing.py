@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from relit_studio.people.geometry import Floats, smoothstep, unit
+from relit_camera.base.easing import smoothstep
+from relit_studio.people.geometry import Floats, unit
 from relit_studio.people.scalp import Obstacle, Roots
 
 

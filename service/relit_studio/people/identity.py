@@ -6,8 +6,9 @@ from dataclasses import asdict
 
 import numpy as np
 
+from relit_camera.base.easing import smoothstep
 from relit_studio.people.face_model import IDENTITIES, FaceModel
-from relit_studio.people.geometry import Floats, smoothstep
+from relit_studio.people.geometry import Floats
 from relit_studio.people.traits import Proportions, Traits
 
 _DECAY = 35

@@ -33,7 +33,7 @@ class Person:
 
     Attributes:
         traits: who it is.
-        wardrobe: what all people share.
+        people_assets: what all people share.
         neutral: (vertices, 3) the face model's vertices for this identity, upright, expression 0.
         hair: on the upright head.
         shirt: what they wear; it stands still.

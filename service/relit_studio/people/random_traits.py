@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from relit_studio.people.geometry import smoothstep
+from relit_camera.base.easing import smoothstep
 from relit_studio.people.traits import (
     BeardStyle,
     BrowTraits,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from relit_camera.base.easing import smoothstep
 from relit_studio.people.face_model import FaceModel, Part
 from relit_studio.people.geometry import (
     Floats,
@@ -15,7 +16,6 @@ from relit_studio.people.geometry import (
     areas,
     find_nearest,
     scatter,
-    smoothstep,
     unit,
     vertex_normals,
 )

@@ -8,17 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from relit_camera.base.easing import smoothstep
 from relit_studio.people.collar import fold_collar
-from relit_studio.people.geometry import (
-    Floats,
-    Indices,
-    edges_of,
-    find_nearest,
-    neighbor_mean,
-    smoothstep,
-    unit,
-    vertex_normals,
-)
+from relit_studio.people.geometry import Floats, Indices, edges_of, find_nearest, neighbor_mean, unit, vertex_normals
 from relit_studio.people.traits import Neckline
 
 _POINT = np.array([0.0, -11.3, -1.5])

@@ -6,9 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
-from relit_studio.people.geometry import Floats, smoothstep
+from relit_studio.people.geometry import Floats
 from relit_studio.people.scan_pictures import lips_mask, scalp_mask
 from relit_studio.people.skin_aging import age_spots, folds
 from relit_studio.people.traits import Traits

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_studio.people.geometry import Floats, smoothstep, unit
+from relit_camera.base.easing import smoothstep
+from relit_studio.people.geometry import Floats, unit
 from relit_studio.people.scalp import Obstacle, Roots
 
 KNOTS = {"ponytail": np.array([0.0, 8.6, -9.0]), "bun": np.array([0.0, 16.0, -3.6])}

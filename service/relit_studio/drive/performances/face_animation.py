@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Angles
 from relit_studio.people.expressions import Expression
 from relit_studio.people.eyes import GAZE_DEG
-from relit_studio.people.geometry import smoothstep
 from relit_studio.people.posture import Posture
 
 Keys = tuple[tuple[float, float], ...]
