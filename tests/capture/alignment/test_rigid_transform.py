@@ -106,7 +106,7 @@ def test_beyond_the_times_known_it_goes_on_as_it_went() -> None:
     np.testing.assert_allclose(transforms_to_array(found), [[0.8, 1.6, -0.8], [3.3, 6.6, -3.3]])
 
 
-@pytest.mark.parametrize("centre", [(100.0, 120.0), (30.0, 200.0)])
+@pytest.mark.parametrize("center", [(100.0, 120.0), (30.0, 200.0)])
 def test_about_another_centre(center):
     from relit_camera.capture.film.face_circle import FaceCircle
     from relit_camera.capture.film.stabilization.face_crops import CropWindow
