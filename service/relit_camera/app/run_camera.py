@@ -57,7 +57,7 @@ def run_camera(
 ) -> None:
     """Run the camera until SIGTERM or SIGINT, then end within 3 s.
 
-    Everything that the settings name is checked before a device is opened: look, subject, address and token, tracker,
+    Names and files in the settings are checked before a device is opened: look, subject, address and token, tracker,
     and what `check_before_devices` lists. Source and sink are checked by opening them.
 
     Args:
