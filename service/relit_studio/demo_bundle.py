@@ -21,8 +21,8 @@ from relit_camera.face.tracking.track_recording import read_track
 from relit_camera.live.compositing.matting import write_mattes
 from relit_camera.subject.compression.webp_packing import pack_subject
 from relit_camera.subject.subject_file import write_subject
+from relit_studio.base.progress import Progress, no_progress
 from relit_studio.cycles.exr import read_rgba
-from relit_studio.progress import Progress, no_progress
 
 _MOST_BYTES = {demo_files.SUBJECT.name: 8_000_000, demo_files.CLIP.name: 4_000_000}
 _MATTE_SHRINK = 2

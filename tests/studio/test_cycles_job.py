@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import DeviceError, InputError
-from relit_studio.camera import Camera
+from relit_studio.base.resume import keep_settings
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.cycles_environment import create_environment, environment_python
 from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene, Strands, write_job
 from relit_studio.cycles.runner import render
-from relit_studio.resume import keep_settings
 
 FAKE = """
 import json, pathlib, sys

@@ -11,13 +11,13 @@ from relit_camera.base.images.image_types import LinearImage
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.exposure import WHITE_BALL_LUMINANCE, auto_exposure_scale
 from relit_camera.light.light_map import LightMap
-from relit_studio.capture.ball_reflection import Room, room_in_balls, torch_in_ball
-from relit_studio.capture.captured_person import Person
-from relit_studio.capture.flash_timing import FlashSchedule, RollingShutter
-from relit_studio.capture.head_motion import HeadMotion, Motion
-from relit_studio.capture.mirror_ball import MirrorBall
-from relit_studio.capture.torch import HandPath, Torch
-from relit_studio.pinhole import Pinhole
+from relit_studio.cameras.pinhole import Pinhole
+from relit_studio.capture.ball.ball_reflection import Room, room_in_balls, torch_in_ball
+from relit_studio.capture.ball.mirror_ball import MirrorBall
+from relit_studio.capture.flash.flash_timing import FlashSchedule, RollingShutter
+from relit_studio.capture.flash.torch import HandPath, Torch
+from relit_studio.capture.persons.captured_person import Person
+from relit_studio.capture.persons.head_motion import HeadMotion, Motion
 
 _BALLS_AT = ((0.7, 0.46), (-0.7, 0.4))
 """Positions of the balls at the head's distance, right and up, as shares of half the picture."""

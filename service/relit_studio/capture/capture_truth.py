@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_studio.camera_simulation import Gains
-from relit_studio.capture.ball_reflection import highlight_px
+from relit_studio.cameras.camera_simulation import Gains
+from relit_studio.cameras.pinhole import Pinhole
+from relit_studio.capture.ball.ball_reflection import highlight_px
+from relit_studio.capture.ball.mirror_ball import MirrorBall
 from relit_studio.capture.capture_scene import FrameState, Scene
-from relit_studio.capture.captured_person import to_rest
-from relit_studio.capture.flash_timing import flash_state
-from relit_studio.capture.mirror_ball import MirrorBall
+from relit_studio.capture.flash.flash_timing import flash_state
+from relit_studio.capture.flash.torch import BEAM_EXPONENT, RADIUS_CM, REFERENCE_CM
+from relit_studio.capture.persons.captured_person import to_rest
 from relit_studio.capture.phone import SENSOR, Stages
-from relit_studio.capture.torch import BEAM_EXPONENT, RADIUS_CM, REFERENCE_CM
-from relit_studio.pinhole import Pinhole
 
 VERSION = 1
 

@@ -13,10 +13,10 @@ from pathlib import Path
 import relit_studio
 from relit_camera.base.errors import DeviceError
 from relit_camera.base.storage.atomic_files import make_folder
-from relit_studio.camera import Camera
+from relit_studio.base.progress import Progress, no_progress
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.cycles_environment import environment_python
 from relit_studio.cycles.job import Picture, Quality, Scene, write_job
-from relit_studio.progress import Progress, no_progress
 
 _WAIT_S = 10.0
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_studio.camera import Camera
-from relit_studio.mannequin.rasterizer import nearness_buffer
+from relit_studio.cameras.studio_camera import Camera
+from relit_studio.mannequin.rendering.rasterizer import nearness_buffer
 from relit_studio.people.geometry import Floats, Indices
 
 _HEIGHT = 180

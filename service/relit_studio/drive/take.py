@@ -8,17 +8,17 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import Delaunay
 
-from relit_studio.camera import Camera
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.job import Scene, Shape
 from relit_studio.cycles.person_objects import Figure
 from relit_studio.drive.face_visibility import Surface, Visibility, visibility
 from relit_studio.drive.performance import ActorState, Performance
-from relit_studio.people.face_model import Part
+from relit_studio.people.face.face_model import Part
+from relit_studio.people.face.landmarks import landmarks
+from relit_studio.people.face.mesh478_points import mesh_points
 from relit_studio.people.geometry import Floats, Indices
-from relit_studio.people.landmarks import landmarks
-from relit_studio.people.mesh478_points import mesh_points
 from relit_studio.people.person import Person
-from relit_studio.props.held_objects import HeldObjects
+from relit_studio.people.props.held_objects import HeldObjects
 
 
 @dataclass(frozen=True, eq=False)

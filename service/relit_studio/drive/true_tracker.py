@@ -11,11 +11,11 @@ from relit_camera.base.images.image_types import Frame
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_studio.camera import Camera
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.drive.performance import ActorState
 from relit_studio.drive.take import Take
-from relit_studio.people.expressions import Expression
-from relit_studio.people.landmarks import canonical_origin
+from relit_studio.people.face.expressions import Expression
+from relit_studio.people.face.landmarks import canonical_origin
 from relit_studio.people.person import Person
 from relit_studio.people.posture import turned
 

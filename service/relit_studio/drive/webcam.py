@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import luminance, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
-from relit_studio.camera_simulation import AutoControls, Gains, Sensor
-from relit_studio.random_walk import RandomWalk
+from relit_studio.base.random_walk import RandomWalk
+from relit_studio.cameras.camera_simulation import AutoControls, Gains, Sensor
 
 SENSOR = Sensor(white=0.25, shot=3e-4, read=1.2e-3)
 """Sensor suited to a room by day; in a dark room gain and noise rise."""

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from relit_camera.light.directions import fibonacci_directions
-from relit_studio.mannequin.mesh import Triangles
-from relit_studio.mannequin.rasterizer import fragments
-from relit_studio.mannequin.shading import axes_along
+from relit_studio.mannequin.rendering.rasterizer import fragments
+from relit_studio.mannequin.rendering.shading import axes_along
+from relit_studio.mannequin.shape.mesh import Triangles
 
 Values = NDArray[np.float32]
 

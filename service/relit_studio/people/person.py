@@ -6,22 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from relit_studio.people.beard import grow_beard
-from relit_studio.people.brows import grow_brows
-from relit_studio.people.expressions import Expression
-from relit_studio.people.eyes import turn_eyes
-from relit_studio.people.face_model import FaceModel, Part
+from relit_studio.people.clothing.glasses import Glasses, fit_glasses
+from relit_studio.people.clothing.shirt import Shirt, sew_shirt
+from relit_studio.people.face.expressions import Expression
+from relit_studio.people.face.eyes import turn_eyes
+from relit_studio.people.face.face_model import FaceModel, Part
+from relit_studio.people.face.identity import neutral_face
 from relit_studio.people.geometry import Floats
-from relit_studio.people.glasses import Glasses, fit_glasses
-from relit_studio.people.hair import FLATTENS_EARS, grow_hair
-from relit_studio.people.hair_strands import Hairs
-from relit_studio.people.identity import neutral_face
-from relit_studio.people.lashes import grow_lashes
+from relit_studio.people.hair.beard import grow_beard
+from relit_studio.people.hair.brows import grow_brows
+from relit_studio.people.hair.hair_strands import Hairs
+from relit_studio.people.hair.head_hair import FLATTENS_EARS, grow_hair
+from relit_studio.people.hair.lashes import grow_lashes
+from relit_studio.people.hair.scalp import ears
 from relit_studio.people.people_assets import PeopleAssets
 from relit_studio.people.posture import Posture, follows_head, rigid_motion, turned
-from relit_studio.people.scalp import ears
-from relit_studio.people.shirt import Shirt, sew_shirt
-from relit_studio.people.traits import Traits
+from relit_studio.people.traits.person_traits import Traits
 
 _SHIRT_HAIR_CM = -10.5
 """Height below which cloth is an obstacle for long hair."""

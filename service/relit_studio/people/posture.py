@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Angles, rotation_from_angles
-from relit_studio.people.expressions import NEUTRAL, Expression
+from relit_studio.people.face.expressions import NEUTRAL, Expression
 from relit_studio.people.geometry import Floats
 
 PIVOT = np.array([0.0, -4.0, -1.0])

@@ -8,8 +8,8 @@ import numpy as np
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Angles
-from relit_studio.people.expressions import Expression
-from relit_studio.people.eyes import GAZE_DEG
+from relit_studio.people.face.expressions import Expression
+from relit_studio.people.face.eyes import GAZE_DEG
 from relit_studio.people.posture import Posture
 
 Keys = tuple[tuple[float, float], ...]
