@@ -170,7 +170,7 @@ class FailsLater:
 def test_an_accelerator_that_fails_on_the_way_is_left_for_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
     pretend_cuda(monkeypatch, {"cuda": 2})
     opened = open_session(graph_bytes(), "small", SessionOptions("cuda"))
-    opened._runtime = runtime = FailsLater(opened._runtime)  # type: ignore[assignment]
+    opened._runtime = runtime = FailsLater(opened._runtime)
     image = np.ones((1, 3), np.float32)
     assert opened.run({"image": image})["total"].tolist() == [[9, 13, 17]]
     with pytest.raises(ModelError, match="it takes image"):
@@ -188,7 +188,7 @@ def test_an_accelerator_that_fails_on_the_way_is_left_for_the_cpu(monkeypatch: p
 def test_strict_does_not_go_on_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     pretend_cuda(monkeypatch, {"cuda": 2})
     opened = open_session(graph_bytes(), "small", SessionOptions("cuda", strict=True))
-    opened._runtime = runtime = FailsLater(opened._runtime)  # type: ignore[assignment]
+    opened._runtime = runtime = FailsLater(opened._runtime)
     runtime.broken = True
     with pytest.raises(ModelError, match="719"):
         opened.run({"image": np.ones((1, 3), np.float32)})
