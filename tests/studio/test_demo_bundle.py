@@ -82,7 +82,7 @@ def test_a_folder_of_something_else_is_refused(rendered: tuple[Path, Path], tmp_
 def test_what_is_too_large_to_ship_is_said(
     rendered: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(demo_bundle._MOST_BYTES, "adam.relit", 1000)
+    monkeypatch.setitem(demo_bundle.MAX_BYTES, "adam.relit", 1000)
     with pytest.raises(InputError, match=r"adam\.relit would have .* MB"):
         make_bundle(*rendered, tmp_path / "out", 6)
     assert list((tmp_path / "out").iterdir()) == []

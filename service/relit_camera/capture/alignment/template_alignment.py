@@ -205,8 +205,8 @@ def _one_round(
     gram = coarse @ coarse.T
     aligned = []
     for index, picture in enumerate(pictures):
-        like, shares = _prediction(gram, index, groups)
-        predicted = np.tensordot(shares, moved[like], axes=1).astype(np.float32)
+        like, mixing = predict_from_similar(gram, index, groups)
+        predicted = np.tensordot(mixing, moved[like], axes=1).astype(np.float32)
         shade = TUNABLES.shade * float(moved[index].mean()) + 1e-9
         template = Template(visible_detail(predicted, shade), weights, same_light=False)
         aligned.append(template.align(visible_detail(picture, shade), start[index]))
@@ -216,7 +216,7 @@ def _one_round(
     return transforms_from_array(rows - rows.mean(axis=0) + transforms_to_array(start).mean(axis=0))
 
 
-def _prediction(gram: Floats, index: int, groups: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+def predict_from_similar(gram: Floats, index: int, groups: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
     """Indices of the pictures most similar to one, and their weights in its prediction, by ridge regression.
 
     Args:
