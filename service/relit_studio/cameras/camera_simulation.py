@@ -72,8 +72,8 @@ class AutoControls:
     """Automatic exposure and white balance, as damped control: each frame corrects part of the error, with momentum.
 
     Attributes:
-        pull: share of the error that is corrected each frame.
-        momentum: share of the last change that is repeated; large values overshoot and come back.
+        pull: fraction of the error that is corrected each frame.
+        momentum: fraction of the last change that is repeated; large values overshoot and come back.
         exposure_limit_ev: of the exposure, in stops.
         balance_limit: of the logarithm of the gains of red and blue.
     """

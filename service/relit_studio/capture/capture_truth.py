@@ -80,7 +80,7 @@ def frame_truth(scene: Scene, state: FrameState, gains: Gains, face: NDArray) ->
         "flash": {
             "state": flash_state(state.lit),
             "lit_share": float(state.lit.mean()),
-            "lit_rows_px_share": [[round(row, 4), round(share, 6)] for row, share in state.knots],
+            "lit_rows_px_share": [[round(row, 4), round(fraction, 6)] for row, fraction in state.knots],
         },
         "head": {
             "pose_deg": motion.angles._asdict(),

@@ -46,7 +46,7 @@ def check(
     samples: Samples = None,
     threads: Threads = 2,
 ) -> None:
-    """Render people in several poses, run the public face models on them, and write shares and errors to check.json.
+    """Render people in several poses, run the public face models on them, and write fractions and errors to check.json.
 
     Finished pictures are kept. The models are those of `relit models pull`.
     """

@@ -1,4 +1,4 @@
-"""Visible share of a face: the part that is neither occluded nor outside the picture."""
+"""Visible fraction of a face: the part that is neither occluded nor outside the picture."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class Visibility:
     """Visibility of a face.
 
     Attributes:
-        covered_share: occluded share of the face's side toward the camera.
-        visible_share: share of that side that is neither occluded nor outside the picture.
+        covered_fraction: occluded fraction of the face's side toward the camera.
+        visible_fraction: fraction of that side that is neither occluded nor outside the picture.
         hidden: (count,) which points are occluded or outside the picture.
     """
 
-    covered_share: float
-    visible_share: float
+    covered_fraction: float
+    visible_fraction: float
     hidden: NDArray[np.bool_]
 
 
@@ -59,8 +59,8 @@ def visibility(camera: Camera, face: Surface, before: Sequence[Surface], points:
     inside[:, (_WIDER // 2) * inner : (_WIDER // 2 + 1) * inner] = True
     total = max(int(seen.sum()), 1)
     return Visibility(
-        covered_share=float(covered.sum() / total),
-        visible_share=float((seen & inside & ~covered).sum() / total),
+        covered_fraction=float(covered.sum() / total),
+        visible_fraction=float((seen & inside & ~covered).sum() / total),
         hidden=_hidden(wide, points, cover) | ~_within(camera, points),
     )
 

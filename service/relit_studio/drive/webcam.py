@@ -19,9 +19,9 @@ _AUTO_CONTROLS = AutoControls(pull=0.035, momentum=0.6, exposure_limit_ev=2.5, b
 _WANTED = 0.25
 """Target luminance of the middle of the picture."""
 _MIDDLE = 0.2
-"""Size of the metered middle: standard deviation of its weights as a share of each side."""
+"""Size of the metered middle: standard deviation of its weights as a fraction of each side."""
 _TRUST = 0.5
-"""Share of the picture's change of tint that white balance attributes to the light."""
+"""Fraction of the picture's change of tint that white balance attributes to the light."""
 _DRIFT, _DRIFT_HZ = 0.04, (0.03, 0.2)
 """White balance drift: RMS of the logarithms of the red and blue gains, and the band of frequencies."""
 _WARM_FRAMES = 240

@@ -34,12 +34,12 @@ def follows_head(points: Floats) -> Floats:
     return smoothstep(points[:, 1] + 0.25 * points[:, 2], -12.5, -6.5)
 
 
-def turned(points: Floats, rotation: Rotation, share: Floats | None = None) -> Floats:
-    """Points (n, 3) rotated about the pivot in the neck, by the part `share` (n,) of the rotation where given."""
+def turned(points: Floats, rotation: Rotation, fraction: Floats | None = None) -> Floats:
+    """Points (n, 3) rotated about the pivot in the neck, by the part `fraction` (n,) of the rotation where given."""
     offset = points - PIVOT
-    if share is None:
+    if fraction is None:
         return np.asarray(rotation.apply(offset) + PIVOT)
-    return np.asarray(Rotation.from_rotvec(share[:, None] * rotation.as_rotvec()).apply(offset) + PIVOT)
+    return np.asarray(Rotation.from_rotvec(fraction[:, None] * rotation.as_rotvec()).apply(offset) + PIVOT)
 
 
 def rigid_motion(rotation: Rotation) -> Floats:

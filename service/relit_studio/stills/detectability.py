@@ -19,7 +19,7 @@ from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 
 MAX_LANDMARK_ERROR = 0.15
-"""Mean landmark error, as a share of the distance of the outer eye corners, below which a face counts as tracked."""
+"""Mean landmark error, as a fraction of the distance of the outer eye corners, below which a face counts as tracked."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def check_detectability(
 
 
 def detectability_table(seen: Sequence[Detectability]) -> list[dict[str, float | str | int | None]]:
-    """Rows of shares and mean errors, over all pictures and by absolute yaw; errors are None where none was tracked."""
+    """Rows of fractions and mean errors, of all pictures and by absolute yaw; an error is None if none was tracked."""
     yaws = sorted({abs(each.yaw_deg) for each in seen})
     groups = [("all", list(seen))] + [(f"yaw ±{yaw:g}°", [s for s in seen if abs(s.yaw_deg) == yaw]) for yaw in yaws]
     rows = []

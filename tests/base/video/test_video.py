@@ -298,8 +298,8 @@ def test_an_absurd_size_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mkv", ".gif", ".avi"])
-@pytest.mark.parametrize("share", [0.5, 0.95])
-def test_a_cut_off_file_is_refused_and_counted(tmp_path: Path, suffix: str, share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.5, 0.95])
+def test_a_cut_off_file_is_refused_and_counted(tmp_path: Path, suffix: str, fraction: float) -> None:
     path = tmp_path / f"clip{suffix}"
     if suffix == ".gif":
         gif(path, 20)
@@ -314,7 +314,7 @@ def test_a_cut_off_file_is_refused_and_counted(tmp_path: Path, suffix: str, shar
     whole = path.read_bytes()
     with VideoReader(path) as video:
         assert len(list(video)) == 20
-    path.write_bytes(whole[: int(len(whole) * share)])
+    path.write_bytes(whole[: int(len(whole) * fraction)])
     with pytest.raises(VideoError, match=r"is cut off: \d+ (of \d+ )?frames can be read") as caught:
         VideoReader(path)
     counted = int(caught.value.what.split("cut off: ")[1].split()[0])

@@ -93,9 +93,9 @@ def test_a_constant_field_stays_constant_where_cosines_do(method: ExactMethod) -
 
 
 def ghosts(seen: NDArray, lit: NDArray) -> float:
-    """Share of the spots that are neither in shadow nor lit as brightly as without it, but between."""
-    share = seen / lit
-    return float(np.mean((share > 0.2) & (share < 0.8)))
+    """Fraction of the spots that are neither in shadow nor lit as brightly as without it, but between."""
+    fraction = seen / lit
+    return float(np.mean((fraction > 0.2) & (fraction < 0.8)))
 
 
 def test_the_shadow_of_a_light_between_captured_ones_is_sharper() -> None:

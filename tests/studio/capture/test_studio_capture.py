@@ -63,8 +63,8 @@ def states(truth: dict[str, Any], state: str) -> list[int]:
 
 
 def lit_rows(frame: dict[str, Any]) -> np.ndarray:
-    y, share = np.array(frame["flash"]["lit_rows_px_share"]).T
-    return np.asarray(np.interp(np.arange(HEIGHT) + 0.5, y, share))
+    y, fraction = np.array(frame["flash"]["lit_rows_px_share"]).T
+    return np.asarray(np.interp(np.arange(HEIGHT) + 0.5, y, fraction))
 
 
 def test_a_frame_for_every_thirtieth_of_six_seconds(plain: tuple[np.ndarray, dict[str, Any]]) -> None:

@@ -36,13 +36,13 @@ TURNED = Posture(Angles(22.0, -6.0, 5.0))
 
 def test_the_head_moves_rigidly_and_the_shoulders_stand_still(person: Person) -> None:
     rest, moved = person.vertices(Posture()), person.vertices(TURNED)
-    share = follows_head(person.neutral)
+    fraction = follows_head(person.neutral)
     matrix = rigid_motion(TURNED.rotation)
-    head, shoulders = share == 1, share == 0
+    head, shoulders = fraction == 1, fraction == 0
     assert head.sum() > 15_000
     np.testing.assert_allclose(moved[head], rest[head] @ matrix[:3, :3].T + matrix[:3, 3], atol=1e-9)
     np.testing.assert_array_equal(moved[shoulders], rest[shoulders])
-    assert (share[person.model.landmarks68] == 1).all()
+    assert (fraction[person.model.landmarks68] == 1).all()
 
 
 @pytest.mark.parametrize("scheme", ["mesh478", "openseeface66"])

@@ -33,7 +33,7 @@ def test_lambert_under_light_from_all_sides_is_pi() -> None:
     np.testing.assert_allclose(summed, np.pi, rtol=0.005)
 
 
-def test_gloss_gives_back_about_the_share_it_is_named_by() -> None:
+def test_gloss_gives_back_about_the_fraction_it_is_named_by() -> None:
     lights = fibonacci_directions(20000)
     flat = patch(np.array([[0, 0, 1.0]]), shine=0.05, exponent=60)
     energy = sum(reflected(flat, light)[1][0] for light in lights) * (4 * np.pi / len(lights))

@@ -31,8 +31,8 @@ def distance_outside(person: Person, points: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("style", get_args(HairStyle))
 def test_hair_stays_out_of_the_head_and_the_face(person: Person, style: HairStyle) -> None:
-    hair = grow_hair(person.model, person.neutral, NOTHING, Traits("x", 4, hair=style), share=0.08)
-    again = grow_hair(person.model, person.neutral, NOTHING, Traits("x", 4, hair=style), share=0.08)
+    hair = grow_hair(person.model, person.neutral, NOTHING, Traits("x", 4, hair=style), fraction=0.08)
+    again = grow_hair(person.model, person.neutral, NOTHING, Traits("x", 4, hair=style), fraction=0.08)
     np.testing.assert_array_equal(hair.points, again.points)
     assert np.isfinite(hair.points).all()
     assert (hair.radius > 0).all()
@@ -47,7 +47,7 @@ def test_hair_stays_out_of_the_head_and_the_face(person: Person, style: HairStyl
 
 def test_the_bald_are_bare_on_top_and_the_receding_at_the_temples(person: Person) -> None:
     def roots(style: HairStyle) -> np.ndarray:
-        grown = grow_hair(person.model, person.neutral, NOTHING, Traits("x", 4, hair=style), share=0.1)
+        grown = grow_hair(person.model, person.neutral, NOTHING, Traits("x", 4, hair=style), fraction=0.1)
         return grown.points[:, 0]
 
     full, bald, receding = roots("short"), roots("bald"), roots("receding")

@@ -111,7 +111,7 @@ def test_a_hand_that_passes_does_not_touch_the_face(person: Person, held: HeldOb
 
 
 def test_hand_and_mug_keep_together_and_sleeves_begin_at_wrists(held: HeldObjects) -> None:
-    gestures = [Gesture(mug=share, tilt_deg=30 * share, hand=share) for share in np.linspace(0, 1, 9)]
+    gestures = [Gesture(mug=fraction, tilt_deg=30 * fraction, hand=fraction) for fraction in np.linspace(0, 1, 9)]
     motions = [held.motions(Posture(), gesture) for gesture in gestures]
     for each in motions:
         np.testing.assert_array_equal(each["mug"], each["right_hand"])

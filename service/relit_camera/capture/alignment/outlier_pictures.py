@@ -32,16 +32,16 @@ class OutlierTunables:
     Attributes:
         min_light_z: z of the light from which a prediction is good enough to judge by: light from behind lights rims
             alone.
-        black_share: share of the predicted light below which a picture is black, if it should not be dark.
-        min_expected_share: share of the median predicted light from which a picture should not be dark.
+        black_fraction: fraction of the predicted light below which a picture is black, if it should not be dark.
+        min_expected_fraction: fraction of the median predicted light from which a picture should not be dark.
         max_roughness_ratio: roughness over the set's median above which a picture is torn or noisy.
         min_correlation: with the prediction; below it a picture shows something else.
         correlation_min_z: z of the light from which the correlation counts.
     """
 
     min_light_z: float = -0.2
-    black_share: float = 0.1
-    min_expected_share: float = 0.3
+    black_fraction: float = 0.1
+    min_expected_fraction: float = 0.3
     max_roughness_ratio: float = 4.0
     min_correlation: float = 0.5
     correlation_min_z: float = 0.0
@@ -91,8 +91,8 @@ def find_outlier_pictures(
     """
     inside = matte > 0.5
     observed, expected = light[:, inside].mean(axis=1), predicted[:, inside].mean(axis=1)
-    share = observed / np.maximum(expected, 1e-9)
-    black = (share < TUNABLES.black_share) & (expected > TUNABLES.min_expected_share * np.median(expected))
+    fraction = observed / np.maximum(expected, 1e-9)
+    black = (fraction < TUNABLES.black_fraction) & (expected > TUNABLES.min_expected_fraction * np.median(expected))
     roughness = _roughness(light) / np.maximum(observed, 1e-3 * float(light.max()) + 1e-9)
     times = roughness / max(float(np.median(roughness)), 1e-9)
     correlation = masked_correlation(light, predicted, matte)
@@ -100,7 +100,7 @@ def find_outlier_pictures(
     reasons = {}
     for index in np.flatnonzero(directions[:, 2] > TUNABLES.min_light_z).tolist():
         if black[index]:
-            reasons[index] = f"black: {share[index]:.0%} of the light expected"
+            reasons[index] = f"black: {fraction[index]:.0%} of the light expected"
         elif times[index] > TUNABLES.max_roughness_ratio:
             reasons[index] = f"torn or noisy: {times[index]:.0f} times as rough as the others"
         elif uncorrelated[index]:

@@ -47,26 +47,26 @@ class AlignmentTunables:
     Attributes:
         largest_side_px: larger pictures are shrunk to this.
         rounds: of `align_across_lights`.
-        shade: summand under the root of light, as a share of the mean light: below it differences count no more.
-        lit_share: a gain is estimated from pixels brighter than this share of the prediction's bright ones,
-        saturated_share: darker than this share of the set's brightest pixel;
-        min_observed_share: and brighter than this share of what is predicted for them, else they are in shadow.
+        shade: summand under the root of light, as a fraction of the mean light: below it differences count no more.
+        lit_fraction: a gain is estimated from pixels brighter than this fraction of the prediction's bright ones,
+        saturated_fraction: darker than this fraction of the set's brightest pixel;
+        min_observed_fraction: and brighter than this fraction of what is predicted for them, else they are in shadow.
         min_lit_pixels: fewer such pixels give no gain.
-        max_shift_share: largest shift as a share of the longer side; someone who keeps still moves less.
+        max_shift_fraction: largest shift as a fraction of the longer side; someone who keeps still moves less.
         min_side_px: in smaller pictures motion cannot be measured.
-        min_improvement: share of the misfit that alignment must remove. It removes 8 to 75 % from photographed sets and
-            2 % at most from rendered ones, which need none: there it takes shading for motion.
+        min_improvement: fraction of the misfit that alignment must remove. It removes 8 to 75 % from photographed sets
+            and 2 % at most from rendered ones, which need none: there it takes shading for motion.
         judged_min_z: z of the lights by which that is judged: shading within 75° of the camera is predicted well.
     """
 
     largest_side_px: int = 256
     rounds: int = 3
     shade: float = 0.02
-    lit_share: float = 0.3
-    saturated_share: float = 0.97
-    min_observed_share: float = 0.1
+    lit_fraction: float = 0.3
+    saturated_fraction: float = 0.97
+    min_observed_fraction: float = 0.1
     min_lit_pixels: int = 100
-    max_shift_share: float = 0.04
+    max_shift_fraction: float = 0.04
     min_side_px: int = 32
     min_improvement: float = 0.05
     judged_min_z: float = 0.25
@@ -169,7 +169,7 @@ def align_to_prediction(picture: LinearImage, predicted: LinearImage, matte: Mas
     shade = TUNABLES.shade * float(there.mean()) + 1e-9
     template = Template(visible_detail(there, shade), without_border(inside), same_light=False)
     transform = template.align(visible_detail(here, shade), RigidTransform()).scaled(1 / scale)
-    if np.hypot(transform.x, transform.y) > TUNABLES.max_shift_share * max(matte.shape):
+    if np.hypot(transform.x, transform.y) > TUNABLES.max_shift_fraction * max(matte.shape):
         transform = RigidTransform()
     return transform, _gain(luminance(apply_alignment(picture, transform)), luminance(predicted), matte, np.inf)
 
@@ -193,7 +193,7 @@ def _without_drift(transforms: list[RigidTransform], directions: NDArray[np.floa
 
 def _gains(light: Floats, predicted: Floats, directions: NDArray[np.float64], matte: Mask) -> NDArray[np.float64]:
     """Gains (lights,) of pictures (lights, height, width) toward their predictions; 1 for lights from behind."""
-    saturated = TUNABLES.saturated_share * float(light.max())
+    saturated = TUNABLES.saturated_fraction * float(light.max())
     in_front = directions[:, 2] > 0
     gains = np.ones(len(light))
     for index in np.flatnonzero(in_front):
@@ -205,8 +205,8 @@ def _gain(light: Floats, predicted: Floats, matte: Mask, saturated: float) -> fl
     """The median ratio of prediction to picture (height, width) over lit pixels; 1 if too few are lit."""
     observed, expected = light[matte > 0.5], predicted[matte > 0.5]
     lit = (
-        (expected > TUNABLES.lit_share * np.percentile(expected, 98))
-        & (observed > TUNABLES.min_observed_share * expected)
+        (expected > TUNABLES.lit_fraction * np.percentile(expected, 98))
+        & (observed > TUNABLES.min_observed_fraction * expected)
         & (observed < saturated)
     )
     return (

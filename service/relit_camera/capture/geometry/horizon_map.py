@@ -25,9 +25,9 @@ class HorizonTunables:
         first_step_px: nearest neighbours that count; what nearer ones hide is better given by the normal.
         step_growth: growth of each step of the march, by which distant surface hides light only where it is large.
         outside_px: depth outside the person, far behind every surface.
-        in_shadow: share of the predicted light below which a pixel counts as in shadow. Between this and `in_light` it
-            may be either: a penumbra, or a normal that is somewhat wrong.
-        in_light: share of the predicted light above which a pixel counts as lit.
+        in_shadow: fraction of the predicted light below which a pixel counts as in shadow. Between this and `in_light`
+            it may be either: a penumbra, or a normal that is somewhat wrong.
+        in_light: fraction of the predicted light above which a pixel counts as lit.
         max_shadow_margin_rad: highest margin above the horizon at which darkness is taken for a shadow. Dark pixels
             under higher lights have another cause, such as a wrong normal; taken for shadow they would hide all light
             from behind, which no capture has.

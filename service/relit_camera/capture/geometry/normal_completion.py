@@ -62,8 +62,8 @@ def pull_push_fill(values: Floats, weight: Mask) -> Floats:
         return values
     half = (max(1, (width + 1) // 2), max(1, (height + 1) // 2))
     summed = cv2.resize(values * weight[..., None], half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0], -1)
-    share = cv2.resize(weight, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0])
-    coarse = pull_push_fill(summed / np.maximum(share, 1e-9)[..., None], np.minimum(4 * share, 1))
+    fraction = cv2.resize(weight, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0])
+    coarse = pull_push_fill(summed / np.maximum(fraction, 1e-9)[..., None], np.minimum(4 * fraction, 1))
     around = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR).reshape(values.shape)
     known = np.minimum(weight, 1)[..., None]
     return np.asarray(values * known + around * (1 - known), np.float32)

@@ -35,7 +35,7 @@ class PhotometricStereoTunables:
             and what skin deviates from Lambert's law.
         grazing_cosine: cosine below which a light has less weight: there indirect light and errors of direction weigh
             most.
-        noise: of a picture, as a share of the bright values of all pictures: a step of 8 bits.
+        noise: of a picture, as a fraction of the bright values of all pictures: a step of 8 bits.
         half_confidence_deg: expected error of a normal whose confidence is one half.
         oblique_cosine: cosine below which a light tells nothing about what blocks it.
     """
@@ -62,8 +62,8 @@ class PhotometricStereoResult:
         normals: (height, width, 3) float32 unit vectors; (0, 0, 1) where nothing is known.
         albedo: (height, width, 3) float32 linear reflectance, 1 for a white wall.
         confidence: (height, width) float32, 0 unknown to 1 certain, by the expected error of the normal.
-        lit: (lights, height, width) float16, measured light as a share 0..1 of what the normal predicts; NaN where the
-            light is behind the surface or nearly so.
+        lit: (lights, height, width) float16, measured light as a fraction 0..1 of what the normal predicts; NaN where
+            the light is behind the surface or nearly so.
     """
 
     normals: Floats
@@ -99,9 +99,10 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
         normals[block[known]] = scaled[known] / length[known]
         confidence[block] = np.where(known, 1 / (1 + (error_deg / TUNABLES.half_confidence_deg) ** 2), 0)
         cosine = np.maximum(normals[block] @ toward.T, 0)
-        shares = weights * cosine
+        fractions = weights * cosine
         albedo[block] = (
-            np.einsum("pl,lpc->pc", shares, colors) / np.maximum(np.einsum("pl,pl->p", shares, cosine), 1e-6)[:, None]
+            np.einsum("pl,lpc->pc", fractions, colors)
+            / np.maximum(np.einsum("pl,pl->p", fractions, cosine), 1e-6)[:, None]
         )
         arrived = np.clip(values / np.maximum(length * cosine, 1e-6), 0, 1)
         arrived[(cosine < TUNABLES.oblique_cosine) | ~known[:, None]] = np.nan

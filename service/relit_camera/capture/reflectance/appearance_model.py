@@ -40,11 +40,11 @@ class AppearanceTunables:
         penumbra_rad: scale of the logistic curve of visibility over the margin above the horizon: about the error of
             the horizons.
         reweighting_rounds: of the robust fit.
-        tolerance: residual at which an observation has half its weight, as a share of the pixel's bright values.
-        tolerance_floor: summand of that residual, as a share of the bright values of all pictures.
+        tolerance: residual at which an observation has half its weight, as a fraction of the pixel's bright values.
+        tolerance_floor: summand of that residual, as a fraction of the bright values of all pictures.
         descent_sweeps: of coordinate descent in the non-negative least squares.
-        ridge: of the normal equations, as a share of their mean diagonal.
-        prior_reach: standard deviation of the blur that averages neighbors' highlights, as a share of the picture's
+        ridge: of the normal equations, as a fraction of their mean diagonal.
+        prior_reach: standard deviation of the blur that averages neighbors' highlights, as a fraction of the picture's
             larger side.
         prior_percentile: of the person's specular amounts; it is the expected difference between neighboring pixels.
         correlated_lights: number of neighboring lights whose errors are so correlated that they count as one.

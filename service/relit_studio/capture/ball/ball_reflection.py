@@ -25,7 +25,7 @@ _DISC_SAMPLES = 64
 """Rays along each side of the window around the torch's reflection."""
 _SHARP_PX, _GLARE_PX = 0.6, 5.0
 _GLARE = 0.02
-"""Point spread of the lens: sigmas of a narrow and a wide Gaussian, and the share of light in the wide one."""
+"""Point spread of the lens: sigmas of a narrow and a wide Gaussian, and the fraction of light in the wide one."""
 _PANORAMA_ROWS = 256
 """Rows of the panorama that the ball reflects; it shrinks the room, so finer detail would alias."""
 
@@ -92,7 +92,7 @@ def torch_in_ball(ball: MirrorBall, camera: Pinhole, torch: Torch) -> LinearImag
     """Reflection of the torch (height, width, 3), spread by the lens; black if the torch does not face the ball.
 
     Rays through a window about the image are mirrored and cut with the disc, which gives the energy that reaches the
-    lens; every ray's share is spread over pixels by the point spread function.
+    lens; every ray's fraction is spread over pixels by the point spread function.
     """
     image = np.zeros((camera.height, camera.width, 3), np.float32)
     x, y, area = _disc_window(ball, camera, torch)
@@ -101,10 +101,10 @@ def torch_in_ball(ball: MirrorBall, camera: Pinhole, torch: Torch) -> LinearImag
     if not seen.any():
         return image
     energy = light[seen] * area
-    for share, sigma in ((1 - _GLARE, _SHARP_PX), (_GLARE, _GLARE_PX)):
+    for fraction, sigma in ((1 - _GLARE, _SHARP_PX), (_GLARE, _GLARE_PX)):
         columns, across = _spread(x.ravel()[seen], sigma, camera.width)
         rows, down = _spread(y.ravel()[seen], sigma, camera.height)
-        spread = share * (down * energy[:, None]).T @ across
+        spread = fraction * (down * energy[:, None]).T @ across
         image[rows, columns] += spread[..., None].astype(np.float32) * ball.reflectance
     return image
 
@@ -158,7 +158,7 @@ def _disc_light(
 
 
 def _spread(place: NDArray[np.float64], sigma: float, size: int) -> tuple[slice, NDArray[np.float64]]:
-    """The pixels of a line of `size` about places (count,) in it, and each place's share (count, pixels) in them.
+    """The pixels of a line of `size` about places (count,) in it, and each place's fraction (count, pixels) in them.
 
     A Gaussian of `sigma`, exact within each pixel; what lies beyond 6 sigma is left out.
     """

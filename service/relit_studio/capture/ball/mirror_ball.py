@@ -37,7 +37,7 @@ class MirrorBall:
     Attributes:
         center: (3,) camera axes, centimeters.
         radius_cm: of the ball.
-        reflectance: share of the light that it mirrors, linear RGB (3,).
+        reflectance: fraction of the light that it mirrors, linear RGB (3,).
     """
 
     center: Vectors

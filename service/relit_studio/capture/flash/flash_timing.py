@@ -1,7 +1,7 @@
-"""Timing of the torch's flashes, and the share of each row's exposure that they light.
+"""Timing of the torch's flashes, and the fraction of each row's exposure that they light.
 
 A phone's shutter rolls: row after row is exposed for the same time, each a little later than the one above. A torch
-that blinks on its own clock is then on for a share of the exposure that differs from row to row: whole frames, dark
+that blinks on its own clock is then on for a fraction of the exposure that differs from row to row: whole frames, dark
 frames, and frames with a band between (thesis 4.3.2).
 """
 
@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 BRIGHT, DARK, PARTIAL = "bright", "dark", "partial"
 _WHOLE = 0.98
-"""Share of every row's exposure from which a frame counts as bright; below 1 minus this share it counts as dark."""
+"""Fraction of every row's exposure from which a frame counts as bright; below 1 minus this it counts as dark."""
 
 
 @dataclass(frozen=True)
 class FlashSchedule:
-    """Periodic flashes: the torch is on for the share `duty` of each period, for the first time at `phase_s`."""
+    """Periodic flashes: the torch is on for the fraction `duty` of each period, for the first time at `phase_s`."""
 
     frequency_hz: float
     duty: float
@@ -52,27 +52,27 @@ class RollingShutter:
     readout_s: float
     height: int
 
-    def lit_share(self, schedule: FlashSchedule, index: int) -> NDArray[np.float64]:
+    def lit_fraction(self, schedule: FlashSchedule, index: int) -> NDArray[np.float64]:
         """Share 0..1 (height,) of each row's exposure for which the torch is on."""
-        return self._share(schedule, index, np.arange(self.height) + 0.5)
+        return self._fraction(schedule, index, np.arange(self.height) + 0.5)
 
     def lit_knots(self, schedule: FlashSchedule, index: int) -> list[tuple[float, float]]:
-        """The lit share as exact knots (y in pixels, share), from y = 0 to height; it is linear between them."""
+        """The lit fraction as exact knots (y in pixels, fraction), from y = 0 to height; it is linear between them."""
         start = index / self.fps
         switches = schedule.switching_times(start, start + self.readout_s + self.exposure_s)
         crossed = np.concatenate([switches - start, switches - start - self.exposure_s])
         heights = crossed / self.readout_s * self.height if self.readout_s else np.empty(0)
         inside = heights[(heights > 0) & (heights < self.height)]
         y = np.unique(np.concatenate([[0.0], inside, [float(self.height)]]))
-        return list(zip(y.tolist(), self._share(schedule, index, y).tolist(), strict=True))
+        return list(zip(y.tolist(), self._fraction(schedule, index, y).tolist(), strict=True))
 
-    def _share(self, schedule: FlashSchedule, index: int, y: NDArray) -> NDArray[np.float64]:
+    def _fraction(self, schedule: FlashSchedule, index: int, y: NDArray) -> NDArray[np.float64]:
         start = index / self.fps + self.readout_s * y / self.height
         return schedule.lit_seconds(start, start + self.exposure_s) / self.exposure_s
 
 
-def flash_state(share: NDArray[np.float64]) -> str:
-    """State `bright`, `dark` or `partial` of a frame with these lit shares of its rows."""
-    if share.min() >= _WHOLE:
+def flash_state(fraction: NDArray[np.float64]) -> str:
+    """State `bright`, `dark` or `partial` of a frame with these lit fractions of its rows."""
+    if fraction.min() >= _WHOLE:
         return BRIGHT
-    return DARK if share.max() <= 1 - _WHOLE else PARTIAL
+    return DARK if fraction.max() <= 1 - _WHOLE else PARTIAL

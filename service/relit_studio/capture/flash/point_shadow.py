@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from relit_studio.mannequin.rendering.rasterizer import nearness_buffer
-from relit_studio.mannequin.rendering.shading import LIFT, axes_along, lit_share
+from relit_studio.mannequin.rendering.shading import LIFT, axes_along, lit_fraction
 from relit_studio.mannequin.shape.mesh import Triangles
 
 Values = NDArray[np.float32]
@@ -32,7 +32,7 @@ class PointShadow:
         distance = self._seen(positions)[2]
         lifted = positions + normals * (np.float32(LIFT * self._texel) * distance)[:, None]
         x, y, nearness = self._texels(*self._seen(lifted)).T
-        return lit_share(self._nearness, x, y, nearness)
+        return lit_fraction(self._nearness, x, y, nearness)
 
     def _seen(self, points: Values) -> tuple[Values, Values, Values]:
         """Slopes to the right and down, and the distance along the axis, of points (count, 3)."""

@@ -161,9 +161,9 @@ def _filled(shift: NDArray[np.float32], inside: NDArray[np.bool_]) -> NDArray[np
     weight = inside.astype(np.float32)
     sigma = max(2.0, inside.shape[0] / 40)
     known = cv2.GaussianBlur(shift * weight[..., None], (0, 0), sigma)
-    share = cv2.GaussianBlur(weight, (0, 0), sigma)[..., None]
+    fraction = cv2.GaussianBlur(weight, (0, 0), sigma)[..., None]
     mean = shift[inside].mean(axis=0)
-    outside = np.where(share > 1e-3, known / np.maximum(share, 1e-3), mean)
+    outside = np.where(fraction > 1e-3, known / np.maximum(fraction, 1e-3), mean)
     return np.where(inside[..., None], shift, outside).astype(np.float32)
 
 

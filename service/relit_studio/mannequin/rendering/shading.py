@@ -14,7 +14,7 @@ from relit_studio.mannequin.shape.mesh import Triangles
 Values = NDArray[np.float32]
 
 FRESNEL = 0.35
-"""Share of Schlick's rise toward grazing light that remains on rough cloth, skin and hair."""
+"""Fraction of Schlick's rise toward grazing light that remains on rough cloth, skin and hair."""
 
 LIFT = 1.6
 """Texels by which points are lifted off their surface before the test: the four texels about a point lie up to √2 of
@@ -55,7 +55,7 @@ class ShadowMap:
         """Share 0..1 (count,) of the light that reaches points with unit normals (count, 3)."""
         lifted = self._axes @ (positions + normals * np.float32(LIFT * self._texel)).T
         x, y, depth = (lifted - self._origin) * self._scale
-        return lit_share(self._depth, x, y, depth)
+        return lit_fraction(self._depth, x, y, depth)
 
 
 def axes_along(direction: ArrayLike) -> Values:
@@ -66,7 +66,7 @@ def axes_along(direction: ArrayLike) -> Values:
     return np.stack([aside, -np.cross(toward, aside), toward]).astype(np.float32)
 
 
-def lit_share(buffer: Values, x: Values, y: Values, nearness: Values) -> Values:
+def lit_fraction(buffer: Values, x: Values, y: Values, nearness: Values) -> Values:
     """Share 0..1 (count,) of the four texels about each point that hold nothing nearer, weighed by how near they are.
 
     Args:
@@ -77,14 +77,14 @@ def lit_share(buffer: Values, x: Values, y: Values, nearness: Values) -> Values:
     """
     x, y = x - np.float32(0.5), y - np.float32(0.5)
     left, top = np.floor(x).astype(np.int32), np.floor(y).astype(np.int32)
-    right_share, down_share = x - left, y - top
+    right_fraction, down_fraction = x - left, y - top
     limit = np.int32(buffer.shape[0] - 2)
     at = np.clip(top, 0, limit) * (limit + 2) + np.clip(left, 0, limit)
     flat = buffer.ravel()
     free = [(flat[at + step] <= nearness).astype(np.float32) for step in (0, 1, limit + 2, limit + 3)]
-    upper = free[0] + (free[1] - free[0]) * right_share
-    lower = free[2] + (free[3] - free[2]) * right_share
-    return np.asarray(upper + (lower - upper) * down_share)
+    upper = free[0] + (free[1] - free[0]) * right_fraction
+    lower = free[2] + (free[3] - free[2]) * right_fraction
+    return np.asarray(upper + (lower - upper) * down_fraction)
 
 
 def reflected(surface: Surface, direction: ArrayLike) -> tuple[Values, Values]:

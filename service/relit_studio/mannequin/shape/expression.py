@@ -23,13 +23,13 @@ from relit_studio.mannequin.shape.mesh import Floats, spread
 JAW_HINGE = np.array([0.0, 0.0, -3.0])
 JAW_RANGE_DEG = 23.0
 _EYES_WIDENED = 0.3
-"""Extra opening of the mannequin's eyes over the canonical face, as a share of the lid gap."""
+"""Extra opening of the mannequin's eyes over the canonical face, as a fraction of the lid gap."""
 
 _FRIENDLY = 0.2
 """Smile of the neutral face."""
 _UPPER_LIP = (0.45, 0.22, 0.08, 0.0, 0.0, 0.0)
 _LOWER_LIP = (0.45, 0.68, 0.88, 1.0, 1.0, 1.0)
-"""Share of the jaw's motion that the lips follow, from the corner to the middle."""
+"""Fraction of the jaw's motion that the lips follow, from the corner to the middle."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def control_vertices(expression: Expression) -> Floats:
 
 
 def jaw_motion(points: Floats, opening: ArrayLike) -> Floats:
-    """Displacements (count, 3) of points (count, 3) that follow a jaw opened by shares (count, 1) or one number."""
+    """Displacements (count, 3) of points (count, 3) that follow a jaw opened by fractions (count, 1) or one number."""
     angle = np.radians(JAW_RANGE_DEG) * np.asarray(opening, np.float64)
     y, z = points[:, 1:2] - JAW_HINGE[1], points[:, 2:] - JAW_HINGE[2]
     # A turn about X takes Z down, as a jaw opens.
@@ -103,15 +103,15 @@ def _fields() -> _Fields:
     canonical = head.mesh.vertices
     rest = canonical + _close_lips(canonical)
     for eye in (SCHEME.right_eye, SCHEME.left_eye):
-        rest += -_EYES_WIDENED * _blink(canonical, eye, upper_share=0.7)
+        rest += -_EYES_WIDENED * _blink(canonical, eye, upper_fraction=0.7)
     rest += _FRIENDLY * _smile(rest)
     # One step towards a skin that passes through the control points: subdivision alone rounds nose and lips off.
     correction = rest - (head.skin @ rest)[: len(rest)]
     correction[FACE_COUNT:] = 0
     return _Fields(
         rest=rest + 0.8 * correction,
-        blink_right=_blink(rest, SCHEME.right_eye, upper_share=0.86),
-        blink_left=_blink(rest, SCHEME.left_eye, upper_share=0.86),
+        blink_right=_blink(rest, SCHEME.right_eye, upper_fraction=0.86),
+        blink_left=_blink(rest, SCHEME.left_eye, upper_fraction=0.86),
         smile=_smile(rest),
         brows=_raise_brows(rest),
         jaw=_jaw_weights(rest),
@@ -135,13 +135,13 @@ def _lid_pairs(eye: EyeLandmarks) -> list[tuple[int, int]]:
     return list(zip(upper, lower, strict=True))
 
 
-def _blink(points: Floats, eye: EyeLandmarks, upper_share: float) -> Floats:
+def _blink(points: Floats, eye: EyeLandmarks, upper_fraction: float) -> Floats:
     middle = points[list(eye.lids)].mean(axis=0)
     fixed = _still(points, middle, 2.3, *eye.lids)
     fixed |= {eye.outer: np.zeros(3), eye.inner: np.zeros(3)}
     for upper, lower in _lid_pairs(eye):
         gap = points[lower] - points[upper]
-        fixed[upper], fixed[lower] = upper_share * gap, (upper_share - 1) * gap
+        fixed[upper], fixed[lower] = upper_fraction * gap, (upper_fraction - 1) * gap
     return _spread(fixed)
 
 

@@ -53,8 +53,8 @@ def teeth(name: str, *, upper: bool) -> Part:
     width, depth = 2.45 + out, 2.3 + out
     vertices = np.stack([width * np.sin(arch), height, front - 2.3 + depth * np.cos(arch)], axis=-1)
     ivory, gum = np.array([0.68, 0.63, 0.55]), np.array([0.42, 0.17, 0.15])
-    share = np.clip((edge - 0.28) / 0.12, 0, 1)[:, None, None]
-    color = (gum + (ivory - gum) * share) * (0.62 + 0.38 * gap)[None, :, None]
+    fraction = np.clip((edge - 0.28) / 0.12, 0, 1)[:, None, None]
+    color = (gum + (ivory - gum) * fraction) * (0.62 + 0.38 * gap)[None, :, None]
     color *= np.clip(np.cos(arch) * 1.5, 0.1, 1)[None, :, None]
     return grid_part(name, vertices, color, TOOTH, caster_step=4)
 

@@ -25,7 +25,7 @@ from relit_studio.mannequin.shape.texture_atlas import atlas, face_paint_positio
 PIVOT = np.array([0.0, -7.0, -4.0])
 """Center of the head's rotation in the neck, in head axes, centimeters."""
 _NECK_TURNS = (-13.0, -5.5)
-"""Heights between which the neck's share of the head's rotation grows from 0 to 1."""
+"""Heights between which the neck's fraction of the head's rotation grows from 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ class Figure:
                 points = part.vertices
             if name == "neck":
                 low, high = _NECK_TURNS
-                share = smoothstep(points[:, 1:2], low, high)
-                points = points + share * (_turned(points, rotation) - points)
+                fraction = smoothstep(points[:, 1:2], low, high)
+                points = points + fraction * (_turned(points, rotation) - points)
             elif name != "pullover":
                 points = _turned(points, rotation)
             placed.append(points)

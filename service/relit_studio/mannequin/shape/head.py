@@ -118,6 +118,6 @@ def _skull(mesh: Mesh) -> Mesh:
     for t in _SKULL_RINGS:
         direction = (np.sin((1 - t) * angle) * start + np.sin(t * angle) * end) / np.sin(angle)
         ellipsoid = 1 / np.linalg.norm(direction / SKULL_RADII, axis=1, keepdims=True)
-        share = np.clip(t / 0.4, 0, 1) ** 1.5
-        rings.append(SKULL_CENTER + direction * (radius + (ellipsoid - radius) * share))
+        fraction = np.clip(t / 0.4, 0, 1) ** 1.5
+        rings.append(SKULL_CENTER + direction * (radius + (ellipsoid - radius) * fraction))
     return extrude(mesh, SCHEME.oval, rings, cap=SKULL_CENTER + end * SKULL_RADII[2])

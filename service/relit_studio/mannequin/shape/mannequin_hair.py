@@ -28,22 +28,22 @@ def hair(skin: Floats) -> Part:
     """Hair on a head at rest whose skin's vertices (count, 3) are given."""
     azimuth = np.linspace(-np.pi, np.pi, _COLUMNS, endpoint=False)
     # The shell starts a little off the top, where a fine fan would shade badly, and ends under the skin.
-    share = np.concatenate([np.linspace(0.01, 0.9, _ROWS - 16), np.linspace(0.91, 1.0, 16)])[:, None]
+    fraction = np.concatenate([np.linspace(0.01, 0.9, _ROWS - 16), np.linspace(0.91, 1.0, 16)])[:, None]
     random = np.random.default_rng(11)
     jag = sum(np.sin(azimuth * n + random.uniform(0, 6.3)) for n in (7, 13, 29, 53)) * 0.4
     line = np.radians(PchipInterpolator(*_HAIRLINE_DEG.T)(np.degrees(np.abs(azimuth))) + jag)
     line = line + np.radians(5) * np.sin(azimuth) * np.clip(np.cos(azimuth), 0, 1)
-    polar = share * line
+    polar = fraction * line
     direction = np.stack(
         [np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0 * azimuth, np.sin(polar) * np.cos(azimuth)], axis=-1
     )
     strands = _strands(direction, random)
-    thickness = _thickness(share, azimuth, polar) * (1 + 0.07 * strands) - 0.1
+    thickness = _thickness(fraction, azimuth, polar) * (1 + 0.07 * strands) - 0.1
     radius = _head_radius(skin, polar, azimuth) + thickness
     vertices = SKULL_CENTER + direction * radius[..., None]
     color = _TONE * (1 + 0.4 * strands)[..., None]
     # Single hairs thin out towards the hairline: the skin shines through.
-    fade = np.clip((share - 0.93) / 0.07, 0, 1)[..., None] ** 2 * 0.45
+    fade = np.clip((fraction - 0.93) / 0.07, 0, 1)[..., None] ** 2 * 0.45
     color = color + (SKIN_TONE * 0.8 - color) * fade
     return grid_part("hair", vertices, color, HAIR, closed=True, caster_step=6)
 
@@ -60,13 +60,13 @@ def _head_radius(skin: Floats, polar: Floats, azimuth: Floats) -> Floats:
     return np.asarray(surface(polar * np.sin(azimuth), polar * np.cos(azimuth)))
 
 
-def _thickness(share: Floats, azimuth: Floats, polar: Floats) -> Floats:
+def _thickness(fraction: Floats, azimuth: Floats, polar: Floats) -> Floats:
     """Centimeters of hair: full on top, swept up over the forehead to one side, short round the ears and neck."""
     front = np.exp(-(((azimuth - 0.15) / 0.85) ** 2))
     short = np.clip((np.degrees(polar) - 55) / 45, 0, 1)
     body = 1.75 - 1.15 * short
-    quiff = 1.25 * front * np.exp(-(((share - 0.66) / 0.27) ** 2))
-    edge = np.clip(1 - share**5, 0, 1) ** (0.5 + 0.3 * front)
+    quiff = 1.25 * front * np.exp(-(((fraction - 0.66) / 0.27) ** 2))
+    edge = np.clip(1 - fraction**5, 0, 1) ** (0.5 + 0.3 * front)
     return np.asarray((body + quiff) * edge)
 
 

@@ -137,12 +137,14 @@ def _eye() -> Albedo:
     radius, angle = np.hypot(dx, dy), np.arctan2(dy, dx)
     random = np.random.default_rng(3)
     eye = np.array([0.64, 0.62, 0.60]) * (1 - 0.25 * np.clip(radius - 0.45, 0, 1)[..., None] * [0.3, 1.0, 1.0])
-    share = radius / IRIS_SHARE
+    fraction = radius / IRIS_SHARE
     streaks = sum(np.sin(angle * n + random.uniform(0, 6.3)) for n in (17, 29, 41, 58)) / 8
-    tone = np.array([0.085, 0.15, 0.17]) * (0.75 + 1.1 * np.exp(-(((share - 0.55) / 0.22) ** 2)) + streaks)[..., None]
-    tone *= 1 - 0.75 * np.clip((share - 0.82) / 0.18, 0, 1)[..., None]
-    eye = _mixed(eye, tone, _step(share, 1.0, 0.035))
-    eye = _mixed(eye, np.full(3, 0.008), _step(share, 0.40, 0.03))
+    tone = (
+        np.array([0.085, 0.15, 0.17]) * (0.75 + 1.1 * np.exp(-(((fraction - 0.55) / 0.22) ** 2)) + streaks)[..., None]
+    )
+    tone *= 1 - 0.75 * np.clip((fraction - 0.82) / 0.18, 0, 1)[..., None]
+    eye = _mixed(eye, tone, _step(fraction, 1.0, 0.035))
+    eye = _mixed(eye, np.full(3, 0.008), _step(fraction, 0.40, 0.03))
     return eye.astype(np.float32)
 
 

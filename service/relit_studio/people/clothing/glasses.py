@@ -62,7 +62,9 @@ def fit_glasses(model: FaceModel, head: Floats, traits: GlassesTraits) -> Glasse
     for side in (-1.0, 1.0):
         rim = outline * [side, 1] + [side * aside, 0]
         frame.tube(placed(rim), traits.rim_cm, closed=True)
-        rings = [placed(outline * [side, 1] * share + [side * aside, 0]) for share in np.linspace(0.02, 1, _RINGS)]
+        rings = [
+            placed(outline * [side, 1] * fraction + [side * aside, 0]) for fraction in np.linspace(0.02, 1, _RINGS)
+        ]
         lenses.grid(np.stack(rings), closed=True)
         frame.tube(_temple(skin, placed(np.array([[side * (aside + half_width), 0.75 * half_height]]))[0], side),
                    max(0.11, 0.85 * traits.rim_cm))  # fmt: skip

@@ -60,8 +60,8 @@ def sew_shirt(
     middle, outward = _neckline(neck, 70)
     collar = _collar(middle, outward)
     _, nearest = find_nearest(cKDTree(middle), cloth)
-    share = 0.9 * smoothstep((cloth - _POINT) @ _NORMAL, -3, 0) * low
-    cloth = cloth + share[:, None] * (middle[nearest] - cloth) * [1, 0.4, 1]
+    fraction = 0.9 * smoothstep((cloth - _POINT) @ _NORMAL, -3, 0) * low
+    cloth = cloth + fraction[:, None] * (middle[nearest] - cloth) * [1, 0.4, 1]
     faces = np.column_stack([triangles[kept], np.full(int(kept.sum()), -1)])
     covered = (skin - _POINT) @ _NORMAL < -0.5
     under = None

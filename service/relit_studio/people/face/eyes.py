@@ -96,8 +96,8 @@ def eye_picture(traits: Traits) -> DisplayImage:
     # A full white looks unnatural beside dark skin.
     sclera = np.array(_SCLERA) * min(1.0, traits.skin[1] / 0.25) ** 0.2 * (1 - veins * [0.15, 0.6, 0.6])
     sclera = sclera * (1 - 0.25 * smoothstep(radius, 0.8, 1.5)[..., None] * [0.4, 0.9, 1.0])
-    share = smoothstep(radius, LIMBUS_CM - 0.06, LIMBUS_CM + 0.07)[..., None]
-    return uint8_from_linear((iris.clip(0, 1) * (1 - share) + sclera * share).astype(np.float32))
+    fraction = smoothstep(radius, LIMBUS_CM - 0.06, LIMBUS_CM + 0.07)[..., None]
+    return uint8_from_linear((iris.clip(0, 1) * (1 - fraction) + sclera * fraction).astype(np.float32))
 
 
 def _iris(traits: Traits, radius: Floats, angle: Floats, rng: np.random.Generator) -> Floats:

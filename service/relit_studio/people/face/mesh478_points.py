@@ -85,9 +85,9 @@ def _contours() -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
 def _along_edge(model: FaceModel, points: Floats, through: Indices) -> SurfacePoints:
     """Points (n, 3) of a curve, placed at the same relative arc lengths on the model's edge `through` some vertices."""
     path = _path(model, through)
-    share, lengths = _shares(points), _shares(model.vertices[path])
-    before = np.clip(np.searchsorted(lengths, share, side="right") - 1, 0, len(path) - 2)
-    part = np.clip((share - lengths[before]) / (lengths[before + 1] - lengths[before]), 0, 1)
+    fraction, lengths = _fractions(points), _fractions(model.vertices[path])
+    before = np.clip(np.searchsorted(lengths, fraction, side="right") - 1, 0, len(path) - 2)
+    part = np.clip((fraction - lengths[before]) / (lengths[before + 1] - lengths[before]), 0, 1)
     corners = np.stack([path[before], path[before + 1], path[before + 1]], axis=1)
     return SurfacePoints(corners, np.stack([1 - part, part, np.zeros_like(part)], axis=1))
 
@@ -112,7 +112,7 @@ def _path(model: FaceModel, through: Indices) -> Indices:
     return np.array(path, np.intp)
 
 
-def _shares(points: Floats) -> Floats:
-    """Share of a polyline's length at each of its points, 0..1."""
+def _fractions(points: Floats) -> Floats:
+    """Fraction of a polyline's length at each of its points, 0..1."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.asarray(np.concatenate([[0], np.cumsum(steps)]) / steps.sum())

@@ -23,7 +23,7 @@ class Combing:
         layer_cm: (n,) distance above `offset_cm` that a hair keeps from the skin.
         points: number of points of a hair.
         offset_cm: least distance from the skin away from the root.
-        loose_from: share of the length at which the combing's influence has fallen to 0.
+        loose_from: fraction of the length at which the combing's influence has fallen to 0.
         frees_face: whether hair is kept out of the face and pulled in below the ears.
         waviness_cm, waves: amplitude and number of a single hair's waves.
     """

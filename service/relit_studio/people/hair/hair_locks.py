@@ -12,7 +12,7 @@ from relit_studio.people.geometry import Floats, Indices, find_nearest, unit
 
 _HEAD_MIDDLE = np.array([0.0, 3.0, 0.0])
 _STRAYS = 0.03
-"""Share of stray hairs, which leave their lock."""
+"""Fraction of stray hairs, which leave their lock."""
 
 
 class Locks(NamedTuple):
@@ -38,16 +38,16 @@ class Curl(NamedTuple):
 
 
 def in_locks(
-    points: Floats, scales: Sequence[Locks], share: float, rng: np.random.Generator
+    points: Floats, scales: Sequence[Locks], fraction: float, rng: np.random.Generator
 ) -> tuple[Floats, Floats, Indices]:
-    """Hairs (n, points, 3) gathered at each scale in turn, of which only a `share` has been grown.
+    """Hairs (n, points, 3) gathered at each scale in turn, of which only a `fraction` has been grown.
 
     Returns their points, their shades (n,), and each one's guide (n,) at the last scale.
     """
     guide = np.arange(len(points))
     shade = 0.35 * rng.normal(size=len(points))
     for locks in scales:
-        guide = _guides(points[:, 0], share * locks.hairs, rng)
+        guide = _guides(points[:, 0], fraction * locks.hairs, rng)
         points = _gathered(points, guide, locks, rng)
         shade += locks.shade * rng.normal(size=len(points))[guide]
     return points, shade, guide

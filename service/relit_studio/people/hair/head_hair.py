@@ -48,23 +48,23 @@ _COMBED: dict[HairStyle, _Style] = {
 }
 
 
-def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits, share: float = 1.0) -> Hairs:
-    """Hair on a neutral head (vertices, 3) above clothes (n, 3); a `share` below 1 grows less, for quick previews."""
+def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits, fraction: float = 1.0) -> Hairs:
+    """Hair on a neutral head (vertices, 3) above clothes (n, 3); `fraction` below 1 grows less, for quick previews."""
     rng = np.random.default_rng(traits.seed + 100)
     if traits.hair in ("buzz", "bald"):
         count = 110_000 if traits.hair == "buzz" else 45_000
-        return _cropped(place_roots(model, head, int(share * count), rng, traits.hair), rng)
+        return _cropped(place_roots(model, head, int(fraction * count), rng, traits.hair), rng)
     if traits.hair == "afro":
-        return _coiled(place_roots(model, head, int(share * 42_000), rng, traits.hair), share, rng)
+        return _coiled(place_roots(model, head, int(fraction * 42_000), rng, traits.hair), fraction, rng)
     if traits.hair in ("ponytail", "bun"):
-        roots = place_roots(model, head, int(share * 42_000), rng, traits.hair)
-        return _tied(roots, traits.hair, head_and_body(model, head, body), share, rng)
+        roots = place_roots(model, head, int(fraction * 42_000), rng, traits.hair)
+        return _tied(roots, traits.hair, head_and_body(model, head, body), fraction, rng)
     style = _COMBED[traits.hair]
-    roots = place_roots(model, head, int(share * style.hairs), rng, traits.hair)
+    roots = place_roots(model, head, int(fraction * style.hairs), rng, traits.hair)
     combing = style.comb(roots, rng)
     obstacle = head_and_body(model, head, body)
     points = combed(roots, combing, obstacle, rng)
-    points, shade, guide = in_locks(points, style.locks, share, rng)
+    points, shade, guide = in_locks(points, style.locks, fraction, rng)
     if style.curl is not None:
         points = curled(points, guide, style.curl, rng)
         if combing.frees_face:
@@ -93,7 +93,7 @@ def _cropped(roots: Roots, rng: np.random.Generator) -> Hairs:
     return Hairs(points, np.full((count, steps), 0.0052) * np.linspace(1, 0.6, steps), 0.5 * rng.normal(size=count))
 
 
-def _coiled(roots: Roots, share: float, rng: np.random.Generator) -> Hairs:
+def _coiled(roots: Roots, fraction: float, rng: np.random.Generator) -> Hairs:
     """Tight coils that stand out in all directions."""
     count, steps = len(roots.place), 26
     radial = unit(roots.place - [0, 4.5, -1.5])
@@ -103,20 +103,22 @@ def _coiled(roots: Roots, share: float, rng: np.random.Generator) -> Hairs:
     direction = unit(0.5 * roots.normal + 0.7 * radial + 0.22 * rng.normal(size=(count, 3)))
     t = np.linspace(0, 1, steps)[None, :, None]
     points = roots.place[:, None] + direction[:, None] * length[:, None, None] * t
-    points, shade, guide = in_locks(points, _COILS, share, rng)
+    points, shade, guide = in_locks(points, _COILS, fraction, rng)
     points = curled(points, guide, Curl(0.2, 0.75, 0.2), rng)
     return Hairs(points, _thickness(points, rng, 1.1), shade)
 
 
-def _tied(roots: Roots, style: HairStyle, obstacle: Obstacle, share: float, rng: np.random.Generator) -> Hairs:
+def _tied(roots: Roots, style: HairStyle, obstacle: Obstacle, fraction: float, rng: np.random.Generator) -> Hairs:
     knot = KNOTS[style]
     surface, normal = obstacle.nearest(knot[None])
     knot = surface[0] + 1.1 * normal[0]
     points = drawn_back(roots, knot, obstacle, rng)
-    points, shade, _ = in_locks(points, _DRAWN, share, rng)
+    points, shade, _ = in_locks(points, _DRAWN, fraction, rng)
     points = frayed(points, np.full(len(points), 2.0), 0.04, 1.0, rng)
     knotted = (
-        tail(knot, obstacle, int(share * 9_000), rng) if style == "ponytail" else bun(knot, int(share * 12_000), rng)
+        tail(knot, obstacle, int(fraction * 9_000), rng)
+        if style == "ponytail"
+        else bun(knot, int(fraction * 12_000), rng)
     )
     tied = Hairs(knotted, _thickness(knotted, rng), 0.8 * rng.normal(size=len(knotted)))
     return concatenate_hairs([Hairs(points, _thickness(points, rng), shade), tied])

@@ -23,9 +23,9 @@ def grow_lashes(model: FaceModel, vertices: Floats, seed: int, amount: float = 1
             count = int((48 if upper else 20) * amount)
             place = np.sort(rng.uniform(0.6, _COLUMNS - 1.6, count))
             left = place.astype(int)
-            share = (place - left)[:, None, None]
+            fraction = (place - left)[:, None, None]
             grid = vertices[strip].transpose(1, 0, 2)
-            points = grid[left] * (1 - share) + grid[left + 1] * share
+            points = grid[left] * (1 - fraction) + grid[left + 1] * fraction
             length = rng.uniform(0.55, 0.95, count) * (0.9 if upper else 0.8)
             points = points[:, :1] + (points - points[:, :1]) * length[:, None, None]
             # The strips point at the camera, which would hide the lashes, so they are curled.

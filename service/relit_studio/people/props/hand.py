@@ -26,7 +26,7 @@ _STUB_CM = 5.0
 @cache
 def gripping_hand() -> Solid:
     """The subject's right hand about the mug, from the picture's left, in the mug's axes."""
-    # Height and share of length of index, middle, ring and little finger.
+    # Height and fraction of length of index, middle, ring and little finger.
     fingers = [
         _wrapped(height, length, thickness)
         for height, length, thickness in ((7.35, 0.95, 1.02), (5.5, 1.03, 1.05), (3.7, 0.97, 1), (2.05, 0.8, 0.88))

@@ -85,7 +85,7 @@ class HeldObjects:
         return {
             "hand": {
                 "kind": "plain",
-                "colour": [share * tint for share, tint in zip(self._person.traits.skin, _REDDER, strict=True)],
+                "colour": [fraction * tint for fraction, tint in zip(self._person.traits.skin, _REDDER, strict=True)],
                 "roughness": 0.5,
                 "scattering": 1.0,
             },

@@ -113,7 +113,7 @@ def surface_nets(field: Floats) -> tuple[Floats, NDArray[np.int64]]:
         along = np.eye(3, dtype=int)[axis]
         first, second = _shifted(field, (0, 0, 0), along), _shifted(field, tuple(along), along)
         cut = (first < 0) != (second < 0)
-        share = np.where(cut, first / np.where(cut, first - second, 1), 0)
+        fraction = np.where(cut, first / np.where(cut, first - second, 1), 0)
         crossings.append(cut)
         # The edge belongs to the four cells that share it.
         others = [other for other in range(3) if other != axis]
@@ -121,7 +121,7 @@ def surface_nets(field: Floats) -> tuple[Floats, NDArray[np.int64]]:
             offset = np.zeros(3, int)
             offset[others] = near
             window = tuple(slice(shift, shift + size) for shift, size in zip(offset, cells, strict=True))
-            total += cut[window][..., None] * (corners + offset + share[window][..., None] * along)
+            total += cut[window][..., None] * (corners + offset + fraction[window][..., None] * along)
             count += cut[window]
     used = count > 0
     number = np.full(cells, -1)
@@ -147,7 +147,7 @@ def _distance_of_chain(points: Floats, chain: Floats) -> Floats:
     distances = []
     for (*start, wide), (*end, narrow) in pairwise(chain):
         axis, offset = np.subtract(end, start), points - start
-        share = np.clip(offset @ axis / (axis @ axis), 0, 1)
-        apart = np.linalg.norm(offset - share[:, None] * axis, axis=1)
-        distances.append(apart - (wide + share * (narrow - wide)))
+        fraction = np.clip(offset @ axis / (axis @ axis), 0, 1)
+        apart = np.linalg.norm(offset - fraction[:, None] * axis, axis=1)
+        distances.append(apart - (wide + fraction * (narrow - wide)))
     return np.asarray(np.min(distances, axis=0))

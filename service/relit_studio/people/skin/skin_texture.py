@@ -20,11 +20,11 @@ _MEAN_ALBEDO = (0.61, 0.355, 0.265)
 _FACE = slice(600, 1450)
 """Rows and columns of the map that hold the face."""
 _MELANIN_SPOT = np.array([0.35, 0.6, 0.8])
-"""Share of each channel that an age spot absorbs."""
+"""Fraction of each channel that an age spot absorbs."""
 _FOLD_SHADE = np.array([0.16, 0.26, 0.26])
-"""Share of each channel that a fold absorbs."""
+"""Fraction of each channel that a fold absorbs."""
 _BLOOD = np.array([0.04, 0.22, 0.18])
-"""Share of each channel that blood absorbs."""
+"""Fraction of each channel that blood absorbs."""
 _FLUSHED = (((392, 400), 48, 0.9), ((638, 400), 48, 0.9), ((513, 405), 26, 0.7), ((513, 590), 40, 0.3))
 """Cheeks, nose and chin: middle and radius in pixels of 1024 x 1024, and how red they are wont to be."""
 

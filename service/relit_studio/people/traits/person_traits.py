@@ -85,7 +85,7 @@ class Traits:
         shaved: whether the skin shows a shaved beard.
         hair: style.
         melanin, redness: of hair and brows, 0..1.
-        grey: share of hairs without color.
+        grey: fraction of hairs without color.
         beard: style.
         iris: linear albedo.
         lips: factor on the photographed lips.

@@ -29,7 +29,7 @@ class TrackingTunables:
         disc_radii: radius of what is compared: the ball with its limb and hardly any background.
         lamp_codes: pixels brighter than usual by more sRGB codes than this belong to the lamp's mirror image; they are
             left out, as they would bias the alignment.
-        max_lamp: share of the ball from which they are not left out, being no lamp's.
+        max_lamp: fraction of the ball from which they are not left out, being no lamp's.
         moved_radii: least shift, in radii, that counts: 2 degrees of light.
         hidden_correlation: relative to the film's median, the correlation below which the ball is hidden.
         sure_correlation: correlation below which the whole window is searched.

@@ -32,12 +32,12 @@ class ProfileTunables:
 
     Attributes:
         black_error: error of a dark picture: one sRGB code, linear.
-        level_error: error as a share of the brightness.
-        blur_error: error as a share of the contrast, by the unknown part of lens blur and compression.
+        level_error: error as a fraction of the brightness.
+        blur_error: error as a fraction of the contrast, by the unknown part of lens blur and compression.
         reflection_variances: variances per radian of the reflected surroundings that are tried, over that of the error.
         background_variances: variances per sample of the background that are tried, over that of the error, each with
             its negative log prior: a background this near is mostly plain.
-        absorption, absorption_error: share of the light that metal absorbs, and its standard deviation.
+        absorption, absorption_error: fraction of the light that metal absorbs, and its standard deviation.
         level_variance: variance of the unknown brightness, over that of the error: practically unlimited.
         blur_samples: steps per sample distance in which the lens blur is integrated.
     """
@@ -167,7 +167,7 @@ class MirrorOutlineFit:
 
     Attributes:
         outline: in pixels.
-        evidence: share of the rays from its center along which the limb is evident where it was found.
+        evidence: fraction of the rays from its center along which the limb is evident where it was found.
         log_focal, log_focal_error: natural logarithm of the focal length in pixels, and its standard error: prior
             knowledge combined with that from the outline's shape.
     """
@@ -203,9 +203,9 @@ def fit_mirror_outline(
     # The stretch of the ellipse is inverse to the square of the focal length, which gives the error of the latter.
     stretch = 2 * np.log(PinholeView(outline, (lights.shape[2], lights.shape[1]), float(np.exp(log_focal))).elongation)
     error = np.sqrt(2) * _OUTLINE.error_px / max(evidence, 0.1) / outline.radius / max(stretch, 1e-9)
-    share = log_focal_error**2 / (log_focal_error**2 + error**2)
-    combined = log_focal + share * float(found[3] - log_focal)
-    return MirrorOutlineFit(outline, evidence, combined, float(log_focal_error * np.sqrt(1 - share)))
+    fraction = log_focal_error**2 / (log_focal_error**2 + error**2)
+    combined = log_focal + fraction * float(found[3] - log_focal)
+    return MirrorOutlineFit(outline, evidence, combined, float(log_focal_error * np.sqrt(1 - fraction)))
 
 
 class _Rays:
@@ -257,7 +257,7 @@ class _Rays:
         return best, -cost(best)
 
     def evidence(self, parameters: Floats) -> float:
-        """Share of all rays that clearly prefer the limb at this outline over other positions."""
+        """Fraction of all rays that clearly prefer the limb at this outline over other positions."""
         value, beyond = self._interpolate(self._offsets(parameters))
         telling = (value - self._likely.mean(axis=1) > _OUTLINE.evidence / _OUTLINE.samples_per_value) & (beyond == 0)
         return float(np.count_nonzero(telling) / _OUTLINE.rays)

@@ -1,4 +1,4 @@
-"""Exposure fractions: the share of an exposure for which the flash was on, measured in blocks of the picture.
+"""Exposure fractions: the fraction of an exposure for which the flash was on, measured in blocks of the picture.
 
 They are measured about every edge of the flash, and predicted from a rolling shutter.
 """
@@ -24,8 +24,8 @@ class BlockTunables:
 
     Attributes:
         blocks: along either side of what the flash reaches.
-        min_cells: share of the median number of cells below which a block is left out, as a highlight that moves on a
-            ball is.
+        min_cells: fraction of the median number of cells below which a block is left out, as a highlight that moves on
+            a ball is.
         frames: before and after an edge in which fractions are measured.
         min_reach, max_reach: frames about a frame among which the darkest and the brightest are sought.
     """
@@ -46,7 +46,7 @@ class BrightnessBlocks:
 
     Attributes:
         level: (frames, blocks) linear, divided by the gains.
-        place: (blocks, 2) centers x, y as shares of the picture's width and height.
+        place: (blocks, 2) centers x, y as fractions of the picture's width and height.
     """
 
     level: Floats
@@ -92,7 +92,7 @@ class ExposureFractions:
 
     Attributes:
         since: (edges, frames, blocks) seconds from the first guess of the edge to the frame.
-        place: (blocks,) position in the order of readout, as a share of the picture's height (or width).
+        place: (blocks,) position in the order of readout, as a fraction of the picture's height (or width).
         by_columns: whether columns are read one after another, not rows.
         fraction: (edges, frames, blocks) measured: 0 unlit, 1 lit throughout.
         root_weight: (edges, frames, blocks) square roots of their weights.

@@ -24,7 +24,7 @@ MIN_FLASHES = 8
 FULLY_LIT_FRACTION = 0.98
 """A frame is bright if every row has at least this exposure fraction, and dark if every row has at most 1 less this."""
 _SHUTTER_ROWS = np.linspace(0, 1, 33)
-"""Rows (or columns) at which exposure fractions are computed, as shares of the picture's height (or width)."""
+"""Rows (or columns) at which exposure fractions are computed, as fractions of the picture's height (or width)."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,10 @@ class BlinkTunables:
         step_hz: distance of the frequencies that are tried.
         window_periods: length of the window in which the darkest and the brightest frame are sought.
         min_height: change of the level, relative to the 90th percentile, that counts as an edge.
-        min_variance_share: least share of the variance that the frequency explains.
+        min_variance_fraction: least fraction of the variance that the frequency explains.
         min_contrast: least ratio of bright to dark.
-        min_step: least share of the whole change that a flash makes from one frame to the next; a slow wave makes less.
+        min_step: least fraction of the whole change that a flash makes from one frame to the next; a slow wave makes
+            less.
         slow_frames: frames per period from which `min_step` applies.
         changing: ratio of brightness over a film in which a light was on all the time.
     """
@@ -47,7 +48,7 @@ class BlinkTunables:
     step_hz: float = 0.02
     window_periods: float = 1.1
     min_height: float = 0.04
-    min_variance_share: float = 0.2
+    min_variance_fraction: float = 0.2
     min_contrast: float = 1.15
     min_step: float = 0.25
     slow_frames: float = 8
@@ -63,11 +64,11 @@ class FlashFrequency:
 
     Attributes:
         frequency_hz: of its fundamental.
-        share: of the variance of the logarithm that the fundamental explains, 0..1.
+        fraction: of the variance of the logarithm that the fundamental explains, 0..1.
     """
 
     frequency_hz: float
-    share: float
+    fraction: float
 
 
 def find_flash_frequency(level: Floats, times_s: Floats) -> FlashFrequency:
@@ -143,8 +144,8 @@ def find_flash_edges(level: Floats, times_s: Floats, frequency_hz: float) -> Fla
     frame, rising = frame[kept], rising[kept]
     # Where the level does not change, it is the middle that crosses it.
     step = level[frame + 1] - level[frame]
-    share = np.divide(middle[frame] - level[frame], step, out=np.full(len(frame), 0.5), where=step != 0)
-    return FlashEdges(times_s[frame] + np.clip(share, 0, 1) * (times_s[frame + 1] - times_s[frame]), rising, frame)
+    fraction = np.divide(middle[frame] - level[frame], step, out=np.full(len(frame), 0.5), where=step != 0)
+    return FlashEdges(times_s[frame] + np.clip(fraction, 0, 1) * (times_s[frame + 1] - times_s[frame]), rising, frame)
 
 
 def _local_extremes(level: Floats, interval_s: float, frequency_hz: float) -> tuple[Floats, Floats]:
@@ -169,7 +170,7 @@ def require_flashing(level: Floats, interval_s: float, beat: FlashFrequency, edg
     contrast = float(np.median(high / np.maximum(low, 1e-6)))
     step = np.abs(level[edges.frame + 1] - level[edges.frame]) / np.maximum((high - low)[edges.frame], 1e-9)
     slow = 1 / beat.frequency_hz / interval_s >= _TUNABLES.slow_frames
-    blinks = beat.share >= _TUNABLES.min_variance_share and contrast >= _TUNABLES.min_contrast and len(step) > 0
+    blinks = beat.fraction >= _TUNABLES.min_variance_fraction and contrast >= _TUNABLES.min_contrast and len(step) > 0
     if not blinks or (slow and np.median(step) < _TUNABLES.min_step):
         ratio = float(np.percentile(level, 98) / max(np.percentile(level, 2), 1e-6))
         if ratio > _TUNABLES.changing:
@@ -217,7 +218,7 @@ class FlashSchedule:
 
     @property
     def duty(self) -> float:
-        """Share of the time for which the light is on."""
+        """Fraction of the time for which the light is on."""
         return float(np.median(self.off_s - self.on_s)) * self.frequency_hz
 
     def exposure_fractions(self, times_s: Floats, shutter: RollingShutter) -> Floats:

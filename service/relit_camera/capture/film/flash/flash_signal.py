@@ -37,13 +37,13 @@ class SignalTunables:
     """Which cells the flash reaches; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
 
     Attributes:
-        min_response: share of the strongest response (logarithm) from which a cell counts as reached by the flash.
+        min_response: fraction of the strongest response (logarithm) from which a cell counts as reached by the flash.
         least_following: percentile of the cells' regression on the flash that stands for the camera's gains alone;
             automatic exposure follows the flash too, mostly against it.
         following_margin: a cell shows the gains if its regression exceeds that by no more.
         reached_everywhere: if the percentile exceeds this, the flash reaches everything.
         min_visible: least mean brightness of a cell that shows the gains.
-        min_unreached: least share of all cells that must show the gains.
+        min_unreached: least fraction of all cells that must show the gains.
     """
 
     min_response: float = 0.5

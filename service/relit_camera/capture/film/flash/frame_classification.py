@@ -46,15 +46,15 @@ class ClassTunables:
     """What frames are good for; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
 
     Attributes:
-        edge_error_s, edge_jitter: standard error of an edge, of a steady flash and as a share of its jitter; frames
+        edge_error_s, edge_jitter: standard error of an edge, of a steady flash and as a fraction of its jitter; frames
             nearer to an edge are partial.
-        min_whole_flashes: share of the flashes that must light a whole frame; with fewer, they are too fast.
-        min_lit, min_lit_alone: a block of a bright frame is an outlier with less than this share of the light that its
-            neighbors in time and the rest of the frame make one expect; the second where the frame is the only one of
-            its flash, as the light moves from flash to flash.
-        max_stray: a block of a dark frame is an outlier with more than this share of the flash's light.
+        min_whole_flashes: fraction of the flashes that must light a whole frame; with fewer, they are too fast.
+        min_lit, min_lit_alone: a block of a bright frame is an outlier with less than this fraction of the light that
+            its neighbors in time and the rest of the frame make one expect; the second where the frame is the only one
+            of its flash, as the light moves from flash to flash.
+        max_stray: a block of a dark frame is an outlier with more than this fraction of the flash's light.
         alone_frames: distance to the nearest bright frame beyond which that belongs to another flash.
-        min_height: blocks are not judged where the flash adds less than this share of the median.
+        min_height: blocks are not judged where the flash adds less than this fraction of the median.
         strength_percentile: percentile of the light that a flash adds to the cells: that of what faces it.
         dark_frames: nearest dark frames whose mean is subtracted from a flash.
     """
@@ -97,7 +97,7 @@ class FlashFrame:
         kind: its class.
         reason: why it is rejected, else empty.
         flash: number of the nearest flash, from 0.
-        exposure_fraction: share of its exposure for which the flash was on, mean over the rows, 0..1.
+        exposure_fraction: fraction of its exposure for which the flash was on, mean over the rows, 0..1.
     """
 
     index: int
@@ -201,11 +201,11 @@ def find_outlier_frames(blocks: BrightnessBlocks, bright: Indices, dark: Indices
     lit, unlit = blocks.between(bright), blocks.between(dark)
     height = np.maximum(lit - unlit, 1e-9)
     clear = height > _TUNABLES.min_height * np.median(height[bright])
-    shares = ((blocks.level - unlit) / height)[bright]
+    fractions = ((blocks.level - unlit) / height)[bright]
     gap = np.diff(bright, prepend=-_TUNABLES.alone_frames - 1, append=2 * bright[-1])
     alone = np.minimum(gap[:-1], gap[1:]) > _TUNABLES.alone_frames
     least = np.where(alone, _TUNABLES.min_lit_alone, _TUNABLES.min_lit)
-    missing = (shares < np.median(shares, axis=1, keepdims=True) * least[:, None]) & clear[bright]
+    missing = (fractions < np.median(fractions, axis=1, keepdims=True) * least[:, None]) & clear[bright]
     of_frame = np.median(blocks.level / np.maximum(unlit, 1e-9), axis=1, keepdims=True)
     stray = ((blocks.level - of_frame * unlit) / height > _TUNABLES.max_stray)[dark]
     outliers = [(bright[missing.any(axis=1)], "bright"), (dark[(stray & clear[dark]).any(axis=1)], "dark")]
@@ -243,7 +243,7 @@ def require_fully_lit_frames(frequency_hz: float, interval_s: float, whole: floa
     Args:
         frequency_hz: of the flashes.
         interval_s: from frame to frame.
-        whole: share of the flashes that light a whole frame.
+        whole: fraction of the flashes that light a whole frame.
 
     Raises:
         CaptureError: too few do.

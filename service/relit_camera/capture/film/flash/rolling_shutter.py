@@ -1,7 +1,7 @@
 """The camera's rolling shutter, and the flash's edges to a fraction of a frame, from partly lit frames.
 
-A row (or column) at share y of the picture is exposed from t + y · readout for `exposure_s`. A light that goes on at
-time a is on for the share clip((t + y · readout + exposure − a) / exposure, 0, 1) of it. Readout and exposure are
+A row (or column) at fraction y of the picture is exposed from t + y · readout for `exposure_s`. A light that goes on at
+time a is on for the fraction clip((t + y · readout + exposure − a) / exposure, 0, 1) of it. Readout and exposure are
 fitted to all edges of a film together; where few frames are partly lit, the nearly regular times of the flashes
 determine the rest.
 """
@@ -40,7 +40,7 @@ class ShutterTunables:
         fraction_error: standard error of a block's exposure fraction, by motion of light and head between frames.
         jitters_s: standard deviations of the flash's period that are tried: of a steady one, of an app's, and by hand.
             Larger deviations count linearly, not squared, so a flash that jitters is followed where frames show it.
-        usual_exposure: exposure as a share of the frame interval. A flash in step with the frames shows only the
+        usual_exposure: exposure as a fraction of the frame interval. A flash in step with the frames shows only the
             relation of exposure and readout: then this prior decides; else it counts no more than one block.
         iterations: most iterations of the fit.
         tolerance: ratio of the cost to the best at which the steadier flash is preferred.

@@ -34,7 +34,7 @@ class AgreementTunables:
     Attributes:
         max_gap_deg, max_gap_ratio: a frame's rays contradict where their gap exceeds this angle and this multiple of
             the median gap.
-        max_contradicting: share of the frames that may do so now and then, by a hand or a lamp mirrored twice.
+        max_contradicting: fraction of the frames that may do so now and then, by a hand or a lamp mirrored twice.
         min_distance_ratio: least distance of the lamp from the head, over that of the farther ball.
     """
 

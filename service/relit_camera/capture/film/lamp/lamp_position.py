@@ -146,8 +146,8 @@ class DistanceTunables:
         prior_error: relative standard error of the distance that the user gives.
         hand_variation: relative standard deviation by which a hand that moves about a person varies the distance.
         correlation_time_s: time for which it keeps a deviation.
-        frames_per_error: successive frames that share one ray error, since that comes from the ball's outline; so many
-            count as one.
+        frames_per_error: successive frames that share one ray error, since that comes from the ball's outline; so
+            many count as one.
     """
 
     min_ray_error: float = np.radians(0.2)

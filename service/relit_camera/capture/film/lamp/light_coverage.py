@@ -79,9 +79,9 @@ def require_light_coverage(directions: Floats, bright: int) -> None:
         raise _too_few(count, bright)
     area = covered_solid_angle(directions)
     if area < _COVERAGE.min_area_sr:
-        share = area / (2 * np.pi)
+        fraction = area / (2 * np.pi)
         raise CaptureError(
-            f"the light covers {share:.0%} of the space before the face",
+            f"the light covers {fraction:.0%} of the space before the face",
             "move it farther: from one ear to the other, from below the chin to above the head",
         )
 

@@ -42,7 +42,7 @@ class StrengthTunables:
         correlated_pixels: neighbors that share one error, and so count as one.
         tilt: standard deviation of the tilt, per radian: that of a lamp that points 7 degrees beside the head.
         tilt_rounds: iterations of the robust fit of the tilt.
-        face: half the side of the square whose median depth is the head's, as a share of the picture's side.
+        face: half the side of the square whose median depth is the head's, as a fraction of the picture's side.
         aim: relative deviation from the trend over directions at which a flash counts half, as it points elsewhere.
         trend_rounds: iterations of the robust fit of that trend.
         far: factor of the lamps' distance that makes them practically distant.

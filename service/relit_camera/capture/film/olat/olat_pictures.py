@@ -185,5 +185,5 @@ def _interpolate_room(time_s: float, before: _Room | None, after: _Room | None) 
     if before is None or after is None:
         known = before or after
         return None if known is None else known.picture
-    share = np.float32(np.clip((time_s - before.time_s) / (after.time_s - before.time_s), 0, 1))
-    return before.picture + share * (after.picture - before.picture)
+    fraction = np.float32(np.clip((time_s - before.time_s) / (after.time_s - before.time_s), 0, 1))
+    return before.picture + fraction * (after.picture - before.picture)

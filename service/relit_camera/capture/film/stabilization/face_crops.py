@@ -55,11 +55,11 @@ class CropWindow:
         matrix[:, 2] -= self.left, self.top
         return warp_affine(picture, matrix, (self.side, self.side))
 
-    def disc(self, circle: FaceCircle, share: float) -> NDArray[np.float32]:
-        """Weights (side, side): 1 within a share of the circle's radius, falling to 0 over a tenth of the radius."""
+    def disc(self, circle: FaceCircle, fraction: float) -> NDArray[np.float32]:
+        """Weights (side, side): 1 within a fraction of the circle's radius, falling to 0 over a tenth of the radius."""
         center = np.arange(self.side) + 0.5
         distance = np.hypot(center + self.left - circle.x, center[:, None] + self.top - circle.y) / circle.radius
-        return np.asarray(np.clip((share + 0.1 - distance) / 0.1, 0, 1), np.float32)
+        return np.asarray(np.clip((fraction + 0.1 - distance) / 0.1, 0, 1), np.float32)
 
     def in_picture(self, transform: RigidTransform) -> RigidTransform:
         """A transform about the square's center as one about the picture's."""

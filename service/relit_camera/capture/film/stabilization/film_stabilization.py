@@ -20,9 +20,9 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _MIN_TRACKED = 0.7
-"""Share of the dark frames in which the face must be found."""
+"""Fraction of the dark frames in which the face must be found."""
 _MIN_FEATURES = 0.1
-"""Share of the dark frames below which the face has no features to track."""
+"""Fraction of the dark frames below which the face has no features to track."""
 _MIN_BRIGHT_FRAMES = 8
 """Least bright frames for the refinement of their transforms."""
 _MAX_FLASH_PERIODS = 1.5

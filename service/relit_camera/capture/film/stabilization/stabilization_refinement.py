@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 _FEATURE_RADIUS = 0.6
-"""Share of the face's radius within which pixels count: features, and not the background at the outline."""
+"""Fraction of the face's radius within which pixels count: features, and not the background at the outline."""
 _BLUR_PX = 1.0
 """Standard deviation of the Gaussian that reduces noise."""
 _MIN_CORRELATION = 0.6

@@ -37,7 +37,7 @@ class Blend:
         """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         modelled = AppearanceMethod().build(samples)
         smooth = factored_field(RadialBasis(), samples)
-        return BlendField(modelled, smooth, choose_model_share(modelled))
+        return BlendField(modelled, smooth, choose_model_fraction(modelled))
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class BlendField:
     Attributes:
         modelled: the field of `model`, for every direction.
         smooth: the field of `rbf`, which fades to black beyond the sampled region.
-        share: weight of the model inside the region, 0..1; the smooth field has the rest.
+        fraction: weight of the model inside the region, 0..1; the smooth field has the rest.
     """
 
     modelled: AppearanceField
     smooth: FactoredField
-    share: float
+    fraction: float
 
     @property
     def size(self) -> tuple[int, int]:
@@ -79,14 +79,14 @@ class BlendField:
 
         `covered` is the weight of the smooth field, whose values have it as a factor already.
         """
-        rest = 1 - self.share
-        total = self.share + rest * covered + 1e-9
-        modelled *= self.share / total
+        rest = 1 - self.fraction
+        total = self.fraction + rest * covered + 1e-9
+        modelled *= self.fraction / total
         modelled += np.maximum(smooth, 0) * (rest / total)
         return modelled
 
 
-def choose_model_share(modelled: AppearanceField) -> float:
+def choose_model_fraction(modelled: AppearanceField) -> float:
     """The model's weight 0..1 that best predicts lights left out of both fits (stacking; Breiman 1996).
 
     Cross-validation in FOLDS parts over the lights that others surround, by least squares over some pixels. Geometry
