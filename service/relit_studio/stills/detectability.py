@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.face.face_state import FaceStatus, Tracker
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
@@ -14,7 +15,6 @@ from relit_camera.face.tracking.face_detector import FaceDetector
 from relit_camera.face.tracking.trackers import track_still
 from relit_studio.cameras.studio_camera import Camera
 from relit_studio.people.face.landmarks import landmarks
-from relit_studio.people.geometry import Floats
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 
@@ -90,7 +90,7 @@ def detectability_table(seen: Sequence[Detectability]) -> list[dict[str, float |
     return rows
 
 
-def _eyes_px(points: Floats, scheme: str, camera: Camera) -> float:
+def _eyes_px(points: Float64Array, scheme: str, camera: Camera) -> float:
     """Distance of the outer eye corners, in pixels, as a frontal view would show it."""
     known = landmark_scheme(scheme)
     right, left = points[known.right_eye.outer], points[known.left_eye.outer]

@@ -45,7 +45,7 @@ def test_mirrored_points_are_not_answered_with_a_mirror() -> None:
 
 def test_scattered_points_lie_on_the_mesh_by_area() -> None:
     triangles = triangles_of(FACES)
-    points = scatter(triangles, areas(SQUARE, triangles), 20_000, np.random.default_rng(0)).of(SQUARE)
+    points = scatter(triangles, areas(SQUARE, triangles), 20_000, np.random.default_rng(0)).interpolate(SQUARE)
     assert (points[:, 2] == 0).all()
     assert abs((points[:, 1] > 1).mean() - 0.5) < 0.015
     low = points[points[:, 1] < 1]
@@ -55,7 +55,7 @@ def test_scattered_points_lie_on_the_mesh_by_area() -> None:
 def test_values_go_with_points() -> None:
     triangles = triangles_of(FACES)
     points = scatter(triangles, areas(SQUARE, triangles), 50, np.random.default_rng(0))
-    np.testing.assert_allclose(points.of(SQUARE[:, 0]), points.of(SQUARE)[:, 0])
+    np.testing.assert_allclose(points.interpolate(SQUARE[:, 0]), points.interpolate(SQUARE)[:, 0])
 
 
 def test_neighbors_are_averaged() -> None:
@@ -78,8 +78,8 @@ def test_nearest_points_are_those_of_a_dense_search() -> None:
     triangles = triangles_of(quads)
     points = np.column_stack([rng.uniform(-1.5, 1.5, (40, 2)), rng.uniform(-0.5, 1.5, 40)])
     found = nearest_on_surface(points, vertices, triangles)
-    dense = scatter(triangles, areas(vertices, triangles), 200_000, rng).of(vertices)
+    dense = scatter(triangles, areas(vertices, triangles), 200_000, rng).interpolate(vertices)
     truth = np.linalg.norm(dense[None] - points[:, None], axis=-1).min(axis=1)
-    distance = np.linalg.norm(found.of(vertices) - points, axis=1)
+    distance = np.linalg.norm(found.interpolate(vertices) - points, axis=1)
     assert (distance < truth + 0.01).all()
     np.testing.assert_allclose(found.weights.sum(axis=1), 1)

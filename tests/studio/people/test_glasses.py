@@ -34,8 +34,8 @@ def test_glasses_do_not_cut_into_the_face(person: Person, seed: int, shape: Lens
     # The temples' ends lie behind the ears.
     front = np.concatenate([glasses.frame[glasses.frame[:, 2] > 3.0][::5], glasses.lenses[::7]])
     where = nearest_on_surface(front, head, triangles)
-    normal = where.of(vertex_normals(head, triangles))
-    assert ((front - where.of(head)) * normal).sum(axis=1).min() > 0
+    normal = where.interpolate(vertex_normals(head, triangles))
+    assert ((front - where.interpolate(head)) * normal).sum(axis=1).min() > 0
     right, left = (head[person.model.landmarks68[each]].mean(axis=0) for each in (slice(36, 42), slice(42, 48)))
     for eye in (right, left):
         lens = glasses.lenses[np.linalg.norm(glasses.lenses[:, :2] - eye[:2], axis=1) < 0.8]

@@ -64,7 +64,9 @@ def test_beards_stand_on_the_skin_beside_the_lips(person: Person, style: BeardSt
     beard = grow_beard(model, person.neutral, person.neutral, 4, style)
     assert beard is not None
     roots = beard.points[::11, 0]
-    surface = nearest_on_surface(roots, person.neutral, model.triangles(Part.FACE, Part.HEAD)).of(person.neutral)
+    surface = nearest_on_surface(roots, person.neutral, model.triangles(Part.FACE, Part.HEAD)).interpolate(
+        person.neutral
+    )
     assert np.linalg.norm(roots - surface, axis=1).max() < 1e-6
     lips = person.neutral[model.landmarks68[48:60]]
     inside = (np.abs(roots[:, 0]) < 0.7) & (roots[:, 1] < lips[3, 1] - 0.25) & (roots[:, 1] > lips[9, 1] + 0.25)
@@ -84,7 +86,7 @@ def test_a_beard_follows_the_jaw(person: Person) -> None:
     assert open_beard is not None
     triangles = model.triangles(Part.FACE, Part.HEAD)
     where = nearest_on_surface(closed_beard.points[::7, 0], person.neutral, triangles)
-    np.testing.assert_allclose(open_beard.points[::7, 0], where.of(opened), atol=1e-6)
+    np.testing.assert_allclose(open_beard.points[::7, 0], where.interpolate(opened), atol=1e-6)
     drop = (open_beard.points - closed_beard.points)[..., 1].mean(axis=1)
     marks = model.landmarks68
     chin = (opened - person.neutral)[marks[8], 1]

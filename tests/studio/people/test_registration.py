@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import InputError
 from relit_studio.people.face.face_model import IDENTITIES, Part, read_face_model
 from relit_studio.people.face.mesh478_points import nearest_on_surface
-from relit_studio.people.geometry import Floats, Indices, Similarity, areas, scatter, vertex_normals
+from relit_studio.people.geometry import Similarity, areas, scatter, vertex_normals
 from relit_studio.people.skin.scan_registration import LANDMARKS, fit
 from tests.studio.people.tiny_model import tiny_model
 
@@ -24,8 +25,8 @@ def test_a_known_identity_is_recovered() -> None:
     triangles = model.triangles(Part.FACE)
     where = scatter(triangles, areas(truth, triangles), 20_000, np.random.default_rng(1))
     scan_from_model = Similarity(0.2, Rotation.from_euler("y", 8, degrees=True).as_matrix(), np.array([0.3, 1, -2]))
-    points = scan_from_model.apply(where.of(truth))
-    normals = where.of(vertex_normals(truth, triangles)) @ scan_from_model.rotation.T
+    points = scan_from_model.apply(where.interpolate(truth))
+    normals = where.interpolate(vertex_normals(truth, triangles)) @ scan_from_model.rotation.T
     targets = scan_from_model.apply(truth[model.landmarks68[LANDMARKS]])
 
     similarity, mesh, distance = fit(model, model.vertices, points, normals, targets, rounds=12)
@@ -38,10 +39,10 @@ def test_a_known_identity_is_recovered() -> None:
     assert abs(similarity.scale * 0.2 - 1) < 0.02
 
 
-def _apart(vertices: Floats, surface: Floats, triangles: Indices) -> float:
+def _apart(vertices: Float64Array, surface: Float64Array, triangles: Indices) -> float:
     """Mean distance of inner vertices from a surface."""
     inner = vertices[np.abs(tiny_model().vertices[:, :2]).max(axis=1) < 7]
-    nearest = nearest_on_surface(inner, surface, triangles).of(surface)
+    nearest = nearest_on_surface(inner, surface, triangles).interpolate(surface)
     return float(np.linalg.norm(nearest - inner, axis=1).mean())
 
 

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.geometry.photometric_stereo import photometric_stereo
 from relit_camera.capture.reflectance.appearance_model import appearance_terms, fit_appearance, half_vectors
-
-Floats = NDArray[np.float32]
 
 _UNOCCLUDED_MARGIN = 10.0
 """A margin above the horizon at which nothing hides the light."""
@@ -79,7 +78,7 @@ def predict_pictures(
 
 
 def find_outlier_pictures(
-    light: Floats, predicted: Floats, directions: NDArray[np.float64], matte: Mask
+    light: Float32Array, predicted: Float32Array, directions: NDArray[np.float64], matte: Mask
 ) -> dict[int, str]:
     """Index of each picture that does not belong to the set, with the reason as a text for the user.
 
@@ -108,7 +107,7 @@ def find_outlier_pictures(
     return reasons
 
 
-def masked_correlation(light: Floats, predicted: Floats, matte: Mask) -> NDArray[np.float64]:
+def masked_correlation(light: Float32Array, predicted: Float32Array, matte: Mask) -> NDArray[np.float64]:
     """Correlation (lights,) of luminances (lights, height, width) inside a matte; 0 of a flat one."""
     one, other = (pictures[:, matte > 0.5].astype(np.float64) for pictures in (light, predicted))
     one, other = one - one.mean(axis=1, keepdims=True), other - other.mean(axis=1, keepdims=True)
@@ -116,7 +115,7 @@ def masked_correlation(light: Floats, predicted: Floats, matte: Mask) -> NDArray
     return np.asarray((one * other).sum(axis=1) / np.maximum(energy, 1e-12))
 
 
-def _roughness(light: Floats) -> NDArray[np.float64]:
+def _roughness(light: Float32Array) -> NDArray[np.float64]:
     """Mean second difference (lights,) along columns or rows, whichever is larger: torn fields show along columns."""
     down, across = (np.abs(np.diff(light, 2, axis=axis)).mean(axis=(1, 2)) for axis in (1, 2))
     return np.asarray(np.maximum(down, across), np.float64)

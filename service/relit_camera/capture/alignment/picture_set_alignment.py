@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.errors import LightsError
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import LinearImage, Mask
@@ -31,8 +32,6 @@ from relit_camera.capture.alignment.template_alignment import (
     without_border,
 )
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
-
-Floats = NDArray[np.float32]
 
 MIN_PICTURES = 8
 """Fewer pictures cannot tell motion from shading."""
@@ -97,7 +96,7 @@ class Alignment:
         """Indices of the pictures that are not rejected, ascending."""
         return np.setdiff1d(np.arange(len(self.gains)), list(self.rejected))
 
-    def pictures(self, pictures: Floats) -> Floats:
+    def pictures(self, pictures: Float32Array) -> Float32Array:
         """All pictures (lights, height, width, channels), each transformed and multiplied by its gain."""
         moved = zip(pictures, self.transforms, self.gains.tolist(), strict=True)
         return np.stack([apply_alignment(*each) for each in moved])
@@ -115,7 +114,7 @@ class Alignment:
 
 
 def align_samples(
-    pictures: Floats,
+    pictures: Float32Array,
     directions: NDArray[np.float64],
     matte: Mask,
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -144,7 +143,7 @@ def align_samples(
     return Alignment(tuple(each.scaled(1 / scale) for each in transforms), gains, correlation, rejected)
 
 
-def downscale_for_alignment(pictures: Floats, matte: Mask) -> tuple[Floats, Mask, float]:
+def downscale_for_alignment(pictures: Float32Array, matte: Mask) -> tuple[Float32Array, Mask, float]:
     """Pictures (lights, height, width, 3) and matte, shrunk to the size of comparison, and the scale, 1 at most."""
     scale = min(1.0, TUNABLES.largest_side_px / max(matte.shape))
     return np.stack([shrink(picture, scale) for picture in pictures]), shrink(matte, scale), scale
@@ -174,7 +173,7 @@ def align_to_prediction(picture: LinearImage, predicted: LinearImage, matte: Mas
     return transform, _gain(luminance(apply_alignment(picture, transform)), luminance(predicted), matte, np.inf)
 
 
-def apply_alignment(picture: Floats, transform: RigidTransform, gain: float = 1.0) -> Floats:
+def apply_alignment(picture: Float32Array, transform: RigidTransform, gain: float = 1.0) -> Float32Array:
     """A picture (height, width[, channels]) transformed and multiplied by its gain; never negative."""
     moved = picture if transform == RigidTransform() else warp_to_reference(picture, transform)
     return np.maximum(moved, 0) * np.float32(gain)
@@ -191,7 +190,9 @@ def _without_drift(transforms: list[RigidTransform], directions: NDArray[np.floa
     return transforms_from_array(rows - terms @ np.linalg.lstsq(terms, rows)[0])
 
 
-def _gains(light: Floats, predicted: Floats, directions: NDArray[np.float64], matte: Mask) -> NDArray[np.float64]:
+def _gains(
+    light: Float32Array, predicted: Float32Array, directions: NDArray[np.float64], matte: Mask
+) -> NDArray[np.float64]:
     """Gains (lights,) of pictures (lights, height, width) toward their predictions; 1 for lights from behind."""
     saturated = TUNABLES.saturated_fraction * float(light.max())
     in_front = directions[:, 2] > 0
@@ -201,7 +202,7 @@ def _gains(light: Floats, predicted: Floats, directions: NDArray[np.float64], ma
     return np.asarray(gains / np.median(gains[in_front])) if in_front.any() else gains
 
 
-def _gain(light: Floats, predicted: Floats, matte: Mask, saturated: float) -> float:
+def _gain(light: Float32Array, predicted: Float32Array, matte: Mask, saturated: float) -> float:
     """The median ratio of prediction to picture (height, width) over lit pixels; 1 if too few are lit."""
     observed, expected = light[matte > 0.5], predicted[matte > 0.5]
     lit = (

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.images.resize import shrink
 from relit_camera.capture.alignment.rigid_transform import (
     RigidTransform,
@@ -29,7 +30,6 @@ from relit_camera.capture.alignment.rigid_transform import (
 
 Picture = NDArray[np.float32]
 Pictures = NDArray[np.float32]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,9 @@ def _one_round(
     return transforms_from_array(rows - rows.mean(axis=0) + transforms_to_array(start).mean(axis=0))
 
 
-def predict_from_similar(gram: Floats, index: int, groups: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+def predict_from_similar(
+    gram: Float64Array, index: int, groups: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], Float64Array]:
     """Indices of the pictures most similar to one, and their weights in its prediction, by ridge regression.
 
     Args:
@@ -232,7 +234,7 @@ def predict_from_similar(gram: Floats, index: int, groups: NDArray[np.intp]) -> 
     return like, np.linalg.solve(among + ridge, gram[like, index])
 
 
-def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Floats:
+def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Float64Array:
     """Small blurred pictures (count, values) that show shading without features."""
     size = (min(weights.shape[1], TUNABLES.thumbnail_side_px), min(weights.shape[0], TUNABLES.thumbnail_side_px))
 

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import LinearImage, Mask
-
-Floats = NDArray[np.float32]
 
 BLOCK = 1 << 12
 """Pixels solved at a time: 1 MB an array at 64 lights, which stays in the cache."""
@@ -66,13 +65,13 @@ class PhotometricStereoResult:
             the light is behind the surface or nearly so.
     """
 
-    normals: Floats
+    normals: Float32Array
     albedo: LinearImage
     confidence: Mask
     lit: NDArray[np.float16]
 
 
-def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte: Mask) -> PhotometricStereoResult:
+def photometric_stereo(pictures: Float32Array, directions: NDArray[np.float64], matte: Mask) -> PhotometricStereoResult:
     """Fit Lambert's law to every pixel of the matte.
 
     Args:
@@ -119,7 +118,7 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
     )
 
 
-def _fit(values: Floats, toward: Floats, noise: float) -> tuple[Floats, Floats, Floats]:
+def _fit(values: Float32Array, toward: Float32Array, noise: float) -> tuple[Float32Array, Float32Array, Float32Array]:
     """ρ·n (pixels, 3) fitted to values (pixels, lights), the final weights, and the expected error in degrees."""
     unit = np.percentile(values, TUNABLES.unit_percentile, axis=1, keepdims=True).astype(np.float32)
     values = np.asarray(values / np.maximum(unit, 1e-9), np.float32)
@@ -144,7 +143,7 @@ def _fit(values: Floats, toward: Floats, noise: float) -> tuple[Floats, Floats, 
     return (scaled * unit).astype(np.float32), weights, error_deg.astype(np.float32)
 
 
-def _solve(weights: Floats, values: Floats, toward: Floats) -> tuple[Floats, Floats]:
+def _solve(weights: Float32Array, values: Float32Array, toward: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Weighted least squares of ρ·n (pixels, 3), and the inverse (pixels, 3, 3) of its normal matrix."""
     products = (toward[:, :, None] * toward[:, None, :]).reshape(-1, 9)
     # A small multiple of the unit matrix, so that pixels with fewer than three lights have a (poor) solution.

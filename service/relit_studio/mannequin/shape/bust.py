@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from relit_studio.mannequin.shape.mesh import Floats
+from relit_camera.base.array_types import Float64Array
 from relit_studio.mannequin.shape.part import CLOTH, SKIN, Part, grid_part
 from relit_studio.mannequin.shape.texture_atlas import SKIN_TONE
 
@@ -61,7 +61,7 @@ def base() -> Part:
     return grid_part("base", middle + shrunk * (edge - middle), _CLOTH_TONE, CLOTH, closed=True, caster_step=1)
 
 
-def _body(heights: Floats, offset: ArrayLike) -> Floats:
+def _body(heights: Float64Array, offset: ArrayLike) -> Float64Array:
     """Points (rows, columns, 3) of the body at these heights (rows, columns), `offset` away from it."""
     profile = PchipInterpolator(_PROFILE[:, 0], _PROFILE[:, 1:])(np.clip(heights, -28, -3))
     width, depth, middle = np.moveaxis(profile, -1, 0)

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks
 from relit_studio.mannequin.shape.head import (
@@ -18,7 +19,7 @@ from relit_studio.mannequin.shape.head import (
     control_head,
     eye_center,
 )
-from relit_studio.mannequin.shape.mesh import Floats, spread
+from relit_studio.mannequin.shape.mesh import spread
 
 JAW_HINGE = np.array([0.0, 0.0, -3.0])
 JAW_RANGE_DEG = 23.0
@@ -58,15 +59,15 @@ class Expression:
 class _Fields:
     """Displacements (control vertices, 3) in centimeters of each movement at 1, and the jaw's weights (vertices, 1)."""
 
-    rest: Floats
-    blink_right: Floats
-    blink_left: Floats
-    smile: Floats
-    brows: Floats
-    jaw: Floats
+    rest: Float64Array
+    blink_right: Float64Array
+    blink_left: Float64Array
+    smile: Float64Array
+    brows: Float64Array
+    jaw: Float64Array
 
 
-def control_vertices(expression: Expression) -> Floats:
+def control_vertices(expression: Expression) -> Float64Array:
     """The control mesh's vertices (count, 3) in head axes, in this expression."""
     fields = _fields()
     vertices = (
@@ -82,7 +83,7 @@ def control_vertices(expression: Expression) -> Floats:
     return vertices
 
 
-def jaw_motion(points: Floats, opening: ArrayLike) -> Floats:
+def jaw_motion(points: Float64Array, opening: ArrayLike) -> Float64Array:
     """Displacements (count, 3) of points (count, 3) that follow a jaw opened by fractions (count, 1) or one number."""
     angle = np.radians(JAW_RANGE_DEG) * np.asarray(opening, np.float64)
     y, z = points[:, 1:2] - JAW_HINGE[1], points[:, 2:] - JAW_HINGE[2]
@@ -92,7 +93,7 @@ def jaw_motion(points: Floats, opening: ArrayLike) -> Floats:
     return np.concatenate([np.zeros_like(down), down, back], axis=1)
 
 
-def gaze_rotation(expression: Expression) -> Floats:
+def gaze_rotation(expression: Expression) -> Float64Array:
     """Rotation matrix (3, 3) of both eyeballs in the head."""
     return rotation_from_angles(expression.gaze_yaw_deg, expression.gaze_pitch_deg).as_matrix()
 
@@ -118,12 +119,12 @@ def _fields() -> _Fields:
     )
 
 
-def _spread(fixed: dict[int, ArrayLike], order: int = 2) -> Floats:
+def _spread(fixed: dict[int, ArrayLike], order: int = 2) -> Float64Array:
     mesh = control_head().mesh
     return spread(mesh.triangles, len(mesh.vertices), fixed, order)
 
 
-def _still(points: Floats, middle: Floats, radius: float, *but: int) -> dict[int, ArrayLike]:
+def _still(points: Float64Array, middle: Float64Array, radius: float, *but: int) -> dict[int, ArrayLike]:
     """Zero displacements that fix all vertices farther than `radius` from `middle`, except vertices `but`."""
     far = np.flatnonzero(np.linalg.norm(points - middle, axis=1) > radius)
     return {int(index): np.zeros(3) for index in far if index not in but}
@@ -135,7 +136,7 @@ def _lid_pairs(eye: EyeLandmarks) -> list[tuple[int, int]]:
     return list(zip(upper, lower, strict=True))
 
 
-def _blink(points: Floats, eye: EyeLandmarks, upper_fraction: float) -> Floats:
+def _blink(points: Float64Array, eye: EyeLandmarks, upper_fraction: float) -> Float64Array:
     middle = points[list(eye.lids)].mean(axis=0)
     fixed = _still(points, middle, 2.3, *eye.lids)
     fixed |= {eye.outer: np.zeros(3), eye.inner: np.zeros(3)}
@@ -145,7 +146,7 @@ def _blink(points: Floats, eye: EyeLandmarks, upper_fraction: float) -> Floats:
     return _spread(fixed)
 
 
-def _keep_outside_eyeball(vertices: Floats, eye: EyeLandmarks) -> None:
+def _keep_outside_eyeball(vertices: Float64Array, eye: EyeLandmarks) -> None:
     center = eye_center(eye)
     near = np.linalg.norm(vertices[:FACE_COUNT] - center, axis=1) < EYE_RADIUS + 0.6
     indices = np.flatnonzero(near)
@@ -154,7 +155,7 @@ def _keep_outside_eyeball(vertices: Floats, eye: EyeLandmarks) -> None:
     vertices[indices] = center + offset * np.maximum(1, (EYE_RADIUS + LID_THICKNESS) / distance)
 
 
-def _close_lips(points: Floats) -> Floats:
+def _close_lips(points: Float64Array) -> Float64Array:
     middle = points[[13, 14]].mean(axis=0)
     mouth = control_head().mouth
     fixed = _still(points, middle, 3.4, *mouth)
@@ -170,7 +171,7 @@ def _close_lips(points: Floats) -> Floats:
     return _spread(fixed)
 
 
-def _smile(points: Floats) -> Floats:
+def _smile(points: Float64Array) -> Float64Array:
     fixed = _still(points, np.array([0, -3.2, 3.5]), 6.3, *control_head().mouth)
     fixed |= {index: np.zeros(3) for index in (1, 2, 4, 5, 195, 152, 175, 199, 98, 327, 33, 263, 133, 362)}
     # Handles of the picture's left half; the other half mirrors them.
@@ -193,7 +194,7 @@ def _smile(points: Floats) -> Floats:
     return _spread(fixed)
 
 
-def _raise_brows(points: Floats) -> Floats:
+def _raise_brows(points: Float64Array) -> Float64Array:
     brows = [*SCHEME.right_brow, *SCHEME.left_brow]
     middle = points[brows].mean(axis=0)
     fixed = _still(points, middle, 6.2, *brows)
@@ -202,7 +203,7 @@ def _raise_brows(points: Floats) -> Floats:
     return _spread(fixed)
 
 
-def _jaw_weights(points: Floats) -> Floats:
+def _jaw_weights(points: Float64Array) -> Float64Array:
     """1 where skin follows the jaw, 0 where it stays with the skull, (count, 1)."""
     head = control_head()
     face = points[:FACE_COUNT]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks
 from relit_studio.mannequin.shape.head import EYE_RADIUS
-from relit_studio.mannequin.shape.mesh import Floats
 from relit_studio.mannequin.shape.part import EYE, SKIN, TOOTH, Part, grid_part
 from relit_studio.mannequin.shape.texture_atlas import IRIS_SHARE, SKIN_TONE, eye_paint_position
 
@@ -30,7 +30,7 @@ def eyeball(eye: EyeLandmarks, name: str) -> Part:
     return grid_part(name, vertices, np.ones(3), EYE, closed=True, mirrored=True, paint=paint, caster_step=3)
 
 
-def iris_points() -> Floats:
+def iris_points() -> Float64Array:
     """Iris landmarks (5, 3) on the eyeball about its center: middle, picture right, top, picture left, bottom."""
     ring = np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]]) * IRIS_SHARE
     depth = np.sqrt(1 - (ring**2).sum(axis=1, keepdims=True))

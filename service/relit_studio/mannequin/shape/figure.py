@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Angles, rotation_from_angles
 from relit_studio.mannequin.shape import features
@@ -18,7 +19,7 @@ from relit_studio.mannequin.shape.bust import base, neck, pullover
 from relit_studio.mannequin.shape.expression import Expression, control_vertices, gaze_rotation, jaw_motion
 from relit_studio.mannequin.shape.head import FACE_COUNT, SCHEME, control_head, eye_center
 from relit_studio.mannequin.shape.mannequin_hair import hair
-from relit_studio.mannequin.shape.mesh import Floats, Triangles, normal_operator, vertex_normals
+from relit_studio.mannequin.shape.mesh import Triangles, normal_operator, vertex_normals
 from relit_studio.mannequin.shape.part import SKIN, Part
 from relit_studio.mannequin.shape.texture_atlas import atlas, face_paint_position
 
@@ -95,7 +96,7 @@ class Figure:
         normals: NDArray[np.float32] = vertex_normals(vertices, self.triangles, self.summing)
         return normals
 
-    def landmarks(self, posture: Posture) -> Floats:
+    def landmarks(self, posture: Posture) -> Float64Array:
         """The points of scheme mesh478, (478, 3) float64 in room axes."""
         head = control_head()
         skin = head.skin[:FACE_COUNT] @ control_vertices(posture.expression)
@@ -163,7 +164,7 @@ def _skin() -> Part:
     )
 
 
-def _turned(points: Floats, rotation: Rotation) -> Floats:
+def _turned(points: Float64Array, rotation: Rotation) -> Float64Array:
     return np.asarray((points - PIVOT) @ rotation.as_matrix().T + PIVOT)
 
 

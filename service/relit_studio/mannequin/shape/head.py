@@ -12,9 +12,10 @@ from functools import lru_cache
 import numpy as np
 from scipy import sparse
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.face.landmarks.canonical_face import canonical_face
 from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks, landmark_scheme
-from relit_studio.mannequin.shape.mesh import Floats, Mesh, Triangles, extrude, loop_subdivision
+from relit_studio.mannequin.shape.mesh import Mesh, Triangles, extrude, loop_subdivision
 
 SCHEME = landmark_scheme("mesh478")
 FACE_COUNT = 468
@@ -77,7 +78,7 @@ def control_head() -> ControlHead:
     )
 
 
-def eye_center(eye: EyeLandmarks) -> Floats:
+def eye_center(eye: EyeLandmarks) -> Float64Array:
     """Center (3,) of the eyeball, so that its front touches the lids from behind."""
     lids = canonical_face().vertices[list(eye.lids)]
     middle = lids.mean(axis=0)
@@ -94,7 +95,7 @@ def _opened(triangles: Triangles) -> Triangles:
     return triangles[kept]
 
 
-def _eye_pocket(lids: Floats) -> list[Floats]:
+def _eye_pocket(lids: Float64Array) -> list[Float64Array]:
     middle = lids.mean(axis=0)
     return [lids - [0, 0, 0.3], middle + (lids - middle) * [1.08, 1.5, 1] - [0, 0, 0.9]]
 

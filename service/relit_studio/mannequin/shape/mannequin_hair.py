@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, PchipInterpolator
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.rotations import rotation_from_angles
 from relit_studio.mannequin.shape.head import SKULL_CENTER
-from relit_studio.mannequin.shape.mesh import Floats
 from relit_studio.mannequin.shape.part import HAIR, Part, grid_part
 from relit_studio.mannequin.shape.texture_atlas import SKIN_TONE
 
@@ -24,7 +24,7 @@ _COMBED_DEG = -62.0
 _ROWS, _COLUMNS = 72, 240
 
 
-def hair(skin: Floats) -> Part:
+def hair(skin: Float64Array) -> Part:
     """Hair on a head at rest whose skin's vertices (count, 3) are given."""
     azimuth = np.linspace(-np.pi, np.pi, _COLUMNS, endpoint=False)
     # The shell starts a little off the top, where a fine fan would shade badly, and ends under the skin.
@@ -48,7 +48,7 @@ def hair(skin: Floats) -> Part:
     return grid_part("hair", vertices, color, HAIR, closed=True, caster_step=6)
 
 
-def _head_radius(skin: Floats, polar: Floats, azimuth: Floats) -> Floats:
+def _head_radius(skin: Float64Array, polar: Float64Array, azimuth: Float64Array) -> Float64Array:
     """Distance of the head's surface from the skull's center, in directions by angle from the top and azimuth."""
     offset = skin - SKULL_CENTER
     radius = np.linalg.norm(offset, axis=1)
@@ -60,7 +60,7 @@ def _head_radius(skin: Floats, polar: Floats, azimuth: Floats) -> Floats:
     return np.asarray(surface(polar * np.sin(azimuth), polar * np.cos(azimuth)))
 
 
-def _thickness(fraction: Floats, azimuth: Floats, polar: Floats) -> Floats:
+def _thickness(fraction: Float64Array, azimuth: Float64Array, polar: Float64Array) -> Float64Array:
     """Centimeters of hair: full on top, swept up over the forehead to one side, short round the ears and neck."""
     front = np.exp(-(((azimuth - 0.15) / 0.85) ** 2))
     short = np.clip((np.degrees(polar) - 55) / 45, 0, 1)
@@ -70,7 +70,7 @@ def _thickness(fraction: Floats, azimuth: Floats, polar: Floats) -> Floats:
     return np.asarray((body + quiff) * edge)
 
 
-def _strands(direction: Floats, random: np.random.Generator) -> Floats:
+def _strands(direction: Float64Array, random: np.random.Generator) -> Float64Array:
     """About -1..1 (rows, columns): locks combed from the forehead at the picture's left over to the back right."""
     combed = direction @ rotation_from_angles(_COMBED_DEG).as_matrix()
     x, y, z = np.moveaxis(combed, -1, 0)

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-Floats = NDArray[np.float64]
+from relit_camera.base.array_types import Float64Array
+
 Triangles = NDArray[np.int64]
 """(count, 3) vertex indices, counter-clockwise seen from outside."""
 
@@ -19,7 +20,7 @@ Triangles = NDArray[np.int64]
 class Mesh:
     """Vertices (count, 3) float64 in centimeters, and triangles."""
 
-    vertices: Floats
+    vertices: Float64Array
     triangles: Triangles
 
 
@@ -37,7 +38,7 @@ def grid_triangles(rows: int, columns: int, *, closed: bool = False, step: int =
     return np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)])
 
 
-def extrude(mesh: Mesh, rim: Sequence[int], rings: Sequence[Floats], *, cap: ArrayLike | None = None) -> Mesh:
+def extrude(mesh: Mesh, rim: Sequence[int], rings: Sequence[Float64Array], *, cap: ArrayLike | None = None) -> Mesh:
     """Continue a hole's or border's rim of vertex indices by further rings (len(rim), 3), and close it at point `cap`.
 
     New vertices are appended ring by ring, the cap last. The rim may run either way round.
@@ -127,7 +128,7 @@ def vertex_normals(vertices: NDArray, triangles: Triangles, operator: sparse.csr
     return np.asarray(summed / np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), 1e-12), vertices.dtype)
 
 
-def spread(triangles: Triangles, count: int, fixed: Mapping[int, ArrayLike], order: int = 1) -> Floats:
+def spread(triangles: Triangles, count: int, fixed: Mapping[int, ArrayLike], order: int = 1) -> Float64Array:
     """Values (count, ...) interpolated smoothly from those given at the fixed vertices.
 
     Solves L^order x = 0 with the mesh's graph Laplacian: order 1 is harmonic and stays within the given values, order 2

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from relit_studio.mannequin.shape.mesh import Floats, Triangles, grid_triangles
+from relit_camera.base.array_types import Float64Array
+from relit_studio.mannequin.shape.mesh import Triangles, grid_triangles
 from relit_studio.mannequin.shape.texture_atlas import PLAIN
 
 
@@ -41,23 +42,23 @@ class Part:
     """
 
     name: str
-    vertices: Floats
+    vertices: Float64Array
     triangles: Triangles
     casters: Triangles
-    color: Floats
-    paint: Floats
+    color: Float64Array
+    paint: Float64Array
     finish: Gloss
 
 
 def grid_part(
     name: str,
-    vertices: Floats,
+    vertices: Float64Array,
     color: ArrayLike,
     finish: Gloss,
     *,
     closed: bool = False,
     mirrored: bool = False,
-    paint: Floats | None = None,
+    paint: Float64Array | None = None,
     caster_step: int = 2,
 ) -> Part:
     """A part of a grid of vertices (rows, columns, 3), as `grid_triangles` joins them.

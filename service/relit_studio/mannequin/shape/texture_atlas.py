@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_filter
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks
 from relit_studio.mannequin.shape.expression import Expression, control_vertices
 from relit_studio.mannequin.shape.head import SCHEME, control_head
-from relit_studio.mannequin.shape.mesh import Floats
 
 Albedo = NDArray[np.float32]
 """(height, width, 3) float32 linear."""
@@ -51,13 +51,13 @@ _ATLAS_SIZE = (1000, 756)
 _SUBPIXEL_BITS = 4
 
 
-def face_paint_position(points: Floats) -> Floats:
+def face_paint_position(points: Float64Array) -> Float64Array:
     """Atlas pixels (count, 2) of points (count, 3) of the head at rest."""
     position = (points[:, :2] - _FACE_ORIGIN) * [_SCALE, -_SCALE]
     return np.asarray(np.clip(position, 1, np.array(_FACE_SIZE) - 2))
 
 
-def eye_paint_position(directions: Floats) -> Floats:
+def eye_paint_position(directions: Float64Array) -> Float64Array:
     """Atlas pixels (..., 2) of unit vectors (..., 3) from the eyeball's center, the iris looking along +Z."""
     return np.asarray(_EYE_CENTER + directions[..., :2] * [_EYE_SPAN, -_EYE_SPAN])
 
@@ -96,7 +96,7 @@ def _face() -> Albedo:
     return np.asarray(face)
 
 
-def _paint_eye(face: Albedo, points: Floats, eye: EyeLandmarks) -> None:
+def _paint_eye(face: Albedo, points: Float64Array, eye: EyeLandmarks) -> None:
     upper = points[list(eye.lids[:9])]
     lower = points[[eye.outer, *eye.lids[:8:-1], eye.inner]]
     shape = face.shape[:2]
@@ -109,7 +109,7 @@ def _paint_eye(face: Albedo, points: Floats, eye: EyeLandmarks) -> None:
     _cover(face, 0.45 * gaussian_filter(_stroke(shape, crease, 3), 2.0), SKIN_TONE * [0.5, 0.38, 0.34])
 
 
-def _paint_brow(face: Albedo, brow: Floats, random: np.random.Generator) -> None:
+def _paint_brow(face: Albedo, brow: Float64Array, random: np.random.Generator) -> None:
     """Fine hairs between the brow's upper edge (5 points from the outer end) and lower edge (5 points, back)."""
     upper, lower = _resampled(brow[:5], 90), _resampled(brow[:4:-1], 90)
     # From the outer end: a fine tail, full over the pupil, softer at the nose.
@@ -173,12 +173,12 @@ def _blob(shape: tuple[int, ...], center: NDArray, radii: NDArray) -> NDArray:
     return np.asarray(np.exp(-(((x - center[0]) / radii[0]) ** 2) - ((y - center[1]) / radii[1]) ** 2))
 
 
-def _resampled(line: Floats, count: int) -> Floats:
+def _resampled(line: Float64Array, count: int) -> Float64Array:
     at = np.linspace(0, 1, len(line))
     return np.stack([np.interp(np.linspace(0, 1, count), at, line[:, axis]) for axis in (0, 1)], axis=1)
 
 
-def _outline(points: Floats, loop: tuple[int, ...]) -> Floats:
+def _outline(points: Float64Array, loop: tuple[int, ...]) -> Float64Array:
     """A closed outline through landmarks, rounded as the subdivided skin is (Chaikin 1974)."""
     line = points[list(loop)]
     for _ in range(2):
@@ -187,21 +187,21 @@ def _outline(points: Floats, loop: tuple[int, ...]) -> Floats:
     return np.asarray(line)
 
 
-def _fixed(line: Floats) -> NDArray[np.int32]:
+def _fixed(line: Float64Array) -> NDArray[np.int32]:
     return np.round(line * (1 << _SUBPIXEL_BITS)).astype(np.int32)[:, None]
 
 
-def _filled(shape: tuple[int, ...], outline: Floats) -> NDArray[np.float32]:
+def _filled(shape: tuple[int, ...], outline: Float64Array) -> NDArray[np.float32]:
     mask = np.zeros(shape[:2], np.uint8)
     cv2.fillPoly(mask, [_fixed(outline)], 255, cv2.LINE_AA, _SUBPIXEL_BITS)
     return (mask / 255.0).astype(np.float32)
 
 
-def _stroke(shape: tuple[int, ...], line: Floats, thickness: int) -> NDArray[np.float32]:
+def _stroke(shape: tuple[int, ...], line: Float64Array, thickness: int) -> NDArray[np.float32]:
     mask = np.zeros(shape[:2], np.uint8)
     _line(mask, line, thickness)
     return (mask / 255.0).astype(np.float32)
 
 
-def _line(mask: NDArray[np.uint8], line: Floats, thickness: int) -> None:
+def _line(mask: NDArray[np.uint8], line: Float64Array, thickness: int) -> None:
     cv2.polylines(mask, [_fixed(line)], False, 255, thickness, cv2.LINE_AA, _SUBPIXEL_BITS)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.easing import smoothstep
-from relit_studio.people.geometry import Floats, Indices, find_nearest, unit
+from relit_studio.people.geometry import find_nearest, unit
 
 _OPENING = (0.03, 0.42)
 """Half the opening angle at the front, at the fold and at the edge, radians."""
@@ -23,7 +24,7 @@ _POINT_CM = 1.3
 """How far the two points reach below the edge."""
 
 
-def fold_collar(neckline: Floats, up: Floats, cloth: Floats) -> tuple[Floats, Indices]:
+def fold_collar(neckline: Float64Array, up: Float64Array, cloth: Float64Array) -> tuple[Float64Array, Indices]:
     """Vertices (n, 3) and faces (m, 4) about a neckline (k, 3) in a plane whose normal is `up`, over cloth (l, 3)."""
     center = neckline.mean(axis=0)
     offset = neckline - center
@@ -46,7 +47,7 @@ def fold_collar(neckline: Floats, up: Floats, cloth: Floats) -> tuple[Floats, In
     return _thickened(sheet)
 
 
-def _above(sheet: Floats, cloth: Floats) -> Floats:
+def _above(sheet: Float64Array, cloth: Float64Array) -> Float64Array:
     """A sheet (r, c, 3) whose falling half is kept outside the cloth."""
     flat = sheet.reshape(-1, 3).copy()
     tree = cKDTree(cloth)
@@ -61,7 +62,7 @@ def _above(sheet: Floats, cloth: Floats) -> Floats:
     return flat.reshape(sheet.shape)
 
 
-def _thickened(sheet: Floats) -> tuple[Floats, Indices]:
+def _thickened(sheet: Float64Array) -> tuple[Float64Array, Indices]:
     """Both sides of a sheet (r, c, 3) and its rim."""
     r, c = sheet.shape[:2]
     normal = unit(np.cross(np.gradient(sheet, axis=1), np.gradient(sheet, axis=0)))

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.easing import smoothstep
 from relit_studio.people.face.face_model import FaceModel, Part
-from relit_studio.people.geometry import Floats, Indices, unit
+from relit_studio.people.geometry import unit
 from relit_studio.people.traits.person_traits import GlassesTraits, LensShape
 
 _SHAPES: dict[LensShape, tuple[float, float, float]] = {
@@ -29,13 +30,13 @@ _EAR = (-0.6, 1.6)
 class Glasses:
     """On the upright head: frame (n, 3) with faces (m, 4), and lenses (k, 3) with faces (l, 4), -1 in a triangle's."""
 
-    frame: Floats
+    frame: Float64Array
     frame_faces: Indices
-    lenses: Floats
+    lenses: Float64Array
     lens_faces: Indices
 
 
-def fit_glasses(model: FaceModel, head: Floats, traits: GlassesTraits) -> Glasses:
+def fit_glasses(model: FaceModel, head: Float64Array, traits: GlassesTraits) -> Glasses:
     """Glasses for a neutral head (vertices, 3)."""
     skin = head[np.unique(model.triangles(Part.FACE, Part.HEAD))]
     marks = head[model.landmarks68]
@@ -55,7 +56,7 @@ def fit_glasses(model: FaceModel, head: Floats, traits: GlassesTraits) -> Glasse
     )
     depth = _depth(skin, marks, middle, aside, outline, traits.rim_cm)
 
-    def placed(flat: Floats) -> Floats:
+    def placed(flat: Float64Array) -> Float64Array:
         return np.column_stack([flat + middle[:2], depth + _sag(flat)])
 
     frame, lenses = _Builder(), _Builder()
@@ -75,12 +76,14 @@ def fit_glasses(model: FaceModel, head: Floats, traits: GlassesTraits) -> Glasse
     return Glasses(*frame.mesh(), *lenses.mesh())
 
 
-def _sag(flat: Floats) -> Floats:
+def _sag(flat: Float64Array) -> Float64Array:
     """Depth (n,) of the frame's surface behind its middle, over (n, 2) from there."""
     return np.asarray(_TILT * flat[:, 1] - _WRAP * flat[:, 0] ** 2)
 
 
-def _depth(skin: Floats, marks: Floats, middle: Floats, aside: float, outline: Floats, rim_cm: float) -> float:
+def _depth(
+    skin: Float64Array, marks: Float64Array, middle: Float64Array, aside: float, outline: Float64Array, rim_cm: float
+) -> float:
     """Depth at which the frame clears lids, nose, brows and cheeks."""
     lids = marks[36:48]
     wanted = [(lids[:, 2] - _sag(lids[:, :2] - middle[:2])).max() + _LASH_CM]
@@ -93,7 +96,7 @@ def _depth(skin: Floats, marks: Floats, middle: Floats, aside: float, outline: F
     return float(max(wanted))
 
 
-def _temple(skin: Floats, hinge: Floats, side: float) -> Floats:
+def _temple(skin: Float64Array, hinge: Float64Array, side: float) -> Float64Array:
     """Path (40, 3) of a temple from its hinge over the ear and down behind it, outside the head."""
     ear = skin[(side * skin[:, 0] > 7.4) & (skin[:, 2] > -2) & (skin[:, 2] < 2.4) & (skin[:, 1] < 5)]
     top = float(np.percentile(ear[:, 1], 97)) if len(ear) else hinge[1]
@@ -114,10 +117,10 @@ class _Builder:
     """Vertices and quads of several pieces."""
 
     def __init__(self) -> None:
-        self._vertices: list[Floats] = []
+        self._vertices: list[Float64Array] = []
         self._faces: list[Indices] = []
 
-    def tube(self, path: Floats, radius: float, *, closed: bool = False) -> None:
+    def tube(self, path: Float64Array, radius: float, *, closed: bool = False) -> None:
         """A round bar along a path (n, 3)."""
         ahead = unit(np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0) if closed else np.gradient(path, axis=0))
         reference = np.where(np.abs(ahead[:, 2:]) > 0.9, [[0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0]])
@@ -127,7 +130,7 @@ class _Builder:
         rings = path + radius * (np.cos(turn)[:, None, None] * first[None] + np.sin(turn)[:, None, None] * second[None])
         self.grid(rings, closed=closed, round_=True)
 
-    def grid(self, rows: Floats, *, closed: bool, round_: bool = False) -> None:
+    def grid(self, rows: Float64Array, *, closed: bool, round_: bool = False) -> None:
         """A sheet of rows (r, c, 3); `closed` joins its last column to the first, `round_` its last row."""
         r, c = rows.shape[:2]
         start = sum(len(each) for each in self._vertices)
@@ -137,6 +140,6 @@ class _Builder:
         self._faces.append(np.stack([(i * c + j).ravel() for i, j in corners], axis=1) + start)
         self._vertices.append(rows.reshape(-1, 3))
 
-    def mesh(self) -> tuple[Floats, Indices]:
+    def mesh(self) -> tuple[Float64Array, Indices]:
         """Vertices (n, 3) and faces (m, 4) of all pieces."""
         return np.concatenate(self._vertices), np.concatenate(self._faces)

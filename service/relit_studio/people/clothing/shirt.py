@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.easing import smoothstep
 from relit_studio.people.clothing.collar import fold_collar
-from relit_studio.people.geometry import Floats, Indices, edges_of, find_nearest, neighbor_mean, unit, vertex_normals
+from relit_studio.people.geometry import edges_of, find_nearest, neighbor_mean, unit, vertex_normals
 from relit_studio.people.traits.person_traits import Neckline
 
 _POINT = np.array([0.0, -11.3, -1.5])
@@ -34,16 +35,16 @@ class Shirt:
         under: vertices and faces of the collar of a shirt worn below, or None.
     """
 
-    cloth: Floats
+    cloth: Float64Array
     cloth_faces: Indices
-    collar: Floats
+    collar: Float64Array
     collar_faces: Indices
     covered: NDArray[np.bool_]
-    under: tuple[Floats, Indices] | None = None
+    under: tuple[Float64Array, Indices] | None = None
 
 
 def sew_shirt(
-    body: Floats, triangles: Indices, skin: Floats, skin_triangles: Indices, neckline: Neckline = "crew"
+    body: Float64Array, triangles: Indices, skin: Float64Array, skin_triangles: Indices, neckline: Neckline = "crew"
 ) -> Shirt:
     """A shirt from the scan's surface over the skin of one identity."""
     body = body + [-body[body[:, 1] < -14, 0].mean(), 0, 0]
@@ -72,7 +73,9 @@ def sew_shirt(
     return Shirt(cloth, faces, collar, _tube_faces(), covered, under)
 
 
-def _fitted(body: Floats, triangles: Indices, low: NDArray[np.bool_], skin: Floats, skin_triangles: Indices) -> Floats:
+def _fitted(
+    body: Float64Array, triangles: Indices, low: NDArray[np.bool_], skin: Float64Array, skin_triangles: Indices
+) -> Float64Array:
     """The body smoothed, and kept outside the skin."""
     normals = vertex_normals(skin, skin_triangles)
     near = np.unique(skin_triangles)
@@ -90,7 +93,7 @@ def _fitted(body: Floats, triangles: Indices, low: NDArray[np.bool_], skin: Floa
     return cloth
 
 
-def _neckline(skin: Floats, percentile: float) -> tuple[Floats, Floats]:
+def _neckline(skin: Float64Array, percentile: float) -> tuple[Float64Array, Float64Array]:
     """Neckline (96, 3) in its plane, outside the given percentile of the skin, and outward unit vectors (96, 3)."""
     neck = skin[(skin[:, 1] < -8) & (np.abs((skin - _POINT) @ _NORMAL) < 1.4)]
     center = np.array([neck[:, 0].mean(), _POINT[1], (neck[:, 2].min() + neck[:, 2].max()) / 2])
@@ -107,7 +110,7 @@ def _neckline(skin: Floats, percentile: float) -> tuple[Floats, Floats]:
     return middle, outward
 
 
-def _collar(middle: Floats, outward: Floats) -> Floats:
+def _collar(middle: Float64Array, outward: Float64Array) -> Float64Array:
     """A rolled tube (96 · 12, 3) about the neckline."""
     section = np.linspace(0, 2 * np.pi, _COLLAR_POINTS, endpoint=False)
     sideways, upward = 0.30 * np.cos(section) - 0.45 * np.sin(section), 1.05 * np.sin(section) - 0.3

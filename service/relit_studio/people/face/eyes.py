@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.rotations import rotation_from_angles
 from relit_studio.people.face.expressions import Expression
 from relit_studio.people.face.face_model import CORNEA_MATERIALS, FaceModel, Part
-from relit_studio.people.geometry import Floats, unit, vertices_of
+from relit_studio.people.geometry import unit, vertices_of
 from relit_studio.people.traits.person_traits import Traits
 
 _WAYS = ("Out", "In", "Down", "Up")
@@ -35,11 +36,11 @@ _EYES = ((Part.EYE_LEFT, CORNEA_MATERIALS[0], "L", 1), (Part.EYE_RIGHT, CORNEA_M
 class EyeMap:
     """Mapping of the eye texture: texture coordinates (vertices, 2), and distance from the gaze axis (vertices,)."""
 
-    uv: Floats
-    eccentricity: Floats
+    uv: Float64Array
+    eccentricity: Float64Array
 
 
-def eye_map(model: FaceModel, neutral: Floats) -> EyeMap:
+def eye_map(model: FaceModel, neutral: Float64Array) -> EyeMap:
     """Project the texture onto both eyeballs of a neutral head along each gaze axis."""
     uv, eccentricity = np.zeros((len(neutral), 2)), np.zeros(len(neutral))
     for part, material, _, _ in _EYES:
@@ -53,7 +54,7 @@ def eye_map(model: FaceModel, neutral: Floats) -> EyeMap:
     return EyeMap(uv, eccentricity)
 
 
-def gaze(shell: Floats) -> tuple[Floats, Floats]:
+def gaze(shell: Float64Array) -> tuple[Float64Array, Float64Array]:
     """Center (3,) and unit gaze axis (3,) of an eyeball's outer shell (n, 3): a fitted sphere, and its cornea."""
     back = shell[shell[:, 2] < np.percentile(shell[:, 2], 60)]
     system = np.column_stack([2 * back, np.ones(len(back))])
@@ -62,7 +63,7 @@ def gaze(shell: Floats) -> tuple[Floats, Floats]:
     return middle, unit(shell[farthest].mean(axis=0) - middle)
 
 
-def turn_eyes(model: FaceModel, vertices: Floats, expression: Expression) -> Floats:
+def turn_eyes(model: FaceModel, vertices: Float64Array, expression: Expression) -> Float64Array:
     """Vertices (count, 3) of an upright head with the eyeballs turned as the expression's `eyeLook` weights say."""
     moved = vertices.copy()
     for part, material, suffix, side in _EYES:
@@ -76,7 +77,7 @@ def turn_eyes(model: FaceModel, vertices: Floats, expression: Expression) -> Flo
     return moved
 
 
-def lid_shade(model: FaceModel) -> Floats:
+def lid_shade(model: FaceModel) -> Float64Array:
     """Darkening 0..1 (vertices,) by the lids, on the shells in front of the eyes."""
     shade = np.zeros(len(model.vertices))
     chosen = np.isin(model.face_part, (Part.OCCLUSION_LEFT, Part.OCCLUSION_RIGHT))
@@ -100,7 +101,7 @@ def eye_picture(traits: Traits) -> DisplayImage:
     return uint8_from_linear((iris.clip(0, 1) * (1 - fraction) + sclera * fraction).astype(np.float32))
 
 
-def _iris(traits: Traits, radius: Floats, angle: Floats, rng: np.random.Generator) -> Floats:
+def _iris(traits: Traits, radius: Float64Array, angle: Float64Array, rng: np.random.Generator) -> Float64Array:
     around = np.linspace(-np.pi, np.pi, 4096)
     waves = [np.sin(f * around + rng.uniform(0, 6.28)) * rng.uniform(0.5, 1) for f in (9, 17, 31, 57, 93, 140)]
     noise = cv2.GaussianBlur(rng.normal(size=radius.shape), (0, 0), 5) * 9
@@ -115,11 +116,11 @@ def _iris(traits: Traits, radius: Floats, angle: Floats, rng: np.random.Generato
     return np.asarray(color * (limbal * pupil)[..., None])
 
 
-def _veins(rng: np.random.Generator) -> Floats:
+def _veins(rng: np.random.Generator) -> Float64Array:
     canvas = np.zeros((_SIDE, _SIDE), np.float32)
     for _ in range(70):
         angle, radius, drift = rng.uniform(-np.pi, np.pi), 1.5, rng.normal() * 0.2
-        points: list[Floats] = []
+        points: list[Float64Array] = []
         while radius > rng.uniform(0.75, 1.1) and len(points) < 60:
             offset = radius * np.array([np.cos(angle), -np.sin(angle)])
             points.append((offset + (VIEW_CM / 2)) / VIEW_CM * _SIDE)

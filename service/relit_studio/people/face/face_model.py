@@ -11,8 +11,9 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import InputError
-from relit_studio.people.geometry import Floats, Indices, triangles_of
+from relit_studio.people.geometry import triangles_of
 
 IDENTITIES = 100
 
@@ -55,7 +56,7 @@ class FaceModel:
         landmarks68: (68,) vertices of the iBUG 300-W points.
     """
 
-    vertices: Floats
+    vertices: Float64Array
     faces: NDArray[np.int32]
     face_uv: NDArray[np.int32]
     uv: NDArray[np.float32]
@@ -67,11 +68,11 @@ class FaceModel:
     names: tuple[str, ...]
     landmarks68: NDArray[np.int32]
 
-    def neutral(self, weights: NDArray) -> Floats:
+    def neutral(self, weights: NDArray) -> Float64Array:
         """Vertices of the identity with these weights (100,)."""
         return np.asarray(self.vertices + np.tensordot(weights, self.identities.astype(np.float32), 1))
 
-    def displacement(self, expression: Mapping[str, float]) -> Floats:
+    def displacement(self, expression: Mapping[str, float]) -> Float64Array:
         """Offsets (vertices, 3) of an expression, weights by name.
 
         Raises:

@@ -6,9 +6,9 @@ from dataclasses import asdict
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
 from relit_studio.people.face.face_model import IDENTITIES, FaceModel
-from relit_studio.people.geometry import Floats
 from relit_studio.people.traits.person_traits import Proportions, Traits
 
 _DECAY = 35
@@ -36,7 +36,7 @@ _RESTING = {
 """Shapes of the face model that each field of `RestingExpression` controls."""
 
 
-def identity_weights(model: FaceModel, traits: Traits) -> Floats:
+def identity_weights(model: FaceModel, traits: Traits) -> Float64Array:
     """Identity weights (100,): random, falling off with the order of the shapes, with the person's proportions."""
     fall = np.exp(-np.arange(IDENTITIES) / _DECAY)
     drawn = np.random.default_rng(traits.seed).normal(size=IDENTITIES) * traits.spread * fall
@@ -49,7 +49,7 @@ def identity_weights(model: FaceModel, traits: Traits) -> Floats:
     return np.asarray(drawn + (measured * scale**2).T @ np.linalg.solve(spread, wanted - measured @ drawn))
 
 
-def neutral_face(model: FaceModel, traits: Traits) -> Floats:
+def neutral_face(model: FaceModel, traits: Traits) -> Float64Array:
     """The model's vertices (count, 3) for this person, expression 0."""
     neutral = model.neutral(identity_weights(model, traits))
     if traits.proportions is not None:
@@ -62,7 +62,7 @@ def neutral_face(model: FaceModel, traits: Traits) -> Floats:
     return neutral
 
 
-def proportion_shapes(model: FaceModel) -> Floats:
+def proportion_shapes(model: FaceModel) -> Float64Array:
     """Change (9, 100) in centimeters of each proportion, in the order of `Proportions`, per unit of identity weight."""
     places = model.identities[:, model.landmarks68].astype(np.float64)
     rows = []

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_studio.people.face.eyes import LIMBUS_CM, VIEW_CM, eye_map
 from relit_studio.people.face.face_model import CORNEA_MATERIALS, FaceModel, Part
 from relit_studio.people.face.mesh478_points import IBUG_66, mesh_points, nearest_on_surface
-from relit_studio.people.geometry import Floats, SurfacePoints, triangles_of
+from relit_studio.people.geometry import SurfacePoints, triangles_of
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
 
@@ -18,21 +19,21 @@ _IRIS_RING = np.array([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]])
 """Iris points in radii: center, picture right, upper, picture left, lower."""
 
 
-def landmarks(person: Person, posture: Posture) -> Mapping[str, Floats]:
+def landmarks(person: Person, posture: Posture) -> Mapping[str, Float64Array]:
     """Points (count, 3) in room axes by scheme.
 
     openseeface66 are the face model's own iBUG points; see `mesh478` for the others.
     """
     vertices = person.vertices(posture)
     model = person.model
-    irises = [points.of(vertices) for points in _irises(person)]
+    irises = [points.interpolate(vertices) for points in _irises(person)]
     return {
-        "mesh478": np.concatenate([mesh_points(model).of(vertices), *irises]),
+        "mesh478": np.concatenate([mesh_points(model).interpolate(vertices), *irises]),
         "openseeface66": vertices[model.landmarks68[IBUG_66]],
     }
 
 
-def canonical_origin(model: FaceModel) -> tuple[Floats, float]:
+def canonical_origin(model: FaceModel) -> tuple[Float64Array, float]:
     """Origin (3,) of the canonical face in the mean head's axes, and its unit in the model's centimeters.
 
     They are the least-squares scale and shift. Rotation is left out, so that an upright head has the identity pose.

@@ -14,9 +14,10 @@ from scipy.interpolate import RBFInterpolator
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.face.landmarks.landmark_schemes import VERTICES_66, landmark_scheme
 from relit_studio.people.face.face_model import FaceModel, Part
-from relit_studio.people.geometry import Floats, Indices, SurfacePoints, edges_of, find_nearest
+from relit_studio.people.geometry import SurfacePoints, edges_of, find_nearest
 
 IBUG_66 = np.delete(np.arange(68), (48, 54))
 """The iBUG points of scheme openseeface66: all but the outer mouth corners."""
@@ -39,7 +40,7 @@ def mesh_points(model: FaceModel) -> SurfacePoints:
     return laid
 
 
-def nearest_on_surface(points: Floats, vertices: Floats, triangles: Indices) -> SurfacePoints:
+def nearest_on_surface(points: Float64Array, vertices: Float64Array, triangles: Indices) -> SurfacePoints:
     """Nearest point on a mesh for each point (n, 3)."""
     middles = vertices[triangles].mean(axis=1)
     _, near = find_nearest(cKDTree(middles), points, min(_CANDIDATES, len(triangles)))
@@ -51,7 +52,7 @@ def nearest_on_surface(points: Floats, vertices: Floats, triangles: Indices) -> 
     return SurfacePoints(triangles[near[rows, best]], weights[rows, best])
 
 
-def _clamped_weights(points: Floats, corners: Floats) -> Floats:
+def _clamped_weights(points: Float64Array, corners: Float64Array) -> Float64Array:
     """Barycentric weights (..., 3) of the feet of perpendiculars on triangles (..., 3, 3), cut off at the edges.
 
     The cut is not the exact nearest point where the foot lies outside; some other triangle then has a nearer one.
@@ -82,7 +83,7 @@ def _contours() -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     ]
 
 
-def _along_edge(model: FaceModel, points: Floats, through: Indices) -> SurfacePoints:
+def _along_edge(model: FaceModel, points: Float64Array, through: Indices) -> SurfacePoints:
     """Points (n, 3) of a curve, placed at the same relative arc lengths on the model's edge `through` some vertices."""
     path = _path(model, through)
     fraction, lengths = _fractions(points), _fractions(model.vertices[path])
@@ -112,7 +113,7 @@ def _path(model: FaceModel, through: Indices) -> Indices:
     return np.array(path, np.intp)
 
 
-def _fractions(points: Floats) -> Floats:
+def _fractions(points: Float64Array) -> Float64Array:
     """Fraction of a polyline's length at each of its points, 0..1."""
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.asarray(np.concatenate([[0], np.cumsum(steps)]) / steps.sum())

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
 from relit_studio.people.face.face_model import FaceModel, Part
-from relit_studio.people.geometry import Floats, SurfacePoints, areas, find_nearest, scatter, unit, vertex_normals
+from relit_studio.people.geometry import SurfacePoints, areas, find_nearest, scatter, unit, vertex_normals
 from relit_studio.people.hair.hair_combing import kept_out
 from relit_studio.people.hair.hair_strands import Hairs
 from relit_studio.people.hair.scalp import Obstacle
@@ -46,19 +47,23 @@ class _Roots:
     """Hair roots on the mesh, with density 0..1 (n,) and hair length (n,)."""
 
     surface: SurfacePoints
-    density: Floats
-    length_cm: Floats
+    density: Float64Array
+    length_cm: Float64Array
 
 
-def grow_beard(model: FaceModel, neutral: Floats, vertices: Floats, seed: int, style: BeardStyle) -> Hairs | None:
+def grow_beard(
+    model: FaceModel, neutral: Float64Array, vertices: Float64Array, seed: int, style: BeardStyle
+) -> Hairs | None:
     """A beard rooted on the `neutral` head, posed on the head with `vertices` in any expression."""
     if style == "none":
         return None
     kind, rng = _STYLES[style], np.random.default_rng(seed + 400)
     triangles = model.triangles(Part.FACE, Part.HEAD)
     roots = _scatter_roots(model, neutral, triangles, kind, rng)
-    place, normals = roots.surface.of(vertices), vertex_normals(vertices, triangles)
-    hairs = _hairs(roots, roots.surface.of(neutral), place, unit(roots.surface.of(normals)), kind, rng)
+    place, normals = roots.surface.interpolate(vertices), vertex_normals(vertices, triangles)
+    hairs = _hairs(
+        roots, roots.surface.interpolate(neutral), place, unit(roots.surface.interpolate(normals)), kind, rng
+    )
     skin = np.unique(triangles)
     obstacle = Obstacle(vertices[skin], normals[skin], cKDTree(vertices[skin]))
     # Hairs over the hollow below the lip would enter the chin. Roots stay in place.
@@ -66,7 +71,7 @@ def grow_beard(model: FaceModel, neutral: Floats, vertices: Floats, seed: int, s
     return hairs._replace(points=np.concatenate([hairs.points[:, :1], outside], axis=1))
 
 
-def beard_area(model: FaceModel) -> tuple[Floats, Floats, Floats]:
+def beard_area(model: FaceModel) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Density 0..1 (vertices,) of mustache, chin beard and whiskers."""
     mean = model.vertices
     x, y, z = np.abs(mean[:, 0]), mean[:, 1], mean[:, 2]
@@ -86,7 +91,7 @@ def beard_area(model: FaceModel) -> tuple[Floats, Floats, Floats]:
 
 
 def _scatter_roots(
-    model: FaceModel, neutral: Floats, triangles: np.ndarray, kind: _Style, rng: np.random.Generator
+    model: FaceModel, neutral: Float64Array, triangles: np.ndarray, kind: _Style, rng: np.random.Generator
 ) -> _Roots:
     areas_of = np.stack(beard_area(model), axis=1) * (np.array(kind[1:4]) > 0)
     thickness = areas_of.max(axis=1)
@@ -94,10 +99,12 @@ def _scatter_roots(
     # The mustache's strip is narrow, and its hairs lie side by side.
     crowded = np.maximum(thickness, 2.6 * areas_of[:, 0])
     surface = scatter(triangles, areas(neutral, triangles) * crowded[triangles].mean(axis=1), kind.hairs, rng)
-    return _Roots(surface, surface.of(thickness), surface.of(lengths))
+    return _Roots(surface, surface.interpolate(thickness), surface.interpolate(lengths))
 
 
-def _hairs(roots: _Roots, rest: Floats, place: Floats, normal: Floats, kind: _Style, rng: np.random.Generator) -> Hairs:
+def _hairs(
+    roots: _Roots, rest: Float64Array, place: Float64Array, normal: Float64Array, kind: _Style, rng: np.random.Generator
+) -> Hairs:
     """Hairs with roots at `place` and skin normals `normal`; `rest` are the roots on the neutral face."""
     count = len(place)
     aside = np.sign(rest[:, 0]) * smoothstep(np.abs(rest[:, 0]), 0.05, 0.6)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from relit_camera.base.array_types import Float64Array
 from relit_studio.people.face.face_model import FaceModel, Part
-from relit_studio.people.geometry import Floats, SurfacePoints, areas, find_nearest, scatter, unit, vertex_normals
+from relit_studio.people.geometry import SurfacePoints, areas, find_nearest, scatter, unit, vertex_normals
 from relit_studio.people.hair.hair_strands import Hairs, concatenate_hairs
 from relit_studio.people.traits.person_traits import BrowTraits
 
@@ -25,11 +26,11 @@ class _Roots:
     """Hair roots on the mesh, with position along the brow (0 tail, 1 inner end) and across it (1 above, -1 below)."""
 
     surface: SurfacePoints
-    along: Floats
-    across: Floats
+    along: Float64Array
+    across: Float64Array
 
 
-def grow_brows(model: FaceModel, neutral: Floats, vertices: Floats, seed: int, traits: BrowTraits) -> Hairs:
+def grow_brows(model: FaceModel, neutral: Float64Array, vertices: Float64Array, seed: int, traits: BrowTraits) -> Hairs:
     """Brows rooted on the `neutral` head, posed on the head with `vertices` in any expression."""
     rng = np.random.default_rng(seed + 200)
     triangles = model.triangles(Part.FACE)
@@ -42,7 +43,7 @@ def grow_brows(model: FaceModel, neutral: Floats, vertices: Floats, seed: int, t
     return concatenate_hairs(grown)
 
 
-def _middle_line(landmarks: Floats, flatness: float) -> Floats:
+def _middle_line(landmarks: Float64Array, flatness: float) -> Float64Array:
     """Middle line (60, 3) of a brow from tail to inner end."""
     points = landmarks - [0, 0.35, 0]
     straight = np.polyval(np.polyfit(points[:, 0], points[:, 1], 1), points[:, 0])
@@ -56,14 +57,14 @@ def _middle_line(landmarks: Floats, flatness: float) -> Floats:
 
 
 def _scatter_roots(
-    neutral: Floats, triangles: np.ndarray, line: Floats, traits: BrowTraits, rng: np.random.Generator
+    neutral: Float64Array, triangles: np.ndarray, line: Float64Array, traits: BrowTraits, rng: np.random.Generator
 ) -> _Roots:
     tree = cKDTree(line[:, :2])
     middles = neutral[triangles].mean(axis=1)
     distance, _ = find_nearest(tree, middles[:, :2])
     near = triangles[(distance < 0.45 * traits.width * _REACH + 0.35) & (middles[:, 2] > 5)]
     drawn = scatter(near, areas(neutral, near), traits.hairs * 16, rng)
-    place = drawn.of(neutral)
+    place = drawn.interpolate(neutral)
     distance, nearest = find_nearest(tree, place[:, :2])
     along = nearest / (_STEPS - 1)
     half_width = traits.width * np.interp(along, [0, 0.25, 0.7, 0.95, 1], [0.06, 0.2, 0.32, 0.3, 0.2])
@@ -76,10 +77,15 @@ def _scatter_roots(
 
 
 def _hairs(
-    roots: _Roots, side: int, vertices: Floats, normals: Floats, traits: BrowTraits, rng: np.random.Generator
+    roots: _Roots,
+    side: int,
+    vertices: Float64Array,
+    normals: Float64Array,
+    traits: BrowTraits,
+    rng: np.random.Generator,
 ) -> Hairs:
     count, along, across = len(roots.along), roots.along, np.clip(roots.across, -1.3, 1.3)
-    start, normal = roots.surface.of(vertices), unit(roots.surface.of(normals))
+    start, normal = roots.surface.interpolate(vertices), unit(roots.surface.interpolate(normals))
     outward = np.tile([float(side), 0.0, 0.0], (count, 1))
     rise = np.clip(np.interp(along, [0, 0.4, 0.75, 1], [-0.25, 0.0, 0.45, 1.3]) - 0.45 * across, -0.8, 1.6)
     direction = outward + rise[:, None] * [0, 1, 0] + 0.24 * rng.normal(size=(count, 3))

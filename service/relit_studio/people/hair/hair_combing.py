@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
-from relit_studio.people.geometry import Floats, unit
+from relit_studio.people.geometry import unit
 from relit_studio.people.hair.scalp import Obstacle, Roots
 
 
@@ -28,11 +29,11 @@ class Combing:
         waviness_cm, waves: amplitude and number of a single hair's waves.
     """
 
-    direction: Floats
-    length_cm: Floats
-    lift: Floats
-    gravity: Floats
-    layer_cm: Floats
+    direction: Float64Array
+    length_cm: Float64Array
+    lift: Float64Array
+    gravity: Float64Array
+    layer_cm: Float64Array
     points: int
     offset_cm: float
     loose_from: float
@@ -41,7 +42,7 @@ class Combing:
     waves: float
 
 
-def combed(roots: Roots, combing: Combing, obstacle: Obstacle, rng: np.random.Generator) -> Floats:
+def combed(roots: Roots, combing: Combing, obstacle: Obstacle, rng: np.random.Generator) -> Float64Array:
     """Polylines (n, points, 3), grown step by step along the combing and gravity, and kept out of the head."""
     count, last = len(roots.place), combing.points - 1
     step = (combing.length_cm / last)[:, None]
@@ -69,7 +70,7 @@ def combed(roots: Roots, combing: Combing, obstacle: Obstacle, rng: np.random.Ge
     return np.stack(grown, axis=1)
 
 
-def kept_out(points: Floats, obstacle: Obstacle) -> Floats:
+def kept_out(points: Float64Array, obstacle: Obstacle) -> Float64Array:
     """Polylines (n, points, 3), with points inside the obstacle moved to its surface."""
     flat = points.reshape(-1, 3)
     surface, normal = obstacle.nearest(flat)
@@ -78,7 +79,7 @@ def kept_out(points: Floats, obstacle: Obstacle) -> Floats:
     return np.asarray((flat + (near * np.clip(-gap, 0, None))[:, None] * normal).reshape(points.shape))
 
 
-def out_of_face(place: Floats) -> Floats:
+def out_of_face(place: Float64Array) -> Float64Array:
     """Points (..., 3) moved out of the face and sideways off the throat, and pulled in below the ears."""
     x, y, z = np.moveaxis(place, -1, 0)
     throat = smoothstep(z, -1.5, 2.5) * smoothstep(-2.5 - y, 0, 3) * smoothstep(7.4 - np.abs(x), 0, 2)

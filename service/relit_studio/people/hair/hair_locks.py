@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from relit_studio.people.geometry import Floats, Indices, find_nearest, unit
+from relit_camera.base.array_types import Float64Array, Indices
+from relit_studio.people.geometry import find_nearest, unit
 
 _HEAD_MIDDLE = np.array([0.0, 3.0, 0.0])
 _STRAYS = 0.03
@@ -38,8 +39,8 @@ class Curl(NamedTuple):
 
 
 def in_locks(
-    points: Floats, scales: Sequence[Locks], fraction: float, rng: np.random.Generator
-) -> tuple[Floats, Floats, Indices]:
+    points: Float64Array, scales: Sequence[Locks], fraction: float, rng: np.random.Generator
+) -> tuple[Float64Array, Float64Array, Indices]:
     """Hairs (n, points, 3) gathered at each scale in turn, of which only a `fraction` has been grown.
 
     Returns their points, their shades (n,), and each one's guide (n,) at the last scale.
@@ -53,7 +54,7 @@ def in_locks(
     return points, shade, guide
 
 
-def _guides(roots: Floats, hairs: float, rng: np.random.Generator) -> Indices:
+def _guides(roots: Float64Array, hairs: float, rng: np.random.Generator) -> Indices:
     """The hair (n,) that guides each hair; about `hairs` have the same."""
     guides = rng.choice(len(roots), max(1, int(len(roots) / hairs)), replace=False)
     # Straight borders between locks would be visible.
@@ -62,7 +63,7 @@ def _guides(roots: Floats, hairs: float, rng: np.random.Generator) -> Indices:
     return np.asarray(guides[nearest])
 
 
-def _gathered(points: Floats, guide: Indices, locks: Locks, rng: np.random.Generator) -> Floats:
+def _gathered(points: Float64Array, guide: Indices, locks: Locks, rng: np.random.Generator) -> Float64Array:
     """Hairs (n, points, 3) pulled to their guide hairs, more toward their tips; each lock is lifted a little."""
     roots = points[:, 0]
     t = np.linspace(0, 1, points.shape[1])
@@ -75,7 +76,7 @@ def _gathered(points: Floats, guide: Indices, locks: Locks, rng: np.random.Gener
     return np.asarray(points + weight * (goal - points))
 
 
-def curled(points: Floats, guide: Indices, curl: Curl, rng: np.random.Generator) -> Floats:
+def curled(points: Float64Array, guide: Indices, curl: Curl, rng: np.random.Generator) -> Float64Array:
     """Hairs (n, points, 3) wound into helices, those with the same guide (n,) together; straight at the root."""
     count = len(points)
     steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
@@ -95,8 +96,13 @@ def curled(points: Floats, guide: Indices, curl: Curl, rng: np.random.Generator)
 
 
 def frayed(
-    points: Floats, length_cm: Floats, waviness_cm: float, waves: float, rng: np.random.Generator, out: float = 0.5
-) -> Floats:
+    points: Float64Array,
+    length_cm: Float64Array,
+    waviness_cm: float,
+    waves: float,
+    rng: np.random.Generator,
+    out: float = 0.5,
+) -> Float64Array:
     """Hairs with slight waves of their own and some strays; a few of those are flyaways, moved outward by `out`."""
     count = len(points)
     t = np.linspace(0, 1, points.shape[1])[None, :, None]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from relit_studio.people.geometry import Floats
+from relit_camera.base.array_types import Float64Array
 
 
 class Hairs(NamedTuple):
@@ -16,9 +16,9 @@ class Hairs(NamedTuple):
     `shade` (hairs,) is how much darker or lighter than the rest a hair is, about -1 to 1.
     """
 
-    points: Floats
-    radius: Floats
-    shade: Floats
+    points: Float64Array
+    radius: Float64Array
+    shade: Float64Array
 
 
 def concatenate_hairs(several: Sequence[Hairs]) -> Hairs:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
-from relit_studio.people.geometry import Floats, unit
+from relit_studio.people.geometry import unit
 from relit_studio.people.hair.hair_combing import Combing
 from relit_studio.people.hair.scalp import Roots
 
@@ -104,7 +105,7 @@ def _cut(
     roots: Roots,
     rng: np.random.Generator,
     *,
-    top: Floats,
+    top: Float64Array,
     top_cm: float,
     side_cm: float,
     rise: float,
@@ -170,7 +171,7 @@ def _hanging(
     )
 
 
-def _direction_noise(roots: Roots, rng: np.random.Generator, wave_cm: float = 5.0) -> Floats:
+def _direction_noise(roots: Roots, rng: np.random.Generator, wave_cm: float = 5.0) -> Float64Array:
     """Random directions (n, 3), of about unit length, that vary smoothly over the head, as hair growth does."""
     total = np.zeros_like(roots.place)
     for _ in range(5):

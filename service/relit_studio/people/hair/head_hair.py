@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
 from relit_studio.people.face.face_model import FaceModel
-from relit_studio.people.geometry import Floats, unit
+from relit_studio.people.geometry import unit
 from relit_studio.people.hair import hair_styles
 from relit_studio.people.hair.hair_combing import Combing, combed, kept_out, out_of_face
 from relit_studio.people.hair.hair_locks import Curl, Locks, curled, frayed, in_locks
@@ -48,7 +49,7 @@ _COMBED: dict[HairStyle, _Style] = {
 }
 
 
-def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits, fraction: float = 1.0) -> Hairs:
+def grow_hair(model: FaceModel, head: Float64Array, body: Float64Array, traits: Traits, fraction: float = 1.0) -> Hairs:
     """Hair on a neutral head (vertices, 3) above clothes (n, 3); `fraction` below 1 grows less, for quick previews."""
     rng = np.random.default_rng(traits.seed + 100)
     if traits.hair in ("buzz", "bald"):
@@ -74,7 +75,7 @@ def grow_hair(model: FaceModel, head: Floats, body: Floats, traits: Traits, frac
     return Hairs(points, _thickness(points, rng, style.coarse), shade)
 
 
-def _thickness(points: Floats, rng: np.random.Generator, coarse: float = 1.0) -> Floats:
+def _thickness(points: Float64Array, rng: np.random.Generator, coarse: float = 1.0) -> Float64Array:
     t = np.linspace(0, 1, points.shape[1])
     return np.asarray(
         _RADIUS_CM * coarse * rng.uniform(0.8, 1.15, (len(points), 1)) * np.interp(t, [0, 0.7, 1], [1, 1, 0.3])

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_studio.people.face.face_model import FaceModel, Part
-from relit_studio.people.geometry import Floats, Indices
 from relit_studio.people.hair.hair_strands import Hairs, concatenate_hairs
 
 _ROWS, _COLUMNS = 6, 19
 """A strip is a grid from root to tip, along the lid; an eye has three on the upper lid and three on the lower."""
 
 
-def grow_lashes(model: FaceModel, vertices: Floats, seed: int, amount: float = 1.0) -> Hairs:
+def grow_lashes(model: FaceModel, vertices: Float64Array, seed: int, amount: float = 1.0) -> Hairs:
     """Lashes on a head in any expression; `amount` is a factor on their number."""
     rng = np.random.default_rng(seed + 300)
     along = np.linspace(0, 1, _ROWS)

@@ -7,18 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.easing import smoothstep
 from relit_studio.people.face.face_model import FaceModel, Part
-from relit_studio.people.geometry import (
-    Floats,
-    Indices,
-    SurfacePoints,
-    areas,
-    find_nearest,
-    scatter,
-    unit,
-    vertex_normals,
-)
+from relit_studio.people.geometry import SurfacePoints, areas, find_nearest, scatter, unit, vertex_normals
 from relit_studio.people.traits.person_traits import HairStyle
 
 _HAIRLINE = np.array(
@@ -30,7 +22,7 @@ _HAIRLINE = np.array(
 """Height of the hairline on the mean head over the azimuth from the front, degrees and centimeters."""
 
 
-def scalp(model: FaceModel, style: HairStyle = "short") -> Floats:
+def scalp(model: FaceModel, style: HairStyle = "short") -> Float64Array:
     """Density 0..1 (vertices,) of hair growth."""
     mean = model.vertices
     azimuth = np.degrees(np.arctan2(np.abs(mean[:, 0]), mean[:, 2]))
@@ -39,7 +31,7 @@ def scalp(model: FaceModel, style: HairStyle = "short") -> Floats:
     return grown * _left(mean, style)
 
 
-def _left(mean: Floats, style: HairStyle) -> Floats:
+def _left(mean: Float64Array, style: HairStyle) -> Float64Array:
     """Share 0..1 (vertices,) of the hair that has not fallen out."""
     x, y, z = np.abs(mean[:, 0]), mean[:, 1], mean[:, 2]
     if style == "receding":
@@ -51,7 +43,7 @@ def _left(mean: Floats, style: HairStyle) -> Floats:
     return np.ones(len(mean))
 
 
-def ears(model: FaceModel) -> Floats:
+def ears(model: FaceModel) -> Float64Array:
     """Membership 0..1 (vertices,) of the ears."""
     x, y, z = np.abs(model.vertices[:, 0]), model.vertices[:, 1], model.vertices[:, 2]
     height = smoothstep(y, -3.2, -1.8) * smoothstep(y, 4.3, 3.2)
@@ -67,36 +59,36 @@ class Roots:
         density: (n,) 0 at the hairline to 1 inside.
     """
 
-    place: Floats
-    normal: Floats
-    density: Floats
+    place: Float64Array
+    normal: Float64Array
+    density: Float64Array
 
 
 @dataclass(frozen=True, eq=False)
 class Obstacle:
     """Surface that hair must not enter, as points and their outward normals, (n, 3) each."""
 
-    points: Floats
-    normals: Floats
+    points: Float64Array
+    normals: Float64Array
     tree: cKDTree
 
-    def nearest(self, places: Floats) -> tuple[Floats, Floats]:
+    def nearest(self, places: Float64Array) -> tuple[Float64Array, Float64Array]:
         """Nearest point and its normal, (n, 3) each."""
         _, index = find_nearest(self.tree, places)
         return self.points[index], self.normals[index]
 
 
-def place_roots(model: FaceModel, head: Floats, count: int, rng: np.random.Generator, style: HairStyle) -> Roots:
+def place_roots(model: FaceModel, head: Float64Array, count: int, rng: np.random.Generator, style: HairStyle) -> Roots:
     """`count` roots on the scalp of a head (vertices, 3)."""
     triangles = model.triangles(Part.FACE, Part.HEAD)
     mask = scalp(model, style)
     density = areas(head, triangles) * mask[triangles].mean(axis=1) ** 1.5
     surface: SurfacePoints = scatter(triangles, density, count, rng)
     normals = vertex_normals(head, triangles)
-    return Roots(surface.of(head), unit(surface.of(normals)), surface.of(mask))
+    return Roots(surface.interpolate(head), unit(surface.interpolate(normals)), surface.interpolate(mask))
 
 
-def head_and_body(model: FaceModel, head: Floats, body: Floats) -> Obstacle:
+def head_and_body(model: FaceModel, head: Float64Array, body: Float64Array) -> Obstacle:
     """Obstacle of the head's skin and the clothes' points (n, 3), whose normals slope like a hill."""
     triangles: Indices = model.triangles(Part.FACE, Part.HEAD)
     skin = np.unique(triangles)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
-from relit_studio.people.geometry import Floats, unit
+from relit_studio.people.geometry import unit
 from relit_studio.people.hair.scalp import Obstacle, Roots
 
 KNOTS = {"ponytail": np.array([0.0, 8.6, -9.0]), "bun": np.array([0.0, 16.0, -3.6])}
@@ -15,7 +16,7 @@ _CENTER = np.array([0.0, 4.0, -0.5])
 _BUN_CM = 3.5
 
 
-def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Generator) -> Floats:
+def drawn_back(roots: Roots, knot: Float64Array, obstacle: Obstacle, rng: np.random.Generator) -> Float64Array:
     """Polylines (n, 30, 3) over the head from each root to the knot."""
     count = len(roots.place)
     offset, goal = roots.place - _CENTER, knot - _CENTER
@@ -39,7 +40,7 @@ def drawn_back(roots: Roots, knot: Floats, obstacle: Obstacle, rng: np.random.Ge
     return np.stack(places, axis=1)
 
 
-def tail(knot: Floats, obstacle: Obstacle, count: int, rng: np.random.Generator) -> Floats:
+def tail(knot: Float64Array, obstacle: Obstacle, count: int, rng: np.random.Generator) -> Float64Array:
     """Polylines (count, 30, 3) of a ponytail: out of the knot, and down toward one shoulder."""
     side = 1.0 if rng.random() < 0.5 else -1.0
     around = 6.28 * rng.random(count)
@@ -62,7 +63,7 @@ def tail(knot: Floats, obstacle: Obstacle, count: int, rng: np.random.Generator)
     return np.stack(places, axis=1)
 
 
-def bun(knot: Floats, count: int, rng: np.random.Generator) -> Floats:
+def bun(knot: Float64Array, count: int, rng: np.random.Generator) -> Float64Array:
     """Polylines (count, 30, 3) wound about a ball over the knot."""
     up = unit(knot - _CENTER)
     aside = unit(np.cross(up, [0, 0, 1]))

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from relit_studio.people.geometry import Floats
+from relit_camera.base.array_types import Float64Array
 from relit_studio.people.props.mug import RADIUS_CM
 from relit_studio.people.props.solids import Blob, Solid, union_surface
 
@@ -65,7 +65,7 @@ def open_hand() -> Solid:
     )
 
 
-def _wrapped(height_cm: float, length: float, thickness: float) -> Floats:
+def _wrapped(height_cm: float, length: float, thickness: float) -> Float64Array:
     """A finger round the mug, from the knuckle at its left over its front."""
     angles = np.radians(-8) + np.radians([0, 50, 82, 106]) * [1, length, length, length]
     distance = RADIUS_CM + np.array([1.75, 1.1, 0.78, 0.66])
@@ -74,7 +74,7 @@ def _wrapped(height_cm: float, length: float, thickness: float) -> Floats:
     return np.stack([-distance * np.cos(angles), heights, distance * np.sin(angles), radii], axis=1)
 
 
-def _straight(x: float, y: float, lean: float, length: float, thickness: float) -> Floats:
+def _straight(x: float, y: float, lean: float, length: float, thickness: float) -> Float64Array:
     """A finger that points up and bends a little toward the palm."""
     along = length * np.array([0, 4.3, 6.8, 8.6])
     bend = length * np.array([0, -0.35, -1.0, -1.9])
@@ -82,16 +82,16 @@ def _straight(x: float, y: float, lean: float, length: float, thickness: float) 
     return np.stack([x + lean * along, y + along, bend, radii], axis=1)
 
 
-def _metacarpal(wrist: Floats, knuckle: Floats, across: float) -> Floats:
+def _metacarpal(wrist: Float64Array, knuckle: Float64Array, across: float) -> Float64Array:
     """From the wrist, `across` of its middle toward the thumb, to a knuckle."""
     side = np.array([-0.25, 0.85, -0.45]) * across * 0.55
     return _chain((*(wrist + side), 1.3), (*knuckle[:3], 1.0))
 
 
-def _stub(wrist: Floats, arm: Floats) -> Floats:
+def _stub(wrist: Float64Array, arm: Float64Array) -> Float64Array:
     end = wrist + _STUB_CM * arm / np.linalg.norm(arm)
     return _chain((*(wrist - 0.6 * arm), 2.0), (*wrist, 2.1), (*end, 2.5))
 
 
-def _chain(*spheres: ArrayLike) -> Floats:
+def _chain(*spheres: ArrayLike) -> Float64Array:
     return np.array(spheres, np.float64)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.rotations import rotation_from_angles
 from relit_studio.cycles.job import Material, Mesh
-from relit_studio.people.geometry import Floats
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture, turned
 from relit_studio.people.props.hand import GRIP_WRIST, gripping_hand, open_hand
@@ -92,7 +92,7 @@ class HeldObjects:
             "glaze": {"kind": "plain", "colour": list(_GLAZE), "roughness": 0.12},
         }
 
-    def motions(self, posture: Posture, gesture: Gesture) -> dict[str, Floats]:
+    def motions(self, posture: Posture, gesture: Gesture) -> dict[str, Float64Array]:
         """Rigid motions (4, 4) from each object's axes to room axes, by name."""
         lips = turned(self._lips[None], posture.rotation)[0]
         tilt = rotation_from_angles(0, -gesture.tilt_deg)
@@ -111,12 +111,12 @@ class HeldObjects:
         }
 
 
-def _along(wrist: Floats, elbow: Floats) -> Floats:
+def _along(wrist: Float64Array, elbow: Float64Array) -> Float64Array:
     """The motion of a sleeve from wrist toward elbow."""
     return _motion(Rotation.align_vectors([elbow - wrist], [[0.0, 1.0, 0.0]])[0], wrist)
 
 
-def _motion(rotation: Rotation, offset: ArrayLike) -> Floats:
+def _motion(rotation: Rotation, offset: ArrayLike) -> Float64Array:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation.as_matrix(), offset
     return matrix

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import logsumexp
 
-from relit_studio.people.geometry import Floats, triangles_of
+from relit_camera.base.array_types import Float64Array
+from relit_studio.people.geometry import triangles_of
 
 _MARGIN_CM = 1.0
 """Margin around a shape when its surface is extracted."""
@@ -25,7 +26,7 @@ class Solid:
         faces: (m, 4) int, counter-clockwise from outside, -1 in the last column of a triangle.
     """
 
-    vertices: Floats
+    vertices: Float64Array
     faces: NDArray[np.int64]
 
     @property
@@ -69,16 +70,16 @@ class Blob:
         crease_cm: how wide the creases are between chains.
     """
 
-    chains: tuple[Floats, ...]
+    chains: tuple[Float64Array, ...]
     crease_cm: float
 
-    def distance(self, points: Floats) -> Floats:
+    def distance(self, points: Float64Array) -> Float64Array:
         """Approximate signed distance (n,) of points (n, 3); negative inside."""
         nearest = [_distance_of_chain(points, chain) for chain in self.chains]
         return np.asarray(-self.crease_cm * logsumexp(-np.array(nearest) / self.crease_cm, axis=0))
 
     @property
-    def bounds(self) -> tuple[Floats, Floats]:
+    def bounds(self) -> tuple[Float64Array, Float64Array]:
         """Lowest and highest corner, with a margin."""
         spheres = np.concatenate(self.chains)
         reach = spheres[:, 3:] + _MARGIN_CM
@@ -98,7 +99,7 @@ def union_surface(blobs: Sequence[Blob], crease_cm: float, step_cm: float) -> So
     return Solid(low + step_cm * vertices, faces)
 
 
-def surface_nets(field: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def surface_nets(field: Float64Array) -> tuple[Float64Array, NDArray[np.int64]]:
     """Zero surface of a field (i, j, k) that is positive at the border: vertices (n, 3) in grid units, quads (m, 4).
 
     Naive surface nets (Gibson 1998): each cell that the surface cuts has one vertex, the mean of the cuts of its edges,
@@ -138,12 +139,12 @@ def surface_nets(field: Floats) -> tuple[Floats, NDArray[np.int64]]:
     return vertices, np.concatenate(quads).astype(np.int64)
 
 
-def _shifted(field: Floats, start: tuple[int, ...], along: NDArray[np.int_]) -> Floats:
+def _shifted(field: Float64Array, start: tuple[int, ...], along: NDArray[np.int_]) -> Float64Array:
     """The ends of the edges along one axis: the field without its last plane there, or without its first."""
     return field[tuple(slice(at, at + size - step) for at, size, step in zip(start, field.shape, along, strict=True))]
 
 
-def _distance_of_chain(points: Floats, chain: Floats) -> Floats:
+def _distance_of_chain(points: Float64Array, chain: Float64Array) -> Float64Array:
     distances = []
     for (*start, wide), (*end, narrow) in pairwise(chain):
         axis, offset = np.subtract(end, start), points - start

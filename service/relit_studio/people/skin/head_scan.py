@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import InputError
-from relit_studio.people.geometry import Floats, Indices
 
 _TYPES = {5126: np.float32, 5123: np.uint16}
 _WIDTHS = {"VEC3": 3, "VEC2": 2, "SCALAR": 1}
@@ -21,8 +21,8 @@ _WIDTHS = {"VEC3": 3, "VEC2": 2, "SCALAR": 1}
 class Scan:
     """A textured surface: vertices (n, 3), texture coordinates (n, 2) with v up, triangles (m, 3)."""
 
-    vertices: Floats
-    uv: Floats
+    vertices: Float64Array
+    uv: Float64Array
     triangles: Indices
 
 

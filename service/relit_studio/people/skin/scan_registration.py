@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_studio.people.face.face_model import IDENTITIES, FaceModel, Part
 from relit_studio.people.geometry import (
-    Floats,
-    Indices,
     Similarity,
     areas,
     edges_of,
@@ -55,16 +54,16 @@ class Registration:
         mean_distance_cm: mean distance of the fitted surfaces.
     """
 
-    uv: Floats
-    body: Floats
+    uv: Float64Array
+    body: Float64Array
     mean_distance_cm: float
 
 
 @dataclass(frozen=True, eq=False)
 class _Samples:
-    points: Floats
-    normals: Floats
-    uv: Floats
+    points: Float64Array
+    normals: Float64Array
+    uv: Float64Array
 
     def moved(self, similarity: Similarity) -> _Samples:
         return _Samples(similarity.apply(self.points), self.normals @ similarity.rotation.T, self.uv)
@@ -80,8 +79,13 @@ def register(model: FaceModel, scan: Scan, samples: int = 1_500_000) -> Registra
 
 
 def fit(
-    model: FaceModel, start: Floats, points: Floats, normals: Floats, targets: Floats, rounds: int = _ROUNDS
-) -> tuple[Similarity, Floats, float]:
+    model: FaceModel,
+    start: Float64Array,
+    points: Float64Array,
+    normals: Float64Array,
+    targets: Float64Array,
+    rounds: int = _ROUNDS,
+) -> tuple[Similarity, Float64Array, float]:
     """Fit the model to a cloud.
 
     Args:
@@ -126,11 +130,11 @@ def fit(
 
 def _sample(scan: Scan, count: int, rng: np.random.Generator) -> _Samples:
     where = scatter(scan.triangles, areas(scan.vertices, scan.triangles), count, rng)
-    normals = where.of(vertex_normals(scan.vertices, scan.triangles))
-    return _Samples(where.of(scan.vertices), normals, where.of(scan.uv))
+    normals = where.interpolate(vertex_normals(scan.vertices, scan.triangles))
+    return _Samples(where.interpolate(scan.vertices), normals, where.interpolate(scan.uv))
 
 
-def _landmark_targets(cloud: _Samples) -> Floats:
+def _landmark_targets(cloud: _Samples) -> Float64Array:
     """The picked points (12, 3) on the scan, at the foremost surface near each."""
     front = cloud.points[cloud.normals[:, 2] > 0.1]
     picked = _PICKED[:, 1:]
@@ -138,7 +142,7 @@ def _landmark_targets(cloud: _Samples) -> Floats:
     return np.column_stack([picked, front[near, 2].max(axis=1)])
 
 
-def _texture_coordinates(model: FaceModel, mesh: Floats, cloud: _Samples) -> Floats:
+def _texture_coordinates(model: FaceModel, mesh: Float64Array, cloud: _Samples) -> Float64Array:
     """Texture coordinates of the nearest scan point with a similar normal, smoothed over the mesh."""
     triangles = model.triangles(Part.FACE, Part.HEAD)
     skin = np.flatnonzero(model.vertex_part <= Part.HEAD)

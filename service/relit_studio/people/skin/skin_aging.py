@@ -7,7 +7,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from relit_studio.people.geometry import Floats
+from relit_camera.base.array_types import Float64Array
 
 SIDE = 2048
 _MIDDLE = 512.0
@@ -36,7 +36,7 @@ _ACROSS = tuple(
 )
 
 
-def folds(seed: int) -> Floats:
+def folds(seed: int) -> Float64Array:
     """Depth 0..1 (2048, 2048) of the folds."""
     rng = np.random.default_rng(seed + 600)
     total = np.zeros((SIDE, SIDE), np.float32)
@@ -49,7 +49,7 @@ def folds(seed: int) -> Floats:
     return total.astype(np.float64)
 
 
-def age_spots(seed: int, age: float) -> Floats:
+def age_spots(seed: int, age: float) -> Float64Array:
     """Strength 0..1 (2048, 2048) of pale brown spots; older skin has more of them."""
     rng = np.random.default_rng(seed + 700)
     canvas = np.zeros((SIDE, SIDE), np.float32)

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
-from relit_studio.people.geometry import Floats
 from relit_studio.people.skin.scan_pictures import lips_mask, scalp_mask
 from relit_studio.people.skin.skin_aging import age_spots, folds
 from relit_studio.people.traits.person_traits import Traits
@@ -51,21 +51,21 @@ def folds_picture(traits: Traits) -> NDArray[np.uint8]:
     return np.asarray(255 * (1 - np.clip(folds(traits.seed), 0, 1)), np.uint8)
 
 
-def oil(mean: Floats) -> Floats:
+def oil(mean: Float64Array) -> Float64Array:
     """0..1 (vertices,) where skin is oily, on the mean head: forehead and nose."""
     forehead = smoothstep(mean[:, 1], 6.5, 9) * smoothstep(mean[:, 2], 6, 9)
     nose = np.exp(-((mean - [0, 1.0, 12.5]) ** 2).sum(axis=1) / 3.5)
     return np.asarray(np.maximum(forehead, nose))
 
 
-def lips(mean: Floats, ring: Floats) -> Floats:
+def lips(mean: Float64Array, ring: Float64Array) -> Float64Array:
     """0..1 (vertices,) where the lips are: inside their outer edge `ring` (n, 2), seen from the front."""
     edge = ring.astype(np.float32).reshape(-1, 1, 2)
     inside = np.array([cv2.pointPolygonTest(edge, (float(x), float(y)), True) for x, y in mean[:, :2]])
     return smoothstep(inside, -0.08, 0.12) * (mean[:, 2] > 8.5)
 
 
-def _blood(seed: int) -> Floats:
+def _blood(seed: int) -> Float64Array:
     """-1..1 (2048, 2048): how much more blood than the photographed skin has, by cheeks and nose, and in blotches."""
     rng = np.random.default_rng(seed + 500)
     y, x = np.mgrid[:SIDE, :SIDE].astype(np.float32)
@@ -78,7 +78,7 @@ def _blood(seed: int) -> Floats:
     return np.asarray(np.clip(red + 0.14 * coarse + 0.08 * fine, -1, 1.5), np.float64)
 
 
-def _spots(seed: int, amount: float) -> Floats:
+def _spots(seed: int, amount: float) -> Float64Array:
     """0..1 (2048, 2048): many faint freckles, `amount` times as many as usual; a few moles, one or two of them dark."""
     rng = np.random.default_rng(seed)
     canvas = np.zeros((SIDE, SIDE), np.float32)

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import lombscargle
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.flash.flash_signal import NOISE_FLOOR
-
-Floats = NDArray[np.float64]
 
 MIN_FREQUENCY_HZ = 0.7
 """Slowest flashes that are looked for."""
@@ -71,7 +70,7 @@ class FlashFrequency:
     fraction: float
 
 
-def find_flash_frequency(level: Floats, times_s: Floats) -> FlashFrequency:
+def find_flash_frequency(level: Float64Array, times_s: Float64Array) -> FlashFrequency:
     """The strongest periodic change from 0.7 Hz to half the frame rate, by Lomb-Scargle periodograms.
 
     These need no even frame times (Lomb 1976, Scargle 1982).
@@ -99,7 +98,7 @@ def find_flash_frequency(level: Floats, times_s: Floats) -> FlashFrequency:
     return FlashFrequency(float(frequencies[peak]), float(spectrum[peak]))
 
 
-def _without_trend(times_s: Floats, values: Floats) -> Floats:
+def _without_trend(times_s: Float64Array, values: Float64Array) -> Float64Array:
     """The values less a fitted parabola, as which the slow changes by a moving light and camera gains count."""
     return np.asarray(values - np.polynomial.Polynomial.fit(times_s, values, 2)(times_s))
 
@@ -114,16 +113,16 @@ class FlashEdges:
         frame: (edges,) index of the last frame before the middle of the change.
     """
 
-    times_s: Floats
+    times_s: Float64Array
     rising: NDArray[np.bool_]
     frame: NDArray[np.intp]
 
-    def only(self, some: slice) -> FlashEdges:
+    def subset(self, some: slice) -> FlashEdges:
         """Some of the edges."""
         return FlashEdges(self.times_s[some], self.rising[some], self.frame[some])
 
 
-def find_flash_edges(level: Floats, times_s: Floats, frequency_hz: float) -> FlashEdges:
+def find_flash_edges(level: Float64Array, times_s: Float64Array, frequency_hz: float) -> FlashEdges:
     """Moments at which the level crosses the middle between its local extremes, interpolated between frames.
 
     Args:
@@ -148,13 +147,13 @@ def find_flash_edges(level: Floats, times_s: Floats, frequency_hz: float) -> Fla
     return FlashEdges(times_s[frame] + np.clip(fraction, 0, 1) * (times_s[frame + 1] - times_s[frame]), rising, frame)
 
 
-def _local_extremes(level: Floats, interval_s: float, frequency_hz: float) -> tuple[Floats, Floats]:
+def _local_extremes(level: Float64Array, interval_s: float, frequency_hz: float) -> tuple[Float64Array, Float64Array]:
     """Minimum and maximum (frames,) of the level (frames,) in a window of about a period around each frame."""
     window = max(3, round(_TUNABLES.window_periods / frequency_hz / interval_s))
     return np.asarray(minimum_filter1d(level, window)), np.asarray(maximum_filter1d(level, window))
 
 
-def require_flashing(level: Floats, interval_s: float, beat: FlashFrequency, edges: FlashEdges) -> None:
+def require_flashing(level: Float64Array, interval_s: float, beat: FlashFrequency, edges: FlashEdges) -> None:
     """Check that the level goes up and down as that of a blinking light does, often enough.
 
     Args:
@@ -208,8 +207,8 @@ class FlashSchedule:
         on_s, off_s: (flashes,) growing times; at the film's beginning and end extrapolated.
     """
 
-    on_s: Floats
-    off_s: Floats
+    on_s: Float64Array
+    off_s: Float64Array
 
     @property
     def frequency_hz(self) -> float:
@@ -221,18 +220,18 @@ class FlashSchedule:
         """Fraction of the time for which the light is on."""
         return float(np.median(self.off_s - self.on_s)) * self.frequency_hz
 
-    def exposure_fractions(self, times_s: Floats, shutter: RollingShutter) -> Floats:
+    def exposure_fractions(self, times_s: Float64Array, shutter: RollingShutter) -> Float64Array:
         """Share (frames, 33) of the exposure for which the light is on, at 33 rows from the first to the last."""
         start = times_s[:, None] + shutter.readout_s * _SHUTTER_ROWS
         return (self._on_before(start + shutter.exposure_s) - self._on_before(start)) / shutter.exposure_s
 
-    def flash_of(self, times_s: Floats, shutter: RollingShutter) -> NDArray[np.intp]:
+    def flash_of(self, times_s: Float64Array, shutter: RollingShutter) -> NDArray[np.intp]:
         """Number (frames,) of the flash whose middle is nearest to that of each frame."""
         middle = (self.on_s + self.off_s) / 2
         frame = times_s + (shutter.readout_s + shutter.exposure_s) / 2
         return np.asarray(np.abs(frame[:, None] - middle).argmin(axis=1), np.intp)
 
-    def _on_before(self, time_s: Floats) -> Floats:
+    def _on_before(self, time_s: Float64Array) -> Float64Array:
         """Seconds (...) for which the light was on before times (...)."""
         times = np.stack([self.on_s, self.off_s], axis=1).ravel()
         lit = np.concatenate([[0.0], np.cumsum(self.off_s - self.on_s)])

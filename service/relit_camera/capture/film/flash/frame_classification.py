@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.face_circle import FaceCircle
 from relit_camera.capture.film.flash.exposure_fractions import BrightnessBlocks
@@ -31,9 +31,6 @@ from relit_camera.capture.film.flash.flash_signal import (
     reached_cells,
 )
 from relit_camera.capture.film.flash.rolling_shutter import fit_rolling_shutter
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 MIN_BRIGHT_FRAMES = 8
 """Least bright frames of a film."""
@@ -123,7 +120,7 @@ class Flashes:
     frames: tuple[FlashFrame, ...]
     schedule: FlashSchedule
     shutter: RollingShutter
-    strength: Floats
+    strength: Float64Array
     signal: FlashSignal
 
     def indices(self, kind: FrameClass) -> Indices:
@@ -131,7 +128,7 @@ class Flashes:
         return np.array([frame.index for frame in self.frames if frame.kind is kind], np.intp)
 
     @property
-    def times_s(self) -> Floats:
+    def times_s(self) -> Float64Array:
         """Presentation times (frames,)."""
         return np.array([frame.time_s for frame in self.frames])
 
@@ -159,7 +156,7 @@ def detect_flashes(brightness: BrightnessGrid, circle: FaceCircle | None = None)
     require_fully_lit_frames(
         schedule.frequency_hz, brightness.interval_s, len(np.unique(flash[bright])) / len(np.unique(flash))
     )
-    reasons = find_outlier_frames(BrightnessBlocks.of(brightness, signal), bright, dark)
+    reasons = find_outlier_frames(BrightnessBlocks.from_grid(brightness, signal), bright, dark)
     strength = relative_flash_strengths(brightness, signal, np.setdiff1d(bright, list(reasons)), dark, flash)
     for index in bright.tolist():
         if strength[flash[index]] < MIN_FLASH_STRENGTH:
@@ -177,7 +174,9 @@ def detect_flashes(brightness: BrightnessGrid, circle: FaceCircle | None = None)
     return Flashes(tuple(frames), schedule, shutter, strength, signal)
 
 
-def _bright_and_dark(times_s: Floats, schedule: FlashSchedule, shutter: RollingShutter) -> tuple[Indices, Indices]:
+def _bright_and_dark(
+    times_s: Float64Array, schedule: FlashSchedule, shutter: RollingShutter
+) -> tuple[Indices, Indices]:
     """Indices of the fully lit frames and of the unlit ones, leaving out those that an edge's error could change."""
     error_s = _TUNABLES.edge_error_s + _TUNABLES.edge_jitter * shutter.jitter_s
     shorter = FlashSchedule(schedule.on_s + error_s, schedule.off_s - error_s).exposure_fractions(times_s, shutter)
@@ -214,7 +213,7 @@ def find_outlier_frames(blocks: BrightnessBlocks, bright: Indices, dark: Indices
 
 def relative_flash_strengths(
     brightness: BrightnessGrid, signal: FlashSignal, bright: Indices, dark: Indices, flash: Indices
-) -> Floats:
+) -> Float64Array:
     """Light (flashes,) that each flash adds, relative to the median; NaN of a flash without a bright frame.
 
     Args:

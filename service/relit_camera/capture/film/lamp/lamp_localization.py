@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.ball.ball_tracking import ObservedBall
 from relit_camera.capture.film.ball.specular_highlight import Highlight, NoHighlight
@@ -22,9 +22,6 @@ from relit_camera.capture.film.lamp.lamp_position import (
     require_lamp_beyond_ball,
     triangulate_lamp,
 )
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -65,8 +62,8 @@ class LampPositions:
     """
 
     index: Indices
-    lamps_cm: Floats
-    at_ball: Floats
+    lamps_cm: Float64Array
+    at_ball: Float64Array
     distances: LampDistances
     triangulated: Mapping[int, LampTriangulation]
     unusable: Mapping[int, str]
@@ -77,13 +74,17 @@ class LampPositions:
         return bool(self.triangulated)
 
     @property
-    def directions(self) -> Floats:
+    def directions(self) -> Float64Array:
         """Unit vectors (count, 3) toward the lamp from the head's middle."""
         return np.asarray(self.lamps_cm / np.linalg.norm(self.lamps_cm, axis=1, keepdims=True))
 
 
 def locate_lamps(
-    balls: Sequence[ObservedBall], bright: Indices, times_s: Floats, layout: CaptureLayout, usual_distance_cm: float
+    balls: Sequence[ObservedBall],
+    bright: Indices,
+    times_s: Float64Array,
+    layout: CaptureLayout,
+    usual_distance_cm: float,
 ) -> LampPositions:
     """Find the lamp in every bright frame in which a ball shows it.
 
@@ -157,7 +158,7 @@ def _triangulate(highlights: Mapping[int, list[BallHighlight]]) -> tuple[dict[in
 
 def _distances(
     balls: Sequence[ObservedBall],
-    times_s: Floats,
+    times_s: Float64Array,
     frames: Indices,
     triangulated: Mapping[int, LampTriangulation],
     layout: CaptureLayout,

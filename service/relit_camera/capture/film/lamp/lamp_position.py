@@ -11,12 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.errors import CaptureError, InputError
 from relit_camera.capture.film.ball.sphere_projection import PinholeView, Vectors
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,12 +168,12 @@ class LampDistances:
         error: (count,) its relative standard error; NaN where the distance is assumed, not measured.
     """
 
-    cm: Floats
-    error: Floats
+    cm: Float64Array
+    error: Float64Array
 
 
 def estimate_lamp_distances(
-    times_s: Floats, triangulated: Mapping[int, LampTriangulation], head_cm: Floats, usual_cm: float
+    times_s: Float64Array, triangulated: Mapping[int, LampTriangulation], head_cm: Float64Array, usual_cm: float
 ) -> LampDistances:
     """Distance in each frame, by Gaussian process regression over time (Rasmussen and Williams 2006, 2.2).
 

@@ -14,12 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.capture.film.flash.flash_signal import NOISE_FLOOR
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ class FrameGains:
             from a bright one as they are, and with gains divided out.
     """
 
-    rgb: Floats
+    rgb: Float64Array
     spread: float
     fraction: float
     visible: float
@@ -102,7 +100,7 @@ def downsample_for_gains(frame: LinearImage) -> NDArray[np.float16]:
 
 
 def estimate_gains(
-    cells: NDArray[np.float16], times_s: Floats, bright: NDArray[np.bool_], flash: NDArray[np.intp]
+    cells: NDArray[np.float16], times_s: Float64Array, bright: NDArray[np.bool_], flash: NDArray[np.intp]
 ) -> FrameGains:
     """Gains of bright and dark frames.
 
@@ -152,7 +150,11 @@ def require_uniform_gains(spread: float) -> None:
 
 
 def _unreached(
-    flat: NDArray[np.float16], times_s: Floats, bright: NDArray[np.bool_], flash: NDArray[np.intp], visible: NDArray
+    flat: NDArray[np.float16],
+    times_s: Float64Array,
+    bright: NDArray[np.bool_],
+    flash: NDArray[np.intp],
+    visible: NDArray,
 ) -> NDArray[np.bool_]:
     """Mask (cells,) of the visible cells that respond least to the flash; none if all respond."""
     light = np.log(flat.astype(np.float32).mean(axis=2) + np.float32(NOISE_FLOOR))
@@ -172,7 +174,7 @@ def _unreached(
     return np.asarray(visible & (response < low + _TUNABLES.response_margin))
 
 
-def _common_gains(cells: NDArray[np.float16]) -> tuple[Floats, float]:
+def _common_gains(cells: NDArray[np.float16]) -> tuple[Float64Array, float]:
     """Logarithms (frames, 3) of the gains common to all cells (frames, cells, 3), and the cells' spread about them."""
     logs = np.log(cells.astype(np.float32) + np.float32(NOISE_FLOOR))
     logs -= logs.mean(axis=0)
@@ -185,7 +187,9 @@ def _common_gains(cells: NDArray[np.float16]) -> tuple[Floats, float]:
     return gains.astype(np.float64), spread
 
 
-def _interpolated_gains(cells: NDArray[np.float16], times_s: Floats, bright: NDArray[np.bool_]) -> tuple[Floats, float]:
+def _interpolated_gains(
+    cells: NDArray[np.float16], times_s: Float64Array, bright: NDArray[np.bool_]
+) -> tuple[Float64Array, float]:
     """Logarithms (frames, 3) of gains, measured in dark frames and interpolated in bright ones; and the spread."""
     if cells.shape[1] == 0:
         return np.zeros((len(times_s), 3)), 0.0
@@ -194,7 +198,7 @@ def _interpolated_gains(cells: NDArray[np.float16], times_s: Floats, bright: NDA
     return logs, spread
 
 
-def _room_left(cells: NDArray[np.float16], gains: Floats, judged: Indices, dark: Indices) -> float:
+def _room_left(cells: NDArray[np.float16], gains: Float64Array, judged: Indices, dark: Indices) -> float:
     """Median fraction of the room's light in cells (frames, cells, 3) that is left without the nearest dark frame."""
     if cells.shape[1] == 0:
         return 1.0

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 
+from relit_camera.base.array_types import Indices
 from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.film.olat.flash_strength import FlashStrengths
 from relit_camera.capture.film.olat.near_field import distant_light_factor
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Indices
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.color import Gamma
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.video.video_readers import LinearVideoReader
 from relit_camera.capture.alignment.rigid_transform import RigidTransform
 from relit_camera.capture.film.olat.head_crop import HeadCrop
-
-Indices = NDArray[np.intp]
 
 _DARK_FRAMES = 4
 """Nearest dark frames on either side of a bright one whose mean shows the room's light."""

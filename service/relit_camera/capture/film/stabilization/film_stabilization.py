@@ -7,17 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import CaptureError
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, interpolate_transforms, transforms_to_array
 from relit_camera.capture.film.face_circle import FaceCircle
 from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass
 from relit_camera.capture.film.stabilization.face_crops import crop_faces
 from relit_camera.capture.film.stabilization.stabilization_refinement import align_bright, align_dark
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 _MIN_TRACKED = 0.7
 """Fraction of the dark frames in which the face must be found."""
@@ -50,7 +47,7 @@ class Stabilization:
     circle: FaceCircle
     measured: Indices
     inliers: Indices
-    residual_px: Floats
+    residual_px: Float64Array
     lost: frozenset[int]
     unsteady_px: float
 
@@ -88,12 +85,12 @@ def stabilize_film(
         flashes.times_s,
     )
     crops = crop_faces(path, dark_frames, bright_frames, circle, threads, progress)
-    dark = crops.of(dark_frames)
+    dark = crops.of_frames(dark_frames)
     transforms = dark.transforms
     if refine and transforms:
         transforms, outliers = align_dark(dark)
         dark, transforms = (
-            dark.only(~outliers),
+            dark.subset(~outliers),
             [each for each, bad in zip(transforms, outliers, strict=True) if not bad],
         )
     lost = _lost_frames(dark_frames, bright_frames, dark.index, times_s, flashes.schedule.frequency_hz)
@@ -102,7 +99,7 @@ def stabilize_film(
     reference = int(np.square(rows - np.median(rows, axis=0)).sum(axis=1).argmin())
     unsteady = _unsteadiness(dark.index, times_s, rows)
     every = interpolate_transforms(times_s, times_s[dark.index], transforms)
-    bright = crops.of(np.setdiff1d(bright_frames, list(lost)))
+    bright = crops.of_frames(np.setdiff1d(bright_frames, list(lost)))
     if refine and len(bright.index) >= _MIN_BRIGHT_FRAMES:
         flash = np.array([flashes.frames[index].flash for index in bright.index])
         by_time = [every[index] for index in bright.index]
@@ -121,7 +118,7 @@ def stabilize_film(
     )
 
 
-def _unsteadiness(index: Indices, times_s: Floats, rows: Floats) -> Floats:
+def _unsteadiness(index: Indices, times_s: Float64Array, rows: Float64Array) -> Float64Array:
     """Root mean square (3,) of rotation and shifts from the interpolation between the dark frames of other pauses."""
     pause = np.cumsum(np.diff(index, prepend=index[0]) > 2)
     deviations = []
@@ -133,7 +130,7 @@ def _unsteadiness(index: Indices, times_s: Floats, rows: Floats) -> Floats:
 
 
 def _lost_frames(
-    dark: Indices, bright: Indices, measured: Indices, times_s: Floats, frequency_hz: float
+    dark: Indices, bright: Indices, measured: Indices, times_s: Float64Array, frequency_hz: float
 ) -> frozenset[int]:
     """Dark frames without a measurement, and bright ones too far in time from any."""
     lost = np.setdiff1d(dark, measured)
@@ -143,7 +140,7 @@ def _lost_frames(
     return frozenset(lost.tolist()) | frozenset(bright.tolist())
 
 
-def _require_tracked_face(measured: Indices, dark: Indices, lost: frozenset[int], times_s: Floats) -> None:
+def _require_tracked_face(measured: Indices, dark: Indices, lost: frozenset[int], times_s: Float64Array) -> None:
     """Check that the face was found in enough dark frames.
 
     Raises:

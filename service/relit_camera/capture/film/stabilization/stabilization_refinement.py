@@ -7,13 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.images.color import srgb_decode
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, transforms_from_array, transforms_to_array
 from relit_camera.capture.alignment.template_alignment import align_across_lights, align_to_mean, gaussian_blur
 from relit_camera.capture.film.stabilization.face_crops import FaceCrops
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 _FEATURE_RADIUS = 0.6
 """Fraction of the face's radius within which pixels count: features, and not the background at the outline."""
@@ -40,7 +38,7 @@ def align_dark(dark: FaceCrops) -> tuple[list[RigidTransform], NDArray[np.bool_]
 
 
 def align_bright(
-    bright: FaceCrops, by_time: Sequence[RigidTransform], flash: Indices, unsteady: Floats
+    bright: FaceCrops, by_time: Sequence[RigidTransform], flash: Indices, unsteady: Float64Array
 ) -> list[RigidTransform]:
     """Align bright frames to pictures that those of other flashes predict for their light.
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.capture.reflectance.appearance_model import (
     SPECULAR_TERMS,
@@ -23,8 +24,6 @@ from relit_camera.capture.reflectance.methods.gaussian_process import Kernel
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import region_coverage
 from relit_camera.subject.reflectance_field import texel_vectors
-
-Floats = NDArray[np.float32]
 
 FIT_BLOCK = 512
 """Pixels fitted at a time: 2 MB of terms for 200 lights."""
@@ -73,7 +72,7 @@ class AppearanceField:
     """
 
     samples: OlatSamples
-    amounts: Floats
+    amounts: Float32Array
     kernel: Kernel
 
     @property
@@ -81,28 +80,30 @@ class AppearanceField:
         """Height and width in pixels."""
         return self.samples.pictures.shape[1], self.samples.pictures.shape[2]
 
-    def dense(self, start: int, stop: int) -> Floats:
+    def dense(self, start: int, stop: int) -> Float32Array:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
         return self._evaluate(texel_vectors(), self._texel_weights, np.arange(start, stop)).transpose(0, 2, 1)
 
-    def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+    def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Float32Array:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
         weights = residual_weights(self.kernel, self.samples.directions, directions)
         return self._evaluate(directions, weights, pixels).transpose(2, 0, 1)
 
     @cached_property
-    def _texel_weights(self) -> Floats:
+    def _texel_weights(self) -> Float32Array:
         return residual_weights(self.kernel, self.samples.directions, texel_vectors())
 
     def fitted_to(self, samples: OlatSamples, pixels: NDArray[np.intp]) -> AppearanceField:
         """A field with the same kernel, fitted to other samples of this person at these row-major pixels only."""
         return AppearanceField(samples, _fit(samples, pixels)[0], self.kernel)
 
-    def appearance_at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+    def appearance_at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Float32Array:
         """R as `at` gives it, of the appearance model alone, without the residual."""
         return _modelled(self.samples, self.amounts, directions, pixels).transpose(2, 0, 1)
 
-    def _evaluate(self, directions: NDArray[np.float64], weights: Floats, pixels: NDArray[np.intp]) -> Floats:
+    def _evaluate(
+        self, directions: NDArray[np.float64], weights: Float32Array, pixels: NDArray[np.intp]
+    ) -> Float32Array:
         """R as (pixels, 3, count), given the weights (lights, count) that predict the residual."""
         result = np.empty((len(pixels), 3, len(directions)), np.float32)
         step = max(1, QUERY_BLOCK // max(1, len(directions)))
@@ -114,7 +115,9 @@ class AppearanceField:
             np.maximum(found, 0, out=result[start : start + step])
         return result
 
-    def _residual(self, directions: NDArray[np.float64], weights: Floats, pixels: NDArray[np.intp]) -> Floats:
+    def _residual(
+        self, directions: NDArray[np.float64], weights: Float32Array, pixels: NDArray[np.intp]
+    ) -> Float32Array:
         """The predicted residual (pixels, 3, count): for lit queries from lights that reach the pixel, else the rest.
 
         The model's error in direct light says nothing about its error in shadow, and the other way round.
@@ -127,7 +130,7 @@ class AppearanceField:
         return np.asarray(query_lit * in_light + (1 - query_lit) * in_shadow)
 
 
-def _predicted_residual(weights: Floats, fractions: Floats, residual: Floats) -> Floats:
+def _predicted_residual(weights: Float32Array, fractions: Float32Array, residual: Float32Array) -> Float32Array:
     """Residuals (pixels, 3, count) predicted from captured ones (pixels, 3, lights), each counted by its fraction.
 
     The weights (lights, count) are rescaled, by MAX_COMPENSATION at most, so that those counted by their fractions
@@ -141,7 +144,7 @@ def _predicted_residual(weights: Floats, fractions: Floats, residual: Floats) ->
 
 def _fit(
     samples: OlatSamples, pixels: NDArray[np.intp], expected: SpecularEstimate | None = None
-) -> tuple[Floats, SpecularEstimate]:
+) -> tuple[Float32Array, SpecularEstimate]:
     """Amounts (height · width, 3, TERM_COUNT), 0 but at the given pixels, and the specular estimate of those pixels."""
     geometry, bright = samples.geometry, _bright(samples)
     amounts = np.zeros((samples.matte.size, 3, TERM_COUNT), np.float32)
@@ -161,7 +164,7 @@ def _fit(
     return amounts, specular
 
 
-def _values(samples: OlatSamples, pixels: NDArray[np.intp]) -> Floats:
+def _values(samples: OlatSamples, pixels: NDArray[np.intp]) -> Float32Array:
     """Captured values (pixels, 3, lights) of row-major pixels."""
     pictures = samples.pictures.reshape(len(samples.directions), -1, 3)
     return np.ascontiguousarray(pictures[:, pixels].transpose(1, 2, 0))
@@ -175,18 +178,18 @@ def _bright(samples: OlatSamples) -> float:
 
 
 def _modelled(
-    samples: OlatSamples, amounts: Floats, directions: NDArray[np.float64], pixels: NDArray[np.intp]
-) -> Floats:
+    samples: OlatSamples, amounts: Float32Array, directions: NDArray[np.float64], pixels: NDArray[np.intp]
+) -> Float32Array:
     """The appearance (pixels, 3, count) of row-major pixels under unit vectors (count, 3)."""
     return np.asarray(amounts[pixels] @ distant_terms(samples.geometry, directions, pixels))
 
 
-def appearance_residual(samples: OlatSamples, amounts: Floats, pixels: NDArray[np.intp]) -> Floats:
+def appearance_residual(samples: OlatSamples, amounts: Float32Array, pixels: NDArray[np.intp]) -> Float32Array:
     """Captured values minus those of the appearance model at row-major pixels: (pixels, 3, lights)."""
     return np.asarray(_values(samples, pixels) - _modelled(samples, amounts, samples.directions, pixels))
 
 
-def residual_weights(kernel: Kernel, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> Floats:
+def residual_weights(kernel: Kernel, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> Float32Array:
     """Weights (lights, queries) of simple kriging with mean 0: they fall to 0 away from every light.
 
     What other lights do not explain is mostly no noise but true of its own direction and changes within a few degrees,

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.capture.reflectance.method_registry import factored_field
 from relit_camera.capture.reflectance.methods.appearance_field import (
     VALIDATION_PIXELS,
@@ -18,8 +19,6 @@ from relit_camera.capture.reflectance.methods.linear_methods import RadialBasis
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import boundary_lights, region_coverage
 from relit_camera.subject.reflectance_field import FactoredField, texel_vectors
-
-Floats = NDArray[np.float32]
 
 FOLDS = 4
 """Parts of the cross-validation."""
@@ -59,22 +58,22 @@ class BlendField:
         """Height and width in pixels."""
         return self.modelled.size
 
-    def dense(self, start: int, stop: int) -> Floats:
+    def dense(self, start: int, stop: int) -> Float32Array:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
         return self._mixed(
             self.modelled.dense(start, stop), self.smooth.dense(start, stop), self._texels_covered[:, None]
         )
 
-    def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+    def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Float32Array:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
         covered = region_coverage(self.smooth.directions, directions)[:, None, None]
         return self._mixed(self.modelled.at(directions, pixels), self.smooth.at(directions, pixels), covered)
 
     @cached_property
-    def _texels_covered(self) -> Floats:
+    def _texels_covered(self) -> Float32Array:
         return region_coverage(self.smooth.directions, texel_vectors())
 
-    def _mixed(self, modelled: Floats, smooth: Floats, covered: Floats) -> Floats:
+    def _mixed(self, modelled: Float32Array, smooth: Float32Array, covered: Float32Array) -> Float32Array:
         """The weighted mean of both fields, written over `modelled`.
 
         `covered` is the weight of the smooth field, whose values have it as a factor already.

@@ -180,7 +180,7 @@ class ThesisMethod:
         def mix(corners: TriangleVertices) -> Values:
             colors = barycentric_mix(corners.weights, corners.colors)
             inside = np.all(corners.triangles < captured, axis=1)
-            colors[inside] = self.mix(corners.only(inside))
+            colors[inside] = self.mix(corners.subset(inside))
             return colors
 
         return TriangleField(with_black_ring(known), mix)
