@@ -49,10 +49,10 @@ def make_bundle(field: Path, clip: Path, out: Path, components: int, progress: P
     with TemporaryDirectory(prefix=".bundle.", dir=out) as name:
         made = _write(field, clip, frames, Path(name), components, progress)
         for path in made:
-            most = MAX_BYTES.get(path.name)
-            if most and path.stat().st_size > most:
+            max_bytes = MAX_BYTES.get(path.name)
+            if max_bytes and path.stat().st_size > max_bytes:
                 raise InputError(
-                    f"{path.name} would have {path.stat().st_size / 1e6:.1f} MB; the demo's may have {most / 1e6:.0f}",
+                    f"{path.name} would have {path.stat().st_size / 1e6:.1f} MB; it may have {max_bytes / 1e6:.0f}",
                     "keep fewer components, or render smaller pictures",
                 )
         return [path.replace(out / path.name) for path in made]

@@ -26,7 +26,7 @@ _FOLD_SHADE = np.array([0.16, 0.26, 0.26])
 _BLOOD = np.array([0.04, 0.22, 0.18])
 """Fraction of each channel that blood absorbs."""
 _FLUSHED = (((392, 400), 48, 0.9), ((638, 400), 48, 0.9), ((513, 405), 26, 0.7), ((513, 590), 40, 0.3))
-"""Cheeks, nose and chin: middle and radius in pixels of 1024 x 1024, and how red they are wont to be."""
+"""Cheeks, nose and chin: middle and radius in pixels of 1024 x 1024, and how red they are."""
 
 
 def skin_picture(photo: DisplayImage, traits: Traits) -> DisplayImage:

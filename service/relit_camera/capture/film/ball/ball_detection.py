@@ -78,13 +78,13 @@ class DetectedBall:
         outline: in pixels of the frames.
         evidence: fraction of the outline that is visible in the pictures. Below about 0.7 the outline may be off by
             several per cent of the radius, and the light by as many degrees. None for a circle that was given.
-        glints: fraction of the pictures in which the ball shows the lamp.
+        highlight_visibility: fraction of the pictures in which the ball shows the lamp.
         focal: focal length of the camera, corrected by the outline's shape where that is more accurate.
     """
 
     outline: BallOutline
     evidence: float | None
-    glints: float
+    highlight_visibility: float
     focal: FocalLength
 
 

@@ -27,7 +27,7 @@ class HighlightTunables:
         max_lit: largest median brightness of the whole ball, relative to the highlight's: a mirror shows a lit room
             but is not lit itself.
         threshold: brightness relative to the highlight's peak from which a pixel belongs to it.
-        core: rays of a glint are cut off if thinner than this fraction of its thickest place.
+        core: rays of a highlight are cut off if thinner than this fraction of its thickest place.
         max_area: largest fraction of the ball's picture that a lamp's mirror image takes.
         white: brightness without the lamp from which the lamp does not show.
         max_white_rim: fraction of the highlight's rim that may lie on white; with more, its center is fitted as a
@@ -98,7 +98,7 @@ def find_highlight(
     normals, not of pixel positions, which would draw highlights at the side inward. Of several bright places the one
     with most light counts, without the thin rays that glare or scratches draw out of it; so the far smaller second
     image of a lamp that another mirror shows does not count. A highlight that lies partly on what is white anyway is
-    fitted as a disc of the usual area, if that is known and half of the disc shows.
+    fitted as a disc of the typical area, if that is known and half of the disc shows.
 
     Args:
         light: linear brightness (height, width) float32.

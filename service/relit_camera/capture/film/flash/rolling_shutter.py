@@ -39,7 +39,7 @@ class ShutterTunables:
         fraction_error: standard error of a block's exposure fraction, by motion of light and head between frames.
         jitters_s: standard deviations of the flash's period that are tried: of a steady one, of an app's, and by hand.
             Larger deviations count linearly, not squared, so a flash that jitters is followed where frames show it.
-        usual_exposure: exposure as a fraction of the frame interval. A flash in step with the frames shows only the
+        typical_exposure: exposure as a fraction of the frame interval. A flash in step with the frames shows only the
             relation of exposure and readout: then this prior decides; else it counts no more than one block.
         iterations: most iterations of the fit.
         tolerance: ratio of the cost to the best at which the steadier flash is preferred.
@@ -50,7 +50,7 @@ class ShutterTunables:
     step_s: float = 0.002
     fraction_error: float = 0.04
     jitters_s: tuple[float, ...] = (0.0001, 0.001, 0.005)
-    usual_exposure: float = 0.5
+    typical_exposure: float = 0.5
     iterations: int = 60
     tolerance: float = 1.25
 
@@ -209,7 +209,7 @@ class _Fit:
 
     def _residuals(self, parameters: Float64Array) -> Float64Array:
         deviations = self.film.clock @ (self.film.edges.times_s + parameters[2:])
-        prior = np.log(parameters[:1] / (_TUNABLES.usual_exposure * self.film.interval_s))
+        prior = np.log(parameters[:1] / (_TUNABLES.typical_exposure * self.film.interval_s))
         return np.concatenate([self._fraction_errors(parameters), deviations / self.jitter_s, prior])
 
     def _jacobian(self, parameters: Float64Array) -> csr_array:

@@ -1,4 +1,8 @@
-"""Where the lamp was in every bright frame: on the ray that a ball reflects, at an assumed or triangulated distance."""
+"""Position of the lamp and direction of its light in every bright frame, from the highlights on one or two balls.
+
+The lamp is on the ray that a ball reflects (`light_from_highlight`), at an assumed or a triangulated distance
+(`lamp_distance`).
+"""
 
 from __future__ import annotations
 
@@ -13,11 +17,10 @@ from relit_camera.capture.film.ball.ball_tracking import ObservedBall
 from relit_camera.capture.film.ball.specular_highlight import Highlight, NoHighlight
 from relit_camera.capture.film.ball.sphere_projection import Vectors
 from relit_camera.capture.film.lamp.capture_layout import CaptureLayout
-from relit_camera.capture.film.lamp.lamp_position import (
+from relit_camera.capture.film.lamp.lamp_distance import LampDistances, estimate_lamp_distances
+from relit_camera.capture.film.lamp.light_from_highlight import (
     BallHighlight,
-    LampDistances,
     LampTriangulation,
-    estimate_lamp_distances,
     position_at_distance,
     require_lamp_beyond_ball,
     triangulate_lamp,
@@ -84,7 +87,7 @@ def locate_lamps(
     bright: Indices,
     times_s: Float64Array,
     layout: CaptureLayout,
-    usual_distance_cm: float,
+    assumed_distance_cm: float,
 ) -> LampPositions:
     """Find the lamp in every bright frame in which a ball shows it.
 
@@ -93,7 +96,7 @@ def locate_lamps(
         bright: growing indices of the bright frames.
         times_s: (frames,) of all frames of the film.
         layout: positions of head and balls.
-        usual_distance_cm: assumed distance of the lamp from the head; of two balls, a rough guess.
+        assumed_distance_cm: assumed distance of the lamp from the head; of two balls, a rough guess.
 
     Raises:
         CaptureError: two balls contradict each other in many frames, or put the lamp no farther than themselves.
@@ -105,12 +108,12 @@ def locate_lamps(
         del highlights[index]
         unusable[index] = "the two balls show the lamp in different places"
     frames = np.array(list(highlights), np.intp)
-    distances = _distances(balls, times_s[frames], frames, triangulated, layout, usual_distance_cm)
+    distances = _distances(balls, times_s[frames], frames, triangulated, layout, assumed_distance_cm)
     lamps, to_lamp = np.empty((len(frames), 3)), np.empty((len(frames), 3))
     for row, (index, of_frame) in enumerate(highlights.items()):
         position = _mean_position(of_frame, layout.head_cm, float(distances.cm[row]))
         ball_cm = balls[0].view_at(index).center * layout.ball_radius_cm
-        require_lamp_beyond_ball(ball_cm, layout.ball_radius_cm, layout.head_cm, usual_distance_cm)
+        require_lamp_beyond_ball(ball_cm, layout.ball_radius_cm, layout.head_cm, assumed_distance_cm)
         lamps[row], to_lamp[row] = position - layout.head_cm, position - ball_cm
     at_ball = to_lamp / np.linalg.norm(to_lamp, axis=1, keepdims=True)
     return LampPositions(frames, lamps, at_ball, distances, triangulated, unusable)
@@ -162,7 +165,7 @@ def _distances(
     frames: Indices,
     triangulated: Mapping[int, LampTriangulation],
     layout: CaptureLayout,
-    usual_cm: float,
+    assumed_cm: float,
 ) -> LampDistances:
     """Distances of the lamp from the head in these frames: assumed with one ball, measured with two.
 
@@ -170,9 +173,9 @@ def _distances(
         CaptureError: two balls put the lamp no farther from the head than the farther of them is.
     """
     if len(balls) == 1:
-        return LampDistances(np.full(len(frames), usual_cm), np.full(len(frames), np.nan))
+        return LampDistances(np.full(len(frames), assumed_cm), np.full(len(frames), np.nan))
     rows = {int(np.searchsorted(frames, index)): each for index, each in triangulated.items()}
-    distances = estimate_lamp_distances(times_s, rows, layout.head_cm, usual_cm)
+    distances = estimate_lamp_distances(times_s, rows, layout.head_cm, assumed_cm)
     reach = max(float(np.linalg.norm(layout.ball_radius_cm * ball.view.center - layout.head_cm)) for ball in balls)
     if len(frames) and distances.cm.min() < _AGREEMENT.min_distance_ratio * reach:
         raise CaptureError(

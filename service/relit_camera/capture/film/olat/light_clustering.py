@@ -1,4 +1,4 @@
-"""Pictures under nearly the same light merged into one with less noise, as under a distant flash of usual strength."""
+"""Pictures under nearly the same light merged into one with less noise, as if the flash were distant and steady."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def merge_lights(
     *,
     near_field: bool = True,
 ) -> NDArray[np.float32]:
-    """Merge each cluster of pictures into one, as under a distant flash of the usual strength; black outside the matte.
+    """Merge each cluster of pictures into one, as under a distant flash of typical strength; black outside the matte.
 
     Args:
         pictures: (lights, size, size, 3) linear RGB of one flash each.

@@ -63,7 +63,7 @@ class CaptureFindings:
         eyes_px: distance of the pupils; None where they were not found.
         layout: positions of head and balls.
         lamps: where the lamp was in the frames that show it.
-        light_distance_cm: usual distance of the lamp that the user gave.
+        light_distance_cm: distance of the lamp that the user gave.
         crop: the square that became the subject's picture.
         room_subtracted: whether the room's light was subtracted.
         near_field: whether the lamp's nearness was corrected.
@@ -258,7 +258,7 @@ def _ball_entry(ball: ObservedBall, radius_cm: float) -> dict[str, Any]:
         **asdict(ball.found.outline),
         "radius_cm": radius_cm,
         "evidence": ball.found.evidence,
-        "glints": ball.found.glints,
+        "glints": ball.found.highlight_visibility,
         "episodes": [
             {"kind": each.kind, "first": each.first, "last": each.last, "shift_px": [each.dx, each.dy]}
             for each in ball.episodes

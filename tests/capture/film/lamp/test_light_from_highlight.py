@@ -8,7 +8,7 @@ import pytest
 from relit_camera.base.errors import CaptureError, InputError
 from relit_camera.capture.film.ball.specular_highlight import Highlight
 from relit_camera.capture.film.ball.sphere_projection import BallOutline, DistantView
-from relit_camera.capture.film.lamp.lamp_position import BallHighlight, position_at_distance, radius_at_depth
+from relit_camera.capture.film.lamp.light_from_highlight import BallHighlight, position_at_distance, radius_at_depth
 from tests.capture.film.ball.mirror_scene import MirrorScene, degrees_between, hand_path, highlight_in, unit, view_of
 
 SCENE = MirrorScene()
