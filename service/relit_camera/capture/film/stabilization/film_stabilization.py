@@ -16,14 +16,26 @@ from relit_camera.capture.film.flash.frame_classification import Flashes, FrameC
 from relit_camera.capture.film.stabilization.face_crops import crop_faces
 from relit_camera.capture.film.stabilization.stabilization_refinement import align_bright, align_dark
 
-_MIN_TRACKED = 0.7
-"""Fraction of the dark frames in which the face must be found."""
-_MIN_FEATURES = 0.1
-"""Fraction of the dark frames below which the face has no features to track."""
-_MIN_BRIGHT_FRAMES = 8
-"""Least bright frames for the refinement of their transforms."""
-_MAX_FLASH_PERIODS = 1.5
-"""Periods of the flash to the nearest measured dark frame beyond which the transform of a bright frame is unknown."""
+
+@dataclass(frozen=True)
+class StabilizationTunables:
+    """What counts as tracked; `relit evaluate stabilisation` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        min_tracked: fraction of the dark frames in which the face must be found.
+        min_features: fraction of the dark frames below which the face has no features to track.
+        min_bright_frames: least bright frames for the refinement of their transforms.
+        max_flash_periods: periods of the flash to the nearest measured dark frame beyond which the transform of a
+            bright frame is unknown.
+    """
+
+    min_tracked: float = 0.7
+    min_features: float = 0.1
+    min_bright_frames: int = 8
+    max_flash_periods: float = 1.5
+
+
+_TUNABLES = StabilizationTunables()
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +112,7 @@ def stabilize_film(
     unsteady = _unsteadiness(dark.index, times_s, rows)
     every = interpolate_transforms(times_s, times_s[dark.index], transforms)
     bright = crops.of_frames(np.setdiff1d(bright_frames, list(lost)))
-    if refine and len(bright.index) >= _MIN_BRIGHT_FRAMES:
+    if refine and len(bright.index) >= _TUNABLES.min_bright_frames:
         flash = np.array([flashes.frames[index].flash for index in bright.index])
         by_time = [every[index] for index in bright.index]
         for index, aligned in zip(bright.index, align_bright(bright, by_time, flash, unsteady), strict=True):
@@ -136,7 +148,7 @@ def _lost_frames(
     lost = np.setdiff1d(dark, measured)
     if len(measured):
         distance_s = np.abs(times_s[bright][:, None] - times_s[measured]).min(axis=1)
-        bright = bright[distance_s > _MAX_FLASH_PERIODS / frequency_hz]
+        bright = bright[distance_s > _TUNABLES.max_flash_periods / frequency_hz]
     return frozenset(lost.tolist()) | frozenset(bright.tolist())
 
 
@@ -146,10 +158,10 @@ def _require_tracked_face(measured: Indices, dark: Indices, lost: frozenset[int]
     Raises:
         CaptureError: it was not.
     """
-    if len(measured) < max(2, _MIN_FEATURES * len(dark)):
+    if len(measured) < max(2, _TUNABLES.min_features * len(dark)):
         what = "the face shows nothing that can be followed in the dark frames"
         raise CaptureError(what, "make the room a little brighter, so that the face shows without the flash")
-    if len(measured) < _MIN_TRACKED * len(dark):
+    if len(measured) < _TUNABLES.min_tracked * len(dark):
         first = float(times_s[min(lost)])
         followed = f"the face is found in {len(measured)} of {len(dark)} dark frames only"
         cure = "sit still, the head against something, until the end; keep hands off the face"

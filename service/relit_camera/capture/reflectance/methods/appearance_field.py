@@ -29,20 +29,33 @@ FIT_BLOCK = 512
 """Pixels fitted at a time: 2 MB of terms for 200 lights."""
 QUERY_BLOCK = 1 << 17
 """Pairs of a pixel and a direction evaluated at a time: half a megabyte a term, which stays in the cache."""
-VALIDATION_PIXELS = 4096
-"""Number of pixels by which cross-validation chooses the residual's kernel."""
-FOLDS = 5
-"""Parts of the cross-validation."""
-SHORT_REACH_RAD = float(np.radians(4.0))
-"""Reach of the second kernel, for what is true of one light's own direction only."""
-MAX_COMPENSATION = 2.0
-"""Largest factor that makes up for captured lights on the other side of a shadow's edge. Where less than half of the
-weight lies on the pixel's own side, the residual is predicted too small rather than extrapolated."""
-PICTURE_NOISE_VARIANCE = 0.01
-"""Variance of the pictures' own noise, in units of the residual's variance."""
 KERNEL_CANDIDATES = [
     Kernel(float(np.radians(reach)), noise) for reach in (10, 15, 20, 30, 45, 70) for noise in (0.03, 0.1, 0.3, 1.0)
 ]
+
+
+@dataclass(frozen=True)
+class ResidualTunables:
+    """Interpolation of the residual; `relit evaluate olat` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        validation_pixels: number of pixels by which cross-validation chooses the residual's kernel.
+        folds: parts of the cross-validation.
+        short_reach_rad: reach of the second kernel, for what is true of one light's own direction only.
+        max_compensation: largest factor that makes up for captured lights on the other side of a shadow's edge. Where
+            less than half of the weight lies on the pixel's own side, the residual is predicted too small rather than
+            extrapolated.
+        picture_noise_variance: variance of the pictures' own noise, in units of the residual's variance.
+    """
+
+    validation_pixels: int = 4096
+    folds: int = 5
+    short_reach_rad: float = float(np.radians(4.0))
+    max_compensation: float = 2.0
+    picture_noise_variance: float = 0.01
+
+
+RESIDUAL = ResidualTunables()
 
 
 @dataclass(frozen=True)
@@ -56,7 +69,7 @@ class AppearanceMethod:
         """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         region_coverage(samples.directions, samples.directions[:1])
         inside = np.flatnonzero(samples.matte.ravel() > 0)
-        validation = inside[:: max(1, len(inside) // VALIDATION_PIXELS)]
+        validation = inside[:: max(1, len(inside) // RESIDUAL.validation_pixels)]
         specular = specular_prior(_fit(samples, inside)[1], inside, samples.matte)
         return AppearanceField(samples, _fit(samples, inside, specular)[0], choose_kernel(samples, validation))
 
@@ -133,11 +146,11 @@ class AppearanceField:
 def _predicted_residual(weights: Float32Array, fractions: Float32Array, residual: Float32Array) -> Float32Array:
     """Residuals (pixels, 3, count) predicted from captured ones (pixels, 3, lights), each counted by its fraction.
 
-    The weights (lights, count) are rescaled, by MAX_COMPENSATION at most, so that those counted by their fractions
-    (pixels, lights) have the sum of all.
+    The weights (lights, count) are rescaled, by `ResidualTunables.max_compensation` at most, so that those counted by
+    their fractions (pixels, lights) have the sum of all.
     """
     counted = fractions @ weights
-    factor = np.clip(weights.sum(axis=0) / np.maximum(counted, 1e-3), 0, MAX_COMPENSATION)
+    factor = np.clip(weights.sum(axis=0) / np.maximum(counted, 1e-3), 0, RESIDUAL.max_compensation)
     predicted = (fractions[:, None] * residual).reshape(-1, len(weights)) @ weights
     return np.asarray(predicted.reshape(*residual.shape[:2], -1) * factor[:, None])
 
@@ -173,7 +186,7 @@ def _values(samples: OlatSamples, pixels: NDArray[np.intp]) -> Float32Array:
 def _bright(samples: OlatSamples) -> float:
     """The 99th percentile of the person's values: the level that counts as bright."""
     inside = np.flatnonzero(samples.matte.ravel() > 0.5)
-    some = inside[:: max(1, len(inside) // VALIDATION_PIXELS)]
+    some = inside[:: max(1, len(inside) // RESIDUAL.validation_pixels)]
     return float(np.percentile(samples.pictures.reshape(len(samples.directions), -1, 3)[:, some], 99))
 
 
@@ -196,24 +209,24 @@ def residual_weights(kernel: Kernel, directions: NDArray[np.float64], queries: N
     as a shadow's edge does. So it is modelled as a second process of short reach, and a captured light returns nearly
     its own picture (a nugget of micro-scale variation; Cressie 1993, 2.3.1).
     """
-    near = Kernel(SHORT_REACH_RAD, 0)
+    near = Kernel(RESIDUAL.short_reach_rad, 0)
 
     def covariance(others: NDArray[np.float64]) -> NDArray[np.float64]:
         return kernel.covariance(directions, others) + kernel.noise * near.covariance(directions, others)
 
-    known = covariance(directions) + PICTURE_NOISE_VARIANCE * np.eye(len(directions))
+    known = covariance(directions) + RESIDUAL.picture_noise_variance * np.eye(len(directions))
     return np.asarray(cho_solve(cho_factor(known), covariance(queries)), np.float32)
 
 
 def choose_kernel(samples: OlatSamples, pixels: NDArray[np.intp]) -> Kernel:
     """The candidate kernel that best predicts lights left out of both the appearance fit and the residual.
 
-    Cross-validation in FOLDS parts, of one light at least, over row-major pixels. The appearance model is fitted anew
-    for each part, because its residual is smaller and rougher for lights that it was fitted to. The geometry is that of
-    all lights, so those left out are not wholly unseen, and the fit is without the specular prior.
+    Cross-validation in parts (`ResidualTunables.folds`), of one light at least, over row-major pixels. The appearance
+    model is fitted anew for each part, because its residual is smaller and rougher for lights that it was fitted to. The
+    geometry is that of all lights, so those left out are not wholly unseen, and the fit is without the specular prior.
     """
     lights = len(samples.directions)
-    folds = min(FOLDS, lights)
+    folds = min(RESIDUAL.folds, lights)
     values = _values(samples, pixels)
     terms = distant_terms(samples.geometry, samples.directions, pixels)
     bright = _bright(samples)

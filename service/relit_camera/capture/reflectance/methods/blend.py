@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relit_camera.base.array_types import Float32Array
 from relit_camera.capture.reflectance.method_registry import factored_field
 from relit_camera.capture.reflectance.methods.appearance_field import (
-    VALIDATION_PIXELS,
+    RESIDUAL,
     AppearanceField,
     AppearanceMethod,
 )
@@ -96,7 +96,7 @@ def choose_model_fraction(modelled: AppearanceField) -> float:
     lights = len(samples.directions)
     surrounded = np.setdiff1d(np.arange(lights), boundary_lights(samples.directions))
     inside = np.flatnonzero(samples.matte.ravel() > 0.5)
-    pixels = inside[:: max(1, len(inside) // VALIDATION_PIXELS)]
+    pixels = inside[:: max(1, len(inside) // RESIDUAL.validation_pixels)]
     agreement = distance = 0.0
     for fold in range(FOLDS):
         left_out = surrounded[fold::FOLDS]
