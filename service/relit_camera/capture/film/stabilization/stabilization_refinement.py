@@ -17,7 +17,7 @@ from relit_camera.capture.film.stabilization.face_crops import FaceCrops
 
 @dataclass(frozen=True)
 class RefinementTunables:
-    """How crops are aligned to each other; `relit evaluate stabilisation` (docs/evaluate.md) shows the effect of a change.
+    """How crops are aligned; `relit evaluate stabilisation` (docs/evaluate.md) shows the effect of a change.
 
     Attributes:
         feature_radius: fraction of the face's radius within which pixels count: features, and not the background at
