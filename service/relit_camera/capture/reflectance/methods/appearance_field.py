@@ -223,7 +223,8 @@ def choose_kernel(samples: OlatSamples, pixels: NDArray[np.intp]) -> Kernel:
 
     Cross-validation in parts (`ResidualTunables.folds`), of one light at least, over row-major pixels. The appearance
     model is fitted anew for each part, because its residual is smaller and rougher for lights that it was fitted to.
-    The geometry is that of all lights, so those left out are not wholly unseen, and the fit is without the specular prior.
+    The geometry is that of all lights, so those left out are not wholly unseen, and the fit is without the specular
+    prior.
     """
     lights = len(samples.directions)
     folds = min(RESIDUAL.folds, lights)
