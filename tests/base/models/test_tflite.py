@@ -110,17 +110,17 @@ def test_pooling_of_the_whole_picture() -> None:
 
 
 UNARY: dict[str, Callable[[Array], Array]] = {
-    "HARD_SWISH": lambda x: x * np.clip(x + 3, 0, 6) / 6,
-    "LOGISTIC": lambda x: 1 / (1 + np.exp(-x)),
+    "HARD_SWISH": lambda x: x * np.clip(x + 3, 0, 6) / np.float32(6),
+    "LOGISTIC": lambda x: np.reciprocal(1 + np.exp(-x)),
     "NEG": np.negative,
     "RELU": lambda x: np.maximum(x, 0),
 }
-POSITIVE: dict[str, Callable[[Array], Array]] = {"RSQRT": lambda x: 1 / np.sqrt(x), "SQRT": np.sqrt}
+POSITIVE: dict[str, Callable[[Array], Array]] = {"RSQRT": lambda x: np.reciprocal(np.sqrt(x)), "SQRT": np.sqrt}
 
 
 @pytest.mark.parametrize("kind", [*UNARY, *POSITIVE])
 def test_functions_of_one_input(kind: str) -> None:
-    feed = noise(2, 7) * 4 if kind in UNARY else np.abs(noise(2, 7)) + 0.1
+    feed: Array = noise(2, 7) * 4 if kind in UNARY else np.abs(noise(2, 7)) + np.float32(0.1)
     np.testing.assert_allclose(single(kind, feed, [], (2, 7)), {**UNARY, **POSITIVE}[kind](feed), rtol=1e-5, atol=1e-6)
 
 
