@@ -6,6 +6,7 @@ import errno
 import logging
 import signal
 import sys
+import traceback
 from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
@@ -121,4 +122,12 @@ def run() -> None:
         if error.errno != errno.ENAMETOOLONG:  # which only a name given by a person can cause
             raise
         print(f"relit: cannot use {error.filename}: the name is too long; choose a shorter one", file=sys.stderr)
+        sys.exit(1)
+    except Exception as error:
+        from relit_camera.base.plugin_groups import package_at_fault
+
+        if (package := package_at_fault(error)) is None:
+            raise
+        traceback.print_exc()
+        print(f"relit: this is a fault of the plug-in package {package}: tell its author", file=sys.stderr)
         sys.exit(1)

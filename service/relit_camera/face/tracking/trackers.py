@@ -43,7 +43,9 @@ class TrackerOptions:
         require_no_argument("tracker", tracker, self.argument)
 
 
-TRACKERS: PluginGroup[Callable[[TrackerOptions], Tracker]] = PluginGroup("relit_camera.trackers", "tracker")
+TRACKERS: PluginGroup[Callable[[TrackerOptions], Tracker]] = PluginGroup(
+    "relit_camera.trackers", "tracker", with_argument=("recorded",)
+)
 
 
 def open_tracker(name: str, options: TrackerOptions | None = None) -> Tracker:

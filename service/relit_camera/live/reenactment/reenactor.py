@@ -81,7 +81,9 @@ class Reenactor(Protocol):
         ...
 
 
-REENACTORS: PluginGroup[Callable[[ReenactorContext], Reenactor]] = PluginGroup("relit_camera.reenactors", "reenactor")
+REENACTORS: PluginGroup[Callable[[ReenactorContext], Reenactor]] = PluginGroup(
+    "relit_camera.reenactors", "reenactor", with_argument=("onnx",)
+)
 
 
 def open_reenactor(name: str, context: ReenactorContext) -> Reenactor:
