@@ -24,7 +24,6 @@ from relit_camera.live.compositing import matting
 from tests.cli.relit_command import Material, write_material
 from tests.small_camera import SteadyTracker, memory_source
 
-
 PLUGINS = Path(__file__).parents[1] / "plugins"
 """Where the example package is, some plug-ins of which fail."""
 
@@ -132,7 +131,12 @@ def test_on_demand_where_no_system_tells_the_readers_is_found_before_a_device_is
 def test_recorded_mattes_are_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[Path] = []
     real = matting.RecordedMatting
-    monkeypatch.setattr(matting, "RecordedMatting", lambda path: read.append(path) or real(path))
+
+    def note(path: Path) -> matting.RecordedMatting:
+        read.append(path)
+        return real(path)
+
+    monkeypatch.setattr(matting, "RecordedMatting", note)
     matting.write_mattes(tmp_path / "mattes.npz", [np.ones((4, 4), np.float32)])
     settings = RelitSettings(matte=f"recorded:{tmp_path / 'mattes.npz'}")
     check_before_devices(settings)

@@ -270,7 +270,8 @@ def test_it_says_when_models_are_opened() -> None:
     made = Pipeline(tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere)
     made.on_opening = lambda: said.append("opening")
     blurred, other = scene(mode=Mode.RATIO, background={"kind": "blur"}), synthetic_subject(64, 80)
-    for wanted in (scene(), scene(), scene(mode=Mode.RATIO), blurred, blurred, scene(), replace(scene(), subject=other)):
+    ratio = scene(mode=Mode.RATIO)
+    for wanted in (scene(), scene(), ratio, blurred, blurred, scene(), replace(scene(), subject=other)):
         made.process(frame(), wanted)
         said.append("picture")
     made.close()

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
 import httpx
 import numpy as np
@@ -172,14 +173,14 @@ def test_a_plug_in_that_cannot_be_made_is_no_fault_of_ours(tmp_path: Path, caplo
     )
     assert "relit_example_plugin/__init__.py" in caplog.text
     with pytest.raises(InputError, match="takes no argument"):  # what it says itself stays as it is
-        REENACTORS.load("example:1")[0](SimpleNamespace(argument="1"))
+        REENACTORS.load("example:1")[0](cast(plugins.ReenactorContext, SimpleNamespace(argument="1")))
 
 
 @pytest.mark.usefixtures("installed")
 def test_a_plug_in_that_fails_later_is_told_from_a_fault_of_ours() -> None:
     board = StatusBoard(EventHub())
     frame = Frame(np.zeros((2, 2, 3), np.uint8), 0, 0.0, 0.0)
-    with pytest.raises(TypeError) as caught:
+    with pytest.raises(FileNotFoundError) as caught:
         open_tracker("raising:later").track(frame)
     board.report(DegradationCode.PICTURE_FAILED, caught.value)
     (degradation,) = board.degradations()
@@ -210,7 +211,9 @@ WITHOUT_ARGUMENT: list[Callable[[], object]] = [
 ]
 
 
-@pytest.mark.parametrize("opening", WITHOUT_ARGUMENT, ids=["source", "sink", "relighter", "reenactor", "tracker", "method"])
+@pytest.mark.parametrize(
+    "opening", WITHOUT_ARGUMENT, ids=["source", "sink", "relighter", "reenactor", "tracker", "method"]
+)
 def test_an_argument_that_is_not_taken_is_an_error(opening: Callable[[], object]) -> None:
     with pytest.raises(InputError, match="takes no argument, and got '3'"):
         opening()

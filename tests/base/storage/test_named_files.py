@@ -113,7 +113,7 @@ def environments(tmp_path: Path) -> NamedFiles:
 
 
 def slips(name: str) -> Iterator[str]:
-    """What a hand makes of a name: a letter lost, doubled, replaced, two swapped; upper case, another dash, an ending."""
+    """What a hand makes of a name: a letter lost, doubled, replaced, two swapped; upper case, another dash, an end."""
     for at, letter in enumerate(name):
         yield name[:at] + name[at + 1 :]
         yield name[:at] + letter + name[at:]

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 Model = Path | bytes | Callable[[], bytes]
-"""An ONNX model: its file, its bytes, or what makes the bytes. Bytes stay in memory while an accelerator runs the model,
-for the CPU to take over; what makes them is called anew then, which suits large models."""
+"""An ONNX model: its file, its bytes, or what makes the bytes. While an accelerator runs the model, its bytes stay in
+memory for the CPU to take over; what makes them is called anew then, which suits large models."""
 
 _LOG_FATAL = 4
 """Least severity that ONNX Runtime prints: anything less arrives as an exception or shows in the placement."""
