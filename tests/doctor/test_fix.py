@@ -282,7 +282,7 @@ def test_the_subject_is_looked_at(settings, tmp_path):
         check_subject(settings.model_copy(update={"subject": "you"})),
         Severity.PROBLEM,
         "no subject 'you'",
-        "stored are",
+        "there are: me",
     )
     (tmp_path / "half.relit").write_bytes(b"half")
     broken = settings.model_copy(update={"subject": str(tmp_path / "half.relit")})

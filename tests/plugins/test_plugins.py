@@ -204,19 +204,25 @@ def test_a_command_names_the_package_whose_plug_in_fails(
 WITHOUT_ARGUMENT: list[Callable[[], object]] = [
     lambda: open_source(RelitSettings.model_validate({"source": {"source": "pattern:3"}}).source),
     lambda: open_sink(RelitSettings.model_validate({"output": {"sink": "null:3"}}).output),
-    lambda: RELIGHTERS.load("basis:3"),
-    lambda: REENACTORS.load("first-order:3"),
-    lambda: TRACKERS.load("mesh:3"),
     lambda: build_subject(sphere_samples(40, 16), "nearest:3", "sphere"),
 ]
 
 
-@pytest.mark.parametrize(
-    "opening", WITHOUT_ARGUMENT, ids=["source", "sink", "relighter", "reenactor", "tracker", "method"]
-)
+@pytest.mark.parametrize("opening", WITHOUT_ARGUMENT, ids=["source", "sink", "method"])
 def test_an_argument_that_is_not_taken_is_an_error(opening: Callable[[], object]) -> None:
     with pytest.raises(InputError, match="takes no argument, and got '3'"):
         opening()
+
+
+@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.kind)
+def test_what_is_built_in_takes_an_argument_only_if_its_group_says_so(group: PluginGroup) -> None:
+    assert set(group.with_argument) <= set(group.names())
+    for name in group.names():
+        if name in group.with_argument:
+            assert group.load(f"{name}:3")[1] == "3"
+        else:
+            with pytest.raises(InputError, match=f"{name} takes no argument, and got '3'; name it '{name}'"):
+                group.load(f"{name}:3")
 
 
 def test_the_public_names_stay() -> None:
