@@ -236,7 +236,7 @@ def test_damaged_subject(damage: object, material: Material, out: Path, tmp_path
 
 def test_missing_subject(material: Material, out: Path) -> None:
     relight(out / "nobody.relit", out, light="0,0").complains("nobody")
-    replay(material, out, subject="nobody").complains("nobody", "stored are")
+    replay(material, out, subject="nobody").complains("nobody", "there are")
 
 
 # Tracks and models

@@ -175,7 +175,7 @@ def test_missing_virtual_camera(material: Material, tmp_path: Path) -> None:
 def test_missing_subject_model_and_track(material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
     for changed, words in (
-        (("--subject", "nobody"), ("nobody", "stored are")),
+        (("--subject", "nobody"), ("nobody", "there are")),
         (("--tracker", "mesh"), ("relit models pull",)),
         (("--tracker", "recorded:none.json"), ("none.json",)),
         (("--environment", "stuido"), ("stuido", "studio")),

@@ -297,7 +297,7 @@ def test_the_subject_is_looked_at(settings: RelitSettings, tmp_path: Path) -> No
         check_subject(settings.model_copy(update={"subject": "you"})),
         Severity.PROBLEM,
         "no subject 'you'",
-        "stored are",
+        "there are: me",
     )
     (tmp_path / "half.relit").write_bytes(b"half")
     broken = settings.model_copy(update={"subject": str(tmp_path / "half.relit")})

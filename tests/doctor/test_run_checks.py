@@ -90,6 +90,18 @@ def test_a_missing_package_and_an_old_one_are_named(monkeypatch: pytest.MonkeyPa
     expect(check_packages(), Severity.PROBLEM, "scipy is missing", "numpy is 1.0, not >=2", "pip install")
 
 
+def test_what_reports_need_beyond_the_camera_is_told_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    def version(name: str) -> str:
+        if name == "matplotlib":
+            raise metadata.PackageNotFoundError(name)
+        return real(name)
+
+    assert "reports" not in check_packages().seen
+    real = metadata.version
+    monkeypatch.setattr(metadata, "version", version)
+    expect(check_packages(), Severity.OK, "reports", "need matplotlib: pip install 'relit-camera[evaluate]'")
+
+
 def test_a_gpu_build_takes_the_place_of_the_usual_one(monkeypatch: pytest.MonkeyPatch) -> None:
     def version(name: str) -> str:
         if name == "onnxruntime":

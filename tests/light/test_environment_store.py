@@ -112,7 +112,7 @@ def test_what_is_no_light_is_refused_and_leaves_what_was(store: EnvironmentStore
 def test_unknown_names_list_close_ones(store: EnvironmentStore) -> None:
     with pytest.raises(NotFoundError, match="did you mean 'studio'"):
         store.load("stdio")
-    with pytest.raises(NotFoundError, match="stored are: studio, window"):
+    with pytest.raises(NotFoundError, match="there are: studio, window"):
         store.remove("zzzzzz")
     with pytest.raises(NotFoundError):
         store.thumbnail("nothing")

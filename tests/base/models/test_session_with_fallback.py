@@ -14,7 +14,12 @@ from onnx import TensorProto, helper, numpy_helper
 
 from relit_camera.base.errors import ConfigError, DeviceError, ModelError
 from relit_camera.base.models import onnx_runtime, provider_names, session_with_fallback
-from relit_camera.base.models.session_with_fallback import SessionOptions, open_session, session_report
+from relit_camera.base.models.session_with_fallback import (
+    SessionOptions,
+    open_session,
+    require_provider,
+    session_report,
+)
 
 
 def graph_bytes(shape: list[int | str] | None = None, element: int = TensorProto.FLOAT, ir_version: int = 10) -> bytes:
@@ -198,6 +203,35 @@ def test_an_accelerator_that_fails_on_the_way_is_left_for_the_cpu(monkeypatch: p
     report = next(each for each in session_report() if each.name == "small")
     assert "restart the camera" in report.cure
     assert opened.run({"image": image})["total"].tolist() == [[9, 13, 17]]
+
+
+def test_a_model_that_can_be_made_again_is_not_kept_for_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    pretend_cuda(monkeypatch, {"cuda": 2})
+    model, made = graph_bytes(), []
+
+    def make() -> bytes:
+        made.append("made")
+        return bytes(bytearray(model))  # new bytes each time
+
+    opened = open_session(make, "small", SessionOptions("cuda"))
+    assert made == ["made"]
+    assert opened._on_cpu is not None
+    kept = [cell.cell_contents for cell in opened._on_cpu.__closure__ or ()]
+    assert make in kept
+    assert not [each for each in kept if isinstance(each, bytes)]
+    opened._runtime = runtime = FailsLater(opened._runtime)  # type: ignore[assignment]
+    runtime.broken = True
+    assert opened.run({"image": np.ones((1, 3), np.float32)})["total"].tolist() == [[9, 13, 17]]
+    assert (opened.provider, made) == ("cpu", ["made", "made"])
+
+
+def test_what_a_provider_needs_is_known_before_a_model_is_opened() -> None:
+    require_provider(SessionOptions("auto", strict=True))
+    require_provider(SessionOptions(missing_provider()))
+    with pytest.raises(DeviceError, match=r"cannot run on \w+: the installed .* was built without it; `relit doctor`"):
+        require_provider(SessionOptions(missing_provider(), strict=True))
+    with pytest.raises(ConfigError, match="unknown provider 'magic'"):
+        require_provider(SessionOptions("magic"))
 
 
 def test_strict_does_not_go_on_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -58,10 +58,8 @@ class MeshTracker(LandmarkTracker):
 
         Raises:
             ModelError: a model is missing.
-            InputError: the options carry an argument.
         """
         options = options or TrackerOptions()
-        options.require_no_argument("mesh")
         network = MeshNetwork(
             open_session(model_path("face_mesh"), "face_mesh", options.session),
             open_session(model_path("face_blendshapes"), "face_blendshapes", options.session)
