@@ -206,21 +206,23 @@ def test_an_accelerator_that_fails_on_the_way_is_left_for_the_cpu(monkeypatch: p
 
 
 def test_a_model_that_can_be_made_again_is_not_kept_for_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend_cuda(monkeypatch, {"cuda": 2})
-    model, made = graph_bytes(), []
+    driver = pretend_cuda(monkeypatch, {"cuda": 2})
+    freed: list[str] = []
+
+    class Model(bytes):
+        def __del__(self) -> None:
+            freed.append("freed")
+
+    made = []
 
     def make() -> bytes:
         made.append("made")
-        return bytes(bytearray(model))  # new bytes each time
+        return Model(graph_bytes())
 
     opened = open_session(make, "small", SessionOptions("cuda"))
-    assert made == ["made"]
-    assert opened._on_cpu is not None
-    kept = [cell.cell_contents for cell in opened._on_cpu.__closure__ or ()]
-    assert make in kept
-    assert not [each for each in kept if isinstance(each, bytes)]
-    opened._runtime = runtime = FailsLater(opened._runtime)  # type: ignore[assignment]
-    runtime.broken = True
+    gc.collect()
+    assert (made, freed) == (["made"], ["freed"])
+    driver.was_reset = True
     assert opened.run({"image": np.ones((1, 3), np.float32)})["total"].tolist() == [[9, 13, 17]]
     assert (opened.provider, made) == ("cpu", ["made", "made"])
 
