@@ -10,6 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import cv2
+import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 
@@ -32,3 +35,11 @@ def angles_from_rotation(rotation: Rotation) -> Angles:
     # Closed form instead of `as_euler`, which warns at the gimbal lock that a garbage pose may well reach.
     pitch = math.asin(max(-1.0, min(-nose_y, 1.0)))
     return Angles(math.degrees(math.atan2(nose_x, nose_z)), math.degrees(pitch), math.degrees(math.atan2(up_x, up_y)))
+
+
+def rotation_from_matrix(matrix: NDArray[np.float64]) -> Rotation:
+    """The rotation of a matrix (3, 3) that is one but for rounding.
+
+    A third of the time of `Rotation.from_matrix`; OpenCV takes turns below 0.0006° for none.
+    """
+    return Rotation.from_rotvec(cv2.Rodrigues(matrix)[0][:, 0])

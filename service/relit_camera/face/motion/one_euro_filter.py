@@ -143,7 +143,7 @@ class RotationOneEuroFilter(_OneEuro[Matrix]):
 
 
 def _norm(vectors: Vectors) -> Vectors:
-    return np.asarray(np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None])
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True)))
 
 
 def _low_pass_gain(cutoff_hz: ArrayLike, step_s: float) -> Vectors:
