@@ -136,7 +136,7 @@ class RotationOneEuroFilter(_OneEuro[Matrix]):
     """
 
     def _between(self, start: Matrix, end: Matrix) -> Vectors:
-        return np.degrees(cv2.Rodrigues(start.T @ end)[0][:, 0])
+        return np.asarray(np.degrees(cv2.Rodrigues(start.T @ end)[0][:, 0]))
 
     def _moved(self, start: Matrix, way: Vectors) -> Matrix:
         return np.asarray(start @ cv2.Rodrigues(np.radians(way))[0])
