@@ -17,6 +17,7 @@ from relit_camera.face.tracking.interval_tracker import IntervalTracker
 from relit_camera.face.tracking.mediapipe_mesh_tracker import MeshTracker
 from relit_camera.face.tracking.trackers import TrackerOptions
 from tests.face.faces import SCHEME, SIZE, face
+from tests.face.test_lip_regression import mouth
 
 FACE = face(at=(0.0, 0.0, -45.0))
 SPAN = SCHEME.eye_span(FACE.landmarks)
@@ -148,6 +149,27 @@ def test_the_chin_moves_by_itself() -> None:
     assert rig.truth.measured == 1
     assert moved[8, 1] == pytest.approx(drop, rel=0.3)
     assert abs(moved[27, 1]) < 0.15 * drop  # between the eyes
+
+
+def talking(gap_cm: float) -> tuple[np.ndarray, FaceState]:
+    """The picture with a drawn mouth, open by so much, and the face in it."""
+    drawn, landmarks = mouth(gap_cm)
+    return cv2.addWeighted(drawn, 0.6, PICTURE, 0.4, 0), state_of(landmarks)
+
+
+def test_a_talking_mouth_is_seen_to_open_between_measurements() -> None:
+    rig, gaps, errors, motions = Rig(2), 0.8 + 0.7 * np.sin(np.arange(90) * 0.5), [], []
+    for index, gap in enumerate(gaps):
+        before = rig.truth.measured
+        picture, truth = talking(gap)
+        state = rig.show(picture, truth)
+        if index > 45 and rig.truth.measured == before:
+            errors.append(SCHEME.mouth_opening(state.landmarks) - SCHEME.mouth_opening(truth.landmarks))
+            held = talking(gaps[index - 1])[1]
+            motions.append(SCHEME.mouth_opening(held.landmarks) - SCHEME.mouth_opening(truth.landmarks))
+            assert state.mouth == SCHEME.mouth_opening(state.landmarks)
+    assert len(errors) > 15
+    assert np.std(errors) < 0.4 * np.std(motions)
 
 
 @pytest.mark.parametrize("status", [FaceStatus.UNCERTAIN, FaceStatus.LOST])

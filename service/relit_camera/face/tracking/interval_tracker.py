@@ -1,7 +1,8 @@
 """Tracking at a fraction of the frame rate: a tracker measures every n-th frame, optical flow carries it on between.
 
 A measurement costs ten times as much as the flow. Dense inverse search (DIS, Kroeger et al. 2016) on a small grey
-picture of the face moves every landmark by itself, so lips and lids go on moving too, and the head pose is fitted anew.
+picture of the face moves every landmark by itself, and the head pose is fitted anew. The lips move as
+`face.tracking.lip_regression` has learned from the measured frames.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from relit_camera.face.face_state import FaceState, FaceStatus, Tracker
 from relit_camera.face.head_pose import fit_pose
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.landmarks.rotated_crop import bounding_box
+from relit_camera.face.tracking.lip_regression import LipRegression
 
 GreyPicture = NDArray[np.uint8]
 
@@ -83,6 +85,7 @@ class IntervalTracker:
         self.scheme = tracker.scheme
         self._tracker = tracker
         self._scheme = landmark_scheme(tracker.scheme)
+        self._lips = LipRegression(self._scheme)
         self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
         self._flow.setFinestScale(TUNABLES.finest_scale)
         self.set_interval(interval)
@@ -106,6 +109,7 @@ class IntervalTracker:
     def reset(self) -> None:
         """Forget the face: the next frame is measured, and searched whole."""
         self._tracker.reset()
+        self._lips.reset()
         self._last: _TrackedFrame | None = None
         self._since_measured = 0
 
@@ -116,8 +120,15 @@ class IntervalTracker:
         if state is None:
             state = self._tracker.track(frame)
             self._since_measured = 0
+            self._learn(frame, state)
         self._last = self._remember(frame, state) if self._since_measured + 1 < self._interval else None
         return state
+
+    def _learn(self, frame: Frame, state: FaceState) -> None:
+        if state.pose is None:
+            self._lips.reset()
+        elif self._interval > 1 and state.status is FaceStatus.FOUND:
+            self._lips.learn(frame.image, state.landmarks, state.pose)
 
     def _remember(self, frame: Frame, state: FaceState) -> _TrackedFrame | None:
         """What the next frame needs to follow this one, if it can."""
@@ -131,15 +142,20 @@ class IntervalTracker:
     def _follow(self, frame: Frame) -> FaceState | None:
         """The face in `frame` by the flow from the last one; None where that could be wrong."""
         last = self._last
-        if last is None or frame.size != last.size or not 0 < frame.time_s - last.time_s <= TUNABLES.max_gap_s:
+        if last is None:
+            return None
+        if frame.size != last.size or not 0 < frame.time_s - last.time_s <= TUNABLES.max_gap_s:
+            self._lips.reset()
             return None
         small = _small_picture(frame.image, last.region)
         if _correlation(last.small, small) < TUNABLES.min_correlation:
+            self._lips.reset()  # it may be another person
             return None
         landmarks = self._moved(last, self._flow.calc(last.small, small, None))
         pose = fit_pose(landmarks, self._scheme, frame.size, last.state.pose.focal_px if last.state.pose else None)
         if pose is None or self._motion(last.state.landmarks, landmarks) > TUNABLES.max_motion:
             return None
+        landmarks = self._lips.corrected(frame.image, landmarks, pose)
         return replace(
             last.state,
             landmarks=landmarks,
