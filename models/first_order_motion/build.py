@@ -73,8 +73,7 @@ def build() -> bytes:
     radius_squared = g.add("Mul", "radius", "radius")
 
     weights = _gaussian(g, "centre", "centre", g.add("Mul", radius_squared, g.constant(2 * NEIGHBOURHOOD**2)), 1)
-    source_moments = _moments(g, weights, "source", "target")
-    target_moments = _moments(g, weights, "target", "target")
+    source_moments, target_moments = _moments(g, weights)
     spread = g.add("Mul", g.add("Add", target_moments[0], target_moments[3]), g.constant(RIGIDITY))
     spread = g.add("Add", spread, g.constant(STIFFNESS))
     for moments in (source_moments, target_moments):
@@ -140,17 +139,23 @@ def _axis_gaussians(g: _Graph, places: str, centres: str, rate: str) -> str:
     return g.add("Exp", g.add("Max", exponent, g.constant(LEAST_EXPONENT)))
 
 
-def _moments(g: _Graph, weights: str, left: str, right: str) -> list[str]:
-    """Σ_j w_ij (left_j − left_i)(right_j − right_i)ᵀ for each i, as four (K, 1) tensors, row by row."""
-    result = []
-    for a in _columns(g, left):
-        across = g.add("Sub", g.add("Transpose", a, perm=[1, 0]), a)
-        weighted = g.add("Mul", weights, across)
-        for b in _columns(g, right):
-            down = g.add("Sub", g.add("Transpose", b, perm=[1, 0]), b)
-            product = g.add("Mul", weighted, down)
-            result.append(g.add("ReduceSum", product, g.constant([1], np.int64), keepdims=1))
-    return result
+def _moments(g: _Graph, weights: str) -> tuple[list[str], list[str]]:
+    """Σ_j w_ij (p_j − p_i)(t_j − t_i)ᵀ for each i, of p the sources and p the targets: four (K, 1) each, row by row.
+
+    One difference is taken before the sum, so that what the other's product out of the brackets loses is little.
+    """
+    points = [*_columns(g, "source"), *_columns(g, "target")]
+    one = g.add("Add", g.add("Mul", points[0], g.constant(0.0)), g.constant(1.0))
+    table = g.add("Concat", *points, one, axis=1)
+    found = []
+    for i, to in enumerate(points[2:]):
+        weighted = g.add("Mul", weights, g.add("Sub", g.add("Transpose", to, perm=[1, 0]), to))
+        sums = [f"sum{i}{j}" for j in range(5)]
+        g.add("Split", g.add("MatMul", weighted, table), g.constant([1] * 5, np.int64), out=sums[0], axis=1)
+        g.nodes[-1].output.extend(sums[1:])
+        found.append([g.add("Sub", s, g.add("Mul", p, sums[4])) for s, p in zip(sums[:4], points, strict=True)])
+    by_x, by_y = found
+    return [by_x[0], by_y[0], by_x[1], by_y[1]], [by_x[2], by_y[2], by_x[3], by_y[3]]
 
 
 def _mixture(g: _Graph, weighted: str, across: str, down: str, fine: str) -> None:
