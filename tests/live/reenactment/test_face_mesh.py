@@ -117,7 +117,7 @@ def triangle_by_triangle(corners: np.ndarray, values: np.ndarray, shape: tuple[i
         edges = np.column_stack([corner[1] - corner[0], corner[2] - corner[0]])
         weights = np.linalg.solve(edges, (points[inside] - corner[0]).T).T
         drawn[inside] = value[0] + weights @ (value[1:] - value[0])
-    return drawn.reshape(*shape, -1)
+    return drawn.T.reshape(-1, *shape)
 
 
 def test_triangles_are_drawn_in_their_order_and_cut_off_at_the_border() -> None:
@@ -136,7 +136,7 @@ def test_no_seam_opens_between_neighbours_nor_where_a_triangle_has_no_area() -> 
     fan = [np.array([middle, a, b]) for a, b in pairwise(rim)]
     line = np.array([(0.0, 0), (10, 10), (20, 20)])
     corners = np.array([*fan, line])
-    x, y = draw_triangles(corners, corners, (21, 21)).transpose(2, 0, 1)
+    x, y = draw_triangles(corners, corners, (21, 21))
     np.testing.assert_allclose(x, np.tile(np.arange(21), (21, 1)), atol=1e-4)
     np.testing.assert_allclose(y.T, np.tile(np.arange(21), (21, 1)), atol=1e-4)
 

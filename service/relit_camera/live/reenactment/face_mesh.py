@@ -88,7 +88,7 @@ class SurfacePatch:
             return
         inverse = inverse_affine(part.source_from_node)
         corners = self.corners @ inverse[:, :2].T + inverse[:, 2]
-        x, y, trust = np.moveaxis(draw_triangles(corners, self.values, part.positions.shape[:2]), 2, 0)
+        x, y, trust = draw_triangles(corners, self.values, part.positions.shape[:2])
         part.blend(x, y, trust * patch_cover(part, self.box))
 
 
@@ -131,15 +131,15 @@ def draw_triangles(
         shape: (rows, columns) of the picture to draw.
 
     Returns:
-        (rows, columns, channels) float32.
+        (channels, rows, columns) float32.
     """
     rows, columns = shape
-    low = np.maximum(np.ceil(corners.min(axis=1)), 0)
-    high = np.minimum(np.floor(corners.max(axis=1)), [columns - 1, rows - 1])
+    a, b, c = np.moveaxis(corners, 1, 0)
+    low = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c)), 0)
+    high = np.minimum(np.floor(np.maximum(np.maximum(a, b), c)), [columns - 1, rows - 1])
     size = np.maximum(high - low + 1, 0)
     count = (size[:, 0] * size[:, 1]).astype(np.intp)
-    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    px, py = (low - corners[:, 0]).T
+    (ax, ay), (bx, by), (px, py) = (b - a).T, (c - a).T, (low - a).T
     area = ax * by - ay * bx
     area[area == 0] = np.nan  # such a triangle shows nowhere: no comparison with its weights holds
     # The weights of the second and the third corner are linear in the place in the bounding rectangle.
@@ -147,21 +147,25 @@ def draw_triangles(
     third_weight = np.stack([-ay, ax, ax * py - ay * px]) / area
     rectangle = np.stack([size[:, 0], np.cumsum(count) - count])
     # All triangles at once: each point of each bounding rectangle is tested against its triangle.
-    table = np.concatenate([second_weight, third_weight, rectangle]).T.astype(np.float32)
-    s0, s1, s2, t0, t1, t2, width, start = np.repeat(table, count, axis=0).T
+    table = np.concatenate([second_weight, third_weight, rectangle]).astype(np.float32)
+    triangle = np.repeat(np.arange(len(corners)), count)
+    s0, s1, s2, t0, t1, t2, width, start = table.take(triangle, axis=1)
     number = np.arange(len(start), dtype=np.float32) - start
     down = np.floor((number + np.float32(0.5)) / width)
     across = number - down * width
     second, third = s0 * across + s1 * down + s2, t0 * across + t1 * down + t2
     inside = np.flatnonzero((second > -ON_BORDER) & (third > -ON_BORDER) & (second + third < 1 + ON_BORDER))
-    triangle = np.repeat(np.arange(len(corners)), count)[inside]
-    second, third = second[inside, None], third[inside, None]
+    triangle, second, third = triangle[inside], second[inside], third[inside]
     x, y = across[inside] + low[triangle, 0], down[inside] + low[triangle, 1]
-    a, b, c = np.moveaxis(values.astype(np.float32)[triangle], 1, 0)
-    drawn = np.zeros((rows, columns, values.shape[2]), np.float32)
-    # Where a place is given several times the last value stays.
-    drawn[y.astype(np.intp), x.astype(np.intp)] = a + second * (b - a) + third * (c - a)
-    return drawn
+    place = (y * columns + x).astype(np.intp)
+    first = values[:, 0]
+    table = np.stack([first, values[:, 1] - first, values[:, 2] - first], axis=2).astype(np.float32)
+    drawn = np.zeros((values.shape[2], rows * columns), np.float32)
+    for channel, of_corners in zip(drawn, table.transpose(1, 2, 0), strict=True):
+        base, by_second, by_third = of_corners.take(triangle, axis=1)
+        # Where a place is given several times the last value stays.
+        channel[place] = base + second * by_second + third * by_third
+    return drawn.reshape(-1, rows, columns)
 
 
 def triangulate_face(face: SourceFace) -> FaceMesh:
