@@ -88,7 +88,7 @@ class SurfacePatch:
             return
         inverse = inverse_affine(part.source_from_node)
         corners = self.corners @ inverse[:, :2].T + inverse[:, 2]
-        x, y, trust = draw_triangles(corners, self.values, part.positions.shape[:2])
+        x, y, trust = draw_triangles(corners, self.values, part.positions.shape[1:])
         part.blend(x, y, trust * patch_cover(part, self.box))
 
 
@@ -112,7 +112,7 @@ class FeaturePatch:
         if part is None:
             return
         left, top, right, bottom = self.feature.astype(np.float32)
-        x, y = part.positions[..., 0], part.positions[..., 1]
+        x, y = part.positions
         beside = np.maximum(np.maximum(left - x, x - right), np.maximum(top - y, y - bottom))
         shown = np.clip(2 - beside / np.float32(self.reach), 0, 1)
         part.blend(*self.flow.positions(part), shown * patch_cover(part, self.flow.box))

@@ -111,7 +111,7 @@ class Nodes:
 
     Attributes:
         source_from_node: (2, 3) float64, column and row of a node → its place, where it would look if nothing moved.
-        positions: (rows, columns, 2) float32 source pixels where each looks; patches change it in place.
+        positions: (2, rows, columns) float32, x and y in source pixels where each looks; patches change it in place.
     """
 
     source_from_node: NDArray[np.float64]
@@ -120,7 +120,7 @@ class Nodes:
     @property
     def places(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Of the places: x and y in source pixels, each of a shape that broadcasts to (rows, columns)."""
-        rows, columns = self.positions.shape[:2]
+        rows, columns = self.positions.shape[1:]
         column, row = np.arange(columns, dtype=np.float32), np.arange(rows, dtype=np.float32)[:, None]
         x, y = (
             # Where the axes of output and source are the same, x is one row and y one column.
@@ -134,17 +134,16 @@ class Nodes:
         inverse = inverse_affine(self.source_from_node)
         corners = box[[[0, 1], [2, 1], [0, 3], [2, 3]]] @ inverse[:, :2].T + inverse[:, 2]
         left, top = np.maximum(np.ceil(corners.min(axis=0)), 0).astype(int)
-        right, bottom = np.minimum(np.floor(corners.max(axis=0)).astype(int) + 1, self.positions.shape[1::-1])
+        right, bottom = np.minimum(np.floor(corners.max(axis=0)).astype(int) + 1, self.positions.shape[:0:-1])
         if right <= left or bottom <= top:
             return None
         moved = self.source_from_node.copy()
         moved[:, 2] += moved[:, :2] @ [left, top]
-        return Nodes(moved, self.positions[top:bottom, left:right])
+        return Nodes(moved, self.positions[:, top:bottom, left:right])
 
     def blend(self, x: NDArray[np.float32], y: NDArray[np.float32], cover: NDArray[np.float32]) -> None:
         """Let other positions count by a share `cover`; all are of shapes that broadcast to (rows, columns)."""
-        for axis, other in enumerate((x, y)):
-            current = self.positions[..., axis]
+        for current, other in zip(self.positions, (x, y), strict=True):
             change = other - current
             change *= cover
             current += change
@@ -196,11 +195,12 @@ class FlowPatch:
         grid_from_node = nodes.source_from_node.copy()
         grid_from_node[:, 2] -= self.box[:2]
         grid_from_node /= spacing[:, None]
-        size = (nodes.positions.shape[1], nodes.positions.shape[0])
+        rows, columns = nodes.positions.shape[1:]
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        flow = cv2.warpAffine(self.flow, grid_from_node, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        flow = cv2.warpAffine(self.flow, grid_from_node, (columns, rows), flags=flags, borderMode=cv2.BORDER_REPLICATE)
         x, y = nodes.places
-        return flow[..., 0] + x, flow[..., 1] + y
+        across, down = cv2.split(flow)
+        return across + x, down + y
 
 
 BORDER_FADE = 0.08
@@ -245,8 +245,8 @@ class Warp:
         columns, rows = -(-(box[2] - box[0]) // step) + 2, -(-(box[3] - box[1]) // step) + 2
         node = np.array([[step, 0, box[0] - 0.5 * step], [0, step, box[1] - 0.5 * step], [0, 0, 1]])
         source_from_node = np.asarray(self.affine @ node)
-        nodes = Nodes(source_from_node, np.empty((rows, columns, 2), np.float32))
-        nodes.positions[..., 0], nodes.positions[..., 1] = nodes.places
+        nodes = Nodes(source_from_node, np.empty((2, rows, columns), np.float32))
+        nodes.positions[0], nodes.positions[1] = nodes.places
         for patch in self.patches:
             patch.write(nodes)
-        return PositionGrid(nodes.positions, box, step)
+        return PositionGrid(np.asarray(cv2.merge(list(nodes.positions)), dtype=np.float32), box, step)
