@@ -19,7 +19,6 @@ from relit_camera.base.images.color import srgb_decode, uint8_from_linear
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.face.landmarks.rotated_crop import Crop
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.live.reenactment.first_order_reenactor import fade_flow_at_border
 from relit_camera.live.reenactment.motion_transfer import split_body_motion
 from relit_camera.live.reenactment.onnx_network.driving_head_crop import DrivingCrops, crop_square, head_crop
 from relit_camera.live.reenactment.onnx_network.onnx_contract import NetworkOutput, ReenactorNetwork, identity_grid
@@ -28,6 +27,8 @@ from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.warp import (
     Box,
     FlowPatch,
+    Patch,
+    StillBorder,
     Warp,
     inverse_affine,
     move_body,
@@ -77,11 +78,11 @@ class OnnxReenactor:
         seen = None if driving is None or initial is None or motion.presence == 0 else (driving, initial)
         # A flow is computed from the source image as it was captured, so at once; a picture from the relit one.
         flow = self._network.run(self._source, *seen).flow if seen and self._network.gives_flow else None
-        patches = () if flow is None else (self._patch(flow, motion.presence),)
-        positions = self._person.positions(Warp(placed, patches), box)
+        patches = () if flow is None else self._patches(flow, motion.presence)
+        grid = Warp(placed, patches).grid(box)
 
         def warp(relit: LinearImage) -> WarpedLayer:
-            picture, alpha = self._person.sampled(relit, positions)
+            picture, alpha = self._person.sampled(relit, grid)
             if seen and not self._network.gives_flow:
                 source = crop_square(uint8_from_linear(relit), self._crop, self._network.side)
                 answer = self._network.run(source, *seen)
@@ -92,14 +93,14 @@ class OnnxReenactor:
 
         return warp
 
-    def _patch(self, flow: NDArray[np.float32], share: float) -> FlowPatch:
+    def _patches(self, flow: NDArray[np.float32], share: float) -> tuple[Patch, ...]:
         """A `share` of the network's flow, in source pixels."""
         # −1 and 1 are the middles of the outermost pixels of the crop.
         half = self._crop.width / 2 * (1 - 1 / self._network.side)
         displacement = (flow - identity_grid(*flow.shape[:2])) * np.float32(half * share)
         middle = np.array(self._crop.center)
         patch = FlowPatch(displacement, np.concatenate([middle - half, middle + half]))
-        return patch if self._person.whole else fade_flow_at_border(patch, self._face.size)
+        return (patch,) if self._person.whole else (patch, StillBorder(self._face.size))
 
 
 def output_from_crop(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.float64], box: Box) -> NDArray[np.float64]:
