@@ -23,7 +23,7 @@ from relit_camera.base.config.look import (
 )
 from relit_camera.base.easing import ease_out_cubic
 from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, srgb_encode, uint8_from_linear
-from relit_camera.base.images.image_types import DisplayImage, Mask
+from relit_camera.base.images.image_types import Alpha, DisplayImage
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.base.images.tone_mapping import inverse_tone_curve, tone_curve
 from relit_camera.base.rotations import rotation_from_angles
@@ -47,11 +47,11 @@ class MattedFrame:
 
     Attributes:
         image: uint8 sRGB (height, width, 3).
-        matte: alpha of the person, (height, width) of the image.
+        matte: alpha of the person, of the image's size.
     """
 
     image: DisplayImage
-    matte: Mask
+    matte: Alpha
 
 
 def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
@@ -67,7 +67,8 @@ def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     # Averaged as light: of codes, small lamps would come out too dark.
     light = cv2.resize(linear_from_uint8(matted.image), size, interpolation=cv2.INTER_AREA)
     # So high a power that a pixel counts only when it is all but surely room.
-    weight = ((1 - cv2.resize(matted.matte, size, interpolation=cv2.INTER_AREA)) ** 16)[..., np.newaxis]
+    room = np.float32(1) - cv2.resize(matted.matte, size, interpolation=cv2.INTER_AREA) / np.float32(255)
+    weight = (room**16)[..., np.newaxis]
     # Averaging r pixels to one and enlarging linearly blurs too, with a variance of r²/12 + r²/6.
     working_sigma = max((sigma / reduce) ** 2 - 1 / 4, 0.01) ** 0.5
     weighted = cv2.GaussianBlur(np.dstack([light * weight, weight]), (0, 0), working_sigma)
