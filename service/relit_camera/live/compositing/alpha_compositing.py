@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from relit_camera.base.errors import ImageError
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_types import Alpha, DisplayImage, LinearImage, RgbaImage, check_image
+from relit_camera.base.images.resize import halve
 
 _NEIGHBORHOOD = 1 / 7
-"""Width, as a share of the picture's height, of the window in which an edge's pure colours are sought."""
+"""Width, as a share of the picture's height, of the window in which an edge's pure colours are sought, or a little more
+or less: the picture is halved until that is about `_WINDOW`."""
 
 _WINDOW = 13
-"""The same in pixels of the reduced picture on which it is done."""
+"""Width of the window in pixels of the reduced picture."""
 
 _EPSILON = np.float32(1e-4)
 
@@ -46,19 +48,66 @@ def over(foreground: DisplayImage, alpha: Alpha, background: DisplayImage, at: t
     """
     check_image(background, np.uint8, "background")
     _check_alpha(foreground, alpha, "foreground")
+    (left, top), (rows, columns) = at, alpha.shape
+    window = np.s_[max(-top, 0) : background.shape[0] - top, max(-left, 0) : background.shape[1] - left]
+    if top + rows <= 0 or left + columns <= 0 or alpha[window].size == 0:
+        return background.copy()
+    foreground, alpha = np.ascontiguousarray(foreground[window]), alpha[window]
+    edge = _partial_pixels(alpha)
+    return _blend(foreground, alpha, edge, _light_at(foreground, edge), background, (max(left, 0), max(top, 0)))
+
+
+def replace_room(image: DisplayImage, alpha: Alpha, background: DisplayImage) -> DisplayImage:
+    """Lay the person in a live frame over another background, without the room that shines through the matte's edge.
+
+    At the edge the camera saw C = αF + (1 - α)B. F and B are first guessed as the colors of surely person and surely
+    room nearby; then F takes up what is left of C: F + α(C - αF - (1 - α)B), the closed-form step of Forte,
+    "Approximate Fast Foreground Colour Estimation" (2021). Pixels with alpha 255 stay as they are.
+
+    Args:
+        image: uint8 sRGB (height, width, 3), the live frame.
+        alpha: (height, width), the person's matte in it.
+        background: of the image's size.
+
+    Raises:
+        ImageError: a picture is not uint8 (height, width, 3), or they differ in size.
+    """
+    check_image(background, np.uint8, "background")
+    _check_alpha(image, alpha, "image")
+    _check_alpha(background, alpha, "background")
+    edge = _partial_pixels(alpha)
+    person, room = _mean_layer_colors(image, alpha, edge)
+    share = _share_at(alpha, edge)
+    person += share * (_light_at(image, edge) - room - share * (person - room))
+    return _blend(image, alpha, edge, person, background, (0, 0))
+
+
+def _blend(
+    foreground: DisplayImage,
+    alpha: Alpha,
+    edge: NDArray[np.intp],
+    light: NDArray[np.float32],
+    background: DisplayImage,
+    at: tuple[int, int],
+) -> DisplayImage:
+    """The background with the foreground where alpha is 255, and at its `edge` a mixture with the given light.
+
+    Args:
+        foreground: (rows, columns, 3), all of it within the background.
+        alpha: (rows, columns).
+        edge: (count,) flat indices in alpha of what is neither clear nor opaque.
+        light: (count, 3) linear, straight, of the foreground there.
+        background: (height, width, 3).
+        at: column and row of the background where the foreground's corner comes.
+    """
     out = np.array(background, order="C")
     (left, top), (rows, columns) = at, alpha.shape
-    below = out[max(top, 0) : max(top + rows, 0), max(left, 0) : max(left + columns, 0)]
-    if below.size:
-        window = np.s_[max(-top, 0) :, max(-left, 0) :]
-        seen = np.s_[: below.shape[0], : below.shape[1]]
-        foreground, alpha = foreground[window][seen], alpha[window][seen]
-        edge = _partial_pixels(alpha)
-        row, column = np.divmod(edge, alpha.shape[1])
-        in_out = (row + max(top, 0)) * out.shape[1] + column + max(left, 0)
-        light, behind = (_light_at(image, at) for image, at in ((np.ascontiguousarray(foreground), edge), (out, in_out)))
-        cv2.copyTo(foreground, cv2.compare(alpha, 255, cv2.CMP_EQ), below)
-        _set(out, in_out, behind + _share_at(alpha, edge) * (light - behind))
+    in_out = edge + (edge // columns) * (out.shape[1] - columns) + (top * out.shape[1] + left)
+    behind = _light_at(out, in_out)
+    cv2.copyTo(foreground, cv2.compare(alpha, 255, cv2.CMP_EQ), out[top : top + rows, left : left + columns])
+    codes, flat = uint8_from_linear(behind + _share_at(alpha, edge) * (light - behind)), out.reshape(-1, 3)
+    for channel in range(3):  # thrice as fast as whole pixels
+        flat[in_out, channel] = codes[:, channel]
     return out
 
 
@@ -71,51 +120,34 @@ def unpremultiply(premultiplied: LinearImage, alpha: NDArray[np.float32]) -> Lin
     return np.asarray(premultiplied / share, dtype=np.float32)
 
 
-def estimate_foreground_colors(image: DisplayImage, alpha: Alpha) -> DisplayImage:
-    """The person's own colors, without the room that shines through the matte's edge, as `over` wants them.
-
-    At the edge the camera saw C = αF + (1 - α)B. F and B are first guessed as the colors of surely person and surely
-    room nearby; then F takes up what is left of C: F + α(C - αF - (1 - α)B), the closed-form step of Forte,
-    "Approximate Fast Foreground Colour Estimation" (2021). Pixels with alpha 255 stay as they are.
-
-    Args:
-        image: uint8 sRGB (height, width, 3), the live frame.
-        alpha: (height, width), the person's matte in it.
-
-    Raises:
-        ImageError: the image is not uint8 (height, width, 3), or alpha has another type or size.
-    """
-    _check_alpha(image, alpha, "image")
-    edge = _partial_pixels(alpha)
-    if edge.size == 0:
-        return image
-    person, room = (_light_at(guess, edge) for guess in _mean_layer_colors(image, alpha))
-    share = _share_at(alpha, edge)
-    result = image.copy()
-    _set(result, edge, person + share * (_light_at(image, edge) - room - share * (person - room)))
-    return result
-
-
-def _mean_layer_colors(image: DisplayImage, alpha: Alpha) -> tuple[DisplayImage, DisplayImage]:
-    """Colors of what is surely person, and of what is surely room, averaged around each pixel; the image's size."""
+def _mean_layer_colors(
+    image: DisplayImage, alpha: Alpha, pixels: NDArray[np.intp]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Linear colors (count, 3) of what is surely person, and of what is surely room, averaged around those pixels."""
     height, width = alpha.shape
-    reduce = max(1, round(height * _NEIGHBORHOOD / _WINDOW))
-    size = (max(1, width // reduce), max(1, height // reduce))
-    light = linear_from_uint8(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
-    share = cv2.resize(alpha, size, interpolation=cv2.INTER_AREA).astype(np.float32) / np.float32(255)
+    coarse: DisplayImage = image
+    while len(coarse) * _NEIGHBORHOOD >= 1.5 * _WINDOW:
+        coarse, alpha = halve(coarse), halve(alpha)
+    light = linear_from_uint8(coarse)
+    share = alpha * np.float32(1 / 255)
+    rows, columns = light.shape[:2]
+    # Enlarged as far as a step between two of its pixels is no longer seen.
+    size = (min(2 * columns, width), min(2 * rows, height))
+    at = (pixels // width) * size[1] // height * size[0] + (pixels % width) * size[0] // width
     # So high a power that a pixel counts only when it is all but sure: at 0.9 already by less than a fifth.
-    person, room = (_weighted_mean(light, certainty**16) for certainty in (share, 1 - share))
-    return cv2.resize(person, (width, height)), cv2.resize(room, (width, height))
+    means = (cv2.resize(_weighted_mean(light, certainty**16), size) for certainty in (share, 1 - share))
+    person, room = (mean.reshape(-1, 3).take(at, axis=0) for mean in means)
+    return person, room
 
 
-def _weighted_mean(light: LinearImage, weight: NDArray[np.float32]) -> DisplayImage:
+def _weighted_mean(light: LinearImage, weight: NDArray[np.float32]) -> LinearImage:
     window = (_WINDOW, _WINDOW)
     weight = weight[..., np.newaxis]
     # The small constant leaves a pixel with nothing certain around it as it is.
     mean = (cv2.blur(light * weight, window) + _EPSILON * light) / (
         cv2.blur(weight, window)[..., np.newaxis] + _EPSILON
     )
-    return uint8_from_linear(mean)
+    return np.asarray(mean, np.float32)
 
 
 def _partial_pixels(alpha: Alpha) -> NDArray[np.intp]:
@@ -131,13 +163,6 @@ def _light_at(image: DisplayImage, pixels: NDArray[np.intp]) -> NDArray[np.float
 def _share_at(alpha: Alpha, pixels: NDArray[np.intp]) -> NDArray[np.float32]:
     """Alpha as 0..1, (count, 1), at flat indices."""
     return np.multiply(alpha.reshape(-1, 1).take(pixels, axis=0), np.float32(1 / 255), dtype=np.float32)
-
-
-def _set(image: DisplayImage, pixels: NDArray[np.intp], light: NDArray[np.float32]) -> None:
-    """Write linear light (count, 3) into a contiguous image at flat indices."""
-    codes, flat = uint8_from_linear(light), image.reshape(-1, 3)
-    for channel in range(3):  # thrice as fast as whole pixels
-        flat[pixels, channel] = codes[:, channel]
 
 
 def _check_alpha(image: DisplayImage, alpha: Alpha, name: str) -> None:

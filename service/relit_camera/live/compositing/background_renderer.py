@@ -24,7 +24,7 @@ from relit_camera.base.config.look import (
 from relit_camera.base.easing import ease_out_cubic
 from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, srgb_encode, uint8_from_linear
 from relit_camera.base.images.image_types import Alpha, DisplayImage
-from relit_camera.base.images.resize import crop_to_fill
+from relit_camera.base.images.resize import crop_to_fill, halve
 from relit_camera.base.images.tone_mapping import inverse_tone_curve, tone_curve
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.light.environments.environment_panorama import Environment, Panorama
@@ -33,10 +33,10 @@ from relit_camera.light.scene_light import scene_light_map
 from relit_camera.live.compositing.environment_view import BLUR_SIGMA, EnvironmentView
 
 _WORKING_SIGMA = 1.5
-"""The room is reduced as far as the blur's sigma stays this many pixels."""
+"""The room is halved while the blur's sigma is more than this many pixels."""
 
-_REDUCTION_RANGE = (3, 8)
-"""Least and greatest whole factor: less is slow, and more shows when it is enlarged again."""
+_MAX_REDUCTION = 8
+"""Greatest factor: more shows when it is enlarged again."""
 
 _EPSILON = np.float32(1e-4)
 
@@ -62,15 +62,15 @@ def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     """
     height, width = matted.matte.shape
     sigma = BLUR_SIGMA * strength * height
-    reduce = int(np.clip(sigma / _WORKING_SIGMA, *_REDUCTION_RANGE))
-    size = (max(1, width // reduce), max(1, height // reduce))
-    # Averaged as light: of codes, small lamps would come out too dark.
-    light = cv2.resize(linear_from_uint8(matted.image), size, interpolation=cv2.INTER_AREA)
+    # The first halving of a large picture may take means of codes; of light more so, small lamps would come out dark.
+    image, matte, reduction = halve(matted.image), halve(matted.matte), 2
+    light, room = linear_from_uint8(image), np.float32(1) - matte * np.float32(1 / 255)
+    while reduction < min(sigma / _WORKING_SIGMA, _MAX_REDUCTION):
+        light, room, reduction = halve(light), halve(room), 2 * reduction
     # So high a power that a pixel counts only when it is all but surely room.
-    room = np.float32(1) - cv2.resize(matted.matte, size, interpolation=cv2.INTER_AREA) / np.float32(255)
     weight = (room**16)[..., np.newaxis]
     # Averaging r pixels to one and enlarging linearly blurs too, with a variance of r²/12 + r²/6.
-    working_sigma = max((sigma / reduce) ** 2 - 1 / 4, 0.01) ** 0.5
+    working_sigma = max((sigma / reduction) ** 2 - 1 / 4, 0.01) ** 0.5
     weighted = cv2.GaussianBlur(np.dstack([light * weight, weight]), (0, 0), working_sigma)
     # Deep behind the person, where no room is near, the constant brings in the room's mean.
     mean = (light * weight).mean(axis=(0, 1)) / max(float(weight.mean()), 1e-6)

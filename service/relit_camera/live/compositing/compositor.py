@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from relit_camera.base.images.image_types import DisplayImage, Frame
-from relit_camera.live.compositing.alpha_compositing import estimate_foreground_colors, over, split_alpha
+from relit_camera.live.compositing.alpha_compositing import over, replace_room, split_alpha
 from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
     BackgroundRequest,
@@ -50,7 +50,7 @@ class Compositor:
         background = self._background_renderer.live_background(
             _background_request(scene), MattedFrame(picture, alpha), frame.time_s
         )
-        return over(estimate_foreground_colors(picture, alpha), alpha, background)
+        return replace_room(picture, alpha, background)
 
 
 def composite_source_image(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import InputError, ModelError, NotFoundError
 from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame, Mask
-from relit_camera.base.images.resize import resize_to_fill
+from relit_camera.base.images.resize import halve, resize_to_fill
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
 from relit_camera.base.storage.atomic_files import atomic_path
@@ -124,9 +124,7 @@ class SelfieMatting:
             self.reset()
             self._size = frame.size
         width, height = frame.size
-        image = frame.image
-        if min(frame.size) >= TUNABLES.half_size_from_px:
-            image = cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+        image = halve(frame.image) if min(frame.size) >= TUNABLES.half_size_from_px else frame.image
         mask = smooth_over_time(self._segment(image), self._previous)
         self._previous = mask
         alpha: Alpha = cv2.resize(refine_edges(mask, image), (width, height), interpolation=cv2.INTER_LINEAR)
@@ -140,7 +138,9 @@ class SelfieMatting:
         landscape = image.shape[1] >= TUNABLES.landscape_aspect * image.shape[0]
         session = self._session(LANDSCAPE_MODEL if landscape else SQUARE_MODEL)
         _, height, width, _ = session.inputs["image"].shape
-        stretched = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+        while image.shape[0] >= 2 * height and image.shape[1] >= 2 * width:
+            image = halve(image)
+        stretched = cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
         mask: Mask = session.run({"image": np.multiply(stretched, np.float32(1 / 255))[np.newaxis]})["mask"]
         return mask[0, :, :, 0]
 
