@@ -19,7 +19,7 @@ _NEIGHBORHOOD = 1 / 7
 """Width, as a share of the picture's height, of the window in which an edge's pure colours are sought, or a little more
 or less: the picture is halved until that is about `_WINDOW`."""
 
-_WINDOW = 13
+_WINDOW = 7
 """Width of the window in pixels of the reduced picture."""
 
 _EPSILON = np.float32(1e-4)
@@ -130,10 +130,11 @@ def _mean_layer_colors(
         coarse, alpha = halve(coarse), halve(alpha)
     light = linear_from_uint8(coarse)
     share = alpha * np.float32(1 / 255)
-    rows, columns = light.shape[:2]
-    # Enlarged as far as a step between two of its pixels is no longer seen.
-    size = (min(2 * columns, width), min(2 * rows, height))
-    at = (pixels // width) * size[1] // height * size[0] + (pixels % width) * size[0] // width
+    # Enlarged as far as a step between two pixels is no longer seen.
+    step = max(height // (4 * len(light)), 1)
+    size = (-(-width // step), -(-height // step))
+    rows = pixels // width
+    at = rows // step * size[0] + (pixels - rows * width) // step
     # So high a power that a pixel counts only when it is all but sure: at 0.9 already by less than a fifth.
     means = (cv2.resize(_weighted_mean(light, certainty**16), size) for certainty in (share, 1 - share))
     person, room = (mean.reshape(-1, 3).take(at, axis=0) for mean in means)
