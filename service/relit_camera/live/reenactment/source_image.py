@@ -92,7 +92,10 @@ UPSAMPLING = 2
 FEATHER_WIDTH = 0.06
 """Share of the source image's width over which a person who is cut off by its side fades out."""
 COLORED = 0.5
-"""Matte from which a pixel's own color counts. With less of the person in it, it borrows that of its neighbor."""
+"""Matte from which a pixel's own color counts: with less of the person in it, it would be mostly noise and what the
+matte gets wrong. It has the color of its nearest neighbor."""
+BEYOND = cv2.BORDER_REPLICATE
+"""The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing."""
 REACH = 4
 """Pixels beyond the matte that have a color: the enlargement and the warp look that far."""
 
@@ -111,6 +114,8 @@ class Cutout:
         self._edge = _edge_colors(subject.matte, subject.metadata.over_black)
         large = cv2.resize(self.alpha, None, fx=UPSAMPLING, fy=UPSAMPLING, interpolation=cv2.INTER_CUBIC)
         self._large_alpha = cv2.convertScaleAbs(np.maximum(large, 0), alpha=255)
+        # Wide enough that a strand of hair between the middles of the warp's cells is seen too.
+        self._near = cv2.dilate(self.alpha, np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8))
 
     def image(self, relit: LinearImage) -> RgbaImage:
         """The person in the relit source image, as the display shows it, enlarged by `UPSAMPLING`; for warping.
@@ -128,8 +133,8 @@ class Cutout:
 
     def warped(self, relit: LinearImage, grid: PositionGrid) -> RgbaImage:
         """The person in the relit source image (height, width, 3) at the positions of `grid`."""
-        # The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing.
-        return grid.sample(self.image(relit), UPSAMPLING)
+        seen = cv2.remap(self._near, grid.nodes() - np.float32(0.5), None, cv2.INTER_LINEAR, borderMode=BEYOND) > 0
+        return grid.sample(self.image(relit), UPSAMPLING, BEYOND, seen)
 
 
 @dataclass(frozen=True)
