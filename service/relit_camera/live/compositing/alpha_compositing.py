@@ -32,7 +32,9 @@ def split_alpha(image: RgbaImage) -> tuple[DisplayImage, Alpha]:
     return colors, alpha
 
 
-def over(foreground: DisplayImage, alpha: Alpha, background: DisplayImage, at: tuple[int, int] = (0, 0)) -> DisplayImage:
+def over(
+    foreground: DisplayImage, alpha: Alpha, background: DisplayImage, at: tuple[int, int] = (0, 0)
+) -> DisplayImage:
     """Lay the foreground over the background; a new uint8 sRGB picture of the background's size.
 
     Where alpha is 0 or 255 pixels are copied; there is arithmetic for the others alone.
@@ -49,9 +51,10 @@ def over(foreground: DisplayImage, alpha: Alpha, background: DisplayImage, at: t
     check_image(background, np.uint8, "background")
     _check_alpha(foreground, alpha, "foreground")
     (left, top), (rows, columns) = at, alpha.shape
-    window = np.s_[max(-top, 0) : background.shape[0] - top, max(-left, 0) : background.shape[1] - left]
-    if top + rows <= 0 or left + columns <= 0 or alpha[window].size == 0:
+    height, width = background.shape[:2]
+    if not (-rows < top < height and -columns < left < width):
         return background.copy()
+    window = np.s_[max(-top, 0) : height - top, max(-left, 0) : width - left]
     foreground, alpha = np.ascontiguousarray(foreground[window]), alpha[window]
     edge = _partial_pixels(alpha)
     return _blend(foreground, alpha, edge, _light_at(foreground, edge), background, (max(left, 0), max(top, 0)))
@@ -109,15 +112,6 @@ def _blend(
     for channel in range(3):  # thrice as fast as whole pixels
         flat[in_out, channel] = codes[:, channel]
     return out
-
-
-def unpremultiply(premultiplied: LinearImage, alpha: NDArray[np.float32]) -> LinearImage:
-    """Colors (height, width, 3) without the factor alpha (height, width), as `over` wants them once they are coded.
-
-    Where alpha is 0 there is no color to find: it stays as it is.
-    """
-    share = np.where(alpha > 0, alpha, np.float32(1))[..., np.newaxis]
-    return np.asarray(premultiplied / share, dtype=np.float32)
 
 
 def _mean_layer_colors(

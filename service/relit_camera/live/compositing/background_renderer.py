@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from relit_camera.base.config.look import (
     Background,
@@ -33,7 +34,7 @@ from relit_camera.light.scene_light import scene_light_map
 from relit_camera.live.compositing.environment_view import BLUR_SIGMA, EnvironmentView
 
 _WORKING_SIGMA = 1.5
-"""The room is halved while the blur's sigma is more than this many pixels."""
+"""The room is halved as long as the blur's sigma stays this many pixels."""
 
 _MAX_REDUCTION = 8
 """Greatest factor: more shows when it is enlarged again."""
@@ -62,10 +63,11 @@ def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     """
     height, width = matted.matte.shape
     sigma = BLUR_SIGMA * strength * height
-    # The first halving of a large picture may take means of codes; of light more so, small lamps would come out dark.
-    image, matte, reduction = halve(matted.image), halve(matted.matte), 2
-    light, room = linear_from_uint8(image), np.float32(1) - matte * np.float32(1 / 255)
-    while reduction < min(sigma / _WORKING_SIGMA, _MAX_REDUCTION):
+    # Averaged as light: of codes, small lamps would come out too dark. In 16 bits that takes half the time.
+    light = halve(cv2.LUT(matted.image, _light_in_16_bits())) * np.float32(1 / 65535)
+    room = 1 - halve(matted.matte) * np.float32(1 / 255)
+    reduction = 2
+    while 2 * reduction <= min(sigma / _WORKING_SIGMA, _MAX_REDUCTION):
         light, room, reduction = halve(light), halve(room), 2 * reduction
     # So high a power that a pixel counts only when it is all but surely room.
     weight = (room**16)[..., np.newaxis]
@@ -77,6 +79,12 @@ def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     filled = (weighted[..., :3] + _EPSILON * mean) / (weighted[..., 3:] + _EPSILON)
     enlarged: DisplayImage = cv2.resize(uint8_from_linear(filled), (width, height), interpolation=cv2.INTER_LINEAR)
     return enlarged
+
+
+@lru_cache(maxsize=1)
+def _light_in_16_bits() -> NDArray[np.uint16]:
+    """Linear light of each code, in steps of 1/65535."""
+    return np.rint(linear_from_uint8(np.arange(256, dtype=np.uint8)) * 65535).astype(np.uint16)
 
 
 _NEUTRAL_LIGHT = (0.030, 0.032, 0.036)

@@ -57,7 +57,8 @@ class RatioMode:
         if lighting.blend < 1:
             share = np.float32(lighting.blend)
             relit = linear_from_display(frame.image) * (1 - share) + relit * share
-        return split_view(self._context.compositor.composite_live(display_from_linear(relit), frame, scene), frame.image, lighting.split)
+        image = self._context.compositor.composite_live(display_from_linear(relit), frame, scene)
+        return split_view(image, frame.image, lighting.split)
 
 
 def split_view(relit: DisplayImage, live: DisplayImage, share: float) -> DisplayImage:

@@ -114,8 +114,8 @@ class Cutout:
         self._edge = _edge_colors(subject.matte, subject.metadata.over_black)
         large = cv2.resize(self.alpha, None, fx=UPSAMPLING, fy=UPSAMPLING, interpolation=cv2.INTER_CUBIC)
         self._large_alpha = cv2.convertScaleAbs(np.maximum(large, 0), alpha=255)
-        # Wide enough that a strand of hair between the middles of the warp's cells is seen too.
-        self._near = cv2.dilate(self.alpha, np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8))
+        # Around it too, so that a strand of hair between the middles of the warp's cells is not left out.
+        self._around = _around(self.alpha)
 
     def image(self, relit: LinearImage) -> RgbaImage:
         """The person in the relit source image, as the display shows it, enlarged by `UPSAMPLING`; for warping.
@@ -133,7 +133,7 @@ class Cutout:
 
     def warped(self, relit: LinearImage, grid: PositionGrid) -> RgbaImage:
         """The person in the relit source image (height, width, 3) at the positions of `grid`."""
-        seen = cv2.remap(self._near, grid.nodes() - np.float32(0.5), None, cv2.INTER_LINEAR, borderMode=BEYOND) > 0
+        seen = cv2.remap(self._around, grid.nodes() - np.float32(0.5), None, cv2.INTER_LINEAR, borderMode=BEYOND) > 0
         return grid.sample(self.image(relit), UPSAMPLING, BEYOND, seen)
 
 
@@ -157,11 +157,16 @@ def _edge_colors(matte: Mask, over_black: bool) -> _EdgeColors:
     colored = matte >= COLORED
     if not colored.any():
         return _EdgeColors(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 1), np.float32))
-    distance, (row, column) = distance_transform_edt(~colored, return_indices=True)
-    pixels = np.flatnonzero((matte < 1) & (distance <= REACH))
+    row, column = distance_transform_edt(~colored, return_distances=False, return_indices=True)
+    pixels = np.flatnonzero((matte < 1) & (_around(matte) > 0))
     nearest = (row * matte.shape[1] + column).reshape(-1)[pixels]
     gain = 1 / matte.reshape(-1, 1)[nearest] if over_black else np.ones((len(pixels), 1), np.float32)
     return _EdgeColors(pixels, nearest, gain.astype(np.float32))
+
+
+def _around(matte: Mask) -> Mask:
+    """The largest value of the matte within `REACH` of each pixel."""
+    return np.asarray(cv2.dilate(matte, np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8)), np.float32)
 
 
 def shows_whole_head(matte: Mask) -> bool:
@@ -177,4 +182,3 @@ def feather_edges(matte: Mask) -> Mask:
     down = np.clip((np.arange(height) + 0.5) / reach, 0, 1)
     smooth = np.minimum.outer(down, across)
     return np.asarray(matte * smoothstep(smooth), dtype=np.float32)
-
