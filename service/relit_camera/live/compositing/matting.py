@@ -138,7 +138,8 @@ class SelfieMatting:
         landscape = image.shape[1] >= TUNABLES.landscape_aspect * image.shape[0]
         session = self._session(LANDSCAPE_MODEL if landscape else SQUARE_MODEL)
         _, height, width, _ = session.inputs["image"].shape
-        assert height is not None and width is not None  # `_session` made sure
+        assert height is not None  # `_session` made sure of both
+        assert width is not None
         while image.shape[0] >= 2 * height and image.shape[1] >= 2 * width:
             image = halve(image)
         stretched = cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
