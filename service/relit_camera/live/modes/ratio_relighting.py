@@ -24,7 +24,7 @@ from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.face_mesh import triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
 from relit_camera.live.reenactment.source_image import SourceFace, feather_edges
-from relit_camera.live.reenactment.warp import Warp, sample_bilinear
+from relit_camera.live.reenactment.warp import Warp
 from relit_camera.subject.relighting.relighter import Relighter
 from relit_camera.subject.subject import Subject
 
@@ -98,8 +98,7 @@ class RatioRelighting:
             frame: the live frame, of the output's size.
         """
         room = self._room_light.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
-        columns, rows = _downsampled_size(frame.size)
-        positions = self._warp(motion, pose, frame.size).map((0, 0, columns, rows))
+        positions = self._warp(motion, pose, frame.size).grid((0, 0, *frame.size), RATIO_DOWNSAMPLING).nodes()
         return RatioPlan(frame, float(motion.presence), room, positions)
 
     def apply(self, plan: RatioPlan, relit: LinearImage) -> LinearImage:
@@ -109,7 +108,11 @@ class RatioRelighting:
         columns, rows = _downsampled_size(plan.frame.size)
         ratio = self._ratio(relit, self._relighter.relight(plan.room.in_head_frame) * plan.room.gain)
         weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
-        everywhere = extrapolate_ratio(sample_bilinear(weighted, plan.positions, cv2.BORDER_REPLICATE))
+        everywhere = extrapolate_ratio(
+            cv2.remap(
+                weighted, plan.positions - np.float32(0.5), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+            )
+        )
         large = cv2.resize(
             everywhere, (columns * RATIO_DOWNSAMPLING, rows * RATIO_DOWNSAMPLING), interpolation=cv2.INTER_LINEAR
         )
@@ -141,7 +144,6 @@ class RatioRelighting:
         source_from_live = fit_similarity(landmarks[list(face.scheme.rigid)], face.landmarks[list(face.scheme.rigid)])
         target = live @ source_from_live[:, :2].T + source_from_live[:, 2]
         moved = landmarks @ source_from_live[:, :2].T + source_from_live[:, 2]
-        source_from_live = source_from_live @ np.diag([RATIO_DOWNSAMPLING, RATIO_DOWNSAMPLING, 1.0])
         # Lids and lips are the live picture's; the light on them is that of the skin round them.
         flow = face_and_head_flow(self._motion, self._mesh, self._points, target, moved, pose, fine=False)
         return Warp(source_from_live, flow)
