@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from relit_camera.base.config.look import Mode
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import Frame
-from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
 from relit_camera.live.compositing.compositor import Compositor
@@ -165,7 +164,7 @@ class Pipeline:
 
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:
         live = fit_frame(frame, self._size)
-        return RenderedFrame(self._compositor.composite_live(linear_from_display(live.image), live, scene), None, scene)
+        return RenderedFrame(self._compositor.composite_live(live.image, live, scene), None, scene)
 
     def _opened_matte(self) -> Matting:
         self.on_opening()

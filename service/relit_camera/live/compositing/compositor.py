@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
-from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
-from relit_camera.base.images.tone_mapping import display_from_linear
-from relit_camera.live.compositing.alpha_compositing import estimate_foreground_colors, over, unpremultiply
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.live.compositing.alpha_compositing import over, replace_room, split_alpha
 from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
     BackgroundRequest,
@@ -38,23 +35,22 @@ class Compositor:
         """
         return composite_source_image(self._background_renderer, layer, scene, now)
 
-    def composite_live(self, picture: LinearImage, frame: Frame, scene: Scene) -> DisplayImage:
-        """The relit live picture (output size, linear, display exposure) before its background, uint8 sRGB.
+    def composite_live(self, picture: DisplayImage, frame: Frame, scene: Scene) -> DisplayImage:
+        """The relit live picture of the output's size before its background; the same where the room stays as it is.
 
         Raises:
             ModelError: the background must be parted from the person and the matting model is missing.
         """
-        shown = display_from_linear(picture)
         if not needs_matte(scene.look.background, scene.look.lighting):
-            return shown
+            return picture
         with self._timer.stage("matte"):
             if self._matte is None:
                 self._matte = self._open_matte()
             alpha = self._matte.matte(frame)
         background = self._background_renderer.live_background(
-            _background_request(scene), MattedFrame(shown, alpha), frame.time_s
+            _background_request(scene), MattedFrame(picture, alpha), frame.time_s
         )
-        return over(estimate_foreground_colors(shown, alpha), alpha, np.ascontiguousarray(background))
+        return replace_room(picture, alpha, background)
 
 
 def composite_source_image(
@@ -62,7 +58,7 @@ def composite_source_image(
 ) -> DisplayImage:
     """A warped source image before the scene's background at `now` seconds: uint8 sRGB of the renderer's size."""
     background = background_renderer.static_background(_background_request(scene), now)
-    return over(display_from_linear(unpremultiply(layer.picture, layer.alpha)), layer.alpha, background, layer.at)
+    return over(*split_alpha(layer.image), background, layer.at)
 
 
 def _background_request(scene: Scene) -> BackgroundRequest:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
-from relit_camera.base.images.tone_mapping import linear_from_display
+from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.frame_fitting import fit_frame, fit_motion
 from relit_camera.live.modes.identity_check import IdentityCheck
@@ -57,7 +57,8 @@ class RatioMode:
         if lighting.blend < 1:
             share = np.float32(lighting.blend)
             relit = linear_from_display(frame.image) * (1 - share) + relit * share
-        return split_view(self._context.compositor.composite_live(relit, frame, scene), frame.image, lighting.split)
+        image = self._context.compositor.composite_live(display_from_linear(relit), frame, scene)
+        return split_view(image, frame.image, lighting.split)
 
 
 def split_view(relit: DisplayImage, live: DisplayImage, share: float) -> DisplayImage:
