@@ -107,7 +107,8 @@ class RatioRelighting:
         image, presence = plan.frame.image, plan.presence
         width, height = plan.frame.size
         columns, rows = _downsampled_size(plan.frame.size)
-        ratio = self._ratio(relit, self._relighter.relight(plan.room.in_head_frame) * plan.room.gain)
+        under_room = self._relighter.relight(plan.room.in_head_frame[None])[0]
+        ratio = self._ratio(relit, under_room * plan.room.gain)
         weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
         everywhere = extrapolate_ratio(sample_bilinear(weighted, plan.positions, cv2.BORDER_REPLICATE))
         large = cv2.resize(

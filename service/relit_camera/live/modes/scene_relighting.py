@@ -41,5 +41,5 @@ class SceneRelighting:
         with self._timer.stage("relight"):
             light = light * self._gain
             if self._last is None or not np.array_equal(self._last[0], light):
-                self._last = (light, self._relighter.relight(light))
+                self._last = (light, self._relighter.relight(light[None])[0])
             return self._last[1]

@@ -81,6 +81,6 @@ class _RelitSource:
     def render(self, light: LightMap) -> WarpedLayer:
         """The person under `light`; the previous layer again if the light has not changed."""
         if self._last is None or not np.array_equal(self._last[0], light):
-            picture, alpha = self._person.sampled(self._relighter.relight(light), self._positions)
+            picture, alpha = self._person.sampled(self._relighter.relight(light[None])[0], self._positions)
             self._last = light, WarpedLayer(picture, alpha, self._box[:2])
         return self._last[1]
