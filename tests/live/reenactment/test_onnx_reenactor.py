@@ -143,7 +143,7 @@ def unmoved(subject: Subject, relit: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """The still as it stands in the output when nothing moves, through a network that is never asked."""
     person_alone = Cutout(subject)
     warp = Warp(source_from_output(subject.size, SIZE), ())
-    return person_alone.sampled(relit, person_alone.positions(warp, (0, 0, *SIZE)))
+    return person_alone.sampled(relit, warp.grid((0, 0, *SIZE)))
 
 
 def test_a_flow_that_moves_nothing_gives_the_still(path: Path) -> None:

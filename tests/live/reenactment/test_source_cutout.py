@@ -19,7 +19,7 @@ def with_edges(over_black: bool):
 
 def unmoved(cutout: Cutout, relit: np.ndarray):
     """Picture and alpha of the still as it lies."""
-    return cutout.sampled(relit, cutout.positions(Warp(np.eye(2, 3), ()), (0, 0, relit.shape[1], relit.shape[0])))
+    return cutout.sampled(relit, Warp(np.eye(2, 3), ()).grid((0, 0, relit.shape[1], relit.shape[0])))
 
 
 def test_a_cut_out_person_is_premultiplied() -> None:

@@ -129,3 +129,39 @@ def test_a_later_patch_keeps_its_detail() -> None:
     looks = looked_at(np.eye(2, 3), WHOLE)
     inside = well_inside(looks, region, 12)
     np.testing.assert_allclose(warp.map(WHOLE)[inside], (looks + wave(looks) - 0.5)[inside], atol=0.1)
+
+
+@pytest.mark.parametrize("box", [WHOLE, (3, 5, 74, 58), (0, 0, 1, 1), (100, 50, 103, 240)])
+@pytest.mark.parametrize("step", [1, 3, 4])
+def test_an_affine_grid_samples_every_pixel_of_its_box(box: Box, step: int) -> None:
+    """The source holds each place's own position, so what is sampled is where each pixel looks: nothing extrapolates."""
+    x, y = np.meshgrid(np.arange(360) + 0.5, np.arange(280) + 0.5)
+    ramp = np.stack([x, y], axis=2).astype(np.float32)
+    sampled = Warp(SIMILARITY, ()).grid(box, step).sample(ramp)
+    looks = looked_at(SIMILARITY, box)
+    seen = ((looks > 1) & (looks < [359, 279])).all(axis=2)
+    assert sampled.shape == looks.shape
+    np.testing.assert_allclose(sampled[seen], looks[seen], atol=0.02)  # cv2 counts in 32nds
+
+
+def test_nodes_are_the_pixels_of_a_smaller_picture() -> None:
+    grid = Warp(SIMILARITY, ()).grid((8, 4, 51, 36), 4)
+    x, y = np.meshgrid(8 + 4 * (np.arange(11) + 0.5), 4 + 4 * (np.arange(8) + 0.5))
+    expected = np.stack([x, y], axis=2) @ SIMILARITY[:, :2].T + SIMILARITY[:, 2]
+    np.testing.assert_allclose(grid.nodes(), expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("channels", [(), (3,), (4,)])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_pictures_of_either_type_and_any_channels_are_sampled_alike(
+    channels: tuple[int, ...], dtype: type[np.generic]
+) -> None:
+    picture = cv2.GaussianBlur(np.random.default_rng(5).random((280, 360, *channels)).astype(np.float32), (0, 0), 6)
+    picture = (255 * picture).astype(dtype)
+    box = (100, 90, 250, 200)
+    warp = Warp(SIMILARITY, (patch_of(lambda u: 0.1 * u - 10),))
+    sampled = warp.grid(box).sample(picture)
+    assert sampled.dtype == dtype
+    expected = warp.grid(box, 1).sample(picture)
+    np.testing.assert_allclose(sampled.astype(float), expected.astype(float), atol=1.5)
+    assert np.ptp(sampled) > 5

@@ -68,12 +68,12 @@ class FirstOrderReenactor:
             patches = tuple(fade_flow_at_border(patch, face.size) for patch in patches)
         placed = move_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
         box = visible_box(placed, face.size, self._size)
-        positions = self._person.positions(Warp(placed, patches), box)
+        grid = Warp(placed, patches).grid(box)
         to_box = inverse_affine(placed)
         to_box[:, 2] -= box[:2]
 
         def warp(relit: LinearImage) -> WarpedLayer:
-            picture, alpha = self._person.sampled(relit, positions)
+            picture, alpha = self._person.sampled(relit, grid)
             self._mouth.draw(picture, alpha, relit, target.landmarks, target.pose, to_box)
             return WarpedLayer(picture, alpha, box[:2])
 

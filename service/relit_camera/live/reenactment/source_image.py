@@ -20,7 +20,7 @@ from relit_camera.face.head_pose import HeadPose, fit_pose, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 from relit_camera.face.tracking.track_recording import RecordedTracker
 from relit_camera.face.tracking.trackers import open_tracker, track_still
-from relit_camera.live.reenactment.warp import Box, Warp, sample_bilinear
+from relit_camera.live.reenactment.warp import PositionGrid
 from relit_camera.subject.subject import Subject
 
 SCHEME_TRACKERS = {"mesh478": "mesh", "openseeface66": "openseeface"}
@@ -107,16 +107,12 @@ class Cutout:
         self._share = share[..., None]
         self._large_alpha = _upsample(self.alpha)
 
-    def positions(self, warp: Warp, box: Box) -> NDArray[np.float32]:
-        """Where the output pixels of `box` look under `warp`: (height, width, 2), for `sample_bilinear`."""
-        return warp.map(box, UPSAMPLING)
-
-    def sampled(self, relit: LinearImage, positions: NDArray[np.float32]) -> tuple[LinearImage, Mask]:
-        """The relit source image (height, width, 3) at `positions`: premultiplied, and alpha."""
+    def sampled(self, relit: LinearImage, grid: PositionGrid) -> tuple[LinearImage, Mask]:
+        """The relit source image (height, width, 3) at the positions of `grid`: premultiplied, and alpha."""
         # Colours and alpha go apart through the same positions: taking four channels apart afterwards costs more.
         # The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing.
-        picture = sample_bilinear(_upsample(relit * self._share), positions, cv2.BORDER_REPLICATE)
-        alpha = sample_bilinear(self._large_alpha, positions, cv2.BORDER_REPLICATE)
+        picture = grid.sample(_upsample(relit * self._share), UPSAMPLING)
+        alpha = grid.sample(self._large_alpha, UPSAMPLING)
         return picture, np.minimum(alpha, np.float32(1))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.image_types import Flow
 
 Box = tuple[int, int, int, int]
+Picture = TypeVar("Picture", NDArray[np.uint8], NDArray[np.float32])
 
 
 def source_from_output(source: tuple[int, int], output: tuple[int, int]) -> NDArray[np.float64]:
@@ -81,6 +83,56 @@ class FlowPatch:
         return np.asarray(self.flow + np.dstack(np.meshgrid(x, y)), dtype=np.float32)
 
 
+GRID_STEP = 4
+"""Output pixels between computed positions; what lies between is interpolated."""
+BAND_CELLS = 16
+"""Rows of cells that are sampled at a time: their positions stay in the processor's cache."""
+
+
+@dataclass(frozen=True)
+class PositionGrid:
+    """Where the pixels of a box of the output look in the source image, given in the middle of cells of `step` pixels.
+
+    The box is covered with cells of `step` × `step` pixels, beginning at its left upper corner, and one more round
+    them, so that nothing in the box is extrapolated: `positions[i, j]` belongs to the output position
+    (left + (j − ½) · step, top + (i − ½) · step). Between the middles of cells positions are bilinear.
+
+    Attributes:
+        positions: (rows + 2, columns + 2, 2) float32 source pixels, pixel centers at integers + ½.
+        box: left, top, right, bottom in output pixels.
+        step: the side of a cell in output pixels.
+    """
+
+    positions: NDArray[np.float32]
+    box: Box
+    step: int
+
+    def nodes(self) -> NDArray[np.float32]:
+        """Positions (rows, columns, 2) of the cells in the box: of the pixels of a picture 1/`step` of its size."""
+        return self.positions[1:-1, 1:-1]
+
+    def sample(self, image: Picture, enlarged: float = 1, beyond: int = cv2.BORDER_REPLICATE) -> Picture:
+        """The box's pixels (height, width[, channels]), bilinear, in the type of `image`.
+
+        Args:
+            image: (rows, columns[, channels ≤ 4]) uint8 or float32, what the positions look at.
+            enlarged: by how much it is larger than the source image.
+            beyond: OpenCV's border mode for what lies outside it; 0 where the mode takes a constant.
+        """
+        width, height = self.box[2] - self.box[0], self.box[3] - self.box[1]
+        sampled = np.empty((height, width, *image.shape[2:]), image.dtype)
+        # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
+        positions = self.positions * np.float32(enlarged) - np.float32(0.5)
+        step = self.step
+        for first in range(0, len(positions) - 2, BAND_CELLS):
+            top, bottom = first * step, min((first + BAND_CELLS) * step, height)
+            cells = positions[first : first + BAND_CELLS + 2]
+            fine = cv2.resize(cells, None, fx=step, fy=step, interpolation=cv2.INTER_LINEAR)
+            band = fine[step : step + bottom - top, step : step + width]
+            cv2.remap(image, band, None, cv2.INTER_LINEAR, dst=sampled[top:bottom], borderMode=beyond, borderValue=0)
+        return sampled
+
+
 @dataclass(frozen=True)
 class Warp:
     """Where each output pixel looks in the source image: u = affine(x), then u + flow(u).
@@ -117,6 +169,18 @@ class Warp:
         for patch in self.patches[1:]:
             _blend_grid(positions, patch.positions * np.float32(enlarged) - np.float32(0.5), patch.region, from_pixel)
         return positions
+
+    def grid(self, box: Box, step: int = GRID_STEP) -> PositionGrid:
+        """Where the output pixels of `box` (left, top, right, bottom) look."""
+        columns, rows = -(-(box[2] - box[0]) // step) + 2, -(-(box[3] - box[1]) // step) + 2
+        from_node = self._source_from_pixel(box[0] - 0.5 * step, box[1] - 0.5 * step, step)
+        positions = np.zeros((rows, columns, 2), np.float32)
+        for patch in self.patches:
+            _blend_grid(positions, patch.flow, patch.region, from_node)
+        a = from_node.astype(np.float32)
+        positions += a[:, 0] * np.arange(columns, dtype=np.float32)[:, None] + a[:, 2]
+        positions += (a[:, 1] * np.arange(rows, dtype=np.float32)[:, None])[:, None]
+        return PositionGrid(positions, box, step)
 
     def _step(self) -> int:
         """Output pixels between computed positions: no more than between the points of the first patch's grid."""

@@ -75,12 +75,12 @@ class _RelitSource:
         self._person = Cutout(subject)
         placed = source_from_output(subject.size, size)
         self._box = visible_box(placed, subject.size, size)
-        self._positions = self._person.positions(Warp(placed, ()), self._box)
+        self._grid = Warp(placed, ()).grid(self._box)
         self._last: tuple[LightMap, WarpedLayer] | None = None
 
     def render(self, light: LightMap) -> WarpedLayer:
         """The person under `light`; the previous layer again if the light has not changed."""
         if self._last is None or not np.array_equal(self._last[0], light):
-            picture, alpha = self._person.sampled(self._relighter.relight(light[None])[0], self._positions)
+            picture, alpha = self._person.sampled(self._relighter.relight(light[None])[0], self._grid)
             self._last = light, WarpedLayer(picture, alpha, self._box[:2])
         return self._last[1]

@@ -78,10 +78,10 @@ class OnnxReenactor:
         # A flow is computed from the source image as it was captured, so at once; a picture from the relit one.
         flow = self._network.run(self._source, *seen).flow if seen and self._network.gives_flow else None
         patches = () if flow is None else (self._patch(flow, motion.presence),)
-        positions = self._person.positions(Warp(placed, patches), box)
+        grid = Warp(placed, patches).grid(box)
 
         def warp(relit: LinearImage) -> WarpedLayer:
-            picture, alpha = self._person.sampled(relit, positions)
+            picture, alpha = self._person.sampled(relit, grid)
             if seen and not self._network.gives_flow:
                 source = crop_square(uint8_from_linear(relit), self._crop, self._network.side)
                 answer = self._network.run(source, *seen)
