@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from relit_camera.base.config.look import Mode
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import Frame
-from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
 from relit_camera.live.compositing.compositor import Compositor
@@ -158,7 +157,7 @@ class Pipeline:
 
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:
         live = fit_frame(frame, self._size)
-        return RenderedFrame(self._compositor.composite_live(linear_from_display(live.image), live, scene), None, scene)
+        return RenderedFrame(self._compositor.composite_live(live.image, live, scene), None, scene)
 
     def _mode_for(self, asked: Mode) -> Mode:
         """The mode asked for, or the fallback where that has found the live face not to be this subject's."""

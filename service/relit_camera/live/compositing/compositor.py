@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
+from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.live.compositing.alpha_compositing import estimate_foreground_colors, over, unpremultiply
 from relit_camera.live.compositing.background_renderer import (
@@ -38,23 +38,22 @@ class Compositor:
         """
         return composite_source_image(self._background_renderer, layer, scene, now)
 
-    def composite_live(self, picture: LinearImage, frame: Frame, scene: Scene) -> DisplayImage:
-        """The relit live picture (output size, linear, display exposure) before its background, uint8 sRGB.
+    def composite_live(self, picture: DisplayImage, frame: Frame, scene: Scene) -> DisplayImage:
+        """The relit live picture of the output's size before its background; the same where the room stays as it is.
 
         Raises:
             ModelError: the background must be parted from the person and the matting model is missing.
         """
-        shown = display_from_linear(picture)
         if not needs_matte(scene.look.background, scene.look.lighting):
-            return shown
+            return picture
         with self._timer.stage("matte"):
             if self._matte is None:
                 self._matte = self._open_matte()
             alpha = self._matte.matte(frame)
         background = self._background_renderer.live_background(
-            _background_request(scene), MattedFrame(shown, alpha), frame.time_s
+            _background_request(scene), MattedFrame(picture, alpha), frame.time_s
         )
-        return over(estimate_foreground_colors(shown, alpha), alpha, np.ascontiguousarray(background))
+        return over(estimate_foreground_colors(picture, alpha), alpha, np.ascontiguousarray(background))
 
 
 def composite_source_image(
