@@ -131,7 +131,7 @@ class RatioRelighting:
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
         nodes = plan.positions.nodes() - np.float32(0.5)
         roots = extrapolate_roots(cv2.remap(plan.roots, nodes, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
-        roots *= root_of_light(1 / plan.gain).ravel()
+        roots = cv2.multiply(roots, (*map(float, root_of_light(1 / plan.gain).ravel()), 0.0))
         if blend < 1:
             roots = root_of_light(1 - np.float32(blend) + np.float32(blend) * light_of_root(roots))
         shown = multiply_light(plan.frame.image, roots, RATIO_STEP, as_shown=1 - blend)
