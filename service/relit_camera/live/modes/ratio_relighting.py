@@ -33,8 +33,8 @@ MIN_CHANNEL_MEAN = 1e-3
 """Linear: the least mean of a channel under the room's light that counts; three sRGB codes."""
 EDGE_MARGIN = 0.02
 """Share of the source image's width at the matte's edge that is not trusted."""
-RATIO_STEP = 4
-"""The ratio is made for cells of so many pixels of the frame: it is as soft as the source image."""
+RATIO_CELLS = 180
+"""The ratio is made for cells of the frame, about so many on its shorter side: it is as soft as the source image."""
 EXTRAPOLATION_DOWNSAMPLING = 4
 """The extrapolation beyond the person is computed at this fraction of that."""
 
@@ -56,7 +56,7 @@ class RatioPlan:
         presence: how far it is relit, 0..1: 0 shows it as it is.
         gain: (3,) float32 by which its exposure differs from that of the ratio, see `RoomLightEstimate`.
         roots: (height, width, 4) float32 of the source image's size, see `RatioRelighting.ratio_roots`.
-        positions: where cells of `RATIO_STEP` pixels of the frame lie in the source image.
+        positions: where cells of some pixels of the frame lie in the source image.
     """
 
     frame: Frame
@@ -90,6 +90,7 @@ class RatioRelighting:
         self._points = control_points(face, head_and_shoulder_anchors(face.pose, face.size))
         self._mesh = triangulate_face(face)
         self._weight = ratio_confidence(feather_edges(subject.matte))
+        self._weights = cv2.merge([self._weight] * 3)
         self._inside = (self._weight > 0.5).astype(np.uint8)
 
     def ratio_roots(self, relit: LinearImage, under_room: LinearImage) -> NDArray[np.float32]:
@@ -103,13 +104,10 @@ class RatioRelighting:
             under_room: the same under the room's.
         """
         # A room may have no light at all of one colour; then the live picture has none of it either.
-        mean = np.maximum(cv2.mean(under_room, self._inside)[:3], MIN_CHANNEL_MEAN)
-        floor = (RATIO_FLOOR * mean).astype(np.float32)
-        ratio = np.clip((relit + floor) / (np.maximum(under_room, 0) + floor), *RATIO_RANGE)
-        weighted = np.empty((*self._weight.shape, 4), np.float32)
-        np.multiply(root_of_light(ratio), self._weight[..., None], out=weighted[..., :3])
-        weighted[..., 3] = self._weight
-        return weighted
+        floor = tuple(RATIO_FLOOR * max(mean, MIN_CHANNEL_MEAN) for mean in cv2.mean(under_room, self._inside))
+        ratio = cv2.divide(cv2.add(relit, floor), cv2.add(np.maximum(under_room, 0), floor))
+        roots = root_of_light(np.clip(ratio, *RATIO_RANGE))
+        return cv2.merge([*cv2.split(cv2.multiply(roots, self._weights)), self._weight])
 
     def positions(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> PositionGrid:
         """Where a live frame of `size` (width, height) lies in the source image.
@@ -119,7 +117,7 @@ class RatioRelighting:
             pose: of the head in the frame.
             size: of the frame.
         """
-        return self._warp(motion, pose, size).grid((0, 0, *size), RATIO_STEP)
+        return self._warp(motion, pose, size).grid((0, 0, *size), max(round(min(size) / RATIO_CELLS), 1))
 
     def apply(self, plan: RatioPlan, blend: float = 1.0) -> DisplayImage:
         """The planned frame in the light of the plan's ratio, uint8 sRGB.
@@ -134,7 +132,7 @@ class RatioRelighting:
         roots = cv2.multiply(roots, (*map(float, root_of_light(1 / plan.gain).ravel()), 0.0))
         if blend < 1:
             roots = root_of_light(1 - np.float32(blend) + np.float32(blend) * light_of_root(roots))
-        shown = multiply_light(plan.frame.image, roots, RATIO_STEP, as_shown=1 - blend)
+        shown = multiply_light(plan.frame.image, roots, plan.positions.step, as_shown=1 - blend)
         if plan.presence < 1:
             # Where nobody is tracked with confidence the picture eases back to the live one, as both are shown:
             # in linear light that guess would be in the mixture.
@@ -193,4 +191,5 @@ def extrapolate_roots(warped: NDArray[np.float32]) -> NDArray[np.float32]:
         spread += cv2.GaussianBlur(small, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE) / np.float32(sigma**3)
     beyond = root_of_light((spread[..., :3] + np.float32(1e-9)) / (spread[..., 3:] + np.float32(1e-9)))
     beyond = cv2.resize(beyond, (width, height), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(warped[..., :3] + (1 - warped[..., 3:]) * beyond, dtype=np.float32)
+    *known, weight = cv2.split(warped)
+    return np.asarray(cv2.merge(known) + cv2.merge([1 - weight] * 3) * beyond, dtype=np.float32)

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-MAX_LAG = np.radians(2.0)
-"""The picture is computed at once where the head is turned further than this from where it can be extrapolated to."""
+MAX_STEP, MAX_LAG = np.radians(2.0), np.radians(1.0)
+"""The picture is computed at once where the head has turned further than the one since, or than the other aside from how
+it turned before: shadow edges do not move evenly over such angles, and every other frame would stand out."""
 MAX_BASE = np.radians(8.0)
 """Two computed pictures further apart than this say nothing about what lies beyond them."""
 _UNMOVED = 1e-6
@@ -58,7 +59,7 @@ class TurnExtrapolation:
         Args:
             rotation: of the head.
             whole: what else the picture depends on; with another object it is computed at once.
-            part: what it depends on a little; with another object it is computed within `every` frames.
+            part: the same of what makes so little difference that the picture goes on changing as before.
             compute: makes it.
         """
         latest = self._latest
@@ -67,13 +68,15 @@ class TurnExtrapolation:
             return self._keep(_Computed(rotation, part, compute()))
         step = _turn(latest.rotation, rotation)
         self._age += 1
-        if part is latest.part and np.linalg.norm(step) < _UNMOVED:
+        same = part is latest.part
+        if same and np.linalg.norm(step) < _UNMOVED:
             return latest.picture
         share = self._share(step)
         lag = step if self._slope is None else step - share * self._slope.turn
-        if self._age >= self.every or np.linalg.norm(lag) > MAX_LAG:
+        jumped = np.linalg.norm(step) > MAX_STEP or np.linalg.norm(lag) > MAX_LAG
+        if self._age >= self.every or not same or jumped:
             computed = _Computed(rotation, part, compute())
-            if part is latest.part:  # else the difference is not the turn's: the last slope still holds
+            if same:  # else the difference is not the turn's alone: the last slope still holds
                 self._slope = _slope(latest, computed)
             return self._keep(computed)
         if self._slope is None or share == 0:
