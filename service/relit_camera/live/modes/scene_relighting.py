@@ -73,7 +73,7 @@ class SceneRelighting:
             time_s: of the frame.
             room: the room's light map; another object for another light.
             room_in_head_frame: the same as the head sees it.
-            combine: makes an array (height, width, channels ≤ 4) of non-negative values.
+            combine: makes an array (height, width, 3 or 4) of non-negative values.
         """
         with self._timer.stage("light"):
             light = self._light.update(scene, time_s)
