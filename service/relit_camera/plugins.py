@@ -31,7 +31,8 @@ from relit_camera.base.errors import (
     TrackError,
     VideoError,
 )
-from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask, Points
+from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask, Points, RgbaImage
+from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
 from relit_camera.capture.reflectance.method_registry import LinearMethod, ReflectanceMethod, factored_field
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
@@ -83,6 +84,7 @@ __all__ = [
     "Relighter",
     "RelighterOptions",
     "RelitError",
+    "RgbaImage",
     "Session",
     "SessionOptions",
     "Sink",
@@ -103,6 +105,7 @@ __all__ = [
     "VideoError",
     "WarpTask",
     "WarpedLayer",
+    "display_from_linear",
     "factored_field",
     "fit_pose",
     "landmark_scheme",

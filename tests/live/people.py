@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
+from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask
+from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose, guess_focal, project
@@ -17,6 +18,7 @@ from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.face.motion.neutral_face import NeutralFace
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
+from relit_camera.live.compositing.alpha_compositing import split_alpha
 from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, WarpedLayer
 from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
 from relit_camera.subject.subject import Subject
@@ -93,6 +95,13 @@ NOBODY = FaceMotion(
 def moved_by(reenactor: Reenactor, relit: LinearImage, motion: FaceMotion, frame: Frame) -> WarpedLayer:
     """A frame as mode reenact does it: plan the warp, then warp the relit picture."""
     return reenactor.plan_warp(motion, frame)(relit)
+
+
+def premultiplied(layer: WarpedLayer) -> tuple[LinearImage, Mask]:
+    """The layer's picture in linear light, premultiplied, and its alpha in 0..1."""
+    colors, alpha = split_alpha(layer.image)
+    share = alpha / np.float32(255)
+    return linear_from_display(colors) * share[..., None], share
 
 
 def live_frame(image: DisplayImage | None = None, index: int = 0) -> Frame:

@@ -15,7 +15,7 @@ from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map_rotation import rotate_light_map
-from relit_camera.live.compositing.alpha_compositing import over, unpremultiply
+from relit_camera.live.compositing.alpha_compositing import over
 from relit_camera.live.compositing.environment_view import EnvironmentView
 from relit_studio.camera import Camera
 from relit_studio.cycles.job import PanoramaLight
@@ -67,5 +67,5 @@ class Room:
 
     def shown(self, picture: LinearImage, alpha: Mask, backdrop: DisplayImage) -> DisplayImage:
         """A rendered picture (h, w, 3), premultiplied, composited over the backdrop, uint8 sRGB."""
-        colors = unpremultiply(picture, alpha) * np.float32(self.scale)
-        return over(display_from_linear(colors), np.clip(alpha, 0, 1), backdrop)
+        colors = picture / np.maximum(alpha, np.float32(1e-6))[..., np.newaxis] * np.float32(self.scale)
+        return over(display_from_linear(colors), np.rint(np.clip(alpha, 0, 1) * 255).astype(np.uint8), backdrop)

@@ -14,7 +14,7 @@ HEIGHT, WIDTH = 240, 320
 def room_with_person(person_colour: int) -> MattedFrame:
     """A green room with a person in the middle, whose colour and alpha end at a soft edge."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
-    alpha = np.clip((60 - np.hypot(x - 160, y - 130)) / 8 + 0.5, 0, 1).astype(np.float32)
+    alpha = np.rint(255 * np.clip((60 - np.hypot(x - 160, y - 130)) / 8 + 0.5, 0, 1)).astype(np.uint8)
     room = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     room[..., 1] = 40 + 100 * (x > 160)
     return MattedFrame(over(np.full_like(room, person_colour), alpha, room), alpha)
@@ -32,7 +32,7 @@ def test_an_even_room_stays_even() -> None:
     person = room_with_person(0).matte
     even = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     result = blur_background(MattedFrame(over(np.full_like(even, 30), person, even), person), 0.4)
-    assert np.abs(result[person < 0.5].astype(int) - 90).max() <= 2
+    assert np.abs(result[person < 128].astype(int) - 90).max() <= 2
 
 
 @pytest.mark.parametrize("strength", [0.1, 0.25, 0.5, 1.0])
@@ -40,7 +40,7 @@ def test_an_empty_room_is_blurred_by_a_gaussian_of_that_sigma_in_linear_light(st
     random = np.random.default_rng(5)
     coarse = random.integers(0, 256, (6, 8, 3), dtype=np.uint8)
     image = cv2.resize(coarse, (960, 720), interpolation=cv2.INTER_NEAREST)
-    found = linear_from_uint8(blur_background(MattedFrame(image, np.zeros((720, 960), np.float32)), strength))
+    found = linear_from_uint8(blur_background(MattedFrame(image, np.zeros((720, 960), np.uint8)), strength))
     expected = cv2.GaussianBlur(linear_from_uint8(image), (0, 0), 0.1 * strength * 720)
     assert np.abs(found - expected).max() < 0.03
     assert np.abs(found - expected).mean() < 0.005
@@ -48,5 +48,5 @@ def test_an_empty_room_is_blurred_by_a_gaussian_of_that_sigma_in_linear_light(st
 
 def test_a_frame_full_of_person_still_gives_a_picture() -> None:
     image = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
-    result = blur_background(MattedFrame(image, np.ones((HEIGHT, WIDTH), np.float32)), 0.5)
+    result = blur_background(MattedFrame(image, np.full((HEIGHT, WIDTH), 255, np.uint8)), 0.5)
     assert result.shape == image.shape

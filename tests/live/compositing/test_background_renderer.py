@@ -53,8 +53,8 @@ def room() -> MattedFrame:
     """A secret pattern that nothing else here shows, with a person in the middle."""
     image = np.zeros((90, 160, 3), np.uint8)
     image[::2, ::2] = (0, 255, 0)
-    person = np.zeros((90, 160), np.float32)
-    person[30:, 60:100] = 1
+    person = np.zeros((90, 160), np.uint8)
+    person[30:, 60:100] = 255
     return MattedFrame(image, person)
 
 

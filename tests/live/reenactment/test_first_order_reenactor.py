@@ -18,7 +18,7 @@ from relit_camera.live.reenactment.reenactor import WarpedLayer, open_reenactor
 from relit_camera.live.reenactment.source_image import feather_edges
 from relit_camera.live.reenactment.warp import FlowPatch, inverse_affine, move_body, source_from_output
 from relit_camera.subject.subject import Subject
-from tests.live.people import NOBODY, SCHEME, close_up, context_of, live_frame, motion, moved_by, person
+from tests.live.people import NOBODY, SCHEME, close_up, context_of, live_frame, motion, moved_by, person, premultiplied
 
 SIZE = (480, 360)
 FEATURES = {"nose": 1, "chin": 152, "brow": 105, "cheek": 50, "mouth corner": 61}
@@ -42,7 +42,7 @@ def marked(subject: Subject, point: np.ndarray):
 
 def centroid(moved: WarpedLayer):
     """Where the light is, in output pixels."""
-    weight = moved.picture.sum(axis=2)
+    weight = premultiplied(moved)[0].sum(axis=2)
     x, y = np.meshgrid(np.arange(weight.shape[1]) + 0.5, np.arange(weight.shape[0]) + 0.5)
     return np.array([(weight * x).sum(), (weight * y).sum()]) / weight.sum() + moved.at
 
@@ -58,10 +58,10 @@ def placed_still(picture: np.ndarray, subject: Subject):
 
 
 def in_output(moved: WarpedLayer):
-    """The moved picture and its alpha in the whole output."""
+    """The moved picture and its alpha in the whole output, linear and premultiplied."""
     picture, alpha = np.zeros((SIZE[1], SIZE[0], 3), np.float32), np.zeros((SIZE[1], SIZE[0]), np.float32)
-    area = np.s_[moved.at[1] : moved.at[1] + moved.alpha.shape[0], moved.at[0] : moved.at[0] + moved.alpha.shape[1]]
-    picture[area], alpha[area] = moved.picture, moved.alpha
+    area = np.s_[moved.at[1] : moved.at[1] + moved.image.shape[0], moved.at[0] : moved.at[0] + moved.image.shape[1]]
+    picture[area], alpha[area] = premultiplied(moved)
     return picture, alpha
 
 
@@ -143,26 +143,23 @@ def test_no_motion_lets_the_body_hover_and_all_stays_in_the_output() -> None:
     relit = relit_picture(subject)
     for shift in ((0, 9, 0), (-12, 5, 4), (12, -6, -20), (0, 0, 12)):
         moved = moved_by(reenactor, relit, motion(rotation_from_angles(10, -8, 4), shift=shift), live_frame())
-        height, width = moved.alpha.shape
-        assert moved.picture.shape == (height, width, 3)
-        assert moved.picture.dtype == moved.alpha.dtype == np.float32
+        height, width = moved.image.shape[:2]
+        assert moved.image.shape == (height, width, 4)
+        assert moved.image.dtype == np.uint8
         assert min(moved.at) >= 0
         assert moved.at[0] + width <= SIZE[0]
         assert moved.at[1] + height == SIZE[1]
-        assert moved.alpha[-1].max() > 0.9
-        assert np.isfinite(moved.picture).all()
-        assert moved.alpha.min() >= 0
-        assert moved.alpha.max() <= 1
+        assert moved.image[-1, :, 3].max() > 230
 
 
 def test_light_and_picture_are_proportional() -> None:
-    """The warp is linear in the light: twice the light is twice the picture."""
+    """The warp is linear in the light, up to codes: twice the light is twice the picture."""
     subject = person()
     relit = relit_picture(subject)
     reenactor = FirstOrderReenactor(context_of(subject, SIZE))
     moving = motion(rotation_from_angles(10, 5, 0))
-    once, twice = (moved_by(reenactor, relit * gain, moving, live_frame()).picture for gain in (1, 2))
-    np.testing.assert_allclose(twice, 2 * once, atol=1e-5)
+    once, twice = (premultiplied(moved_by(reenactor, relit * gain, moving, live_frame()))[0] for gain in (0.4, 0.8))
+    np.testing.assert_allclose(twice, 2 * once, atol=0.02)
 
 
 def test_a_face_cut_off_by_its_border_does_not_move_there() -> None:

@@ -23,7 +23,7 @@ from relit_camera.live.reenactment.control_points import NECK_PIVOT
 from relit_camera.live.reenactment.motion_transfer import rotate_about
 from relit_camera.live.reenactment.onnx_network.driving_head_crop import crop_square, head_crop, tracked_head_crop
 from relit_camera.live.reenactment.onnx_network.onnx_contract import ReenactorNetwork, identity_grid
-from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, open_reenactor
+from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, WarpedLayer, open_reenactor
 from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.warp import Warp, source_from_output
 from relit_camera.subject.subject import Subject
@@ -39,6 +39,7 @@ from tests.live.people import (
     motion,
     moved_by,
     person,
+    premultiplied,
 )
 
 SIDE = 64
@@ -143,7 +144,7 @@ def unmoved(subject: Subject, relit: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """The still as it stands in the output when nothing moves, through a network that is never asked."""
     person_alone = Cutout(subject)
     warp = Warp(source_from_output(subject.size, SIZE), ())
-    return person_alone.sampled(relit, warp.grid((0, 0, *SIZE)))
+    return premultiplied(WarpedLayer(person_alone.warped(relit, warp.grid((0, 0, *SIZE))), (0, 0)))
 
 
 def test_a_flow_that_moves_nothing_gives_the_still(path: Path) -> None:
@@ -153,8 +154,8 @@ def test_a_flow_that_moves_nothing_gives_the_still(path: Path) -> None:
     moved = moved_by(reenactor, relit, motion(), live_frame())
     picture, alpha = unmoved(subject, relit)
     assert moved.at == (0, 0)
-    np.testing.assert_allclose(moved.picture, picture, atol=2e-4)
-    np.testing.assert_allclose(moved.alpha, alpha, atol=2e-4)
+    np.testing.assert_allclose(premultiplied(moved)[0], picture, atol=2e-4)
+    np.testing.assert_allclose(premultiplied(moved)[1], alpha, atol=2e-4)
 
 
 @pytest.mark.parametrize("shift", [(0.2, 0.0), (0.0, -0.15), (0.1, 0.1)])
@@ -172,7 +173,7 @@ def test_a_shift_of_the_flow_is_that_share_of_the_crop(path: Path, shift: tuple[
     expected = cv2.warpAffine(picture, np.array([[1, 0, -pixels[0]], [0, 1, -pixels[1]]], np.float64), SIZE)
     middle = np.s_[100:150, 80:112]
     assert np.abs(pixels).max() > 4
-    np.testing.assert_allclose(view.picture[middle], expected[middle], atol=3e-3)
+    np.testing.assert_allclose(premultiplied(view)[0][middle], expected[middle], atol=3e-3)
 
 
 def test_a_flow_is_eased_by_presence(path: Path) -> None:
@@ -182,8 +183,9 @@ def test_a_flow_is_eased_by_presence(path: Path) -> None:
     half = opened(context, flow_network(path, (0.1, 0.0), inputs=INPUTS))
     for one in (reenactor, half):
         moved_by(one, relit, motion(), live_frame(np.zeros_like(RED)))
-    eased = moved_by(reenactor, relit, motion(presence=0.5), live_frame(RED, 1)).picture
-    np.testing.assert_allclose(eased, moved_by(half, relit, motion(), live_frame(RED, 1)).picture, atol=1e-4)
+    eased = premultiplied(moved_by(reenactor, relit, motion(presence=0.5), live_frame(RED, 1)))[0]
+    expected, _ = premultiplied(moved_by(half, relit, motion(), live_frame(RED, 1)))
+    np.testing.assert_allclose(eased, expected, atol=0.02)
 
 
 def test_a_lost_face_is_driven_by_what_was_seen_last_and_then_rests(path: Path) -> None:
@@ -191,18 +193,18 @@ def test_a_lost_face_is_driven_by_what_was_seen_last_and_then_rests(path: Path) 
     relit = texture(context.subject)
     reenactor = opened(context, flow_network(path, (0.2, 0.0), inputs=INPUTS))
     moved_by(reenactor, relit, motion(), live_frame(np.zeros_like(RED)))
-    seen = moved_by(reenactor, relit, motion(), live_frame(RED, 1)).picture
+    seen = premultiplied(moved_by(reenactor, relit, motion(), live_frame(RED, 1)))[0]
     noise = live_frame(index=2)
-    lost = moved_by(reenactor, relit, motion(status=FaceStatus.LOST), noise).picture
+    lost = premultiplied(moved_by(reenactor, relit, motion(status=FaceStatus.LOST), noise))[0]
     np.testing.assert_array_equal(lost, seen)
-    gone = moved_by(reenactor, relit, motion(status=FaceStatus.LOST, presence=0.0), noise).picture
+    gone = premultiplied(moved_by(reenactor, relit, motion(status=FaceStatus.LOST, presence=0.0), noise))[0]
     np.testing.assert_allclose(gone, unmoved(context.subject, relit)[0], atol=1e-4)
 
 
 def test_before_the_first_face_the_still_stands_unmoved(path: Path) -> None:
     context = context_of(person(), SIZE)
     relit = texture(context.subject)
-    picture = moved_by(opened(context, mix_network(path, 1.0)), relit, NOBODY, live_frame()).picture
+    picture = premultiplied(moved_by(opened(context, mix_network(path, 1.0)), relit, NOBODY, live_frame()))[0]
     np.testing.assert_allclose(picture, unmoved(context.subject, relit)[0], atol=1e-4)
 
 
@@ -215,10 +217,10 @@ def test_a_picture_is_laid_over_the_still_in_its_place(path: Path) -> None:
     middle = np.s_[110:150, 80:112]
     expected = srgb_decode((srgb_encode(picture[middle]) + [1, 0, 0]) / 2)
     assert alpha[middle].min() == 1
-    np.testing.assert_allclose(moved.picture[middle], expected, atol=0.02)
-    np.testing.assert_allclose(moved.alpha, alpha, atol=1e-5)
+    np.testing.assert_allclose(premultiplied(moved)[0][middle], expected, atol=0.02)
+    np.testing.assert_allclose(premultiplied(moved)[1], alpha, atol=1e-5)
     outside = np.s_[-6:, 60:130]  # under the crop the still goes on
-    np.testing.assert_allclose(moved.picture[outside], picture[outside], atol=1e-4)
+    np.testing.assert_allclose(premultiplied(moved)[0][outside], picture[outside], atol=1e-4)
 
 
 def test_an_alpha_of_its_own_cuts_the_picture_out(path: Path) -> None:
@@ -227,24 +229,23 @@ def test_an_alpha_of_its_own_cuts_the_picture_out(path: Path) -> None:
         opened(context, mix_network(path, 1.0, alpha=0.25)), texture(context.subject), motion(), live_frame(RED)
     )
     middle = np.s_[110:150, 80:112]
-    np.testing.assert_allclose(moved.alpha[middle], 0.25, atol=1e-3)
-    np.testing.assert_allclose(moved.picture[middle], np.broadcast_to([0.25, 0, 0], (40, 32, 3)), atol=1e-3)
+    np.testing.assert_array_equal(moved.image[middle], np.broadcast_to([255, 0, 0, 64], (40, 32, 4)))
 
 
 def test_the_body_follows_the_neck_and_never_hovers(path: Path) -> None:
     context = context_of(person(), SIZE)
     reenactor = opened(context, flow_network(path))
     relit = np.ones((*context.subject.matte.shape, 3), np.float32)
-    rest = moved_by(reenactor, relit, motion(), live_frame()).alpha
+    rest = premultiplied(moved_by(reenactor, relit, motion(), live_frame()))[1]
     right = moved_by(reenactor, relit, motion(shift=(4, 0, 0)), live_frame())
     up = moved_by(reenactor, relit, motion(shift=(0, 6, 0)), live_frame())
 
     def column(alpha: np.ndarray, at: tuple[int, int] = (0, 0)) -> float:
         return float(at[0] + (alpha[-20:].sum(axis=0) * np.arange(alpha.shape[1])).sum() / alpha[-20:].sum())
 
-    assert column(right.alpha, right.at) > column(rest) + 8
-    assert up.at[1] + up.alpha.shape[0] == SIZE[1]
-    assert up.alpha[-1].max() > 0.9
+    assert column(premultiplied(right)[1], right.at) > column(rest) + 8
+    assert up.at[1] + premultiplied(up)[1].shape[0] == SIZE[1]
+    assert premultiplied(up)[1][-1].max() > 0.9
 
 
 def test_a_face_cut_off_by_its_border_stays_there(path: Path) -> None:
@@ -255,10 +256,10 @@ def test_a_face_cut_off_by_its_border_stays_there(path: Path) -> None:
     moved = moved_by(reenactor, relit, motion(shift=(5, 0, 0)), live_frame(RED, 1))
     rest, alpha = unmoved(context.subject, relit)
     assert moved.at == (0, 0)
-    assert moved.picture.shape == rest.shape
+    assert premultiplied(moved)[0].shape == rest.shape
     # Unheld, the left edge, which fades out, would show what lies nine pixels further in, where nothing fades.
-    assert np.abs(moved.alpha - alpha)[:, :2].max() < 0.2
-    assert np.abs(moved.picture - rest)[100:150, 80:112].max() > 0.02
+    assert np.abs(premultiplied(moved)[1] - alpha)[:, :2].max() < 0.2
+    assert np.abs(premultiplied(moved)[0] - rest)[100:150, 80:112].max() > 0.02
 
 
 def test_crops_show_the_same_part_of_any_head() -> None:

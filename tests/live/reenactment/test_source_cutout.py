@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 
+import cv2
 import numpy as np
 
-from relit_camera.live.reenactment.source_image import Cutout, feather_edges, shows_whole_head
-from relit_camera.live.reenactment.warp import Warp
+from relit_camera.base.images.tone_mapping import display_from_linear
+from relit_camera.live.compositing.alpha_compositing import over, split_alpha
+from relit_camera.live.reenactment.source_image import UPSAMPLING, Cutout, feather_edges, shows_whole_head
+from relit_camera.live.reenactment.warp import Warp, source_from_output
 from tests.live.people import close_up, person
 
 
@@ -18,25 +21,73 @@ def with_edges(over_black: bool):
 
 
 def unmoved(cutout: Cutout, relit: np.ndarray):
-    """Picture and alpha of the still as it lies."""
-    return cutout.sampled(relit, Warp(np.eye(2, 3), ()).grid((0, 0, relit.shape[1], relit.shape[0])))
+    """Colours and alpha of the still as it lies."""
+    grid = Warp(np.eye(2, 3), ()).grid((0, 0, relit.shape[1], relit.shape[0]))
+    return split_alpha(cutout.warped(relit, grid))
 
 
-def test_a_cut_out_person_is_premultiplied() -> None:
+HALF_LIGHT = display_from_linear(np.full((1, 1, 3), 0.5, np.float32))[0, 0]
+
+
+def test_a_cut_out_person_is_straight_and_has_color_beyond_the_edge() -> None:
     subject = with_edges(over_black=False)
     relit = np.full((*subject.matte.shape, 3), 0.5, np.float32)
-    picture, alpha = unmoved(Cutout(subject), relit)
-    assert picture.dtype == alpha.dtype == np.float32
-    np.testing.assert_allclose(alpha, feather_edges(subject.matte), atol=0.06)
-    np.testing.assert_allclose(picture, 0.5 * np.repeat(alpha[..., None], 3, axis=2), atol=0.01)
+    relit[subject.matte < 0.05] = 0.0  # what stood behind
+    colors, alpha = unmoved(Cutout(subject), relit)
+    assert colors.dtype == alpha.dtype == np.uint8
+    np.testing.assert_allclose(alpha / 255, feather_edges(subject.matte), atol=0.06)
+    assert np.abs(colors[alpha > 0].astype(int) - HALF_LIGHT).max() <= 1
 
 
-def test_frames_taken_over_black_carry_the_matte_already() -> None:
-    """Their soft edge is the person times the matte: it is not darkened a second time."""
+def test_frames_taken_over_black_give_back_the_matte() -> None:
+    """Their soft edge is the person times the matte: without it the person has one colour to the very edge."""
     subject = with_edges(over_black=True)
     captured = np.repeat(0.5 * subject.matte[..., None], 3, axis=2)
-    picture, alpha = unmoved(Cutout(subject), captured)
-    np.testing.assert_allclose(picture, 0.5 * np.repeat(alpha[..., None], 3, axis=2), atol=0.03)
+    colors, alpha = unmoved(Cutout(subject), captured)
+    assert np.abs(colors[alpha > 0].astype(int) - HALF_LIGHT).max() <= 1
+
+
+def test_an_edge_over_another_background_is_as_a_finer_rendering_has_it() -> None:
+    """A shaded disc at a third of the size and over black, enlarged again: no dark rim over white, none over grey."""
+    subject = with_edges(over_black=True)
+    width, height = 3 * subject.size[0], 3 * subject.size[1]
+    y, x = (np.mgrid[:height, :width] + 0.5) / width - np.array([2 / 3, 0.5])[:, None, None]
+    alpha = np.clip((0.3 - np.hypot(x, y)) * width / 2 + 0.5, 0, 1).astype(np.float32)
+    colors = (0.3 + 0.2 * np.dstack([x, y, x + y])).astype(np.float32)
+    matte, picture = (
+        cv2.resize(p, subject.size, interpolation=cv2.INTER_AREA) for p in (alpha, colors * alpha[..., None])
+    )
+    cutout = Cutout(dataclasses.replace(subject, matte=matte))
+    grid = Warp(source_from_output(subject.size, (width, height)), ()).grid((0, 0, width, height))
+    found, found_alpha = split_alpha(cutout.warped(picture, grid))
+    exact = np.rint(alpha * 255).astype(np.uint8)
+    for behind in (0, 60, 255):
+        background = np.full((height, width, 3), behind, np.uint8)
+        truth = over(display_from_linear(colors), exact, background)
+        # The same alpha, so that only the colors count; half a code of the reduced picture is a code here.
+        assert np.abs(over(found, exact, background).astype(int) - truth).max() <= 4
+        assert np.abs(over(found, found_alpha, background).astype(int) - truth).mean() < 1
+
+
+def test_a_person_without_a_single_sure_pixel_is_no_trouble() -> None:
+    subject = dataclasses.replace(person(), matte=np.full_like(person().matte, 0.3))
+    relit = np.full((*subject.matte.shape, 3), 0.5, np.float32)
+    colors, _ = unmoved(Cutout(subject), relit)
+    assert np.abs(colors.astype(int) - HALF_LIGHT).max() <= 1
+
+
+def test_what_the_cutout_leaves_out_cannot_be_seen() -> None:
+    """Only the cells that show the person are sampled: the rest of a full sampling is clear."""
+    subject = with_edges(over_black=False)
+    cutout = Cutout(subject)
+    relit = np.random.default_rng(1).random((*subject.matte.shape, 3)).astype(np.float32)
+    for scale in (0.6, 1.0, 3.1):
+        size = (round(96 * scale), round(128 * scale))
+        grid = Warp(source_from_output(subject.size, size), ()).grid((0, 0, *size))
+        cut, whole = cutout.warped(relit, grid), grid.sample(cutout.image(relit), UPSAMPLING)
+        left_out = (cut != whole).any(axis=2)
+        assert left_out.mean() > 0.02
+        assert whole[left_out, 3].max() == 0
 
 
 def test_who_is_seen_whole() -> None:

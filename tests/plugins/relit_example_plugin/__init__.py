@@ -28,6 +28,7 @@ from relit_camera.plugins import (
     TrackerOptions,
     WarpedLayer,
     WarpTask,
+    display_from_linear,
     factored_field,
     fit_pose,
     landmark_scheme,
@@ -87,10 +88,10 @@ class TopLeft:
     def __init__(self, context: ReenactorContext) -> None:
         if context.argument:
             raise InputError("the reenactor example takes no argument", "name it 'example'")
-        self.matte = context.subject.matte
+        self.alpha = np.rint(context.subject.matte * 255).astype(np.uint8)
 
     def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
-        return lambda relit: WarpedLayer(relit * self.matte[..., None], self.matte, (0, 0))
+        return lambda relit: WarpedLayer(np.dstack([display_from_linear(relit), self.alpha]), (0, 0))
 
 
 class OneColor:

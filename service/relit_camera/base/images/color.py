@@ -49,9 +49,8 @@ def _decode_table() -> NDArray[np.float32]:
 def uint8_from_linear(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     """SRGB uint8 picture of linear light, same shape; values outside 0..1 are clipped, NaN becomes 0."""
     table = _encode_table()
-    scaled = np.nan_to_num(linear, nan=0.0, posinf=1.0, neginf=0.0) * np.float32(table.size - 1)
-    index = np.clip(scaled + np.float32(0.5), 0, table.size - 1).astype(np.uint16)
-    coded: NDArray[np.uint8] = table[index]
+    scaled = np.fmax(linear * np.float32(table.size - 1) + np.float32(0.5), 0)  # unlike maximum, fmax drops NaN
+    coded: NDArray[np.uint8] = table.take(np.minimum(scaled, table.size - 1).astype(np.uint16))
     return coded
 
 

@@ -23,6 +23,12 @@ DisplayImage = NDArray[np.uint8]
 Mask = NDArray[np.float32]
 """(height, width) float32 in 0..1."""
 
+Alpha = NDArray[np.uint8]
+"""(height, width) uint8: 0 clear, 255 opaque, between them shares of linear light."""
+
+RgbaImage = NDArray[np.uint8]
+"""(height, width, 4) uint8: sRGB and alpha, straight: the colors do not hold the factor alpha."""
+
 Points = NDArray[np.float32]
 """(count, 2) float32 pixel positions (x, y), pixel centers at integers + ½."""
 

@@ -42,6 +42,15 @@ def shrink(picture: NDArray[Scalar], scale: float) -> NDArray[Scalar]:
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), picture.dtype)
 
 
+def halve(picture: NDArray[Scalar]) -> NDArray[Scalar]:
+    """A picture (height, width[, channels]) at half its size, rounded down: each pixel is the mean of four.
+
+    OpenCV is several times as fast at this as at any other reduction.
+    """
+    size = (max(1, picture.shape[1] // 2), max(1, picture.shape[0] // 2))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), picture.dtype)
+
+
 def letterbox(
     picture: DisplayImage, size: tuple[int, int], color: tuple[int, int, int], enlarging: int
 ) -> DisplayImage:

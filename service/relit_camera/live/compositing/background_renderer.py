@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from relit_camera.base.config.look import (
     Background,
@@ -23,8 +24,8 @@ from relit_camera.base.config.look import (
 )
 from relit_camera.base.easing import ease_out_cubic
 from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, srgb_encode, uint8_from_linear
-from relit_camera.base.images.image_types import DisplayImage, Mask
-from relit_camera.base.images.resize import crop_to_fill
+from relit_camera.base.images.image_types import Alpha, DisplayImage
+from relit_camera.base.images.resize import crop_to_fill, halve
 from relit_camera.base.images.tone_mapping import inverse_tone_curve, tone_curve
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.light.environments.environment_panorama import Environment, Panorama
@@ -33,10 +34,10 @@ from relit_camera.light.scene_light import scene_light_map
 from relit_camera.live.compositing.environment_view import BLUR_SIGMA, EnvironmentView
 
 _WORKING_SIGMA = 1.5
-"""The room is reduced as far as the blur's sigma stays this many pixels."""
+"""The room is halved as long as the blur's sigma stays this many pixels."""
 
-_REDUCTION_RANGE = (3, 8)
-"""Least and greatest whole factor: less is slow, and more shows when it is enlarged again."""
+_MAX_REDUCTION = 8
+"""Greatest factor: more shows when it is enlarged again."""
 
 _EPSILON = np.float32(1e-4)
 
@@ -47,11 +48,11 @@ class MattedFrame:
 
     Attributes:
         image: uint8 sRGB (height, width, 3).
-        matte: alpha of the person, (height, width) of the image.
+        matte: alpha of the person, of the image's size.
     """
 
     image: DisplayImage
-    matte: Mask
+    matte: Alpha
 
 
 def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
@@ -62,20 +63,28 @@ def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     """
     height, width = matted.matte.shape
     sigma = BLUR_SIGMA * strength * height
-    reduce = int(np.clip(sigma / _WORKING_SIGMA, *_REDUCTION_RANGE))
-    size = (max(1, width // reduce), max(1, height // reduce))
-    # Averaged as light: of codes, small lamps would come out too dark.
-    light = cv2.resize(linear_from_uint8(matted.image), size, interpolation=cv2.INTER_AREA)
+    # Averaged as light: of codes, small lamps would come out too dark. In 16 bits that takes half the time.
+    light = halve(cv2.LUT(matted.image, _light_in_16_bits())) * np.float32(1 / 65535)
+    room = 1 - halve(matted.matte) * np.float32(1 / 255)
+    reduction = 2
+    while 2 * reduction <= min(sigma / _WORKING_SIGMA, _MAX_REDUCTION):
+        light, room, reduction = halve(light), halve(room), 2 * reduction
     # So high a power that a pixel counts only when it is all but surely room.
-    weight = ((1 - cv2.resize(matted.matte, size, interpolation=cv2.INTER_AREA)) ** 16)[..., np.newaxis]
+    weight = (room**16)[..., np.newaxis]
     # Averaging r pixels to one and enlarging linearly blurs too, with a variance of r²/12 + r²/6.
-    working_sigma = max((sigma / reduce) ** 2 - 1 / 4, 0.01) ** 0.5
+    working_sigma = max((sigma / reduction) ** 2 - 1 / 4, 0.01) ** 0.5
     weighted = cv2.GaussianBlur(np.dstack([light * weight, weight]), (0, 0), working_sigma)
     # Deep behind the person, where no room is near, the constant brings in the room's mean.
     mean = (light * weight).mean(axis=(0, 1)) / max(float(weight.mean()), 1e-6)
     filled = (weighted[..., :3] + _EPSILON * mean) / (weighted[..., 3:] + _EPSILON)
     enlarged: DisplayImage = cv2.resize(uint8_from_linear(filled), (width, height), interpolation=cv2.INTER_LINEAR)
     return enlarged
+
+
+@lru_cache(maxsize=1)
+def _light_in_16_bits() -> NDArray[np.uint16]:
+    """Linear light of each code, in steps of 1/65535."""
+    return np.rint(linear_from_uint8(np.arange(256, dtype=np.uint8)) * 65535).astype(np.uint16)
 
 
 _NEUTRAL_LIGHT = (0.030, 0.032, 0.036)

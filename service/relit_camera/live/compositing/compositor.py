@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+<<<<<<< HEAD
 import numpy as np
 
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.live.compositing.alpha_compositing import estimate_foreground_colors, over, unpremultiply
+=======
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.live.compositing.alpha_compositing import over, replace_room, split_alpha
+>>>>>>> e-compose
 from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
     BackgroundRequest,
@@ -53,7 +58,11 @@ class Compositor:
         background = self._background_renderer.live_background(
             _background_request(scene), MattedFrame(picture, alpha), frame.time_s
         )
+<<<<<<< HEAD
         return over(estimate_foreground_colors(picture, alpha), alpha, np.ascontiguousarray(background))
+=======
+        return replace_room(picture, alpha, background)
+>>>>>>> e-compose
 
 
 def composite_source_image(
@@ -61,7 +70,7 @@ def composite_source_image(
 ) -> DisplayImage:
     """A warped source image before the scene's background at `now` seconds: uint8 sRGB of the renderer's size."""
     background = background_renderer.static_background(_background_request(scene), now)
-    return over(display_from_linear(unpremultiply(layer.picture, layer.alpha)), layer.alpha, background, layer.at)
+    return over(*split_alpha(layer.image), background, layer.at)
 
 
 def _background_request(scene: Scene) -> BackgroundRequest:

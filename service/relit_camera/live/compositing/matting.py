@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.errors import InputError, ModelError, NotFoundError
-from relit_camera.base.images.image_types import DisplayImage, Frame, Mask
-from relit_camera.base.images.resize import resize_to_fill
+from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame, Mask
+from relit_camera.base.images.resize import halve, resize_to_fill
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
 from relit_camera.base.storage.atomic_files import atomic_path
@@ -32,8 +32,8 @@ RECORDED_CURE = "name a file that holds `alpha`, uint8 (frames, height, width)"
 class Matting(Protocol):
     """Finds the person in consecutive frames of one source. Not thread-safe: each worker has its own."""
 
-    def matte(self, frame: Frame) -> Mask:
-        """Alpha of the person, float32 (height, width) of the frame in 0..1, not premultiplied.
+    def matte(self, frame: Frame) -> Alpha:
+        """Alpha of the person, of the frame's size.
 
         Raises:
             ModelError: a network is missing or unusable.
@@ -114,8 +114,8 @@ class SelfieMatting:
         self._size: tuple[int, int] | None = None
         self._previous: Mask | None = None
 
-    def matte(self, frame: Frame) -> Mask:
-        """Alpha of the person, float32 (height, width) of the frame in 0..1, not premultiplied.
+    def matte(self, frame: Frame) -> Alpha:
+        """Alpha of the person, of the frame's size.
 
         Raises:
             ModelError: the network cannot be opened, or has other inputs or outputs than expected.
@@ -124,12 +124,10 @@ class SelfieMatting:
             self.reset()
             self._size = frame.size
         width, height = frame.size
-        image = frame.image
-        if min(frame.size) >= TUNABLES.half_size_from_px:
-            image = cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
+        image = halve(frame.image) if min(frame.size) >= TUNABLES.half_size_from_px else frame.image
         mask = smooth_over_time(self._segment(image), self._previous)
         self._previous = mask
-        alpha: Mask = cv2.resize(refine_edges(mask, image), (width, height), interpolation=cv2.INTER_LINEAR)
+        alpha: Alpha = cv2.resize(refine_edges(mask, image), (width, height), interpolation=cv2.INTER_LINEAR)
         return alpha
 
     def reset(self) -> None:
@@ -140,7 +138,9 @@ class SelfieMatting:
         landscape = image.shape[1] >= TUNABLES.landscape_aspect * image.shape[0]
         session = self._session(LANDSCAPE_MODEL if landscape else SQUARE_MODEL)
         _, height, width, _ = session.inputs["image"].shape
-        stretched = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+        while image.shape[0] >= 2 * height and image.shape[1] >= 2 * width:
+            image = halve(image)
+        stretched = cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
         mask: Mask = session.run({"image": np.multiply(stretched, np.float32(1 / 255))[np.newaxis]})["mask"]
         return mask[0, :, :, 0]
 
@@ -169,8 +169,8 @@ def smooth_over_time(mask: Mask, previous: Mask | None) -> Mask:
     return mask + share * (previous - mask)
 
 
-def refine_edges(mask: Mask, image: DisplayImage) -> Mask:
-    """Alpha (height, width) of the image's size, from a coarser mask of the same scene, with the image's edges.
+def refine_edges(mask: Mask, image: DisplayImage) -> Alpha:
+    """Alpha of the image's size, from a coarser mask of the same scene, with the image's edges.
 
     Fast guided filter (He and Sun 2015) with the gray image as guide. Then the certain ends of the mask are stretched
     to 0 and 1.
@@ -185,8 +185,8 @@ def refine_edges(mask: Mask, image: DisplayImage) -> Mask:
         scale=1 / shrink,
     )
     low, high = TUNABLES.certain_background, TUNABLES.certain_person
-    stretched: Mask = cv2.addWeighted(fitted, 1 / (high - low), fitted, 0, -low / (high - low))
-    return np.clip(stretched, 0, 1, out=stretched)
+    scale = 255 / (high - low)
+    return cv2.addWeighted(fitted, scale, fitted, 0, -low * scale, dtype=cv2.CV_8U)  # rounded, clipped to 0..255
 
 
 class RecordedMatting:
@@ -205,14 +205,13 @@ class RecordedMatting:
         except (ValueError, KeyError, EOFError, NotImplementedError, BadZipFile, zlib.error) as error:
             raise InputError(f"{path} holds no recorded mattes: {error}", RECORDED_CURE) from error
 
-    def matte(self, frame: Frame) -> Mask:
-        """Alpha of the person, float32 (height, width) of the frame in 0..1, not premultiplied.
+    def matte(self, frame: Frame) -> Alpha:
+        """Alpha of the person, of the frame's size.
 
         For a frame of another shape the matte is scaled to cover it and cropped about its center.
         """
         alpha = self._alpha[frame.index % len(self._alpha)]
-        filled = resize_to_fill(alpha, frame.size, cv2.INTER_LINEAR)
-        return np.multiply(filled, np.float32(1 / 255), dtype=np.float32)
+        return resize_to_fill(alpha, frame.size, cv2.INTER_LINEAR)
 
 
 def _read_alpha(path: Path) -> NDArray[np.uint8]:

@@ -73,9 +73,9 @@ class FirstOrderReenactor:
         to_box[:, 2] -= box[:2]
 
         def warp(relit: LinearImage) -> WarpedLayer:
-            picture, alpha = self._person.sampled(relit, grid)
-            self._mouth.draw(picture, alpha, relit, target.landmarks, target.pose, to_box)
-            return WarpedLayer(picture, alpha, box[:2])
+            image = self._person.warped(relit, grid)
+            self._mouth.draw(image, relit, target.landmarks, target.pose, to_box)
+            return WarpedLayer(image, box[:2])
 
         return warp
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.color import linear_from_uint8
-from relit_camera.base.images.image_types import DisplayImage, LinearImage
+from relit_camera.base.images.image_types import DisplayImage, LinearImage, RgbaImage
+from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
 from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.live.reenactment.source_image import SourceFace
 
@@ -47,29 +48,27 @@ class MouthInterior:
 
     def draw(
         self,
-        picture: LinearImage,
-        alpha: NDArray[np.float32],
+        image: RgbaImage,
         relit: LinearImage,
         landmarks: NDArray[np.float64],
         pose: HeadPose,
         to_output: NDArray[np.float64],
     ) -> None:
-        """Draw into the moved picture, in place.
+        """Draw into the moved picture, in place; its alpha stays.
 
         Args:
-            picture: (height, width, 3) premultiplied output picture.
-            alpha: (height, width) its alpha.
+            image: (height, width, 4) the moved picture, as the display shows it.
             relit: the relit source image, for the light at the lips.
             landmarks: (count, 2) moved landmarks in source pixels.
             pose: the moved head's pose in the source image's camera.
-            to_output: (2, 3) source pixels → pixels of `picture`.
+            to_output: (2, 3) source pixels → pixels of `image`.
         """
         shown = float(np.clip((self._gap(landmarks) - self._source_gap) / FULL_OPENING, 0, 1))
         if shown == 0:
             return
         opening = _transform(to_output, np.vstack([landmarks[self._upper], landmarks[self._lower][::-1]]))
         low = np.maximum(np.floor(opening.min(axis=0)).astype(int) - 3, 0)
-        high = np.minimum(np.ceil(opening.max(axis=0)).astype(int) + 4, [picture.shape[1], picture.shape[0]])
+        high = np.minimum(np.ceil(opening.max(axis=0)).astype(int) + 4, [image.shape[1], image.shape[0]])
         if (high - low < 3).any():
             return
         shape = (int(high[1] - low[1]), int(high[0] - low[0]))
@@ -81,8 +80,10 @@ class MouthInterior:
         shade = self._row(pose, to_output, np.arange(shape[1]) + low[0] + 0.5)[None, :, None]
         inside += teeth * (TEETH * shade * light - inside)
         area = np.s_[low[1] : high[1], low[0] : high[0]]
-        cover = (hole * alpha[area])[..., None]
-        picture[area] += cover * (inside - picture[area] / np.maximum(alpha[area][..., None], 1e-3))
+        colors = image[area][..., :3]
+        around = linear_from_display(np.ascontiguousarray(colors))
+        drawn = display_from_linear(around + hole[..., None] * (inside - around))
+        np.copyto(colors, drawn, where=hole[..., None] > 0)
 
     def _gap(self, landmarks: NDArray) -> float:
         return self._face.scheme.mouth_opening(landmarks.astype(np.float32))

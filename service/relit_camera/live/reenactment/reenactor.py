@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from relit_camera.base.images.image_types import Frame, LinearImage, Mask
+from relit_camera.base.images.image_types import Frame, LinearImage, RgbaImage
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
 from relit_camera.face.motion.face_follower import FaceMotion
@@ -50,13 +50,12 @@ class WarpedLayer:
     """A warped picture, as large as the part of the output that it covers.
 
     Attributes:
-        picture: (height, width, 3) float32 linear, premultiplied with `alpha`, in display exposure.
-        alpha: (height, width) float32, the person.
+        image: (height, width, 4) uint8, the person as the display shows it: sRGB after the display curve, and alpha,
+            straight: the colors do not hold the factor alpha.
         at: column and row of the output where its corner lies.
     """
 
-    picture: LinearImage
-    alpha: Mask
+    image: RgbaImage
     at: tuple[int, int]
 
 

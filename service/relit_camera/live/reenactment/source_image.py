@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import SubjectError
-from relit_camera.base.images.image_types import LinearImage, Mask, Points
+from relit_camera.base.images.image_types import LinearImage, Mask, Points, RgbaImage
+from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.head_pose import HeadPose, fit_pose, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
@@ -89,6 +91,13 @@ UPSAMPLING = 2
 """Factor of a bicubic enlargement before the bilinear warp: as sharp as a bicubic warp, and quicker."""
 FEATHER_WIDTH = 0.06
 """Share of the source image's width over which a person who is cut off by its side fades out."""
+COLORED = 0.5
+"""Matte from which a pixel's own color counts: with less of the person in it, it would be mostly noise and what the
+matte gets wrong. It has the color of its nearest neighbor."""
+BEYOND = cv2.BORDER_REPLICATE
+"""The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing."""
+REACH = 4
+"""Pixels beyond the matte that have a color: the enlargement and the warp look that far."""
 
 
 class Cutout:
@@ -102,18 +111,62 @@ class Cutout:
     def __init__(self, subject: Subject) -> None:
         self.alpha = feather_edges(subject.matte)
         self.whole = shows_whole_head(subject.matte)
-        # Frames that were taken over black carry the matte as a factor already: twice would darken the edge.
-        share = feather_edges(np.ones_like(self.alpha)) if subject.metadata.over_black else self.alpha
-        self._share = share[..., None]
-        self._large_alpha = _upsample(self.alpha)
+        self._edge = _edge_colors(subject.matte, subject.metadata.over_black)
+        large = cv2.resize(self.alpha, None, fx=UPSAMPLING, fy=UPSAMPLING, interpolation=cv2.INTER_CUBIC)
+        self._large_alpha = cv2.convertScaleAbs(np.maximum(large, 0), alpha=255)
+        # Around it too, so that a strand of hair between the middles of the warp's cells is not left out.
+        self._around = _around(self.alpha)
 
-    def sampled(self, relit: LinearImage, grid: PositionGrid) -> tuple[LinearImage, Mask]:
-        """The relit source image (height, width, 3) at the positions of `grid`: premultiplied, and alpha."""
-        # Colours and alpha go apart through the same positions: taking four channels apart afterwards costs more.
-        # The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing.
-        picture = grid.sample(_upsample(relit * self._share), UPSAMPLING)
-        alpha = grid.sample(self._large_alpha, UPSAMPLING)
-        return picture, np.minimum(alpha, np.float32(1))
+    def image(self, relit: LinearImage) -> RgbaImage:
+        """The person in the relit source image, as the display shows it, enlarged by `UPSAMPLING`; for warping.
+
+        Colors go on beyond the edge, for a warp that mixes neighbors. They are coded before they are enlarged: there
+        are few pixels then, and an overshoot in codes is less visible in dark places than one in light.
+        """
+        colors, edge = relit.copy(), self._edge
+        colors.reshape(-1, 3)[edge.pixels] = relit.reshape(-1, 3).take(edge.colored, axis=0) * edge.gain
+        size = (UPSAMPLING * relit.shape[1], UPSAMPLING * relit.shape[0])
+        large = cv2.resize(display_from_linear(colors), size, interpolation=cv2.INTER_CUBIC)
+        image: RgbaImage = cv2.cvtColor(large, cv2.COLOR_RGB2RGBA)
+        cv2.insertChannel(self._large_alpha, image, 3)
+        return image
+
+    def warped(self, relit: LinearImage, grid: PositionGrid) -> RgbaImage:
+        """The person in the relit source image (height, width, 3) at the positions of `grid`."""
+        seen = cv2.remap(self._around, grid.nodes() - np.float32(0.5), None, cv2.INTER_LINEAR, borderMode=BEYOND) > 0
+        return grid.sample(self.image(relit), UPSAMPLING, BEYOND, seen)
+
+
+@dataclass(frozen=True)
+class _EdgeColors:
+    """Where the pixels at the edge of the person, and next to it, take their colors from.
+
+    Attributes:
+        pixels: (count,) flat indices of those pixels.
+        colored: (count,) flat index of the pixel whose color each of them has: its own, or the nearest.
+        gain: (count, 1) float32 factor of that color.
+    """
+
+    pixels: NDArray[np.intp]
+    colored: NDArray[np.intp]
+    gain: NDArray[np.float32]
+
+
+def _edge_colors(matte: Mask, over_black: bool) -> _EdgeColors:
+    """`over_black`: whether the picture has the matte as a factor."""
+    colored = matte >= COLORED
+    if not colored.any():
+        return _EdgeColors(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 1), np.float32))
+    row, column = distance_transform_edt(~colored, return_distances=False, return_indices=True)
+    pixels = np.flatnonzero((matte < 1) & (_around(matte) > 0))
+    nearest = (row * matte.shape[1] + column).reshape(-1)[pixels]
+    gain = 1 / matte.reshape(-1, 1)[nearest] if over_black else np.ones((len(pixels), 1), np.float32)
+    return _EdgeColors(pixels, nearest, gain.astype(np.float32))
+
+
+def _around(matte: Mask) -> Mask:
+    """The largest value of the matte within `REACH` of each pixel."""
+    return np.asarray(cv2.dilate(matte, np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8)), np.float32)
 
 
 def shows_whole_head(matte: Mask) -> bool:
@@ -129,9 +182,3 @@ def feather_edges(matte: Mask) -> Mask:
     down = np.clip((np.arange(height) + 0.5) / reach, 0, 1)
     smooth = np.minimum.outer(down, across)
     return np.asarray(matte * smoothstep(smooth), dtype=np.float32)
-
-
-def _upsample(source: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Enlarge a picture (height, width[, channels]) by `UPSAMPLING`, without bicubic's overshoot below 0."""
-    large = cv2.resize(source, None, fx=UPSAMPLING, fy=UPSAMPLING, interpolation=cv2.INTER_CUBIC)
-    return np.asarray(np.maximum(large, 0, out=large), dtype=np.float32)

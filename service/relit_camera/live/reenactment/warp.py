@@ -111,25 +111,39 @@ class PositionGrid:
         """Positions (rows, columns, 2) of the cells in the box: of the pixels of a picture 1/`step` of its size."""
         return self.positions[1:-1, 1:-1]
 
-    def sample(self, image: Picture, enlarged: float = 1, beyond: int = cv2.BORDER_REPLICATE) -> Picture:
+    def sample(
+        self,
+        image: Picture,
+        enlarged: float = 1,
+        beyond: int = cv2.BORDER_REPLICATE,
+        seen: NDArray[np.bool_] | None = None,
+    ) -> Picture:
         """The box's pixels (height, width[, channels]), bilinear, in the type of `image`.
 
         Args:
             image: (rows, columns[, channels ≤ 4]) uint8 or float32, what the positions look at.
             enlarged: by how much it is larger than the source image.
             beyond: OpenCV's border mode for what lies outside it; 0 where the mode takes a constant.
+            seen: (rows, columns) the cells in the box that are needed, for all if None; others may be left 0.
         """
         width, height = self.box[2] - self.box[0], self.box[3] - self.box[1]
-        sampled = np.empty((height, width, *image.shape[2:]), image.dtype)
+        sampled = (np.empty if seen is None else np.zeros)((height, width, *image.shape[2:]), image.dtype)
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
         positions = self.positions * np.float32(enlarged) - np.float32(0.5)
         step = self.step
         for first in range(0, len(positions) - 2, BAND_CELLS):
-            top, bottom = first * step, min((first + BAND_CELLS) * step, height)
             cells = positions[first : first + BAND_CELLS + 2]
+            top, bottom, left, right = first * step, min((first + BAND_CELLS) * step, height), 0, width
+            if seen is not None:
+                columns = np.flatnonzero(seen[first : first + BAND_CELLS].any(axis=0))
+                if columns.size == 0:
+                    continue
+                left, right = columns[0] * step, min((columns[-1] + 1) * step, width)
+                cells = cells[:, columns[0] : columns[-1] + 3]
             fine = cv2.resize(cells, None, fx=step, fy=step, interpolation=cv2.INTER_LINEAR)
-            band = fine[step : step + bottom - top, step : step + width]
-            cv2.remap(image, band, None, cv2.INTER_LINEAR, dst=sampled[top:bottom], borderMode=beyond, borderValue=0)
+            band = fine[step : step + bottom - top, step : step + right - left]
+            onto = sampled[top:bottom, left:right]
+            cv2.remap(image, band, None, cv2.INTER_LINEAR, dst=onto, borderMode=beyond, borderValue=0)
         return sampled
 
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.affine import opencv_affine
-from relit_camera.base.images.color import srgb_decode, uint8_from_linear
-from relit_camera.base.images.image_types import Frame, LinearImage, Mask
+from relit_camera.base.images.color import linear_from_uint8, srgb_decode, uint8_from_linear
+from relit_camera.base.images.image_types import Frame, LinearImage, Mask, RgbaImage
+from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.face.landmarks.rotated_crop import Crop
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.first_order_reenactor import fade_flow_at_border
@@ -81,14 +82,14 @@ class OnnxReenactor:
         grid = Warp(placed, patches).grid(box)
 
         def warp(relit: LinearImage) -> WarpedLayer:
-            picture, alpha = self._person.sampled(relit, grid)
+            image = self._person.warped(relit, grid)
             if seen and not self._network.gives_flow:
-                source = crop_square(uint8_from_linear(relit), self._crop, self._network.side)
+                source = crop_square(display_from_linear(relit), self._crop, self._network.side)
                 answer = self._network.run(source, *seen)
                 assert answer.picture is not None
                 affine = output_from_crop(self._crop, answer.picture.shape[:2], placed, box)
-                _blend_prediction(picture, alpha, answer, motion.presence, affine)
-            return WarpedLayer(picture, alpha, box[:2])
+                _blend_prediction(image, answer, motion.presence, affine)
+            return WarpedLayer(image, box[:2])
 
         return warp
 
@@ -117,22 +118,23 @@ def output_from_crop(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.floa
     return opencv_affine(np.asarray(box_from_source @ source_from_picture, dtype=np.float64))
 
 
-def _blend_prediction(
-    picture: LinearImage, alpha: Mask, answer: NetworkOutput, share: float, affine: NDArray[np.float64]
-) -> None:
-    """Blend a `share` of the network's picture into the unmoved one, in place.
+def _blend_prediction(image: RgbaImage, answer: NetworkOutput, share: float, affine: NDArray[np.float64]) -> None:
+    """Blend a `share` of the network's picture into the unmoved one in linear light, in place.
 
     Without an alpha of its own it is cut out by the source image's.
     """
     assert answer.picture is not None
-    size = (picture.shape[1], picture.shape[0])
-    cover = _edge_fade_mask(answer.picture.shape[:2])
-    own = cover if answer.alpha is None else answer.alpha
+    size = (image.shape[1], image.shape[0])
+    alpha = image[..., 3:] * np.float32(1 / 255)
+    fade = _edge_fade_mask(answer.picture.shape[:2])
+    masks = cv2.warpAffine(np.dstack([fade, fade if answer.alpha is None else answer.alpha]), affine, size)
+    cover, own = masks[..., :1] * np.float32(share), alpha if answer.alpha is None else masks[..., 1:]
     colors = cv2.warpAffine(srgb_decode(answer.picture), affine, size, borderMode=cv2.BORDER_REPLICATE)
-    masks = cv2.warpAffine(np.dstack([cover, own]), affine, size)
-    cover, own = masks[..., 0] * np.float32(share), alpha if answer.alpha is None else masks[..., 1]
-    picture += cover[..., None] * (colors * own[..., None] - picture)
-    alpha += cover * (own - alpha)
+    below = linear_from_uint8(np.ascontiguousarray(image[..., :3])) * alpha
+    light, mixed = below + cover * (colors * own - below), alpha + cover * (own - alpha)
+    codes = uint8_from_linear(light / np.maximum(mixed, np.float32(1 / 255)))
+    blended = np.dstack([codes, np.rint(mixed * 255).astype(np.uint8)])
+    np.copyto(image, blended, where=cover > 0)
 
 
 def _edge_fade_mask(shape: tuple[int, ...]) -> Mask:
