@@ -24,7 +24,7 @@ IR_VERSION = 9
 
 
 def basis_graph(subject: Subject) -> bytes:
-    """A serialised model, the products of `BasisRelighter`: `light` (3, 2048, count) → `pictures` (3, pixels, count)."""
+    """A serialised model, as `BasisRelighter` multiplies: `light` (3, 2048, count) → `pictures` (3, pixels, count)."""
     from onnx import helper
 
     groups = group_by_rank(subject.basis)
