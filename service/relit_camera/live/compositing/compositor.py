@@ -4,16 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-<<<<<<< HEAD
-import numpy as np
-
-from relit_camera.base.images.image_types import DisplayImage, Frame
-from relit_camera.base.images.tone_mapping import display_from_linear
-from relit_camera.live.compositing.alpha_compositing import estimate_foreground_colors, over, unpremultiply
-=======
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.live.compositing.alpha_compositing import over, replace_room, split_alpha
->>>>>>> e-compose
 from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
     BackgroundRequest,
@@ -58,11 +50,7 @@ class Compositor:
         background = self._background_renderer.live_background(
             _background_request(scene), MattedFrame(picture, alpha), frame.time_s
         )
-<<<<<<< HEAD
-        return over(estimate_foreground_colors(picture, alpha), alpha, np.ascontiguousarray(background))
-=======
         return replace_room(picture, alpha, background)
->>>>>>> e-compose
 
 
 def composite_source_image(
