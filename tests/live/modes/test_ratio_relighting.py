@@ -182,5 +182,7 @@ def test_nearly_clipped_skin_dims_as_the_light_does() -> None:
     height, width = image.shape[:2]
     middle = picture[int(0.4 * height) : int(0.6 * height), int(0.4 * width) : int(0.6 * width)]
     np.testing.assert_allclose(
-        float(np.median(linear_from_uint8(middle))), 0.5 * float(linear_from_uint8(np.array([252], np.uint8))[0]), rtol=0.1
+        float(np.median(linear_from_uint8(middle))),
+        0.5 * float(linear_from_uint8(np.array([252], np.uint8))[0]),
+        rtol=0.1,
     )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from relit_camera.base.config.look import Look
 from relit_camera.base.images.image_quality import psnr
@@ -40,7 +42,7 @@ def made() -> tuple[SceneRelighting, Counting]:
     return SceneRelighting(close_up(), relighter, LightTransition(), StageTimer()), relighter
 
 
-def turn(index: int):
+def turn(index: int) -> Rotation:
     return rotation_from_angles(10 * np.sin(index / 10), 3 * np.sin(index / 7), 0)
 
 
@@ -63,7 +65,7 @@ def test_a_change_of_light_is_eased_in_every_frame() -> None:
     assert relighter.lights == [1]
     seen = [ours.relight(PARTY, turn(0), (6 + index) / 30) for index in range(20)]
     assert 10 <= len(relighter.lights) <= 15  # in 0.4 s, then no more
-    steps = [psnr(a, b) for a, b in zip(seen, seen[1:], strict=False)]
+    steps = [psnr(a, b) for a, b in pairwise(seen)]
     assert steps == sorted(steps)  # fast at first
     assert psnr(seen[-1], truth(PARTY, 0)) > 60
 

@@ -1,7 +1,7 @@
 """Multiplying the light of an sRGB picture, pixel by pixel, without making linear light of it.
 
-Above its toe sRGB is the 2.4th root of light, scaled and shifted. The root of a product is the product of the roots, and
-roots need 16 bits where light would need floats. So two tables, toe and display curve included, and one product of
+Above its toe sRGB is the 2.4th root of light, scaled and shifted. The root of a product is the product of the roots,
+and roots need 16 bits where light would need floats. So two tables, toe and display curve included, and one product of
 16-bit numbers do what decoding, multiplying and coding would.
 """
 
@@ -40,8 +40,8 @@ def multiply_light(image: DisplayImage, roots: NDArray[np.float32], step: int, a
 
     Args:
         image: uint8 sRGB (height, width, 3).
-        roots: (⌈height / step⌉, ⌈width / step⌉, 3) float32, the roots of the factors in the middles of cells of `step` ×
-            `step` pixels; between them they are interpolated.
+        roots: (⌈height / step⌉, ⌈width / step⌉, 3) float32, the roots of the factors in the middles of cells of `step`
+            by `step` pixels; between them they are interpolated.
         step: the side of a cell in pixels.
         as_shown: how far the picture's brightest codes are taken for the light that the display curve would show so: 0
             takes them for just what sRGB says, 1 gives back the picture itself where the factor is 1.
@@ -53,13 +53,14 @@ def multiply_light(image: DisplayImage, roots: NDArray[np.float32], step: int, a
     product = cv2.multiply(cv2.LUT(image, _roots_of_codes(as_shown)), factors, scale=1 / _ONE)
     if _WIDE_TABLES:
         return np.asarray(cv2.LUT(product, _codes_of_roots()), np.uint8)
-    return _codes_of_roots().take(product)
+    shown: DisplayImage = _codes_of_roots().take(product)
+    return shown
 
 
 @lru_cache(maxsize=64)
 def _roots_of_codes(as_shown: float) -> NDArray[np.uint16]:
     light = (1 - as_shown) * linear_from_uint8(_CODES) + as_shown * linear_from_display(_CODES[None])[0]
-    return np.round(_ONE * light ** (1 / _POWER)).astype(np.uint16)
+    return np.asarray(np.round(_ONE * light ** (1 / _POWER)), np.uint16)
 
 
 @lru_cache(maxsize=1)

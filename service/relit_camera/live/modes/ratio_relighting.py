@@ -107,7 +107,7 @@ class RatioRelighting:
         floor = tuple(RATIO_FLOOR * max(mean, MIN_CHANNEL_MEAN) for mean in cv2.mean(under_room, self._inside))
         ratio = cv2.divide(cv2.add(relit, floor), cv2.add(np.maximum(under_room, 0), floor))
         roots = root_of_light(np.clip(ratio, *RATIO_RANGE))
-        return cv2.merge([*cv2.split(cv2.multiply(roots, self._weights)), self._weight])
+        return np.asarray(cv2.merge([*cv2.split(cv2.multiply(roots, self._weights)), self._weight]), np.float32)
 
     def positions(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> PositionGrid:
         """Where a live frame of `size` (width, height) lies in the source image.
@@ -129,9 +129,10 @@ class RatioRelighting:
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
         nodes = plan.positions.nodes() - np.float32(0.5)
         roots = extrapolate_roots(cv2.remap(plan.roots, nodes, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
-        roots = cv2.multiply(roots, (*map(float, root_of_light(1 / plan.gain).ravel()), 0.0))
+        roots = cv2.multiply(roots, (*map(float, root_of_light(np.reciprocal(plan.gain)).ravel()), 0.0))
         if blend < 1:
-            roots = root_of_light(1 - np.float32(blend) + np.float32(blend) * light_of_root(roots))
+            mixed = 1 - blend + blend * light_of_root(np.asarray(roots, np.float32))
+            roots = root_of_light(mixed.astype(np.float32))
         shown = multiply_light(plan.frame.image, roots, plan.positions.step, as_shown=1 - blend)
         if plan.presence < 1:
             # Where nobody is tracked with confidence the picture eases back to the live one, as both are shown:

@@ -45,7 +45,8 @@ class RoomLightTunables:
         lobe_sharpness: k of a light's exp(k (cos − 1)): with 12 half its value at 20°, about the spacing of 80 lights.
         harmonics_degree: of the harmonics that a light is written in: finer light hardly changes a face.
         ridge: pull toward the last fit, relative to the normal matrix's mean diagonal.
-        robust_iterations: fits with new weights at the start; later fits are one each, with weights by the light so far.
+        robust_iterations: solutions of the first fit, each with new weights; later fits have one, weighed by the last
+            light.
         fits_per_s: how often the light is fitted.
         light_smoothing: share of the way from the last light to the newly fitted one.
         residual_smoothing: share of the way that the reported residual goes to that of each frame.
@@ -71,7 +72,7 @@ class RoomLightTunables:
 
 TUNABLES = RoomLightTunables()
 BLUR_CELLS = 3
-"""A large live picture is reduced until a sample is the mean of so many by so many pixels: odd, so none is displaced."""
+"""A large live picture is reduced until a sample is the mean of so many by so many pixels; odd: none is displaced."""
 CELLS_PER_BOX = 3.3
 """Cells in a box that blurs as much as that mean with the interpolation between cells: √(3² + 2)."""
 
@@ -139,9 +140,9 @@ class RoomLightEstimator:
             0.0 if self._residual is None else self._residual,
         )
 
-    def _predict(self, harmonics: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _predict(self, harmonics: NDArray[np.floating]) -> NDArray[np.float32]:
         """The samples (count, 3) under a light of these harmonics (harmonics, 3)."""
-        return np.stack([self._response[c] @ harmonics[:, c] for c in range(3)], axis=1)
+        return np.stack([self._response[c] @ harmonics[:, c] for c in range(3)], axis=1).astype(np.float32)
 
     def _fit(self, live: NDArray[np.float32], usable: NDArray[np.bool_], lobes: NDArray[np.float32]) -> None:
         mixed = self._project @ lobes
@@ -174,7 +175,7 @@ def _robust_weight(
 ) -> NDArray[np.float64]:
     """Huber's weights (count,) of samples, by their error relative to `level`."""
     error = np.abs(fitted - goal) / level
-    return usable * np.minimum(1, TUNABLES.huber_threshold / np.maximum(error, 1e-9))
+    return np.asarray(usable * np.minimum(1, TUNABLES.huber_threshold / np.maximum(error, 1e-9)))
 
 
 def regularized_nnls(

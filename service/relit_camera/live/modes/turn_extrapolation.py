@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 MAX_STEP, MAX_LAG = np.radians(2.0), np.radians(1.0)
-"""The picture is computed at once where the head has turned further than the one since, or than the other aside from how
-it turned before: shadow edges do not move evenly over such angles, and every other frame would stand out."""
+"""The picture is computed at once where the head has turned further than the one since, or than the other aside from
+how it turned before: shadow edges do not move evenly over such angles, and every other frame would stand out."""
 MAX_BASE = np.radians(8.0)
 """Two computed pictures further apart than this say nothing about what lies beyond them."""
 _UNMOVED = 1e-6
@@ -81,7 +81,7 @@ class TurnExtrapolation:
             return self._keep(computed)
         if self._slope is None or share == 0:
             return latest.picture
-        return np.maximum(cv2.scaleAdd(self._slope.change, share, latest.picture), 0)
+        return np.asarray(np.maximum(cv2.scaleAdd(self._slope.change, share, latest.picture), 0), np.float32)
 
     def _keep(self, computed: _Computed) -> NDArray[np.float32]:
         self._latest, self._age = computed, 0
