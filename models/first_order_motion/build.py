@@ -31,6 +31,10 @@ meet do not squeeze the eyeball between them."""
 BACKGROUND = 1e-3
 """Weight of the still background, in the unit of `strength`."""
 
+LEAST_EXPONENT = -36.0
+"""Gaussians of one axis end here, 11 orders of magnitude below the background: processors are slow with the denormal
+numbers that the products of lesser ones are."""
+
 
 class _Graph:
     """Collects nodes; `add` returns the name of the node's one output."""
@@ -59,17 +63,17 @@ def build() -> bytes:
         centre (K, 2): where in the moved picture its influence is centred; its target, except beside a slit.
         radius (K, 1): reach of each landmark.
         strength (K, 1): weight of each landmark at its centre; 1 / radius² lets fine ones win near themselves.
-        grid (G, 2): positions in the moved picture at which the flow is wanted.
+        columns (N, C), rows (N, R): x and y of the lines of N grids in the moved picture, where the flow is wanted.
+        fine_columns (M, D), fine_rows (M, S): of M more grids, with other numbers of lines.
 
-    Output:
-        flow (G, 2): moved(x) = still(x + flow(x)).
+    Outputs:
+        flow (N, R, C, 2), fine_flow (M, S, D, 2): moved(x) = still(x + flow(x)).
     """
     g = _Graph()
     radius_squared = g.add("Mul", "radius", "radius")
 
     weights = _gaussian(g, "centre", "centre", g.add("Mul", radius_squared, g.constant(2 * NEIGHBOURHOOD**2)), 1)
-    source_moments = _moments(g, weights, "source", "target")
-    target_moments = _moments(g, weights, "target", "target")
+    source_moments, target_moments = _moments(g, weights)
     spread = g.add("Mul", g.add("Add", target_moments[0], target_moments[3]), g.constant(RIGIDITY))
     spread = g.add("Add", spread, g.constant(STIFFNESS))
     for moments in (source_moments, target_moments):
@@ -86,31 +90,27 @@ def build() -> bytes:
     rows = [g.add("Sub", affine[0], one), affine[1], offset_x, affine[2], g.add("Sub", affine[3], one), offset_y]
     table = g.add("Concat", *rows, g.add("Add", g.add("Mul", tx, g.constant(0.0)), one), axis=1)
 
-    # −|x − t|² / 2r² as one product of (x, y, |x|², 1) and a row a landmark: the grid is large, its passes are dear.
-    gx, gy = _columns(g, "grid")
     cx, cy = _columns(g, "centre")
-    half = g.add("Div", g.constant(0.5), radius_squared)
-    square = g.add("Add", g.add("Mul", cx, cx), g.add("Mul", cy, cy))
-    rows = [g.add("Div", cx, radius_squared), g.add("Div", cy, radius_squared), g.add("Neg", half)]
-    exponents = g.add("Concat", *rows, g.add("Neg", g.add("Mul", square, half)), axis=1)
-    grid_square = g.add("Add", g.add("Mul", gx, gx), g.add("Mul", gy, gy))
-    ones = g.add("Add", g.add("Mul", gx, g.constant(0.0)), one)
-    positions = g.add("Concat", gx, gy, grid_square, ones, axis=1)
-    mixture = g.add("Exp", g.add("MatMul", positions, g.add("Transpose", exponents, perm=[1, 0])))
-    mixed = g.add("MatMul", mixture, g.add("Mul", table, "strength"))
-    parts = g.add("Split", mixed, g.constant([1] * 7, np.int64), out="part0", axis=1)
-    g.nodes[-1].output.extend([f"part{i}" for i in range(1, 7)])
-    total = g.add("Add", "part6", g.constant(BACKGROUND))
-    flow_x = g.add("Add", g.add("Add", g.add("Mul", parts, gx), g.add("Mul", "part1", gy)), "part2")
-    flow_y = g.add("Add", g.add("Add", g.add("Mul", "part3", gx), g.add("Mul", "part4", gy)), "part5")
-    g.add("Div", g.add("Concat", flow_x, flow_y, axis=1), total, out="flow")
+    rate = g.add("Div", g.constant(-0.5), radius_squared)
+    weighted = g.add("Unsqueeze", g.add("Mul", table, "strength"), g.constant([2], np.int64))
+    for fine in ("", "fine_"):
+        across = _axis_gaussians(g, f"{fine}columns", cx, rate)
+        down = _axis_gaussians(g, f"{fine}rows", cy, rate)
+        _mixture(g, weighted, across, down, fine)
 
-    def port(name: str, rows: str, columns: int) -> object:
-        return helper.make_tensor_value_info(name, TensorProto.FLOAT, [rows, columns])
+    def port(name: str, *shape: str | int) -> object:
+        return helper.make_tensor_value_info(name, TensorProto.FLOAT, shape)
 
     points = [port(name, "K", 2) for name in ("source", "target", "centre")]
-    inputs = [*points, port("radius", "K", 1), port("strength", "K", 1), port("grid", "G", 2)]
-    graph = helper.make_graph(g.nodes, "first_order_motion", inputs, [port("flow", "G", 2)], g.constants)
+    grids = [
+        port("columns", "N", "C"),
+        port("rows", "N", "R"),
+        port("fine_columns", "M", "D"),
+        port("fine_rows", "M", "S"),
+    ]
+    inputs = [*points, port("radius", "K", 1), port("strength", "K", 1), *grids]
+    outputs = [port("flow", "N", "R", "C", 2), port("fine_flow", "M", "S", "D", 2)]
+    graph = helper.make_graph(g.nodes, "first_order_motion", inputs, outputs, g.constants)
     model = helper.make_model(
         graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION, producer_name="relit-camera"
     )
@@ -132,17 +132,55 @@ def _gaussian(g: _Graph, rows: str, columns: str, two_variances: str, axis: int)
     return g.add("Exp", g.add("Neg", g.add("Div", g.add("Add", *squares), two_variances)))
 
 
-def _moments(g: _Graph, weights: str, left: str, right: str) -> list[str]:
-    """Σ_j w_ij (left_j − left_i)(right_j − right_i)ᵀ for each i, as four (K, 1) tensors, row by row."""
-    result = []
-    for a in _columns(g, left):
-        across = g.add("Sub", g.add("Transpose", a, perm=[1, 0]), a)
-        weighted = g.add("Mul", weights, across)
-        for b in _columns(g, right):
-            down = g.add("Sub", g.add("Transpose", b, perm=[1, 0]), b)
-            product = g.add("Mul", weighted, down)
-            result.append(g.add("ReduceSum", product, g.constant([1], np.int64), keepdims=1))
-    return result
+def _axis_gaussians(g: _Graph, places: str, centres: str, rate: str) -> str:
+    """exp(rate · (place − centre)²), (N, K, places), of places (N, some) along one axis, centres and rates (K, 1)."""
+    difference = g.add("Sub", g.add("Unsqueeze", places, g.constant([1], np.int64)), centres)
+    exponent = g.add("Mul", g.add("Mul", difference, difference), rate)
+    return g.add("Exp", g.add("Max", exponent, g.constant(LEAST_EXPONENT)))
+
+
+def _moments(g: _Graph, weights: str) -> tuple[list[str], list[str]]:
+    """Σ_j w_ij (p_j − p_i)(t_j − t_i)ᵀ for each i, of p the sources and p the targets: four (K, 1) each, row by row.
+
+    One difference is taken before the sum, so that what the other's product out of the brackets loses is little.
+    """
+    points = [*_columns(g, "source"), *_columns(g, "target")]
+    one = g.add("Add", g.add("Mul", points[0], g.constant(0.0)), g.constant(1.0))
+    table = g.add("Concat", *points, one, axis=1)
+    found = []
+    for i, to in enumerate(points[2:]):
+        weighted = g.add("Mul", weights, g.add("Sub", g.add("Transpose", to, perm=[1, 0]), to))
+        sums = [f"sum{i}{j}" for j in range(5)]
+        g.add("Split", g.add("MatMul", weighted, table), g.constant([1] * 5, np.int64), out=sums[0], axis=1)
+        g.nodes[-1].output.extend(sums[1:])
+        found.append([g.add("Sub", s, g.add("Mul", p, sums[4])) for s, p in zip(sums[:4], points, strict=True)])
+    by_x, by_y = found
+    return [by_x[0], by_y[0], by_x[1], by_y[1]], [by_x[2], by_y[2], by_x[3], by_y[3]]
+
+
+def _mixture(g: _Graph, weighted: str, across: str, down: str, fine: str) -> None:
+    """The output `{fine}flow` (N, R, C, 2) of affine maps (K, 7, 1) mixed on grids.
+
+    A Gaussian is a product of one over columns (N, K, C) and one over rows (N, K, R), so a sum of Gaussians is one
+    matrix product a grid.
+    """
+    middle, last = g.constant([1], np.int64), g.constant([2], np.int64)
+    columns, rows = f"{fine}columns", f"{fine}rows"
+    spread = g.add("Mul", g.add("Unsqueeze", across, last), weighted)  # (N, K, 7, C)
+    spread = g.add("Reshape", spread, g.constant([0, 0, -1], np.int64))
+    mixed = g.add("MatMul", g.add("Transpose", down, perm=[0, 2, 1]), spread)
+    shape = g.add("Concat", g.constant([0, 0, 7], np.int64), g.add("Shape", columns, start=1), axis=0)
+    names = [f"{fine}part{i}" for i in range(7)]
+    g.add("Split", g.add("Reshape", mixed, shape), g.constant([1] * 7, np.int64), out=names[0], axis=2)
+    g.nodes[-1].output.extend(names[1:])
+    parts = [g.add("Squeeze", name, last) for name in names]  # (N, R, C)
+    x, y = g.add("Unsqueeze", columns, middle), g.add("Unsqueeze", rows, last)
+    total = g.add("Add", parts[6], g.constant(BACKGROUND))
+    flows = []
+    for by_x, by_y, offset in (parts[:3], parts[3:6]):
+        flow = g.add("Add", g.add("Add", g.add("Mul", by_x, x), g.add("Mul", by_y, y)), offset)
+        flows.append(g.add("Unsqueeze", g.add("Div", flow, total), g.constant([3], np.int64)))
+    g.add("Concat", *flows, out=f"{fine}flow", axis=3)
 
 
 def _times_inverse(g: _Graph, m: list[str], n: list[str]) -> list[str]:

@@ -17,7 +17,7 @@ from relit_camera.live.reenactment.control_points import (
     SKULL_CENTER,
     ControlPoints,
     control_points,
-    fine_regions,
+    feature_boxes,
     head_and_shoulder_anchors,
     select_landmarks,
     shoulder_anchors,
@@ -28,6 +28,7 @@ from relit_camera.live.reenactment.face_mesh import triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
 from relit_camera.live.reenactment.motion_transfer import rotate_about, transfer_motion
 from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.reenactment.warp import Warp
 from tests.live.people import SCHEME, face_of, motion, person
 
 UP = np.array([0.0, -1.0])
@@ -114,12 +115,11 @@ def test_a_blink_shows_the_upper_lid_above_the_slit_and_the_lower_lid_below_it(
         DenseMotion(SessionOptions()), triangulate_face(face), points, moved.points, moved.landmarks, moved.pose
     )
     still = face.landmarks.astype(float)
-    for eye, patch in zip((SCHEME.right_eye, SCHEME.left_eye), patches[2:4], strict=True):
-        rows, columns = patch.flow.shape[:2]
-        x, y = np.meshgrid(
-            np.linspace(patch.region[0], patch.region[2], columns), np.linspace(patch.region[1], patch.region[3], rows)
-        )
-        looks_y = y + patch.flow[..., 1]
+    # A fifth of a source pixel from place to place.
+    grid = Warp(np.array([[0.2, 0, 0], [0, 0.2, 0]]), patches).grid((0, 0, 5 * face.size[0], 5 * face.size[1]), 1)
+    looks_y = grid.nodes()[..., 1]
+    x, y = np.meshgrid(*(0.2 * (np.arange(looks_y.shape[i]) + 0.5) for i in (1, 0)))
+    for eye in (SCHEME.right_eye, SCHEME.left_eye):
         inner = eye.lids.index(eye.inner)
         upper, lower = eye.lids[1:inner], eye.lids[:inner:-1]
         middle = len(upper) // 2
@@ -136,12 +136,12 @@ def test_a_blink_shows_the_upper_lid_above_the_slit_and_the_lower_lid_below_it(
             assert looks_y[below, column].min() > still[v, 1] - 0.2 * gap
 
 
-def test_fine_regions_hold_eyes_and_mouth(face: SourceFace) -> None:
-    regions = fine_regions(face, face.landmarks.astype(float))
-    for region, group in zip(regions, (SCHEME.right_eye.lids, SCHEME.left_eye.lids, SCHEME.lips), strict=True):
+def test_feature_boxes_hold_eyes_and_mouth(face: SourceFace) -> None:
+    boxes = feature_boxes(face, face.landmarks.astype(float))
+    for box, group in zip(boxes, (SCHEME.right_eye.lids, SCHEME.left_eye.lids, SCHEME.lips), strict=True):
         part = face.landmarks[list(group)]
-        assert (part > region.box[:2]).all()
-        assert (part < region.box[2:]).all()
+        assert (part > box[:2]).all()
+        assert (part < box[2:]).all()
 
 
 def test_the_skulls_outline_stays_when_the_head_turns_about_its_middle(face: SourceFace) -> None:

@@ -12,11 +12,11 @@ from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.head_pose import project
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
-from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor, fade_flow_at_border
+from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
 from relit_camera.live.reenactment.motion_transfer import split_body_motion, transfer_motion
 from relit_camera.live.reenactment.reenactor import WarpedLayer, open_reenactor
 from relit_camera.live.reenactment.source_image import feather_edges
-from relit_camera.live.reenactment.warp import FlowPatch, inverse_affine, move_body, source_from_output
+from relit_camera.live.reenactment.warp import inverse_affine, move_body, source_from_output
 from relit_camera.subject.subject import Subject
 from tests.live.people import NOBODY, SCHEME, close_up, context_of, live_frame, motion, moved_by, person, premultiplied
 
@@ -160,13 +160,3 @@ def test_light_and_picture_are_proportional() -> None:
     moving = motion(rotation_from_angles(10, 5, 0))
     once, twice = (premultiplied(moved_by(reenactor, relit * gain, moving, live_frame()))[0] for gain in (0.4, 0.8))
     np.testing.assert_allclose(twice, 2 * once, atol=0.02)
-
-
-def test_a_face_cut_off_by_its_border_does_not_move_there() -> None:
-    flow = np.full((41, 31, 2), 3, np.float32)
-    held = fade_flow_at_border(FlowPatch(flow, np.array([-10.0, 0, 110, 160])), (100, 150)).flow
-    x, y = np.meshgrid(np.linspace(-10, 110, 31), np.linspace(0, 160, 41))
-    outside = (x <= 0) | (x >= 100) | (y <= 0) | (y >= 150)
-    np.testing.assert_array_equal(held[outside], 0)
-    inside = (np.abs(x - 50) < 30) & (np.abs(y - 75) < 50)
-    np.testing.assert_array_equal(held[inside], 3)

@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import Indices, LandmarkScheme
-from relit_camera.live.reenactment.dense_motion import Influence, Region, region_around
+from relit_camera.live.reenactment.dense_motion import Influence, box_around
 from relit_camera.live.reenactment.source_image import SourceFace
 
 MAX_LANDMARKS = 180
@@ -37,9 +37,8 @@ gives way to the other's within a third of the radius."""
 FEATURE_REACH = 0.6
 """Radius of landmarks inside the outline by the distance of their neighbours: with 1 the nose, nearer to the camera
 than all round it, falls 15 % short when the head turns. Of outline and anchors it is 1, or the hairline tears."""
-COARSE_GRID = (64, 64)
-FINE_GRID = (30, 38)
-"""Rows and columns: a lid's gap is some seven rows."""
+FEATURE_MARGIN = 0.12
+"""Eye distances round an eye or the mouth that its own flow takes in."""
 
 
 @dataclass(frozen=True)
@@ -112,19 +111,19 @@ def control_points(face: SourceFace, anchors: NDArray[np.float64]) -> ControlPoi
     return ControlPoints(chosen, source, radius, np.array(pairs), tuple(irises), span)
 
 
-def fine_regions(face: SourceFace, target: NDArray[np.float64]) -> list[Region]:
-    """Where the flow needs a fine grid: round both eyes and the mouth.
+def feature_boxes(face: SourceFace, landmarks: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Boxes (4,) round both eyes and the mouth, where the flow needs a fine grid, in the order of `feature_landmarks`.
 
     Args:
         face: the source image's face.
-        target: (count, 2) moved landmarks in source pixels.
+        landmarks: (count, 2) where all landmarks are.
     """
-    scheme, span = face.scheme, face.scheme.eye_span(face.landmarks)
-    return [region_around(target[list(group)], 0.12 * span, *FINE_GRID) for group in feature_landmarks(scheme)]
+    margin = FEATURE_MARGIN * face.scheme.eye_span(face.landmarks)
+    return [box_around(landmarks[list(group)], margin) for group in feature_landmarks(face.scheme)]
 
 
 def feature_landmarks(scheme: LandmarkScheme) -> tuple[Indices, ...]:
-    """Lids of both eyes and lips, in the order of `fine_regions`."""
+    """Lids of both eyes, and lips."""
     return scheme.right_eye.lids, scheme.left_eye.lids, scheme.lips
 
 

@@ -7,28 +7,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.face.head_pose import HeadPose
-from relit_camera.live.reenactment.dense_motion import Region, region_around
+from relit_camera.live.reenactment.dense_motion import box_around
 from relit_camera.live.reenactment.source_image import SourceFace
-from relit_camera.live.reenactment.warp import FlowPatch
+from relit_camera.live.reenactment.warp import FlowPatch, Nodes, inverse_affine, patch_cover
 
-GRID_SHAPE = (160, 160)
-"""Rows and columns over the face: the ridge of a nose is some ten of them wide."""
 MARGIN = 0.1
-"""Eye distances round the face that the grid takes in."""
+"""Eye distances round the face that the mesh's patch takes in: it fades out there and a little inside."""
 OUTLINE_BLEND = 0.2
 """Eye distances inside the face's outline, over which the mesh's flow gives way to the flow around the face."""
 FEATURE_REACH = 0.1
 """Eye distances round lids and lips: their own flow fades out between this and twice this distance."""
-EXTRAPOLATION_LIMIT = 0.25
-"""Share of a triangle by which points outside may look beyond its own part of the source image."""
-SUBPIXEL_BITS = 4
+ON_BORDER = 1e-5
+"""Share of a triangle by which a point beyond it still counts as on its border, so that rounding opens no seam."""
 
 
 @dataclass(frozen=True)
@@ -40,70 +36,136 @@ class FaceMesh:
         members: (points,) the landmarks that are corners: all but the irises, which roll behind the lids.
         triangles: (count, 3) rows of `members`.
         clockwise: (count,) the sign of each triangle's area in the source image.
-        trust: (points,) 0 at the outline of them all, rising to 1 inside: how far the mesh counts beside the flow
-            round it.
+        values: (count, 3, 3) float64, of each triangle's corners: x and y in the source image, and how far the mesh
+            counts beside the flow round it, 0 at the outline of the face, rising to 1 inside.
+        span: the eye distance in source pixels.
     """
 
     face: SourceFace
     members: NDArray[np.intp]
     triangles: NDArray[np.intp]
     clockwise: NDArray[np.float64]
-    trust: NDArray[np.float64]
+    values: NDArray[np.float64]
+    span: float
 
-    def surface_flow(self, head: FlowPatch, landmarks: NDArray[np.float64], pose: HeadPose) -> FlowPatch:
-        """The flow of the mesh over the face, and `head`'s where the mesh does not reach.
+    def surface(self, landmarks: NDArray[np.float64], pose: HeadPose) -> SurfacePatch:
+        """The mesh, moved.
 
         Args:
-            head: the flow of the whole head.
             landmarks: (count, 2) where all landmarks go, source pixels.
             pose: of the head that goes there: it says which of two parts is nearer.
         """
-        target, source = landmarks[self.members], self.face.landmarks[self.members].astype(np.float64)
-        span = self.face.scheme.eye_span(self.face.landmarks)
-        region = region_around(target, MARGIN * span, *GRID_SHAPE)
-        step = (region.box[2:] - region.box[:2]) / [region.columns - 1, region.rows - 1]
-        depth = (self.face.scheme.canonical[self.members] @ pose.rotation.as_matrix().T)[:, 2]
-        shown = self._nearest((target - region.box[:2]) / step, depth)
-        covered = shown >= 0
-        grid = region.grid.reshape(region.rows, region.columns, 2)
-        flow = _resampled(head, grid)
-        triangles = self.triangles[shown[covered]]
-        weights = _barycentric(grid[covered], target[triangles])
-        trust = np.einsum("nk,nk->n", weights, self.trust[triangles])[:, None]
-        source_positions = np.einsum("nk,nki->ni", weights, source[triangles])
-        flow[covered] += trust * (source_positions - grid[covered] - flow[covered])
-        return FlowPatch(flow, region.box)
+        target = landmarks[self.members]
+        corners = target[self.triangles]
+        depth = self.face.scheme.canonical[self.members] @ pose.rotation.as_matrix()[2]
+        facing = np.flatnonzero(_doubled_areas(corners) * self.clockwise > 0)
+        order = facing[np.argsort(depth[self.triangles[facing]].mean(axis=1))]
+        return SurfacePatch(corners[order], self.values[order], box_around(target, MARGIN * self.span))
 
-    def occlude_feature(self, patch: FlowPatch, mesh: FlowPatch, feature: NDArray[np.float64]) -> FlowPatch:
-        """A fine patch, but where the mesh shows something else in front of it: a nose before the far eye.
+    def feature_patch(self, flow: FlowPatch, feature: NDArray[np.float64]) -> FeaturePatch:
+        """The flow of an eye or the mouth, whose landmarks in the source image are `feature` (count, 2)."""
+        return FeaturePatch(flow, box_around(feature, 0.0), FEATURE_REACH * self.span)
 
-        Args:
-            patch: the flow of an eye or the mouth.
-            mesh: what `surface_flow` has given.
-            feature: (count, 2) its landmarks in the source image.
-        """
-        rows, columns = patch.flow.shape[:2]
-        grid = Region(patch.region, rows, columns).grid.reshape(rows, columns, 2)
-        flow = _resampled(mesh, grid)
-        reach = FEATURE_REACH * self.face.scheme.eye_span(self.face.landmarks)
-        beside = np.maximum(feature.min(axis=0) - (grid + flow), (grid + flow) - feature.max(axis=0)).max(axis=2)
-        share = np.clip(beside / reach - 1, 0, 1)[..., None].astype(np.float32)
-        return FlowPatch(patch.flow + share * (flow - patch.flow), patch.region)
 
-    def _nearest(self, corners: NDArray[np.float64], depth: NDArray[np.float64]) -> NDArray[np.int32]:
-        """The triangle that shows at each grid point, −1 where none does: (rows, columns).
+@dataclass(frozen=True)
+class SurfacePatch:
+    """The moved mesh: of surfaces behind each other the nearest shows.
 
-        Args:
-            corners: (points, 2) in grid points.
-            depth: (points,) the nearer, the greater.
-        """
-        shown = np.full(GRID_SHAPE, -1, np.int32)
-        facing = _doubled_areas(corners[self.triangles]) * self.clockwise > 0
-        order = np.argsort(depth[self.triangles].mean(axis=1))
-        fixed = np.round(corners[self.triangles] * (1 << SUBPIXEL_BITS)).astype(np.int32)
-        for index in order[facing[order]]:
-            cv2.fillConvexPoly(shown, fixed[index], int(index), shift=SUBPIXEL_BITS)
-        return shown
+    Attributes:
+        corners: (triangles, 3, 2) float64 source pixels where the corners go, from the farthest to the nearest.
+        values: (triangles, 3, 3) float64 as in `FaceMesh`, of the corners.
+        box: (4,) float64 round them all, toward whose sides the patch fades out.
+    """
+
+    corners: NDArray[np.float64]
+    values: NDArray[np.float64]
+    box: NDArray[np.float64]
+
+    def write(self, nodes: Nodes) -> None:
+        """See `Patch.write`."""
+        part = nodes.within(self.box)
+        if part is None:
+            return
+        inverse = inverse_affine(part.source_from_node)
+        corners = self.corners @ inverse[:, :2].T + inverse[:, 2]
+        x, y, trust = draw_triangles(corners, self.values, part.positions.shape[:2])
+        part.blend(x, y, trust * patch_cover(part, self.box))
+
+
+@dataclass(frozen=True)
+class FeaturePatch:
+    """The flow of an eye or the mouth, but where the mesh shows something else there: a nose before the far eye.
+
+    Attributes:
+        flow: its fine flow.
+        feature: (4,) float64 box of it in the source image.
+        reach: source pixels beside that box, from which on and up to twice of which its flow gives way.
+    """
+
+    flow: FlowPatch
+    feature: NDArray[np.float64]
+    reach: float
+
+    def write(self, nodes: Nodes) -> None:
+        """See `Patch.write`."""
+        part = nodes.within(self.flow.box)
+        if part is None:
+            return
+        left, top, right, bottom = self.feature.astype(np.float32)
+        x, y = part.positions[..., 0], part.positions[..., 1]
+        beside = np.maximum(np.maximum(left - x, x - right), np.maximum(top - y, y - bottom))
+        shown = np.clip(2 - beside / np.float32(self.reach), 0, 1)
+        part.blend(*self.flow.positions(part), shown * patch_cover(part, self.flow.box))
+
+
+def draw_triangles(
+    corners: NDArray[np.float64], values: NDArray[np.float64], shape: tuple[int, ...]
+) -> NDArray[np.float32]:
+    """Triangles drawn over each other in their order, with values interpolated between corners, 0 where there is none.
+
+    A point shows the last triangle that it lies in; pixel (row, column) stands for the point (column, row).
+
+    Args:
+        corners: (triangles, 3, 2) columns and rows.
+        values: (triangles, 3, channels).
+        shape: (rows, columns) of the picture to draw.
+
+    Returns:
+        (channels, rows, columns) float32.
+    """
+    rows, columns = shape
+    a, b, c = np.moveaxis(corners, 1, 0)
+    low = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c)), 0)
+    high = np.minimum(np.floor(np.maximum(np.maximum(a, b), c)), [columns - 1, rows - 1])
+    size = np.maximum(high - low + 1, 0)
+    count = (size[:, 0] * size[:, 1]).astype(np.intp)
+    (ax, ay), (bx, by), (px, py) = (b - a).T, (c - a).T, (low - a).T
+    area = ax * by - ay * bx
+    area[area == 0] = np.nan  # such a triangle shows nowhere: no comparison with its weights holds
+    # The weights of the second and the third corner are linear in the place in the bounding rectangle.
+    second_weight = np.stack([by, -bx, px * by - py * bx]) / area
+    third_weight = np.stack([-ay, ax, ax * py - ay * px]) / area
+    rectangle = np.stack([size[:, 0], np.cumsum(count) - count])
+    # All triangles at once: each point of each bounding rectangle is tested against its triangle.
+    table = np.concatenate([second_weight, third_weight, rectangle]).astype(np.float32)
+    triangle = np.repeat(np.arange(len(corners)), count)
+    s0, s1, s2, t0, t1, t2, width, start = table.take(triangle, axis=1)
+    number = np.arange(len(start), dtype=np.float32) - start
+    down = np.floor((number + np.float32(0.5)) / width)
+    across = number - down * width
+    second, third = s0 * across + s1 * down + s2, t0 * across + t1 * down + t2
+    inside = np.flatnonzero((second > -ON_BORDER) & (third > -ON_BORDER) & (second + third < 1 + ON_BORDER))
+    triangle, second, third = triangle[inside], second[inside], third[inside]
+    x, y = across[inside] + low[triangle, 0], down[inside] + low[triangle, 1]
+    place = (y * columns + x).astype(np.intp)
+    first = values[:, 0]
+    table = np.stack([first, values[:, 1] - first, values[:, 2] - first], axis=2).astype(np.float32)
+    drawn = np.zeros((values.shape[2], rows * columns), np.float32)
+    for channel, of_corners in zip(drawn, table.transpose(1, 2, 0), strict=True):
+        base, by_second, by_third = of_corners.take(triangle, axis=1)
+        # Where a place is given several times the last value stays.
+        channel[place] = base + second * by_second + third * by_third
+    return drawn.reshape(-1, rows, columns)
 
 
 def triangulate_face(face: SourceFace) -> FaceMesh:
@@ -114,8 +176,10 @@ def triangulate_face(face: SourceFace) -> FaceMesh:
     delaunay = Delaunay(corners)
     triangles = np.asarray(delaunay.simplices, dtype=np.intp)
     outline = np.array([corners[row] for row in delaunay.convex_hull])
-    trust = smoothstep(_distance(corners, outline), 0, OUTLINE_BLEND * face.scheme.eye_span(face.landmarks))
-    return FaceMesh(face, members, triangles, np.sign(_doubled_areas(corners[triangles])), trust)
+    span = face.scheme.eye_span(face.landmarks)
+    trust = smoothstep(_distance(corners, outline), 0, OUTLINE_BLEND * span)
+    clockwise = np.sign(_doubled_areas(corners[triangles]))
+    return FaceMesh(face, members, triangles, clockwise, np.column_stack([corners, trust])[triangles], span)
 
 
 def _distance(points: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -130,30 +194,3 @@ def _doubled_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """Signed areas (count,) of triangles (count, 3, 2), doubled."""
     (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     return np.asarray(ax * by - ay * bx)
-
-
-def _barycentric(points: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Barycentric weights (count, 3) of points (count, 2) in triangles (count, 3, 2), clipped to `EXTRAPOLATION_LIMIT`.
-
-    A drawn triangle takes in points beyond its border, in a thin one by many times its own width.
-    """
-    (ax, ay), (bx, by), (px, py) = (
-        (corners[:, 1] - corners[:, 0]).T,
-        (corners[:, 2] - corners[:, 0]).T,
-        (points - corners[:, 0]).T,
-    )
-    area = ax * by - ay * bx
-    area = np.where(np.abs(area) < 1e-9, 1e-9, area)
-    second, third = (px * by - py * bx) / area, (ax * py - ay * px) / area
-    weights = np.clip(
-        np.stack([1 - second - third, second, third], axis=1), -EXTRAPOLATION_LIMIT, 1 + EXTRAPOLATION_LIMIT
-    )
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
-
-
-def _resampled(patch: FlowPatch, points: NDArray[np.float64]) -> NDArray[np.float32]:
-    """A patch's flow at points (rows, columns, 2) in source pixels, bilinear; 0 beyond it."""
-    rows, columns = patch.flow.shape[:2]
-    spacing = (patch.region[2:] - patch.region[:2]) / [columns - 1, rows - 1]
-    positions = ((points - patch.region[:2]) / spacing).astype(np.float32)
-    return np.asarray(cv2.remap(patch.flow, positions, None, cv2.INTER_LINEAR), dtype=np.float32)

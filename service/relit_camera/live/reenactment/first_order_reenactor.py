@@ -9,26 +9,25 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import Frame, LinearImage
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import (
-    COARSE_GRID,
     ControlPoints,
     control_points,
+    feature_boxes,
     feature_landmarks,
-    fine_regions,
     head_and_shoulder_anchors,
 )
-from relit_camera.live.reenactment.dense_motion import DenseMotion, region_around
+from relit_camera.live.reenactment.dense_motion import DenseMotion, box_around
 from relit_camera.live.reenactment.face_mesh import FaceMesh, triangulate_face
 from relit_camera.live.reenactment.motion_transfer import transfer_motion, transfer_motion_in_place
 from relit_camera.live.reenactment.mouth_interior import MouthInterior
 from relit_camera.live.reenactment.reenactor import ReenactorContext, WarpedLayer, WarpTask
 from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.warp import (
-    FlowPatch,
+    Patch,
+    StillBorder,
     Warp,
     inverse_affine,
     move_body,
@@ -36,8 +35,10 @@ from relit_camera.live.reenactment.warp import (
     visible_box,
 )
 
-BORDER_FADE = 0.08
-"""Share of the source image's shorter side over which the flow of a face that is cut off by the border fades to 0."""
+NODE_SPACING = 0.019
+"""Eye distances between computed positions, at most: half as many rows in the gap of the lids are visibly too few."""
+HEAD_MARGIN = 0.6
+"""Eye distances round all control points, over which the flow fades out."""
 
 
 class FirstOrderReenactor:
@@ -56,6 +57,8 @@ class FirstOrderReenactor:
         self._motion = DenseMotion(context.session)
         self._mouth = MouthInterior(context.face, context.subject.neutral)
         self._placed = source_from_output(context.subject.size, context.size)
+        # Of the body at rest: a step that changed as the body grows would be seen.
+        self._step = max(int(NODE_SPACING * self._points.unit / self._placed[0, 0]), 1)
 
     def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
         """See `Reenactor.plan_warp`."""
@@ -65,10 +68,10 @@ class FirstOrderReenactor:
             self._motion, self._mesh, self._points, target.points, target.landmarks, target.pose
         )
         if not self._person.whole:
-            patches = tuple(fade_flow_at_border(patch, face.size) for patch in patches)
+            patches = (*patches, StillBorder(face.size))
         placed = move_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
         box = visible_box(placed, face.size, self._size)
-        grid = Warp(placed, patches).grid(box)
+        grid = Warp(placed, patches).grid(box, self._step)
         to_box = inverse_affine(placed)
         to_box[:, 2] -= box[:2]
 
@@ -88,7 +91,7 @@ def face_and_head_flow(
     landmarks: NDArray[np.float64],
     pose: HeadPose,
     fine: bool = True,
-) -> tuple[FlowPatch, ...]:
+) -> tuple[Patch, ...]:
     """The flow that brings the source image's control points to `target`: over the head, the face, then eyes and mouth.
 
     Args:
@@ -100,27 +103,16 @@ def face_and_head_flow(
         pose: of the head that goes there.
         fine: eyes and mouth too: they open and close, as the mesh's seams cannot.
     """
-    face = mesh.face
-    head = region_around(np.vstack([points.source, target]), 0.6 * points.unit, *COARSE_GRID)
-    regions = [head, *(fine_regions(face, landmarks) if fine else ())]
-    scheme = face.scheme
+    scheme = mesh.face.scheme
+    head = box_around(np.vstack([points.source, target]), HEAD_MARGIN * points.unit)
+    boxes = feature_boxes(mesh.face, landmarks) if fine else []
     up = scheme.eye_centers(landmarks.astype(np.float32)).mean(axis=0) - landmarks[list(scheme.lips)].mean(axis=0)
     influence = points.influence(target, up / max(float(np.linalg.norm(up)), 1e-6))
-    whole, *features = motion.flow(points.source, influence, points.radius, points.unit, regions)
-    surface_flow = mesh.surface_flow(whole, landmarks, pose)
-    groups = feature_landmarks(face.scheme) if fine else ()
-    source = face.landmarks.astype(np.float64)
+    whole, *features = motion.flow(points.source, influence, points.radius, points.unit, head, boxes)
+    source = mesh.face.landmarks.astype(np.float64)
+    groups = feature_landmarks(scheme) if fine else ()
     return (
         whole,
-        surface_flow,
-        *(mesh.occlude_feature(p, surface_flow, source[list(g)]) for p, g in zip(features, groups, strict=True)),
+        mesh.surface(landmarks, pose),
+        *(mesh.feature_patch(patch, source[list(group)]) for patch, group in zip(features, groups, strict=True)),
     )
-
-
-def fade_flow_at_border(patch: FlowPatch, size: tuple[int, int]) -> FlowPatch:
-    """The flow, faded to 0 at the border of a source image of `size` (width, height), which must not come into view."""
-    rows, columns = patch.flow.shape[:2]
-    x, y = (np.linspace(patch.region[i], patch.region[i + 2], n) for i, n in ((0, columns), (1, rows)))
-    inward = np.minimum.outer(np.minimum(y, size[1] - y), np.minimum(x, size[0] - x))
-    fade = smoothstep(inward, 0, BORDER_FADE * min(size)).astype(np.float32)
-    return FlowPatch(patch.flow * fade[..., None], patch.region)

@@ -10,7 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.live.reenactment.control_points import NECK_PIVOT, ControlPoints, rigid_head_anchors, shoulder_anchors
+from relit_camera.live.reenactment.control_points import (
+    NECK_PIVOT,
+    SHOULDER_ANCHORS_CM,
+    ControlPoints,
+    rigid_head_anchors,
+)
 from relit_camera.live.reenactment.source_image import SourceFace
 
 MAX_SHIFT_CM = 12.0
@@ -77,8 +82,8 @@ def transfer_motion(face: SourceFace, points: ControlPoints, motion: FaceMotion)
     """
     body = split_body_motion(face, motion)
     landmarks = project(face.head_points + motion.expression, body.turned, face.size).astype(np.float64)
-    anchors = [rigid_head_anchors(body.turned, face.size), shoulder_anchors(face.pose, face.size)]
-    moved = np.vstack([landmarks[points.chosen], *anchors])
+    shoulders = points.source[-len(SHOULDER_ANCHORS_CM) :]  # they stay
+    moved = np.vstack([landmarks[points.chosen], rigid_head_anchors(body.turned, face.size), shoulders])
     return TransferredPose(moved, landmarks, body.turned, body.shift, body.scale, body.pivot)
 
 

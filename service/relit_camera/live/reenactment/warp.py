@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import Flow
 
 Box = tuple[int, int, int, int]
@@ -53,38 +54,9 @@ def visible_box(placed: NDArray[np.float64], source: tuple[int, int], output: tu
 
 def inverse_affine(affine: NDArray[np.float64]) -> NDArray[np.float64]:
     """The inverse (2, 3) of an affine map (2, 3)."""
-    return np.linalg.inv(np.vstack([affine, [0, 0, 1]]))[:2]
+    return np.asarray(cv2.invertAffineTransform(affine), dtype=np.float64)
 
 
-PATCH_FADE = 0.1
-"""Share of a patch's side over which it gives way to what lies under it."""
-MAX_STEP = 8
-"""Positions outside the fine patches are computed for at least every eighth output pixel and interpolated."""
-
-
-@dataclass(frozen=True)
-class FlowPatch:
-    """Flow on a grid.
-
-    Attributes:
-        flow: (rows, columns, 2) float32 backward flow in source pixels; the grid's corners are the region's.
-        region: (4,) float64 left, top, right, bottom in source pixels.
-    """
-
-    flow: Flow
-    region: NDArray[np.float64]
-
-    @property
-    def positions(self) -> NDArray[np.float32]:
-        """Where each grid point looks: its own place plus the flow, (rows, columns, 2) source pixels."""
-        rows, columns = self.flow.shape[:2]
-        x = np.linspace(self.region[0], self.region[2], columns, dtype=np.float32)
-        y = np.linspace(self.region[1], self.region[3], rows, dtype=np.float32)
-        return np.asarray(self.flow + np.dstack(np.meshgrid(x, y)), dtype=np.float32)
-
-
-GRID_STEP = 4
-"""Output pixels between computed positions; what lies between is interpolated."""
 BAND_CELLS = 16
 """Rows of cells that are sampled at a time: their positions stay in the processor's cache."""
 
@@ -148,104 +120,147 @@ class PositionGrid:
 
 
 @dataclass(frozen=True)
-class Warp:
-    """Where each output pixel looks in the source image: u = affine(x), then u + flow(u).
+class Nodes:
+    """The points of a grid over the output while positions are written there.
 
     Attributes:
-        affine: (2, 3) float64, output pixels → source pixels (centres at integers + ½ in both).
-        patches: the first covers the head and fades to 0 outside; later ones refine it where motion is fine.
+        source_from_node: (2, 3) float64, column and row of a node → its place, where it would look if nothing moved.
+        positions: (rows, columns, 2) float32 source pixels where each looks; patches change it in place.
+    """
+
+    source_from_node: NDArray[np.float64]
+    positions: NDArray[np.float32]
+
+    @property
+    def places(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Of the places: x and y in source pixels, each of a shape that broadcasts to (rows, columns)."""
+        rows, columns = self.positions.shape[:2]
+        column, row = np.arange(columns, dtype=np.float32), np.arange(rows, dtype=np.float32)[:, None]
+        x, y = (
+            # Where the axes of output and source are the same, x is one row and y one column.
+            (a * column if a else np.float32(0)) + (b * row if b else np.float32(0)) + c
+            for a, b, c in self.source_from_node.astype(np.float32)
+        )
+        return x, y
+
+    def within(self, box: NDArray[np.float64]) -> Nodes | None:
+        """A view of the smallest rectangle of nodes with all whose places lie in a box (4,); None where none do."""
+        inverse = inverse_affine(self.source_from_node)
+        corners = box[[[0, 1], [2, 1], [0, 3], [2, 3]]] @ inverse[:, :2].T + inverse[:, 2]
+        left, top = np.maximum(np.ceil(corners.min(axis=0)), 0).astype(int)
+        right, bottom = np.minimum(np.floor(corners.max(axis=0)).astype(int) + 1, self.positions.shape[1::-1])
+        if right <= left or bottom <= top:
+            return None
+        moved = self.source_from_node.copy()
+        moved[:, 2] += moved[:, :2] @ [left, top]
+        return Nodes(moved, self.positions[top:bottom, left:right])
+
+    def blend(self, x: NDArray[np.float32], y: NDArray[np.float32], cover: NDArray[np.float32]) -> None:
+        """Let other positions count by a share `cover`; all are of shapes that broadcast to (rows, columns)."""
+        for axis, other in enumerate((x, y)):
+            current = self.positions[..., axis]
+            change = other - current
+            change *= cover
+            current += change
+
+
+class Patch(Protocol):
+    """Part of a warp."""
+
+    def write(self, nodes: Nodes) -> None:
+        """Change the positions of the nodes that it covers."""
+        ...
+
+
+PATCH_FADE = 0.1
+"""Share of a patch's side over which it gives way to what lies under it."""
+
+
+def patch_cover(nodes: Nodes, box: NDArray[np.float64]) -> NDArray[np.float32]:
+    """How far a patch over a box (4,) counts at each node, 0..1 (rows, columns): it fades in from its sides."""
+    left, top, right, bottom = box.astype(np.float32)
+    x, y = nodes.places
+    across = np.minimum(x - left, right - x) / (np.float32(PATCH_FADE) * (right - left))
+    down = np.minimum(y - top, bottom - y) / (np.float32(PATCH_FADE) * (bottom - top))
+    return np.asarray(np.minimum(np.clip(across, 0, 1), np.clip(down, 0, 1)))
+
+
+@dataclass(frozen=True)
+class FlowPatch:
+    """Flow on a grid over part of the source image.
+
+    Attributes:
+        flow: (rows, columns, 2) float32 backward flow in source pixels; the grid's corners are the box's.
+        box: (4,) float64 left, top, right, bottom in source pixels.
+    """
+
+    flow: Flow
+    box: NDArray[np.float64]
+
+    def write(self, nodes: Nodes) -> None:
+        """See `Patch.write`."""
+        part = nodes.within(self.box)
+        if part is not None:
+            part.blend(*self.positions(part), patch_cover(part, self.box))
+
+    def positions(self, nodes: Nodes) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Where the nodes look by this flow: x and y, each (rows, columns), source pixels."""
+        rows, columns = self.flow.shape[:2]
+        spacing = (self.box[2:] - self.box[:2]) / [columns - 1, rows - 1]
+        grid_from_node = nodes.source_from_node.copy()
+        grid_from_node[:, 2] -= self.box[:2]
+        grid_from_node /= spacing[:, None]
+        size = (nodes.positions.shape[1], nodes.positions.shape[0])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        flow = cv2.warpAffine(self.flow, grid_from_node, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+        x, y = nodes.places
+        return flow[..., 0] + x, flow[..., 1] + y
+
+
+BORDER_FADE = 0.08
+"""Share of the source image's shorter side over which motion fades to none at a border that cuts the face off."""
+
+
+@dataclass(frozen=True)
+class StillBorder:
+    """Holds the border of the source image where it is: what lies beyond was not captured and must not come into view.
+
+    Attributes:
+        size: (width, height) of the source image.
+    """
+
+    size: tuple[int, int]
+
+    def write(self, nodes: Nodes) -> None:
+        """See `Patch.write`."""
+        x, y = nodes.places
+        inward = np.minimum(np.minimum(x, self.size[0] - x), np.minimum(y, self.size[1] - y))
+        nodes.blend(x, y, 1 - smoothstep(inward, 0, BORDER_FADE * min(self.size)))
+
+
+GRID_STEP = 4
+"""Output pixels between computed positions; what lies between is interpolated."""
+
+
+@dataclass(frozen=True)
+class Warp:
+    """Where each output pixel looks in the source image: at its affine place, moved by the patches.
+
+    Attributes:
+        affine: (2, 3) float64, output pixels → source pixels (centers at integers + ½ in both).
+        patches: in the order in which they are written, later ones over earlier ones.
     """
 
     affine: NDArray[np.float64]
-    patches: tuple[FlowPatch, ...]
-
-    def map(self, box: Box, enlarged: int = 1) -> NDArray[np.float32]:
-        """Positions (height, width, 2) for cv2.remap, for the output pixels of `box` (left, top, right, bottom).
-
-        `enlarged`: by how much the source image to be sampled is larger than the one that the warp was made for.
-        """
-        width, height = box[2] - box[0], box[3] - box[1]
-        # Few positions, interpolated. One beyond each side, so that none is extrapolated.
-        step = self._step()
-        columns, rows = -(-width // step) + 2, -(-height // step) + 2
-        coarse = np.zeros((rows, columns, 2), dtype=np.float32)
-        from_coarse = self._source_from_pixel(box[0] - 0.5 * step, box[1] - 0.5 * step, step)
-        for patch in self.patches[:1]:
-            _blend_grid(coarse, patch.flow, patch.region, from_coarse)
-        a = from_coarse.astype(np.float32)
-        coarse += (a[:, 0] * np.arange(columns, dtype=np.float32)[:, None] + a[:, 2])[None]
-        coarse += (a[:, 1] * np.arange(rows, dtype=np.float32)[:, None])[:, None]
-        # cv2 counts pixel centres as integers: x_ours = x_cv + ½.
-        coarse = coarse * np.float32(enlarged) - np.float32(0.5)
-        fine = cv2.resize(coarse, (columns * step, rows * step), interpolation=cv2.INTER_LINEAR)
-        positions = np.ascontiguousarray(fine[step : step + height, step : step + width])
-        from_pixel = self._source_from_pixel(box[0] + 0.5, box[1] + 0.5, 1)
-        for patch in self.patches[1:]:
-            _blend_grid(positions, patch.positions * np.float32(enlarged) - np.float32(0.5), patch.region, from_pixel)
-        return positions
+    patches: tuple[Patch, ...]
 
     def grid(self, box: Box, step: int = GRID_STEP) -> PositionGrid:
         """Where the output pixels of `box` (left, top, right, bottom) look."""
         columns, rows = -(-(box[2] - box[0]) // step) + 2, -(-(box[3] - box[1]) // step) + 2
-        from_node = self._source_from_pixel(box[0] - 0.5 * step, box[1] - 0.5 * step, step)
-        positions = np.zeros((rows, columns, 2), np.float32)
+        node = np.array([[step, 0, box[0] - 0.5 * step], [0, step, box[1] - 0.5 * step], [0, 0, 1]])
+        source_from_node = np.asarray(self.affine @ node)
+        nodes = Nodes(source_from_node, np.empty((rows, columns, 2), np.float32))
+        nodes.positions[..., 0], nodes.positions[..., 1] = nodes.places
         for patch in self.patches:
-            _blend_grid(positions, patch.flow, patch.region, from_node)
-        a = from_node.astype(np.float32)
-        positions += a[:, 0] * np.arange(columns, dtype=np.float32)[:, None] + a[:, 2]
-        positions += (a[:, 1] * np.arange(rows, dtype=np.float32)[:, None])[:, None]
-        return PositionGrid(positions, box, step)
-
-    def _step(self) -> int:
-        """Output pixels between computed positions: no more than between the points of the first patch's grid."""
-        if not self.patches:
-            return MAX_STEP
-        first = self.patches[0]
-        spacing = (first.region[2:] - first.region[:2]) / (np.array(first.flow.shape[1::-1]) - 1)
-        source_per_output = np.sqrt(abs(np.linalg.det(self.affine[:, :2])))
-        return int(np.clip(spacing.min() / source_per_output, 1, MAX_STEP))
-
-    def _source_from_pixel(self, left: float, top: float, step: float) -> NDArray[np.float64]:
-        """The affine map (2, 3) from array indices to source pixels, index 0 at output position (left, top)."""
-        return np.asarray(self.affine @ np.array([[step, 0, left], [0, step, top], [0, 0, 1]]))
-
-    def apply(self, source: NDArray[np.float32], box: Box, enlarged: int = 1) -> NDArray[np.float32]:
-        """Warp the source image (height, width[, channels ≤ 4]) to the output pixels of `box`; 0 beyond its edges."""
-        return sample_bilinear(source, self.map(box, enlarged))
-
-
-def sample_bilinear(
-    source: NDArray[np.float32], positions: NDArray[np.float32], beyond: int = cv2.BORDER_CONSTANT
-) -> NDArray[np.float32]:
-    """Sample a picture at `positions` (height, width, 2) from `Warp.map`, bilinear; `beyond`: OpenCV's border mode."""
-    view = cv2.remap(source, positions, None, cv2.INTER_LINEAR, borderMode=beyond, borderValue=0)
-    return np.asarray(view, dtype=np.float32)
-
-
-def _blend_grid(
-    onto: NDArray[np.float32],
-    values: NDArray[np.float32],
-    region: NDArray[np.float64],
-    source_from_index: NDArray[np.float64],
-) -> None:
-    """Blend a grid of values (rows, columns, 2) over a source region into an array of positions, in place."""
-    rows, columns = values.shape[:2]
-    spacing = (region[2:] - region[:2]) / [columns - 1, rows - 1]
-    grid_from_source = np.array([[1 / spacing[0], 0, 0], [0, 1 / spacing[1], 0], [0, 0, 1]])
-    grid_from_source[:2, 2] = -region[:2] / spacing
-    grid_from_index = grid_from_source @ np.vstack([source_from_index, [0, 0, 1]])
-    corners = np.array([[0, 0, 1], [columns - 1, 0, 1], [0, rows - 1, 1], [columns - 1, rows - 1, 1]], dtype=float)
-    seen = (corners @ np.linalg.inv(grid_from_index).T)[:, :2]
-    left, top = np.maximum(np.floor(seen.min(axis=0)).astype(int), 0)
-    right, bottom = np.minimum(np.ceil(seen.max(axis=0)).astype(int) + 1, onto.shape[1::-1])
-    if right <= left or bottom <= top:
-        return
-    local = (grid_from_index @ np.array([[1, 0, left], [0, 1, top], [0, 0, 1]]))[:2]
-    edges = [np.clip(np.minimum(np.arange(n), np.arange(n)[::-1]) / (PATCH_FADE * n), 0, 1) for n in (rows, columns)]
-    cover = np.minimum.outer(*edges).astype(np.float32)
-    stacked = np.dstack([values * cover[..., None], cover])
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    pasted = cv2.warpAffine(stacked, local, (int(right - left), int(bottom - top)), flags=flags)
-    area = onto[top:bottom, left:right]
-    area *= 1 - pasted[..., 2:]
-    area += pasted[..., :2]
+            patch.write(nodes)
+        return PositionGrid(nodes.positions, box, step)

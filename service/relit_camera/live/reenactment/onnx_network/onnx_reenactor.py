@@ -20,7 +20,6 @@ from relit_camera.base.images.image_types import Frame, LinearImage, Mask, RgbaI
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.face.landmarks.rotated_crop import Crop
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.live.reenactment.first_order_reenactor import fade_flow_at_border
 from relit_camera.live.reenactment.motion_transfer import split_body_motion
 from relit_camera.live.reenactment.onnx_network.driving_head_crop import DrivingCrops, crop_square, head_crop
 from relit_camera.live.reenactment.onnx_network.onnx_contract import NetworkOutput, ReenactorNetwork, identity_grid
@@ -29,6 +28,8 @@ from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.warp import (
     Box,
     FlowPatch,
+    Patch,
+    StillBorder,
     Warp,
     inverse_affine,
     move_body,
@@ -78,7 +79,7 @@ class OnnxReenactor:
         seen = None if driving is None or initial is None or motion.presence == 0 else (driving, initial)
         # A flow is computed from the source image as it was captured, so at once; a picture from the relit one.
         flow = self._network.run(self._source, *seen).flow if seen and self._network.gives_flow else None
-        patches = () if flow is None else (self._patch(flow, motion.presence),)
+        patches = () if flow is None else self._patches(flow, motion.presence)
         grid = Warp(placed, patches).grid(box)
 
         def warp(relit: LinearImage) -> WarpedLayer:
@@ -93,14 +94,14 @@ class OnnxReenactor:
 
         return warp
 
-    def _patch(self, flow: NDArray[np.float32], share: float) -> FlowPatch:
+    def _patches(self, flow: NDArray[np.float32], share: float) -> tuple[Patch, ...]:
         """A `share` of the network's flow, in source pixels."""
         # −1 and 1 are the middles of the outermost pixels of the crop.
         half = self._crop.width / 2 * (1 - 1 / self._network.side)
         displacement = (flow - identity_grid(*flow.shape[:2])) * np.float32(half * share)
         middle = np.array(self._crop.center)
         patch = FlowPatch(displacement, np.concatenate([middle - half, middle + half]))
-        return patch if self._person.whole else fade_flow_at_border(patch, self._face.size)
+        return (patch,) if self._person.whole else (patch, StillBorder(self._face.size))
 
 
 def output_from_crop(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.float64], box: Box) -> NDArray[np.float64]:
