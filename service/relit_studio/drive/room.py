@@ -67,5 +67,5 @@ class Room:
 
     def shown(self, picture: LinearImage, alpha: Mask, backdrop: DisplayImage) -> DisplayImage:
         """A rendered picture (h, w, 3), premultiplied, composited over the backdrop, uint8 sRGB."""
-        colors = picture / np.maximum(alpha, np.float32(1e-6))[..., np.newaxis] * np.float32(self.scale)
+        colors = np.float32(self.scale) * picture / np.maximum(alpha, 1e-6).astype(np.float32)[..., np.newaxis]
         return over(display_from_linear(colors), np.rint(np.clip(alpha, 0, 1) * 255).astype(np.uint8), backdrop)

@@ -109,7 +109,7 @@ def test_background_gain_dims_the_room_and_not_the_person() -> None:
     relit = relit_picture()
     dimmed = scene(NoBackground(), **Lighting(background_gain_ev=-1).model_dump(include={"background_gain_ev"}))
     picture = compositor().composite_live(relit, live_frame(), dimmed)
-    expected = uint8_from_linear(linear_from_uint8(relit) / 2).astype(int)
+    expected = uint8_from_linear(linear_from_uint8(relit) / np.float32(2)).astype(int)
     assert np.abs(picture[:, 40:] - expected[:, 40:]).max() <= 1
     np.testing.assert_array_equal(picture[:, :24], relit[:, :24])
 

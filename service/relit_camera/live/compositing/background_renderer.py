@@ -39,7 +39,7 @@ _WORKING_SIGMA = 1.5
 _MAX_REDUCTION = 8
 """Greatest factor: more shows when it is enlarged again."""
 
-_EPSILON = np.float32(1e-4)
+_EPSILON = 1e-4
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,17 @@ def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     reduction = 2
     while 2 * reduction <= min(sigma / _WORKING_SIGMA, _MAX_REDUCTION):
         light, room, reduction = halve(light), halve(room), 2 * reduction
-    # So high a power that a pixel counts only when it is all but surely room.
-    weight = (room**16)[..., np.newaxis]
+    for _ in range(4):  # so high a power, 16, that a pixel counts only when it is all but surely room
+        room = np.square(room)
+    weighted = cv2.multiply(cv2.cvtColor(light, cv2.COLOR_RGB2RGBA), cv2.merge([room] * 4))
+    # Deep behind the person, where no room is near, the constant brings in the room's mean.
+    mean = np.array(cv2.mean(weighted))
+    constant = _EPSILON * mean / max(mean[3], 1e-6)
     # Averaging r pixels to one and enlarging linearly blurs too, with a variance of r²/12 + r²/6.
     working_sigma = max((sigma / reduction) ** 2 - 1 / 4, 0.01) ** 0.5
-    weighted = cv2.GaussianBlur(np.dstack([light * weight, weight]), (0, 0), working_sigma)
-    # Deep behind the person, where no room is near, the constant brings in the room's mean.
-    mean = (light * weight).mean(axis=(0, 1)) / max(float(weight.mean()), 1e-6)
-    filled = (weighted[..., :3] + _EPSILON * mean) / (weighted[..., 3:] + _EPSILON)
+    blurred = cv2.add(cv2.GaussianBlur(weighted, (0, 0), working_sigma), (*constant[:3], _EPSILON))
+    weights = cv2.cvtColor(cv2.extractChannel(blurred, 3), cv2.COLOR_GRAY2RGB)
+    filled = cv2.divide(cv2.cvtColor(blurred, cv2.COLOR_RGBA2RGB), weights)
     enlarged: DisplayImage = cv2.resize(uint8_from_linear(filled), (width, height), interpolation=cv2.INTER_LINEAR)
     return enlarged
 

@@ -138,6 +138,8 @@ class SelfieMatting:
         landscape = image.shape[1] >= TUNABLES.landscape_aspect * image.shape[0]
         session = self._session(LANDSCAPE_MODEL if landscape else SQUARE_MODEL)
         _, height, width, _ = session.inputs["image"].shape
+        assert height is not None  # `_session` made sure of both
+        assert width is not None
         while image.shape[0] >= 2 * height and image.shape[1] >= 2 * width:
             image = halve(image)
         stretched = cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
@@ -186,7 +188,9 @@ def refine_edges(mask: Mask, image: DisplayImage) -> Alpha:
     )
     low, high = TUNABLES.certain_background, TUNABLES.certain_person
     scale = 255 / (high - low)
-    return cv2.addWeighted(fitted, scale, fitted, 0, -low * scale, dtype=cv2.CV_8U)  # rounded, clipped to 0..255
+    # Rounded, and clipped to 0..255.
+    stretched: Alpha = cv2.addWeighted(fitted, scale, fitted, 0, -low * scale, dtype=cv2.CV_8U)
+    return stretched
 
 
 class RecordedMatting:

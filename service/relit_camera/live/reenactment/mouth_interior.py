@@ -82,7 +82,7 @@ class MouthInterior:
         area = np.s_[low[1] : high[1], low[0] : high[0]]
         colors = image[area][..., :3]
         around = linear_from_display(np.ascontiguousarray(colors))
-        drawn = display_from_linear(around + hole[..., None] * (inside - around))
+        drawn = display_from_linear(np.asarray(around + hole[..., None] * (inside - around), np.float32))
         np.copyto(colors, drawn, where=hole[..., None] > 0)
 
     def _gap(self, landmarks: NDArray) -> float:

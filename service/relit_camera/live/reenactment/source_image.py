@@ -91,9 +91,9 @@ UPSAMPLING = 2
 """Factor of a bicubic enlargement before the bilinear warp: as sharp as a bicubic warp, and quicker."""
 FEATHER_WIDTH = 0.06
 """Share of the source image's width over which a person who is cut off by its side fades out."""
-COLORED = 0.5
-"""Matte from which a pixel's own color counts: with less of the person in it, it would be mostly noise and what the
-matte gets wrong. It has the color of its nearest neighbor."""
+COLORED = 0.7
+"""Matte from which a pixel's own color counts; others have that of the nearest such pixel. Where less of a pixel is the
+person, what the matte or the capture got wrong there shows as a dark or jagged outline."""
 BEYOND = cv2.BORDER_REPLICATE
 """The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing."""
 REACH = 4
