@@ -81,7 +81,8 @@ class TurnExtrapolation:
             return self._keep(computed)
         if self._slope is None or share == 0:
             return latest.picture
-        return np.asarray(np.maximum(cv2.scaleAdd(self._slope.change, share, latest.picture), 0), np.float32)
+        beyond = cv2.scaleAdd(self._slope.change, share, latest.picture)
+        return np.asarray(np.maximum(beyond, 0, out=beyond), np.float32)
 
     def _keep(self, computed: _Computed) -> NDArray[np.float32]:
         self._latest, self._age = computed, 0
