@@ -195,7 +195,7 @@ def test_not_even_the_source_image_can_be_relit(
 ) -> None:
     with watched_camera(tmp_path, fallback=fallback) as watched:
 
-        def fail(self: BasisRelighter, light: object) -> LinearImage:
+        def fail(self: BasisRelighter, lights: object) -> LinearImage:
             raise MemoryError("no memory for a picture")
 
         with monkeypatch.context() as broken:

@@ -44,14 +44,14 @@ def relighter() -> BasisRelighter:
 
 def still_under(light: LightMap, turn: Rotation | None = None) -> LinearImage:
     """The source image's linear picture in the room's light, the head turned, exposed so that little of it clips."""
-    relit = relighter().relight(rotate_light_map(light, turn or Rotation.identity()))
+    relit = relighter().relight(rotate_light_map(light, turn or Rotation.identity())[None])[0]
     return relit * exposure()
 
 
 @cache
 def exposure() -> np.float32:
     """One camera exposure for all rooms."""
-    relit = relighter().relight(WINDOW)
+    relit = relighter().relight(WINDOW[None])[0]
     return np.float32(0.7 / np.percentile(relit, 99))
 
 

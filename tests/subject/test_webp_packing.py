@@ -27,7 +27,7 @@ def subject() -> Subject:
 
 
 def under(subject: Subject, environment: str) -> np.ndarray:
-    return BasisRelighter(subject).relight(builtin_environment(environment).light_map)
+    return BasisRelighter(subject).relight(builtin_environment(environment).light_map[None])[0]
 
 
 def test_a_basis_comes_back_within_half_a_step() -> None:

@@ -103,7 +103,7 @@ def mode_factories(settings: RelitSettings) -> Mapping[Mode, ModeFactory]:
 
     def ratio(context: ModeContext) -> RenderMode:
         room_light = RoomLightEstimator(context.subject, context.face)
-        relighting = RatioRelighting(context.subject, context.face, context.relighter, room_light, DenseMotion(session))
+        relighting = RatioRelighting(context.subject, context.face, room_light, DenseMotion(session))
         return RatioMode(context, relighting)
 
     return {Mode.REENACT: reenact, Mode.RATIO: ratio}

@@ -47,7 +47,7 @@ def fresh_probe() -> RoomLightEstimator:
 def seen(room: RoomLightEstimate, turn: Rotation | None = None) -> np.ndarray:
     """The still under the light that the probe says."""
     light = room.light_map if turn is None else rotate_light_map(room.light_map, turn)
-    return relighter().relight(light) * room.gain
+    return relighter().relight(light[None])[0] * room.gain
 
 
 @pytest.mark.parametrize("light", [WINDOW, EVENING], ids=["window", "evening"])

@@ -15,8 +15,6 @@ from relit_camera.plugins import (
     FactoredField,
     Frame,
     InputError,
-    LightMap,
-    LinearImage,
     OlatSamples,
     ReenactorContext,
     ReflectanceField,
@@ -95,9 +93,9 @@ class AverageColor:
         self.gain = np.float32(options.argument or 1)
         self.subject = subject
 
-    def relight(self, light_map: LightMap) -> LinearImage:
-        color = weighted_light(light_map).sum(axis=0) / (4 * np.pi) * self.gain
-        return (self.subject.matte[..., None] > 0) * color.astype(np.float32)
+    def relight(self, light_maps: np.ndarray) -> np.ndarray:
+        colors = weighted_light(light_maps).sum(axis=1) / (4 * np.pi) * self.gain
+        return (self.subject.matte[..., None] > 0) * colors[:, None, None].astype(np.float32)
 
 
 class TopLeft:

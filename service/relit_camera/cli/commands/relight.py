@@ -54,7 +54,7 @@ def relight(
         scale = 1.0
     else:
         room = EnvironmentStore(storage.environments).resolve(environment or "").light_map
-        picture = BasisRelighter(opened).relight(rotate_map(room, head))
+        picture = BasisRelighter(opened).relight(rotate_map(room, head)[None])[0]
         scale = auto_exposure_scale(room)
     if linear:
         write_linear(out, picture)

@@ -51,6 +51,8 @@ def pack(
     """Make a small copy of a subject, to send or ship: fewer principal pictures, of 8 bits each."""
     from statistics import median
 
+    import numpy as np
+
     from relit_camera.base.images.image_quality import psnr
     from relit_camera.cli.arguments import load_command_settings
     from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
@@ -63,8 +65,8 @@ def pack(
     write_subject(out, pack_subject(full, components), small=True)
     small = read_subject(out)
     before, after = BasisRelighter(full), BasisRelighter(small)
-    maps = {name: builtin_environment(name).light_map for name in BUILTIN_NAMES}
-    worst = min(psnr(after.relight(light), before.relight(light), full.matte) for light in maps.values())
+    maps = np.stack([builtin_environment(name).light_map for name in BUILTIN_NAMES])
+    worst = min(psnr(*pair, full.matte) for pair in zip(after.relight(maps), before.relight(maps), strict=True))
     lights = light_psnrs_db(small, full)
     typer.echo(f"{out}: {out.stat().st_size / 1e6:.1f} MB, {components} of {full.metadata.components} components")
     typer.echo(

@@ -72,17 +72,19 @@ def _benchmark_relighting(subject: Subject, maps: Mapping[str, LightMap], option
         "naive_ms": median_ms(naive, 5) * matrix.shape[1] / NAIVE_LOOP_PIXELS,
         "gemm_ms": median_ms(gemm, 10),
     }
-    result["numpy_ms"] = median_ms(lambda: dense.relight(light_map), 20)
-    result["basis_ms"] = median_ms(lambda: basis.relight(light_map), 200)
+    result["numpy_ms"] = median_ms(lambda: dense.relight(light_map[None]), 20)
+    result["basis_ms"] = median_ms(lambda: basis.relight(light_map[None]), 200)
     onnx = OnnxBasisRelighter(subject, RelighterOptions(options))
-    result["onnx_ms"] = median_ms(lambda: onnx.relight(light_map), 200)
+    result["onnx_ms"] = median_ms(lambda: onnx.relight(light_map[None]), 200)
     result["onnx_provider"] = onnx.session.provider
     result["dense_mb"] = round(matrix.nbytes / 1e6, 1)
     result["basis_mb"] = round(basis.nbytes / 1e6, 1)
     result["gemm_over_basis"] = result["gemm_ms"] / result["basis_ms"]  # type: ignore[operator]
     result["numpy_over_basis"] = result["numpy_ms"] / result["basis_ms"]  # type: ignore[operator]
+    every_map = np.stack(list(maps.values()))
     result["psnr_db"] = {
-        name: psnr(basis.relight(each), dense.relight(each), subject.matte) for name, each in maps.items()
+        name: psnr(seen, truth, subject.matte)
+        for name, seen, truth in zip(maps, basis.relight(every_map), dense.relight(every_map), strict=True)
     }
     return result
 

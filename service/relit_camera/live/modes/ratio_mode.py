@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
-from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
+from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.frame_fitting import fit_frame, fit_motion
 from relit_camera.live.modes.identity_check import IdentityCheck
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
+from relit_camera.live.reenactment.warp import PositionGrid
 from relit_camera.live.scene.scene import Scene
 
 
@@ -23,42 +21,47 @@ class RatioMode:
         self._identity = IdentityCheck(context.face)
 
     def begin(self, frame: Frame, motion: FaceMotion, scene: Scene) -> RenderTask | FaceMismatch:
-        """See `RenderMode.begin`: estimates the room's light while the source image is relit; the task does the rest.
+        """See `RenderMode.begin`: relights the source image in both lights, and finds where it lies on the live face.
 
-        The second relighting, under the room's light, is left to the task although it could be done here: only so do
-        both halves take about as long.
+        Both at the same time; the task multiplies and composes.
         """
-        context, timer = self._context, self._context.timer
-        live, motion = fit_frame(frame, context.size), fit_motion(motion, frame.size, context.size)
-        planned = context.executor.submit(self._plan, motion, live)
-        relit = context.scene_relighting.relight(scene, motion.rotation, live.time_s)
-        plan = planned.result()
+        timer = self._context.timer
+        live = fit_frame(frame, self._context.size)
+        motion = fit_motion(motion, frame.size, self._context.size)
+        plan = self._plan(motion, live, scene)
         if isinstance(plan, FaceMismatch):
             return plan
 
         def render() -> RenderedFrame:
             with timer.stage("move"):
-                picture = linear_from_display(live.image) if plan is None else self._relighting.apply(plan, relit)
+                blend = scene.look.lighting.blend
+                picture = live.image if plan is None else self._relighting.apply(plan, blend)
             with timer.stage("compose"):
-                return RenderedFrame(self._compose(picture, live, scene), motion, scene)
+                image = self._context.compositor.composite_live(picture, live, scene)
+                return RenderedFrame(split_view(image, live.image, scene.look.lighting.split), motion, scene)
 
         return render
 
-    def _plan(self, motion: FaceMotion, frame: Frame) -> RatioPlan | FaceMismatch | None:
-        """What of the frame needs no relit picture; None without a face: then the live picture is shown."""
-        with self._context.timer.stage("follow"):
-            if motion.pose is None:
-                return None
-            plan = self._relighting.plan(motion, motion.pose, frame)
-            return self._identity.check(motion, plan.room.residual, frame.time_s) or plan
+    def _plan(self, motion: FaceMotion, frame: Frame, scene: Scene) -> RatioPlan | FaceMismatch | None:
+        """What must be known to relight the frame; None without a face: then it is shown as it is."""
+        context, relighting, pose = self._context, self._relighting, motion.pose
+        if pose is None:
+            return None
+        with context.timer.stage("room"):
+            room = relighting.room_light.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
+            mismatch = self._identity.check(motion, room.residual, frame.time_s)
+        if mismatch is not None:
+            return mismatch
+        followed = context.executor.submit(self._follow, motion, frame)
+        roots = context.scene_relighting.compare(
+            scene, motion.rotation, frame.time_s, room.light_map, room.in_head_frame, relighting.ratio_roots
+        )
+        return RatioPlan(frame, float(motion.presence), room.gain, roots, followed.result())
 
-    def _compose(self, relit: LinearImage, frame: Frame, scene: Scene) -> DisplayImage:
-        lighting = scene.look.lighting
-        if lighting.blend < 1:
-            share = np.float32(lighting.blend)
-            relit = linear_from_display(frame.image) * (1 - share) + relit * share
-        image = self._context.compositor.composite_live(display_from_linear(relit), frame, scene)
-        return split_view(image, frame.image, lighting.split)
+    def _follow(self, motion: FaceMotion, frame: Frame) -> PositionGrid:
+        assert motion.pose is not None
+        with self._context.timer.stage("follow"):
+            return self._relighting.positions(motion, motion.pose, frame.size)
 
 
 def split_view(relit: DisplayImage, live: DisplayImage, share: float) -> DisplayImage:

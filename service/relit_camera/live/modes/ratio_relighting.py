@@ -13,19 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask, Points
-from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.modes.light_multiplication import light_of_root, multiply_light, root_of_light
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.face_mesh import triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
 from relit_camera.live.reenactment.source_image import SourceFace, feather_edges
-from relit_camera.live.reenactment.warp import Warp
-from relit_camera.subject.relighting.relighter import Relighter
+from relit_camera.live.reenactment.warp import PositionGrid, Warp
 from relit_camera.subject.subject import Subject
 
 RATIO_RANGE = (0.02, 12.0)
@@ -35,9 +33,9 @@ MIN_CHANNEL_MEAN = 1e-3
 """Linear: the least mean of a channel under the room's light that counts; three sRGB codes."""
 EDGE_MARGIN = 0.02
 """Share of the source image's width at the matte's edge that is not trusted."""
-RATIO_DOWNSAMPLING = 2
-"""The ratio is warped and extrapolated at this fraction of the frame's size: it is as soft as the source image."""
-EXTRAPOLATION_DOWNSAMPLING = 8
+RATIO_CELLS = 180
+"""The ratio is made for cells of the frame, about so many on its shorter side: it is as soft as the source image."""
+EXTRAPOLATION_DOWNSAMPLING = 4
 """The extrapolation beyond the person is computed at this fraction of that."""
 
 
@@ -51,90 +49,99 @@ class RoomLight(Protocol):
 
 @dataclass(frozen=True)
 class RatioPlan:
-    """What is known of one live frame before the subject is relit for it.
+    """What is known of one live frame before it is relit.
 
     Attributes:
         frame: the live frame.
         presence: how far it is relit, 0..1: 0 shows it as it is.
-        room: the room's light in it.
-        positions: (rows, columns, 2) float32 where each pixel of the downsampled frame lies in the source image.
+        gain: (3,) float32 by which its exposure differs from that of the ratio, see `RoomLightEstimate`.
+        roots: (height, width, 4) float32 of the source image's size, see `RatioRelighting.ratio_roots`.
+        positions: where cells of some pixels of the frame lie in the source image.
     """
 
     frame: Frame
     presence: float
-    room: RoomLightEstimate
-    positions: NDArray[np.float32]
+    gain: NDArray[np.float32]
+    roots: NDArray[np.float32]
+    positions: PositionGrid
 
 
 class RatioRelighting:
-    """Exchanges the light on the live face of one subject. `plan` is for one thread; `apply` may run in another."""
+    """Exchanges the light on the live face of one subject.
 
-    def __init__(
-        self, subject: Subject, face: SourceFace, relighter: Relighter, room_light: RoomLight, motion: DenseMotion
-    ) -> None:
+    `positions`, `ratio_roots` and `apply` share nothing that changes: each may run in a thread of its own.
+
+    Attributes:
+        room_light: estimates the room's light from the live face.
+    """
+
+    def __init__(self, subject: Subject, face: SourceFace, room_light: RoomLight, motion: DenseMotion) -> None:
         """Prepare for one subject.
 
         Args:
             subject: the person.
             face: the face in the source image.
-            relighter: of that subject.
             room_light: estimates the room's light from the live face.
             motion: makes the flow between source image and live face.
         """
+        self.room_light = room_light
         self._face = face
-        self._relighter = relighter
-        self._room_light = room_light
         self._motion = motion
         self._points = control_points(face, head_and_shoulder_anchors(face.pose, face.size))
         self._mesh = triangulate_face(face)
         self._weight = ratio_confidence(feather_edges(subject.matte))
+        self._weights = cv2.merge([self._weight] * 3)
+        self._inside = (self._weight > 0.5).astype(np.uint8)
 
-    def plan(self, motion: FaceMotion, pose: HeadPose, frame: Frame) -> RatioPlan:
-        """Estimate the room's light, and where the source image lies on the live face.
+    def ratio_roots(self, relit: LinearImage, under_room: LinearImage) -> NDArray[np.float32]:
+        """How much brighter the source image is under the scene's light than under the room's.
+
+        As roots (`light_multiplication`), each times the confidence in it, and the confidence: (height, width, 4)
+        float32. In roots, because the step between two of them is about as visible anywhere.
 
         Args:
-            motion: of the face in `frame`.
-            pose: of the head in `frame`.
-            frame: the live frame, of the output's size.
+            relit: (height, width, 3) float32 linear, the source image under the scene's light.
+            under_room: the same under the room's.
         """
-        room = self._room_light.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
-        positions = self._warp(motion, pose, frame.size).grid((0, 0, *frame.size), RATIO_DOWNSAMPLING).nodes()
-        return RatioPlan(frame, float(motion.presence), room, positions)
+        # A room may have no light at all of one colour; then the live picture has none of it either.
+        floor = tuple(RATIO_FLOOR * max(mean, MIN_CHANNEL_MEAN) for mean in cv2.mean(under_room, self._inside))
+        ratio = cv2.divide(cv2.add(relit, floor), cv2.add(np.maximum(under_room, 0), floor))
+        roots = root_of_light(np.clip(ratio, *RATIO_RANGE))
+        return np.asarray(cv2.merge([*cv2.split(cv2.multiply(roots, self._weights)), self._weight]), np.float32)
 
-    def apply(self, plan: RatioPlan, relit: LinearImage) -> LinearImage:
-        """The planned frame in the light of `relit` (the subject's size): float32 linear, the frame's size."""
-        image, presence = plan.frame.image, plan.presence
-        width, height = plan.frame.size
-        columns, rows = _downsampled_size(plan.frame.size)
-        ratio = self._ratio(relit, self._relighter.relight(plan.room.in_head_frame) * plan.room.gain)
-        weighted = np.dstack([ratio * self._weight[..., None], self._weight]).astype(np.float32)
-        everywhere = extrapolate_ratio(
-            cv2.remap(
-                weighted, plan.positions - np.float32(0.5), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-            )
-        )
-        large = cv2.resize(
-            everywhere, (columns * RATIO_DOWNSAMPLING, rows * RATIO_DOWNSAMPLING), interpolation=cv2.INTER_LINEAR
-        )
-        # Not `linear_from_display`: what it makes of the brightest codes, where skin is red first, is a guess that
-        # a ratio would show as red blotches.
-        picture = cv2.multiply(linear_from_uint8(image), np.ascontiguousarray(large[:height, :width]))
-        if presence < 1:
+    def positions(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> PositionGrid:
+        """Where a live frame of `size` (width, height) lies in the source image.
+
+        Args:
+            motion: of the face in the frame.
+            pose: of the head in the frame.
+            size: of the frame.
+        """
+        return self._warp(motion, pose, size).grid((0, 0, *size), max(round(min(size) / RATIO_CELLS), 1))
+
+    def apply(self, plan: RatioPlan, blend: float = 1.0) -> DisplayImage:
+        """The planned frame in the light of the plan's ratio, uint8 sRGB.
+
+        `blend` is how far, in light: 0 gives the frame as it is. Its brightest codes are taken for no more light than
+        sRGB says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
+        first.
+        """
+        # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
+        nodes = plan.positions.nodes() - np.float32(0.5)
+        roots = extrapolate_roots(cv2.remap(plan.roots, nodes, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+        roots = cv2.multiply(roots, (*map(float, root_of_light(np.reciprocal(plan.gain)).ravel()), 0.0))
+        if blend < 1:
+            mixed = 1 - blend + blend * light_of_root(np.asarray(roots, np.float32))
+            roots = root_of_light(mixed.astype(np.float32))
+        shown = multiply_light(plan.frame.image, roots, plan.positions.step, as_shown=1 - blend)
+        if plan.presence < 1:
             # Where nobody is tracked with confidence the picture eases back to the live one, as both are shown:
             # in linear light that guess would be in the mixture.
-            shown = display_from_linear(picture)
-            picture = linear_from_display(cv2.addWeighted(shown, presence, image, 1 - presence, 0))
-        return np.asarray(picture, dtype=np.float32)
-
-    def _ratio(self, relit: LinearImage, under_room: LinearImage) -> LinearImage:
-        """How much brighter the source image is relit than under the room's light."""
-        # A room may have no light at all of one colour; then the live picture has none of it either.
-        floor = RATIO_FLOOR * np.maximum(under_room[self._weight > 0.5].mean(axis=0), MIN_CHANNEL_MEAN)
-        ratio = (relit + floor) / (np.maximum(under_room, 0) + floor)
-        return np.asarray(np.clip(ratio, *RATIO_RANGE), dtype=np.float32)
+            shown = cv2.addWeighted(shown, plan.presence, plan.frame.image, 1 - plan.presence, 0)
+        return np.asarray(shown, np.uint8)
 
     def _warp(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> Warp:
-        """The source image as it lies on the live face of a frame of `size`, for the downsampled frame.
+        """The source image as it lies on the live face of a frame of `size`.
 
         One similarity for the head, a dense flow for the rest.
         """
@@ -147,11 +154,6 @@ class RatioRelighting:
         # Lids and lips are the live picture's; the light on them is that of the skin round them.
         flow = face_and_head_flow(self._motion, self._mesh, self._points, target, moved, pose, fine=False)
         return Warp(source_from_live, flow)
-
-
-def _downsampled_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Columns and rows of the ratio for a frame of `size` (width, height)."""
-    return -(-size[0] // RATIO_DOWNSAMPLING), -(-size[1] // RATIO_DOWNSAMPLING)
 
 
 def ratio_confidence(matte: Mask) -> Mask:
@@ -171,24 +173,24 @@ def fit_similarity(points: NDArray[np.float64], onto: NDArray[np.floating]) -> N
     return np.column_stack([turn, goal - turn @ center])
 
 
-def extrapolate_ratio(warped: NDArray[np.float32]) -> LinearImage:
-    """Extrapolate a ratio that is known only on the person to the whole frame: (height, width, 3).
+def extrapolate_roots(warped: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Extrapolate a ratio that is known only on the person to the whole frame: its roots (height, width, 3) float32.
 
-    Beyond the person it goes on smoothly: wide blurs of what is known, divided by the blurred weight.
+    Beyond the person it goes on smoothly: wide blurs of what is known, divided by the blurred weight, as light.
 
     Args:
-        warped: (height, width, 4): ratio times weight, and the weight.
+        warped: (height, width, 4): roots of the ratio times weight, and the weight.
     """
     height, width = warped.shape[:2]
-    small = cv2.resize(
-        warped,
-        (max(width // EXTRAPOLATION_DOWNSAMPLING, 1), max(height // EXTRAPOLATION_DOWNSAMPLING, 1)),
-        interpolation=cv2.INTER_AREA,
-    )
+    size = max(width // EXTRAPOLATION_DOWNSAMPLING, 1), max(height // EXTRAPOLATION_DOWNSAMPLING, 1)
+    small = cv2.resize(warped, size, interpolation=cv2.INTER_AREA)
+    roots, weight = small[..., :3], small[..., 3:]
+    small[..., :3] = light_of_root(roots / (weight + np.float32(1e-9))) * weight
     spread = np.zeros_like(small)
     for sigma in (1.0, 3.0, 8.0, 20.0):
         # Narrow blurs win where they have weight: detail near the person, the mean far away.
         spread += cv2.GaussianBlur(small, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE) / np.float32(sigma**3)
-    beyond = (spread[..., :3] + 1e-9) / (spread[..., 3:] + 1e-9)
+    beyond = root_of_light((spread[..., :3] + np.float32(1e-9)) / (spread[..., 3:] + np.float32(1e-9)))
     beyond = cv2.resize(beyond, (width, height), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(warped[..., :3] + (1 - warped[..., 3:]) * beyond, dtype=np.float32)
+    *known, weight = cv2.split(warped)
+    return np.asarray(cv2.merge(known) + cv2.merge([1 - weight] * 3) * beyond, dtype=np.float32)

@@ -3,6 +3,9 @@
 The subject's reflectance field gives the face under any light, so the light under which it looks as it does now is a
 linear fit: non-negative amounts of some eighty soft lights, fixed in the room, that explain the live pixels of the
 face. It is fitted robustly, a few times a second. Between fits a gain per frame follows the camera's exposure.
+
+What a soft light does to the face is written in spherical harmonics of degree 12: no more are in it, and 169 of them
+are read in place of the subject's components and the 2048 texels.
 """
 
 from __future__ import annotations
@@ -28,9 +31,8 @@ from relit_camera.light.directions import (
     texel_solid_angles,
 )
 from relit_camera.light.light_map import LightMap
-from relit_camera.light.light_map_rotation import rotate_light_map
+from relit_camera.light.spherical_harmonics import basis
 from relit_camera.live.reenactment.source_image import SourceFace
-from relit_camera.subject.relighting.relighter import weighted_light
 from relit_camera.subject.subject import Subject
 
 
@@ -41,8 +43,10 @@ class RoomLightTunables:
     Attributes:
         lobe_count: soft lights whose amounts are fitted.
         lobe_sharpness: k of a light's exp(k (cos − 1)): with 12 half its value at 20°, about the spacing of 80 lights.
+        harmonics_degree: of the harmonics that a light is written in: finer light hardly changes a face.
         ridge: pull toward the last fit, relative to the normal matrix's mean diagonal.
-        robust_iterations: fits with new weights in each update.
+        robust_iterations: solutions of the first fit, each with new weights; later fits have one, weighed by the last
+            light.
         fits_per_s: how often the light is fitted.
         light_smoothing: share of the way from the last light to the newly fitted one.
         residual_smoothing: share of the way that the reported residual goes to that of each frame.
@@ -54,6 +58,7 @@ class RoomLightTunables:
 
     lobe_count: int = 80
     lobe_sharpness: float = 12.0
+    harmonics_degree: int = 10
     ridge: float = 3e-3
     robust_iterations: int = 3
     fits_per_s: float = 4.0
@@ -66,6 +71,10 @@ class RoomLightTunables:
 
 
 TUNABLES = RoomLightTunables()
+BLUR_CELLS = 3
+"""A large live picture is reduced until a sample is the mean of so many by so many pixels; odd: none is displaced."""
+CELLS_PER_BOX = 3.3
+"""Cells in a box that blurs as much as that mean with the interpolation between cells: √(3² + 2)."""
 
 
 @dataclass(frozen=True)
@@ -90,10 +99,13 @@ class RoomLightEstimator:
 
     def __init__(self, subject: Subject, face: SourceFace) -> None:
         self._triangles = _skin_triangles(face)
-        self._samples = _sample_basis(subject, face.landmarks[self._triangles].mean(axis=1))
-        self._coefficients = subject.coefficients
-        self._amounts = np.zeros((TUNABLES.lobe_count, 3))
-        self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), dtype=np.float32)
+        harmonics = basis(texel_directions().reshape(-1, 3), TUNABLES.harmonics_degree)
+        weighted = harmonics * texel_solid_angles().reshape(-1, 1)
+        self._project = np.linalg.solve(harmonics.T @ weighted, weighted.T).astype(np.float32)
+        samples = _sample_basis(subject, face.landmarks[self._triangles].mean(axis=1))
+        self._response = samples @ (subject.coefficients @ weighted.astype(np.float32))
+        self._amounts = np.zeros((TUNABLES.lobe_count, 3), np.float32)
+        self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
         self._fitted_at = -np.inf
         self._residual: float | None = None
 
@@ -107,48 +119,70 @@ class RoomLightEstimator:
             time_s: of the frame.
         """
         live, usable = _sample_frame(image, landmarks[self._triangles].mean(axis=1))
+        lobes = _lobe_maps(rotation)
         if time_s - self._fitted_at > 1 / TUNABLES.fits_per_s or time_s < self._fitted_at:
-            self._fit(live, usable, rotation)
+            self._fit(live, usable, lobes)
             self._fitted_at = time_s
-            light = _lobe_maps(Rotation.identity()) @ self._amounts
-            self._light_map = light.reshape(MAP_HEIGHT, MAP_WIDTH, 3).astype(np.float32)
-        in_head_frame = rotate_light_map(self._light_map, rotation)
-        predicted = self._predict(in_head_frame)
-        gain = np.ones(3, np.float32)
+            self._light_map = (_lobe_maps(Rotation.identity()) @ self._amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3)
+        in_head_frame = lobes @ self._amounts
+        predicted = self._predict(self._project @ in_head_frame)
+        gain = _exposure_gain(live, predicted, usable)
         if usable.sum() >= TUNABLES.min_samples:
-            ratio = live[usable] / np.maximum(predicted[usable], 1e-4)
-            gain = np.clip(np.median(ratio, axis=0), *TUNABLES.gain_range).astype(np.float32)
             deviation = np.abs(predicted * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
             now = float(np.median(deviation))
             self._residual = (
                 now if self._residual is None else self._residual + TUNABLES.residual_smoothing * (now - self._residual)
             )
         return RoomLightEstimate(
-            self._light_map, in_head_frame, gain, 0.0 if self._residual is None else self._residual
+            self._light_map,
+            in_head_frame.reshape(self._light_map.shape),
+            gain,
+            0.0 if self._residual is None else self._residual,
         )
 
-    def _predict(self, in_head_frame: LightMap) -> NDArray[np.float32]:
-        amounts = self._coefficients @ weighted_light(in_head_frame)
-        return np.stack([self._samples[c] @ amounts[:, c] for c in range(3)], axis=1)
+    def _predict(self, harmonics: NDArray[np.floating]) -> NDArray[np.float32]:
+        """The samples (count, 3) under a light of these harmonics (harmonics, 3)."""
+        return np.stack([self._response[c] @ harmonics[:, c] for c in range(3)], axis=1).astype(np.float32)
 
-    def _fit(self, live: NDArray[np.float32], usable: NDArray[np.bool_], rotation: Rotation) -> None:
-        weighted = _lobe_maps(rotation) * texel_solid_angles().reshape(-1, 1)
-        mixed = self._coefficients @ weighted.astype(np.float32)
+    def _fit(self, live: NDArray[np.float32], usable: NDArray[np.bool_], lobes: NDArray[np.float32]) -> None:
+        mixed = self._project @ lobes
         first = not self._amounts.any()
+        predicted = self._predict(mixed @ self._amounts)
+        predicted *= _exposure_gain(live, predicted, usable)
         for channel in range(3):
-            design = (self._samples[channel] @ mixed).astype(np.float64)
+            design, goal = (self._response[channel] @ mixed).astype(np.float64), live[:, channel]
             amounts = self._amounts[:, channel]
-            weight = usable.astype(np.float64)
-            level = max(float(live[usable, channel].mean()) if usable.any() else 0.0, 1e-4)
-            for _ in range(TUNABLES.robust_iterations):
-                fitted = regularized_nnls(design, live[:, channel], weight, amounts)
-                error = np.abs(design @ fitted - live[:, channel]) / level
-                weight = usable * np.minimum(1, TUNABLES.huber_threshold / np.maximum(error, 1e-9))
+            level = max(float(goal[usable].mean()) if usable.any() else 0.0, 1e-4)
+            weight = usable if first else _robust_weight(predicted[:, channel], goal, level, usable)
+            for _ in range(TUNABLES.robust_iterations if first else 1):
+                fitted = regularized_nnls(design, goal, weight, amounts)
+                weight = _robust_weight(design @ fitted, goal, level, usable)
             self._amounts[:, channel] = fitted if first else amounts + TUNABLES.light_smoothing * (fitted - amounts)
 
 
+def _exposure_gain(
+    live: NDArray[np.float32], predicted: NDArray[np.float32], usable: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """The factor (3,) float32 by which the live samples (count, 3) are brighter than the predicted ones."""
+    if usable.sum() < TUNABLES.min_samples:
+        return np.ones(3, np.float32)
+    ratio = live[usable] / np.maximum(predicted[usable], 1e-4)
+    return np.clip(np.median(ratio, axis=0), *TUNABLES.gain_range).astype(np.float32)
+
+
+def _robust_weight(
+    fitted: NDArray[np.floating], goal: NDArray[np.float32], level: float, usable: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Huber's weights (count,) of samples, by their error relative to `level`."""
+    error = np.abs(fitted - goal) / level
+    return np.asarray(usable * np.minimum(1, TUNABLES.huber_threshold / np.maximum(error, 1e-9)))
+
+
 def regularized_nnls(
-    design: NDArray[np.float64], values: NDArray[np.float32], weight: NDArray[np.float64], prior: NDArray[np.float64]
+    design: NDArray[np.float64],
+    values: NDArray[np.float32],
+    weight: NDArray[np.floating] | NDArray[np.bool_],
+    prior: NDArray[np.floating],
 ) -> NDArray[np.float64]:
     """Solve argmin_{x ≥ 0} Σ w (A x − b)² + λ |x − prior|², with λ from `RoomLightTunables.ridge`.
 
@@ -163,10 +197,11 @@ def regularized_nnls(
     return np.asarray(solution)
 
 
-def _lobe_maps(rotation: Rotation) -> NDArray[np.float64]:
-    """The soft lights, fixed in the room, in the frame of a head under `rotation`: (2048, lobe_count)."""
-    seen = rotation.inv().apply(fibonacci_directions(TUNABLES.lobe_count))
-    return np.exp(TUNABLES.lobe_sharpness * (texel_directions().reshape(-1, 3) @ seen.T - 1))
+def _lobe_maps(rotation: Rotation) -> NDArray[np.float32]:
+    """The soft lights, fixed in the room, in the frame of a head under `rotation`: (2048, lobe_count) float32."""
+    toward = rotation.inv().apply(fibonacci_directions(TUNABLES.lobe_count)).astype(np.float32)
+    exponent = texel_directions().reshape(-1, 3).astype(np.float32) @ (TUNABLES.lobe_sharpness * toward.T)
+    return np.exp(exponent - np.float32(TUNABLES.lobe_sharpness))
 
 
 def _skin_triangles(face: SourceFace) -> NDArray[np.intp]:
@@ -203,19 +238,26 @@ def _sample_basis(subject: Subject, points: Points) -> NDArray[np.float32]:
 
 
 def _sample_frame(image: DisplayImage, points: Points) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Linear values (count, 3) of the live picture at `points`, and which of them lie inside it and are not clipped."""
+    """Linear values (count, 3) of the live picture at `points`, and which of them lie inside it and are not clipped.
+
+    They are means over about `_blur_size` pixels.
+    """
     reach = _blur_size(points)
+    cell = max(round(reach / CELLS_PER_BOX), 1)
+    box = reach if cell == 1 else BLUR_CELLS
     height, width = image.shape[:2]
     low = np.clip(np.floor(points.min(axis=0)).astype(int) - reach, 0, [width - 2, height - 2])
     high = np.clip(np.ceil(points.max(axis=0)).astype(int) + reach, low + 2, [width, height])
-    part = image[low[1] : high[1], low[0] : high[0]]
-    soft = cv2.blur(linear_from_uint8(part), (reach, reach))
-    local = (points - low).astype(np.float32) - 0.5
-    x, y = local[:, 0][None], local[:, 1][None]
-    values = cv2.remap(soft, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
-    brightest = cv2.remap(part, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)[0].max(axis=1)
+    columns, rows = map(int, np.maximum((high - low) // cell, 1))
+    part = image[low[1] : low[1] + rows * cell, low[0] : low[0] + columns * cell]
+    light = linear_from_uint8(part)
+    small = light if cell == 1 else cv2.resize(light, (columns, rows), interpolation=cv2.INTER_AREA)
+    soft = cv2.blur(small, (box, box))
+    local = ((points - low) / cell - 0.5).astype(np.float32)
+    values = cv2.remap(soft, local[None], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
+    column, row = np.clip(np.floor(points), 0, [width - 1, height - 1]).astype(int).T
     inside = ((points > 0) & (points < [width, height])).all(axis=1)
-    return values, inside & (brightest < TUNABLES.clipping_code)
+    return values, inside & (image[row, column].max(axis=1) < TUNABLES.clipping_code)
 
 
 def _blur_size(points: Points) -> int:

@@ -2,29 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
+from relit_camera.live.modes.turn_extrapolation import TurnExtrapolation
 from relit_camera.live.scene.light_transition import LightTransition
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.stage_timing import StageTimer
 from relit_camera.subject.relighting.relighter import Relighter
 from relit_camera.subject.subject import Subject
 
+RELIT_EVERY = 2
+"""While the head turns, the subject is relit in every so many frames."""
+
 
 class SceneRelighting:
-    """Relights one subject frame by frame. Not thread-safe."""
+    """Relights one subject frame by frame. Not thread-safe.
+
+    Attributes:
+        extrapolation: what it gives while the head turns, in frames in which the subject is not relit.
+    """
 
     def __init__(self, subject: Subject, relighter: Relighter, light: LightTransition, timer: StageTimer) -> None:
         """`light` goes on from subject to subject, so that a change of light stays smooth."""
+        self.extrapolation = TurnExtrapolation(RELIT_EVERY)
         self._gain = np.float32(subject.metadata.display_gain)
         self._relighter = relighter
         self._light = light
         self._timer = timer
-        self._last: tuple[LightMap, LinearImage] | None = None
 
     def relight(self, scene: Scene, rotation: Rotation, time_s: float) -> LinearImage:
         """The subject under the scene's light: float32 linear, the subject's size, in display exposure.
@@ -37,9 +48,41 @@ class SceneRelighting:
             time_s: of the frame.
         """
         with self._timer.stage("light"):
-            light = rotate_light_map(self._light.update(scene, time_s), rotation)
+            light = self._light.update(scene, time_s)
         with self._timer.stage("relight"):
-            light = light * self._gain
-            if self._last is None or not np.array_equal(self._last[0], light):
-                self._last = (light, self._relighter.relight(light))
-            return self._last[1]
+            return self.extrapolation.picture(
+                rotation, light, None, lambda: self._relighter.relight(self._seen(light, rotation)[None])[0]
+            )
+
+    def compare(
+        self,
+        scene: Scene,
+        rotation: Rotation,
+        time_s: float,
+        room: LightMap,
+        room_in_head_frame: LightMap,
+        combine: Callable[[LinearImage, LinearImage], NDArray[np.float32]],
+    ) -> NDArray[np.float32]:
+        """What `combine` makes of the subject under the scene's light and under the room's, both of the subject's size.
+
+        The same again while neither the lights nor the head have moved; it must not be written to.
+
+        Args:
+            scene: what to show.
+            rotation: of the head since neutral.
+            time_s: of the frame.
+            room: the room's light map; another object for another light.
+            room_in_head_frame: the same as the head sees it.
+            combine: makes an array (height, width, 3 or 4) of non-negative values.
+        """
+        with self._timer.stage("light"):
+            light = self._light.update(scene, time_s)
+
+        def relit() -> NDArray[np.float32]:
+            return combine(*self._relighter.relight(np.stack([self._seen(light, rotation), room_in_head_frame])))
+
+        with self._timer.stage("relight"):
+            return self.extrapolation.picture(rotation, light, room, relit)
+
+    def _seen(self, light: LightMap, rotation: Rotation) -> LightMap:
+        return rotate_light_map(light, rotation) * self._gain

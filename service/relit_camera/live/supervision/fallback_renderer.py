@@ -81,6 +81,6 @@ class _RelitSource:
     def render(self, light: LightMap) -> WarpedLayer:
         """The person under `light`; the previous layer again if the light has not changed."""
         if self._last is None or not np.array_equal(self._last[0], light):
-            image = self._person.warped(self._relighter.relight(light), self._grid)
+            image = self._person.warped(self._relighter.relight(light[None])[0], self._grid)
             self._last = light, WarpedLayer(image, self._box[:2])
         return self._last[1]

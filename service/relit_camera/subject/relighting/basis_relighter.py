@@ -10,8 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import LinearImage
-from relit_camera.light.light_map import LightMap
 from relit_camera.subject.compression.local_basis import LocalBasis
 from relit_camera.subject.relighting.relighter import RelighterOptions, weighted_light
 from relit_camera.subject.subject import Subject
@@ -86,24 +84,23 @@ class BasisRelighter:
         """Bytes of the arrays that it keeps in memory."""
         return sum(each.nbytes for each in (*self._values, self._mixes, self._coefficients))
 
-    def relight(self, light_map: LightMap) -> LinearImage:
+    def relight(self, light_maps: NDArray[np.float32]) -> NDArray[np.float32]:
         """See `Relighter.relight`."""
-        return self.mix(self._coefficients @ weighted_light(light_map))
-
-    def mix(self, amounts: NDArray[np.float32]) -> LinearImage:
-        """The picture of `amounts` (components, 3) of the shared basis: float32 (height, width, 3)."""
-        local = np.matmul(np.ascontiguousarray(amounts.T), self._mixes).transpose(0, 2, 1).reshape(-1, 3)
-        found = np.empty(self._found + 1, np.float32)
-        found[-1] = 0
+        count = len(light_maps)
+        light = weighted_light(light_maps).transpose(2, 0, 1).reshape(3 * count, -1)
+        amounts = light @ self._coefficients.T
+        local = np.matmul(amounts, self._mixes).transpose(0, 2, 1).reshape(-1, 3, count)
+        found = np.empty((count, self._found + 1), np.float32)
+        found[:, -1] = 0
         component = start = 0
         for values in self._values:
             clusters, _, rank, places = values.shape
-            mixed = local[component : component + clusters * rank].reshape(clusters, rank, 3).transpose(0, 2, 1)
-            target = found[start : start + clusters * 3 * places].reshape(clusters, 3, 1, places)
-            np.matmul(mixed[:, :, None], values, out=target)
-            component += clusters * rank
-            start += target.size
-        return found.take(self._source).reshape(*self._shape, 3)
+            mixed = local[component : component + clusters * rank].reshape(clusters, rank, 3, count)
+            product = np.matmul(mixed.transpose(0, 2, 3, 1), values)
+            end = start + clusters * 3 * places
+            found[:, start:end] = product.transpose(2, 0, 1, 3).reshape(count, -1)
+            component, start = component + clusters * rank, end
+        return found.take(self._source, axis=1).reshape(count, *self._shape, 3)
 
 
 def _blocks(mixes: NDArray[np.float32]) -> NDArray[np.float32]:

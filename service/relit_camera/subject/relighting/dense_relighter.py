@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import LinearImage
-from relit_camera.light.light_map import LightMap
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.relighting.relighter import RelighterOptions, weighted_light
 from relit_camera.subject.subject import Subject
@@ -29,11 +27,11 @@ class DenseRelighter:
         self._shape = (subject.metadata.height, subject.metadata.width)
         self.matrix = dense_matrix(subject)
 
-    def relight(self, light_map: LightMap) -> LinearImage:
+    def relight(self, light_maps: NDArray[np.float32]) -> NDArray[np.float32]:
         """See `Relighter.relight`."""
-        light = weighted_light(light_map)
-        planes = [self.matrix[channel] @ light[:, channel] for channel in range(3)]
-        return np.stack(planes, axis=-1).reshape(*self._shape, 3)
+        light = weighted_light(light_maps)
+        planes = [light[:, :, channel] @ self.matrix[channel].T for channel in range(3)]
+        return np.stack(planes, axis=-1).reshape(len(light_maps), *self._shape, 3)
 
 
 def dense_matrix(subject: Subject) -> NDArray[np.float32]:

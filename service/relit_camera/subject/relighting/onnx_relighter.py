@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.models.session_with_fallback import open_session
-from relit_camera.light.light_map import LightMap
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.relighting.basis_relighter import group_by_rank
 from relit_camera.subject.relighting.relighter import RelighterOptions, weighted_light
@@ -27,7 +25,7 @@ IR_VERSION = 9
 
 
 def basis_graph(subject: Subject) -> bytes:
-    """A serialised ONNX model: `light` (3, 2048, 1) → `picture` (3, pixels, 1), the products of `BasisRelighter`."""
+    """A serialised model, as `BasisRelighter` multiplies: `light` (3, 2048, count) → `pictures` (3, pixels, count)."""
     from onnx import helper
 
     groups = group_by_rank(subject.basis)
@@ -39,13 +37,14 @@ def basis_graph(subject: Subject) -> bytes:
         helper.make_node("Split", ["local", "ranks"], [f"local_{i}" for i in range(len(groups))], axis=1),
     ]
     for i, group in enumerate(groups):
-        clusters, _, rank, _ = group.values.shape
-        constants[f"values_{i}"] = group.values.transpose(1, 0, 2, 3)
-        constants[f"shape_{i}"] = np.array([3, clusters, 1, rank], np.int64)
+        clusters, _, rank, places = group.values.shape
+        constants[f"values_{i}"] = group.values.transpose(1, 0, 3, 2)
+        constants[f"by_cluster_{i}"] = np.array([3, clusters, rank, -1], np.int64)
+        constants[f"by_place_{i}"] = np.array([3, clusters * places, -1], np.int64)
         nodes += [
-            helper.make_node("Reshape", [f"local_{i}", f"shape_{i}"], [f"amounts_{i}"]),
-            helper.make_node("MatMul", [f"amounts_{i}", f"values_{i}"], [f"mixed_{i}"]),
-            helper.make_node("Reshape", [f"mixed_{i}", "as_column"], [f"column_{i}"]),
+            helper.make_node("Reshape", [f"local_{i}", f"by_cluster_{i}"], [f"amounts_{i}"]),
+            helper.make_node("MatMul", [f"values_{i}", f"amounts_{i}"], [f"mixed_{i}"]),
+            helper.make_node("Reshape", [f"mixed_{i}", f"by_place_{i}"], [f"places_{i}"]),
         ]
     places = np.concatenate([group.pixels.ravel() for group in groups])
     # Pixels of no cluster take what stands behind all places.
@@ -53,14 +52,13 @@ def basis_graph(subject: Subject) -> bytes:
     place_of_pixel[places] = np.arange(len(places))
     constants |= {
         "ranks": np.array([group.values.shape[0] * group.values.shape[2] for group in groups], np.int64),
-        "as_column": np.array([3, -1, 1], np.int64),
-        "nothing": np.zeros((3, 1, 1), np.float32),
+        "one_more_place": np.array([0, 0, 0, 0, 1, 0], np.int64),
         "place_of_pixel": place_of_pixel,
     }
-    columns = [f"column_{i}" for i in range(len(groups))]
     nodes += [
-        helper.make_node("Concat", [*columns, "nothing"], ["places"], axis=1),
-        helper.make_node("Gather", ["places", "place_of_pixel"], ["picture"], axis=1),
+        helper.make_node("Concat", [f"places_{i}" for i in range(len(groups))], ["found"], axis=1),
+        helper.make_node("Pad", ["found", "one_more_place"], ["places"]),
+        helper.make_node("Gather", ["places", "place_of_pixel"], ["pictures"], axis=1),
     ]
     return _serialized(nodes, constants, subject.matte.size)
 
@@ -71,8 +69,8 @@ def _serialized(nodes: list[NodeProto], constants: dict[str, NDArray], pixels: i
     graph = helper.make_graph(
         nodes,
         "relight",
-        [helper.make_tensor_value_info("light", TensorProto.FLOAT, [3, TEXELS, 1])],
-        [helper.make_tensor_value_info("picture", TensorProto.FLOAT, [3, pixels, 1])],
+        [helper.make_tensor_value_info("light", TensorProto.FLOAT, [3, TEXELS, "count"])],
+        [helper.make_tensor_value_info("pictures", TensorProto.FLOAT, [3, pixels, "count"])],
         [numpy_helper.from_array(np.ascontiguousarray(value), name) for name, value in constants.items()],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
@@ -104,8 +102,8 @@ class OnnxBasisRelighter:
         """The execution provider that is proven to run the graph."""
         return self.session.provider
 
-    def relight(self, light_map: LightMap) -> LinearImage:
+    def relight(self, light_maps: NDArray[np.float32]) -> NDArray[np.float32]:
         """See `Relighter.relight`."""
-        light = np.ascontiguousarray(weighted_light(light_map).T)[..., None]
-        picture = self.session.run({"light": light})["picture"]
-        return np.ascontiguousarray(picture[..., 0].T).reshape(*self._shape, 3)
+        light = np.ascontiguousarray(weighted_light(light_maps).transpose(2, 1, 0))
+        pictures = self.session.run({"light": light})["pictures"]
+        return np.ascontiguousarray(pictures.transpose(2, 1, 0)).reshape(len(light_maps), *self._shape, 3)

@@ -17,11 +17,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.light_map import LightMap
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.subject import Subject
 
@@ -41,10 +39,11 @@ class Relighter(Protocol):
         """What runs it, for the status: `numpy`, or the execution provider that is proven to, such as `cuda`."""
         ...
 
-    def relight(self, light_map: LightMap) -> LinearImage:
-        """The subject under a light map (32, 64, 3): float32 linear (height, width, 3), unscaled and unclipped.
+    def relight(self, light_maps: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The subject under each of some light maps (count, 32, 64, 3): float32 linear (count, height, width, 3).
 
-        Black where the matte is 0.
+        Unscaled and unclipped, black where the matte is 0. Together, because what most of the time is spent on, reading
+        the field, is then done once.
         """
         ...
 
@@ -84,7 +83,7 @@ def open_relighter(name: str, subject: Subject, session: SessionOptions | None =
     return relighter
 
 
-def weighted_light(light_map: LightMap) -> NDArray[np.float32]:
-    """E[l] · ω_l as float32 (2048, 3): the right-hand side of the relighting product."""
+def weighted_light(light_maps: NDArray[np.float32]) -> NDArray[np.float32]:
+    """E[l] · ω_l of light maps (..., 32, 64, 3) as float32 (..., 2048, 3): the right-hand side of the product."""
     omega = texel_solid_angles().astype(np.float32)
-    return np.ascontiguousarray((light_map * omega[..., None]).reshape(TEXELS, 3))
+    return np.ascontiguousarray((light_maps * omega[..., None]).reshape(*light_maps.shape[:-3], TEXELS, 3))

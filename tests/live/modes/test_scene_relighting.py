@@ -1,0 +1,83 @@
+"""The subject in the scene's light, relit in some frames only."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from relit_camera.base.config.look import Look
+from relit_camera.base.images.image_quality import psnr
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
+from relit_camera.light.light_map import LightMap
+from relit_camera.light.light_map_rotation import rotate_light_map
+from relit_camera.live.modes.scene_relighting import SceneRelighting
+from relit_camera.live.scene.light_transition import LightTransition, display_light
+from relit_camera.live.scene.scene import Scene
+from relit_camera.live.status.stage_timing import StageTimer
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from tests.live.people import close_up
+
+SUNSET = Scene(Look(), builtin_environment("sunset"))
+PARTY = Scene(Look(), builtin_environment("party"))
+
+
+class Counting(BasisRelighter):
+    """Counts how often it relights, and under how many lights."""
+
+    def __init__(self) -> None:
+        super().__init__(close_up())
+        self.lights: list[int] = []
+
+    def relight(self, light_maps: np.ndarray) -> np.ndarray:
+        self.lights.append(len(light_maps))
+        return super().relight(light_maps)
+
+
+def made() -> tuple[SceneRelighting, Counting]:
+    relighter = Counting()
+    return SceneRelighting(close_up(), relighter, LightTransition(), StageTimer()), relighter
+
+
+def turn(index: int) -> Rotation:
+    return rotation_from_angles(10 * np.sin(index / 10), 3 * np.sin(index / 7), 0)
+
+
+def truth(scene: Scene, index: int) -> np.ndarray:
+    light = rotate_light_map(display_light(scene.environment, scene.look.lighting), turn(index))
+    return BasisRelighter(close_up()).relight((light * np.float32(close_up().metadata.display_gain))[None])[0]
+
+
+def test_a_turning_head_is_relit_in_every_second_frame_and_lit_rightly_in_all() -> None:
+    ours, relighter = made()
+    pictures = [ours.relight(SUNSET, turn(index), index / 30) for index in range(30)]
+    assert 14 <= len(relighter.lights) <= 17
+    assert min(psnr(pictures[index], truth(SUNSET, index)) for index in range(3, 30)) > 45
+
+
+def test_a_change_of_light_is_eased_in_every_frame() -> None:
+    ours, relighter = made()
+    for index in range(6):
+        ours.relight(SUNSET, turn(0), index / 30)
+    assert relighter.lights == [1]
+    seen = [ours.relight(PARTY, turn(0), (6 + index) / 30) for index in range(20)]
+    assert 10 <= len(relighter.lights) <= 15  # in 0.4 s, then no more
+    steps = [psnr(a, b) for a, b in pairwise(seen)]
+    assert steps == sorted(steps)  # fast at first
+    assert psnr(seen[-1], truth(PARTY, 0)) > 60
+
+
+def test_scene_and_room_are_relit_together_and_combined() -> None:
+    ours, relighter = made()
+    room: LightMap = builtin_environment("window").light_map
+    head = rotate_light_map(room, turn(3))
+    both = ours.compare(SUNSET, turn(3), 0.1, room, head, lambda scene, room: np.concatenate([scene, room]))
+    assert relighter.lights == [2]
+    height = close_up().matte.shape[0]
+    np.testing.assert_allclose(both[:height], truth(SUNSET, 3), rtol=1e-3, atol=1e-5)
+    np.testing.assert_allclose(both[height:], BasisRelighter(close_up()).relight(head[None])[0], rtol=1e-3, atol=1e-5)
+    again = replace(SUNSET, revision=1)
+    assert ours.compare(again, turn(3), 0.2, room, head, lambda *_: np.zeros(0, np.float32)) is both
