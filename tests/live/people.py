@@ -100,8 +100,8 @@ def moved_by(reenactor: Reenactor, relit: LinearImage, motion: FaceMotion, frame
 def premultiplied(layer: WarpedLayer) -> tuple[LinearImage, Mask]:
     """The layer's picture in linear light, premultiplied, and its alpha in 0..1."""
     colors, alpha = split_alpha(layer.image)
-    share = alpha / np.float32(255)
-    return linear_from_display(colors) * share[..., None], share
+    share = np.divide(alpha, 255, dtype=np.float32)
+    return np.multiply(linear_from_display(colors), share[..., None], dtype=np.float32), share
 
 
 def live_frame(image: DisplayImage | None = None, index: int = 0) -> Frame:

@@ -14,7 +14,7 @@ from relit_camera.app.wiring import make_follower, make_pipeline, mode_factories
 from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
 from relit_camera.base.config.settings import InferenceSettings, RelitSettings
 from relit_camera.base.errors import ModelError, SubjectError
-from relit_camera.base.images.image_types import Frame, Mask
+from relit_camera.base.images.image_types import Alpha, Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.motion.face_follower import FaceMotion
@@ -259,8 +259,8 @@ def test_the_relighter_at_work_is_named_for_the_status() -> None:
 class Everywhere:
     """A matting that sees the person in every pixel."""
 
-    def matte(self, frame: Frame) -> Mask:
-        return np.ones(frame.image.shape[:2], np.float32)
+    def matte(self, frame: Frame) -> Alpha:
+        return np.full(frame.image.shape[:2], 255, np.uint8)
 
 
 def test_it_says_when_models_are_opened() -> None:
