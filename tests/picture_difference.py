@@ -57,7 +57,9 @@ class Difference:
     edge: tuple[float, float]
 
 
-def render_scenes(video: Path, subject: Path, size: tuple[int, int], every: int, most: int, out: Path) -> None:
+def render_scenes(
+    video: Path, subject: Path, tracker: str, size: tuple[int, int], every: int, most: int, out: Path
+) -> None:
     """Render all scenes with the `relit_camera` that is imported, into `out`/NAME.npy."""
     from relit_camera.app.wiring import make_pipeline, make_tracker
     from relit_camera.base.concurrency.threads import limit_threads
@@ -73,7 +75,7 @@ def render_scenes(video: Path, subject: Path, size: tuple[int, int], every: int,
         frames: list[Frame] = [fit_frame(frame, size) for frame, _ in zip(reader, range(most), strict=False)]
 
     def rendered(mode: str, environment: str, background: dict[str, object]) -> Frames:
-        settings = RelitSettings()
+        settings = RelitSettings.model_validate({"tracker": {"name": tracker}})
         controller = SceneController(settings.storage)
         controller.load_configured_subject(str(subject))
         controller.set_look(
@@ -144,6 +146,7 @@ def main() -> None:
     parser.add_argument("old_tree", type=Path, help="another checkout of this repository")
     parser.add_argument("video", type=Path, help="a film of the subject's face")
     parser.add_argument("subject", type=Path)
+    parser.add_argument("--tracker", default="mesh", help="recorded:FILE where both shall see the same face")
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--every", type=int, default=6, help="compare every so many frames")
     parser.add_argument("--frames", type=int, default=144)
@@ -153,7 +156,7 @@ def main() -> None:
     width, height = (int(side) for side in arguments.size.split("x"))
     if arguments.render:
         size, every, most = (width, height), arguments.every, arguments.frames
-        render_scenes(arguments.video, arguments.subject, size, every, most, arguments.render)
+        render_scenes(arguments.video, arguments.subject, arguments.tracker, size, every, most, arguments.render)
         return
     arguments.out.mkdir(parents=True, exist_ok=True)
     here = Path(__file__).resolve().parents[1]
