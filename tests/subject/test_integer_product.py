@@ -23,11 +23,11 @@ def test_a_large_matrix(columns: int, allowed: float) -> None:
     fading = np.exp(-np.arange(columns) / 40).astype(np.float32)
     matrix = rng.standard_normal((500, columns), np.float32) * fading
     factors = rng.standard_normal((6, columns), np.float32) * fading * np.float32(1e4)
-    product = IntegerProduct(np.split(matrix, [100, 130]))
+    product = IntegerProduct(500, columns, np.split(matrix, [100, 130]))
     expected = factors.astype(np.float64) @ matrix.T
     assert relative_error(product(factors), expected) < allowed
     assert relative_error(product(factors[:1] * 1e-9), expected[:1] * 1e-9) < allowed
-    assert product.nbytes <= 500 * (columns + 64 + 12)
+    assert product.nbytes <= 512 * (columns + 64 + 12)
     assert not product(np.zeros((3, columns), np.float32)).any()
 
 
@@ -35,7 +35,7 @@ def test_the_largest_codes_and_digits_do_not_overflow() -> None:
     """Where bytes are added in pairs within 16 bits, full digits times full codes would be clipped."""
     signs = np.random.default_rng(5).choice([-1, 1], (3, 256)).astype(np.float32)
     for factors in (signs, np.ones((2, 256), np.float32)):
-        np.testing.assert_allclose(IntegerProduct([signs])(factors), factors @ signs.T, rtol=2e-4, atol=0.1)
+        np.testing.assert_allclose(IntegerProduct(3, 256, [signs])(factors), factors @ signs.T, rtol=2e-4, atol=0.1)
 
 
 def test_clusters_of_several_ranks() -> None:

@@ -37,10 +37,14 @@ class RankGroup:
     mixes: NDArray[np.float32]
 
 
+def rounded_ranks(basis: LocalBasis) -> NDArray[np.int32]:
+    """The rank (clusters,) that each cluster has in its group."""
+    return np.asarray(-(-np.diff(basis.first) // RANK_STEP) * RANK_STEP, np.int32)
+
+
 def groups_by_rank(basis: LocalBasis) -> Iterator[RankGroup]:
     """All clusters of a basis, by rising rank; one group at a time, because mixes are large as floats."""
-    ranks = np.diff(basis.first)
-    rounded = -(-ranks // RANK_STEP) * RANK_STEP
+    ranks, rounded = np.diff(basis.first), rounded_ranks(basis)
     for rank in np.unique(rounded):
         chosen = np.flatnonzero(rounded == rank)
         grouped = np.zeros((len(chosen), 3, rank, basis.pixels.shape[1]), basis.values.dtype)
@@ -84,21 +88,26 @@ class BasisRelighter:
     name, provider = "basis", "cpu"
 
     def __init__(self, subject: Subject, options: RelighterOptions | None = None) -> None:
-        """`options` are those of every relighter; it takes no argument."""
-        (options or RelighterOptions()).require_no_argument(self.name)
+        """Of `options` it takes the number of threads; it takes no argument, and always runs on the CPU."""
+        options = options or RelighterOptions()
+        options.require_no_argument(self.name)
+        threads = options.session.threads
         self._shape = (subject.metadata.height, subject.metadata.width)
         self._coefficients = subject.coefficients
+        basis = in_8_bits(subject.basis)
         values: list[NDArray[Any]] = []
         pixels: list[NDArray[np.int32]] = []
 
         def mixes() -> Iterator[NDArray[np.float32]]:
-            for group in groups_by_rank(in_8_bits(subject.basis)):
+            for group in groups_by_rank(basis):
                 values.append(group.values)
                 pixels.append(group.pixels)
-                yield group.mixes.reshape(-1, subject.basis.components)
+                for part in np.array_split(group.mixes, len(group.mixes)):
+                    yield part.reshape(-1, basis.components)
 
-        self._mixes = IntegerProduct(mixes())
-        self._clusters = ClusterProducts(values)
+        rows = int(rounded_ranks(basis).sum())
+        self._mixes = IntegerProduct(rows, basis.components, mixes(), threads)
+        self._clusters = ClusterProducts(values, threads)
         # Where each value of the picture stands among the clusters' products; what is in no cluster is behind them.
         self._source = np.full((subject.matte.size, 3), self._clusters.size, np.intp)
         for group, positions in zip(pixels, self._clusters.positions(), strict=True):

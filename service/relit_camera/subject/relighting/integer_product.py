@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,14 +72,26 @@ class IntegerProduct:
         nbytes: bytes of the matrix.
     """
 
-    def __init__(self, blocks: Iterable[Values]) -> None:
+    def __init__(self, rows: int, columns: int, blocks: Iterable[Values], threads: int = 1) -> None:
         """`blocks` are the matrix's rows (some, columns), in order, read one at a time."""
-        parts = [
-            QuantizedRows(np.concatenate([p.codes for p in each]), np.concatenate([p.scales for p in each]))
-            for each in zip(*map(_encode, blocks), strict=True)
-        ]
-        self.nbytes = sum(part.codes.nbytes + part.scales.nbytes for part in parts)
-        self._session = _product_session(parts)
+        self._rows = rows
+        tiles = -(-rows // PLACES_PER_TILE)
+        head = min(columns, HEAD_COLUMNS)
+        widths = [head, head, columns - head][: 2 + (columns > head)]
+        # Fed at each run, which copies nothing: as a part of the graph ONNX Runtime would hold every number twice.
+        self._matrix: dict[str, NDArray[Any]] = {}
+        for i, width in enumerate(widths):
+            self._matrix[f"codes_{i}"] = np.zeros((tiles, width, PLACES_PER_TILE), np.int8)
+            self._matrix[f"scales_{i}"] = np.zeros((tiles, 1, PLACES_PER_TILE), np.float32)
+        start = 0
+        for block in blocks:
+            tile, place = np.divmod(np.arange(start, start + len(block)), PLACES_PER_TILE)
+            for i, part in enumerate(_encode(block)):
+                self._matrix[f"codes_{i}"][tile, :, place] = part.codes
+                self._matrix[f"scales_{i}"][tile, 0, place] = part.scales
+            start += len(block)
+        self.nbytes = sum(each.nbytes for each in self._matrix.values())
+        self._session = _product_session(widths, threads)
 
     def __call__(self, factors: Values) -> Values:
         """The product (count, rows) with factors (count, columns)."""
@@ -87,7 +99,8 @@ class IntegerProduct:
         digits = _digits(factors, scales)
         feed = {"head": digits[:, :HEAD_COLUMNS], "rest": digits[:, HEAD_COLUMNS:]}
         feed = {name: np.ascontiguousarray(each) for name, each in feed.items() if each.size}
-        return np.asarray(_sum_of_digits(self._session.run(feed)["product"]) * scales)
+        product = self._session.run({**feed, **self._matrix})["product"].reshape(2 * len(factors), -1)
+        return np.asarray(_sum_of_digits(product[:, : self._rows]) * scales)
 
 
 def _encode(block: Values) -> list[QuantizedRows]:
@@ -96,25 +109,30 @@ def _encode(block: Values) -> list[QuantizedRows]:
     return [first, quantize(head - first.restored()), *([quantize(rest)] if rest.size else [])]
 
 
-def _product_session(parts: Sequence[QuantizedRows]) -> Session:
-    """`head` and `rest`, digits (count, columns), → `product`, float32 (count, rows)."""
+def _product_session(widths: Sequence[int], threads: int) -> Session:
+    """`head` and `rest`, digits (count, columns), codes and scales of each part, → `product` (count, tiles, places)."""
     from onnx import TensorProto, helper
 
-    names = ["head", "head", "rest"][: len(parts)]
-    constants: dict[str, NDArray] = {}
-    nodes = []
-    for i, (name, part) in enumerate(zip(names, parts, strict=True)):
-        constants |= {f"codes_{i}": np.ascontiguousarray(part.codes.T), f"scales_{i}": part.scales}
+    names = ["head", "head", "rest"][: len(widths)]
+    nodes, inputs = [], []
+    for i, (name, width) in enumerate(zip(names, widths, strict=True)):
+        inputs += [
+            helper.make_tensor_value_info(f"codes_{i}", TensorProto.INT8, ["tiles", width, PLACES_PER_TILE]),
+            helper.make_tensor_value_info(f"scales_{i}", TensorProto.FLOAT, ["tiles", 1, PLACES_PER_TILE]),
+        ]
         nodes += [
             helper.make_node("MatMulInteger", [name, f"codes_{i}", "zero"], [f"sum_{i}"]),
             helper.make_node("Cast", [f"sum_{i}"], [f"number_{i}"], to=TensorProto.FLOAT),
             helper.make_node("Mul", [f"number_{i}", f"scales_{i}"], [f"product_{i}"]),
         ]
-    nodes.append(helper.make_node("Sum", [f"product_{i}" for i in range(len(parts))], ["product"]))
-    widths = {name: ["count", part.codes.shape[1]] for name, part in zip(names, parts, strict=True)}
-    inputs = [helper.make_tensor_value_info(each, TensorProto.UINT8, width) for each, width in widths.items()]
-    output = helper.make_tensor_value_info("product", TensorProto.FLOAT, ["count", len(parts[0].scales)])
-    return _session("relight-mixes", nodes, constants, inputs, output)
+    nodes.append(helper.make_node("Sum", [f"product_{i}" for i in range(len(widths))], ["tiles"]))
+    nodes.append(helper.make_node("Transpose", ["tiles"], ["product"], perm=[1, 0, 2]))
+    inputs += [
+        helper.make_tensor_value_info(name, TensorProto.UINT8, ["count", width])
+        for name, width in dict(zip(names, widths, strict=True)).items()
+    ]
+    output = helper.make_tensor_value_info("product", TensorProto.FLOAT, ["count", "tiles", PLACES_PER_TILE])
+    return _session("relight-mixes", nodes, {}, inputs, output, threads)
 
 
 class ClusterProducts:
@@ -125,7 +143,7 @@ class ClusterProducts:
         nbytes: bytes of the values.
     """
 
-    def __init__(self, groups: Sequence[NDArray[np.int8]]) -> None:
+    def __init__(self, groups: Sequence[NDArray[np.int8]], threads: int = 1) -> None:
         """`groups` are values (clusters, 3, rank, places), with the same places each."""
         self._groups = [_tiled(values) for values in groups]
         self._places = groups[0].shape[3]
@@ -135,7 +153,8 @@ class ClusterProducts:
         self._ranks = np.repeat([values.shape[2] for values in groups], clusters)
         self._tiles = np.repeat([values.shape[1] for values in self._groups], clusters)
         self._first = np.cumsum(self._ranks) - self._ranks
-        self._session = _cluster_session(self._groups)
+        self._values = {f"values_{i}": values for i, values in enumerate(self._groups)}
+        self._session = _cluster_session(self._groups, threads)
 
     def positions(self) -> Iterator[NDArray[np.intp]]:
         """Where each place's channels stand among the products: (clusters, places, 3) of each group."""
@@ -155,7 +174,7 @@ class ClusterProducts:
         scales = np.maximum.reduceat(np.abs(by_light), self._first, axis=2) / MAX_FACTOR + np.float32(1e-30)
         digits = _digits(by_light, np.repeat(scales, self._ranks, axis=2)).reshape(2, *by_light.shape)
         scales = np.repeat(scales.transpose(0, 2, 1), self._tiles, axis=1).reshape(len(by_light), -1, 1)
-        return np.asarray(self._session.run({"digits": digits, "scales": scales})["products"])
+        return np.asarray(self._session.run({"digits": digits, "scales": scales, **self._values})["products"])
 
 
 def _tiled(values: NDArray[np.int8]) -> NDArray[np.int8]:
@@ -165,7 +184,7 @@ def _tiled(values: NDArray[np.int8]) -> NDArray[np.int8]:
     return np.ascontiguousarray(padded.reshape(clusters, 3, rank, -1, PLACES_PER_TILE).transpose(0, 3, 1, 2, 4))
 
 
-def _cluster_session(groups: Sequence[NDArray[np.int8]]) -> Session:
+def _cluster_session(groups: Sequence[NDArray[np.int8]], threads: int) -> Session:
     """`digits` (2, count, 3, components) and `scales` (count, tiles · 3, 1) → `products` of `ClusterProducts`."""
     from onnx import TensorProto, helper
 
@@ -181,10 +200,12 @@ def _cluster_session(groups: Sequence[NDArray[np.int8]]) -> Session:
         "base": np.array(1 << DIGIT_BITS, np.float32),
         "one_more": np.array([0, 0, 0, 1], np.int64),
     }
+    inputs = []
     nodes = [helper.make_node("Split", ["digits", "sizes"], names, axis=3)]
     for i, values in enumerate(groups):
         constants[f"row_{i}"] = np.array([-1, len(values) * values.shape[1] * 3 * places], np.int64)
-        constants |= {f"values_{i}": values, f"shape_{i}": np.array([-1, 3, len(values), 1, values.shape[3]], np.int64)}
+        inputs.append(helper.make_tensor_value_info(f"values_{i}", TensorProto.INT8, values.shape))
+        constants |= {f"shape_{i}": np.array([-1, 3, len(values), 1, values.shape[3]], np.int64)}
         nodes += [
             helper.make_node("Reshape", [names[i], f"shape_{i}"], [f"by_light_{i}"]),
             helper.make_node("Transpose", [f"by_light_{i}"], [f"by_cluster_{i}"], perm=[2, 3, 1, 0, 4]),
@@ -204,12 +225,12 @@ def _cluster_session(groups: Sequence[NDArray[np.int8]]) -> Session:
         helper.make_node("Reshape", ["scaled", "flat"], ["all"]),
         helper.make_node("Pad", ["all", "one_more"], ["products"]),
     ]
-    inputs = [
+    inputs += [
         helper.make_tensor_value_info("digits", TensorProto.UINT8, [2, "count", 3, sum(sizes)]),
         helper.make_tensor_value_info("scales", TensorProto.FLOAT, ["count", rows, 1]),
     ]
     output = helper.make_tensor_value_info("products", TensorProto.FLOAT, ["count", rows * places + 1])
-    return _session("relight-clusters", nodes, constants, inputs, output)
+    return _session("relight-clusters", nodes, constants, inputs, output, threads)
 
 
 def _session(
@@ -218,6 +239,7 @@ def _session(
     constants: dict[str, NDArray],
     inputs: list[ValueInfoProto],
     output: ValueInfoProto,
+    threads: int,
 ) -> Session:
     from onnx import helper, numpy_helper
 
@@ -225,4 +247,4 @@ def _session(
     tensors = [numpy_helper.from_array(value, each) for each, value in constants.items()]
     graph = helper.make_graph(nodes, name, inputs, [output], tensors)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
-    return open_session(model.SerializeToString(), name, SessionOptions("cpu"))
+    return open_session(model.SerializeToString(), name, SessionOptions("cpu", threads))

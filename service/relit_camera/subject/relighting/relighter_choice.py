@@ -23,9 +23,9 @@ def choose_relighter(subject: Subject, options: RelighterOptions) -> Relighter:
     """
     options.require_no_argument("auto")
     if provider_names.choose_provider(options.session.provider) == provider_names.CPU:
-        return BasisRelighter(subject)
+        return BasisRelighter(subject, options)
     relighter = OnnxBasisRelighter(subject, options)
     if relighter.provider != provider_names.CPU:
         return relighter
     log.warning("relighting stays on the CPU: %s", relighter.session.why)
-    return BasisRelighter(subject)
+    return BasisRelighter(subject, options)
