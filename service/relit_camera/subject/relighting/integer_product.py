@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 Values = NDArray[np.float32]
 
-HEAD_COLUMNS = 64
+HEAD_COLUMNS = 256
 """The first columns, whose factors are the largest, are kept in two codes a value, the second of what the first leaves;
-the others in one."""
+the others in one. With 64 a lamp alone, without an environment, showed clusters in the dark of a face."""
 MAX_CODE = 127
 DIGIT_BITS, DIGIT_ZERO = 7, 64
 MAX_FACTOR = (63 << DIGIT_BITS) + 63
