@@ -31,6 +31,7 @@ def test_relighting_is_compared_in_one_run() -> None:
     for name in ("naive_ms", "gemm_ms", "numpy_ms", "basis_ms", "onnx_ms"):
         assert result[name] > 0  # type: ignore[operator]
     assert result["psnr_db"]["even"] > 45  # type: ignore[index]
+    assert all(speed > 0 for speed in result["gb_per_s"].values())  # type: ignore[attr-defined]
     assert result["onnx_provider"] == "cpu"
     assert result["naive_ms"] > result["basis_ms"]  # type: ignore[operator]
 

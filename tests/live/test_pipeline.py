@@ -253,7 +253,7 @@ def test_the_relighter_at_work_is_named_for_the_status() -> None:
     made = pipeline()
     assert made.providers == {}
     made.process(frame(), scene())
-    assert made.providers == {"relighter basis": "numpy"}
+    assert made.providers == {"relighter basis": "cpu"}
 
 
 class Everywhere:

@@ -18,12 +18,15 @@ from relit_camera.capture.subject_builder import build_subject
 from relit_camera.light.directions import direction_from_degrees, texel_directions, texel_solid_angles
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.subject.compression.local_basis import global_basis
+from relit_camera.subject.relighting.onnx_relighter import OnnxBasisRelighter
 from relit_camera.subject.relighting.relighter import open_relighter
 from relit_camera.subject.subject import Subject
 from tests.subject.handmade_basis import rows_by_hand
 from tests.synthetic import render_sphere, sphere_samples, sphere_surface
 
-ALL = ["dense", "basis", "onnx-basis"]
+ACCURACY_DB = {"dense": 90, "basis": 65, "onnx-basis": 90}
+"""Least PSNR of linear pictures against the field summed by hand: `basis` keeps and multiplies 8-bit integers."""
+ALL = list(ACCURACY_DB)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +54,7 @@ def test_agrees_with_the_field_summed_by_hand(sphere: Subject, coloured_light: n
     expected = np.einsum("hwlc,lc->hwc", field, weighted).astype(np.float32)
     picture = relit(name, sphere, coloured_light)
     assert picture.dtype == np.float32
-    assert psnr(picture, expected, sphere.matte) > 90
+    assert psnr(picture, expected, sphere.matte) > ACCURACY_DB[name]
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -62,7 +65,7 @@ def test_under_several_lights_at_once_as_under_each(sphere: Subject, coloured_li
     assert pictures.shape == (3, 32, 32, 3)
     assert pictures.dtype == np.float32
     for light, picture in zip(lights, pictures, strict=True):
-        assert psnr(picture, relighter.relight(light[None])[0], sphere.matte) > 110
+        assert psnr(picture, relighter.relight(light[None])[0], sphere.matte) > ACCURACY_DB[name]
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -75,7 +78,7 @@ def test_a_lit_sphere_reads_its_irradiance(sphere: Subject, name: str) -> None:
 def test_white_light_gives_the_sum_picture(sphere: Subject) -> None:
     field = _field_by_hand(sphere)
     summed = (field * texel_solid_angles().ravel()[:, None]).sum(axis=2).astype(np.float32)
-    assert psnr(relit("basis", sphere, np.ones((32, 64, 3), np.float32)), summed, sphere.matte) > 90
+    assert psnr(relit("basis", sphere, np.ones((32, 64, 3), np.float32)), summed, sphere.matte) > ACCURACY_DB["basis"]
 
 
 def test_a_captured_direction_returns_the_captured_frame(sphere: Subject) -> None:
@@ -167,15 +170,15 @@ def pretend_cuda(monkeypatch: pytest.MonkeyPatch, placement: dict[str, int]) -> 
     monkeypatch.setattr(provider_names, "preload", lambda _: "")
 
 
-def test_auto_is_numpy_where_there_is_no_gpu(
+def test_auto_is_the_basis_where_there_is_no_gpu(
     sphere: Subject, coloured_light: np.ndarray, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(onnxruntime, "get_available_providers", lambda: ["CPUExecutionProvider"])
-    monkeypatch.setattr(onnxruntime, "InferenceSession", pytest.fail)  # no graph is made in vain
+    monkeypatch.setattr(OnnxBasisRelighter, "__init__", pytest.fail)  # no graph is made in vain
     caplog.set_level("DEBUG", "relit_camera")
     chosen = open_relighter("auto", sphere)
-    assert (chosen.name, chosen.provider) == ("basis", "numpy")
-    assert "the subject is relit by basis on numpy" in caplog.text
+    assert (chosen.name, chosen.provider) == ("basis", "cpu")
+    assert "the subject is relit by basis on cpu" in caplog.text
     expected = relit("basis", sphere, coloured_light)
     np.testing.assert_array_equal(chosen.relight(coloured_light[None])[0], expected)
 
@@ -189,16 +192,16 @@ def test_auto_is_the_graph_where_a_gpu_is_proven_to_run_it(
     assert (chosen.name, chosen.provider) == ("onnx-basis", "cuda")
     assert "the subject is relit by onnx-basis on cuda" in caplog.text
     expected = relit("basis", sphere, coloured_light)
-    assert psnr(chosen.relight(coloured_light[None])[0], expected, sphere.matte) > 90
+    assert psnr(chosen.relight(coloured_light[None])[0], expected, sphere.matte) > ACCURACY_DB["basis"]
 
 
 @pytest.mark.parametrize("placement", [{"cpu": 21}, {"cuda": 2, "cpu": 19}], ids=["none", "few"])
-def test_auto_is_numpy_where_the_gpu_does_not_take_the_graph_and_the_log_says_why(
+def test_auto_is_the_basis_where_the_gpu_does_not_take_the_graph_and_the_log_says_why(
     sphere: Subject, placement: dict[str, int], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     pretend_cuda(monkeypatch, placement)
     assert open_relighter("auto", sphere).name == "basis"
-    assert "relighting stays on the CPU, with NumPy: cuda: " in caplog.text
+    assert "relighting stays on the CPU: cuda: " in caplog.text
     assert "placed there" in caplog.text
     with pytest.raises(DeviceError, match="model relight-basis cannot run on cuda"):
         open_relighter("auto", sphere, SessionOptions("cuda", strict=True))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 
 import cv2
@@ -42,8 +43,10 @@ NAIVE_LOOP_PIXELS = 600
 def benchmark_relighting(subject: Subject, maps: Mapping[str, LightMap], options: SessionOptions) -> dict[str, object]:
     """Milliseconds a picture of each implementation, memory, and the basis against the dense matrix under each map.
 
-    All hold float32, have every core, and give the finished (height, width, 3) picture. `naive_ms` loops over pixels
-    and multiplies map by map, as Eq. 6.1 is written; `gemm_ms` is OpenCV's product, the thesis's CPU implementation.
+    All have every core and give the finished (height, width, 3) picture; the basis holds 8-bit integers, the others
+    float32. `naive_ms` loops over pixels and multiplies map by map, as Eq. 6.1 is written; `gemm_ms` is OpenCV's
+    product, the thesis's CPU implementation. `gb_per_s` says how fast memory is read: by the basis, by numpy's dense
+    product, and at most (`read`, the largest of the dense matrix's numbers, on one core).
     """
     with threadpool_limits(limits=os.cpu_count(), user_api="blas"):
         return _benchmark_relighting(subject, maps, options)
@@ -51,7 +54,8 @@ def benchmark_relighting(subject: Subject, maps: Mapping[str, LightMap], options
 
 def _benchmark_relighting(subject: Subject, maps: Mapping[str, LightMap], options: SessionOptions) -> dict[str, object]:
     light_map = next(iter(maps.values()))
-    dense, basis = DenseRelighter(subject), BasisRelighter(subject)
+    every_core = replace(options, threads=os.cpu_count() or 1)
+    dense, basis = DenseRelighter(subject), BasisRelighter(subject, RelighterOptions(every_core))
     matrix = dense.matrix
     shape = (subject.metadata.height, subject.metadata.width)
     light = weighted_light(light_map)
@@ -74,11 +78,17 @@ def _benchmark_relighting(subject: Subject, maps: Mapping[str, LightMap], option
     }
     result["numpy_ms"] = median_ms(lambda: dense.relight(light_map[None]), 20)
     result["basis_ms"] = median_ms(lambda: basis.relight(light_map[None]), 200)
-    onnx = OnnxBasisRelighter(subject, RelighterOptions(options))
+    onnx = OnnxBasisRelighter(subject, RelighterOptions(every_core))
     result["onnx_ms"] = median_ms(lambda: onnx.relight(light_map[None]), 200)
     result["onnx_provider"] = onnx.session.provider
     result["dense_mb"] = round(matrix.nbytes / 1e6, 1)
     result["basis_mb"] = round(basis.nbytes / 1e6, 1)
+    read_ms = median_ms(matrix.max, 5)
+    result["gb_per_s"] = {
+        "basis": basis.nbytes / 1e6 / result["basis_ms"],  # type: ignore[operator]
+        "dense": matrix.nbytes / 1e6 / result["numpy_ms"],  # type: ignore[operator]
+        "read": matrix.nbytes / 1e6 / read_ms,
+    }
     result["gemm_over_basis"] = result["gemm_ms"] / result["basis_ms"]  # type: ignore[operator]
     result["numpy_over_basis"] = result["numpy_ms"] / result["basis_ms"]  # type: ignore[operator]
     every_map = np.stack(list(maps.values()))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.models.session_with_fallback import open_session
 from relit_camera.subject.reflectance_field import TEXELS
-from relit_camera.subject.relighting.basis_relighter import group_by_rank
+from relit_camera.subject.relighting.basis_relighter import groups_by_rank
 from relit_camera.subject.relighting.relighter import RelighterOptions, weighted_light
 from relit_camera.subject.subject import Subject
 
@@ -28,7 +28,7 @@ def basis_graph(subject: Subject) -> bytes:
     """A serialised model, as `BasisRelighter` multiplies: `light` (3, 2048, count) → `pictures` (3, pixels, count)."""
     from onnx import helper
 
-    groups = group_by_rank(subject.basis)
+    groups = list(groups_by_rank(subject.basis))
     mixes = np.concatenate([group.mixes.reshape(-1, subject.basis.components) for group in groups])
     constants: dict[str, NDArray] = {"coefficients": subject.coefficients, "mixes": mixes}
     nodes = [
@@ -38,7 +38,7 @@ def basis_graph(subject: Subject) -> bytes:
     ]
     for i, group in enumerate(groups):
         clusters, _, rank, places = group.values.shape
-        constants[f"values_{i}"] = group.values.transpose(1, 0, 3, 2)
+        constants[f"values_{i}"] = group.values.transpose(1, 0, 3, 2).astype(np.float32)
         constants[f"by_cluster_{i}"] = np.array([3, clusters, rank, -1], np.int64)
         constants[f"by_place_{i}"] = np.array([3, clusters * places, -1], np.int64)
         nodes += [

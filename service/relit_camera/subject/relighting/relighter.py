@@ -76,7 +76,7 @@ def open_relighter(name: str, subject: Subject, session: SessionOptions | None =
     """
     factory, argument = RELIGHTERS.load(name)
     relighter = factory(subject, RelighterOptions(session or SessionOptions(), argument))
-    usual = relighter.provider == "numpy"
+    usual = relighter.provider in ("numpy", "cpu")
     log.log(
         logging.DEBUG if usual else logging.INFO, "the subject is relit by %s on %s", relighter.name, relighter.provider
     )

@@ -1,4 +1,4 @@
-"""Relighter `auto`, the default: the ONNX graph where a GPU is proven to run it, else NumPy on the CPU."""
+"""Relighter `auto`, the default: the ONNX graph of floats where a GPU is proven to run it, else integers on the CPU."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ log = logging.getLogger(__name__)
 def choose_relighter(subject: Subject, options: RelighterOptions) -> Relighter:
     """`onnx-basis` where another provider than the CPU is asked for and proven to run it, else `basis`.
 
-    On the CPU NumPy is the quicker of the two (`relit bench`), so ONNX Runtime is not even tried there.
+    On the CPU `basis` is the quicker of the two (`relit bench`), so the graph of floats is not even tried there.
 
     Raises:
         DeviceError: the provider is strict, and cannot run it.
     """
     if provider_names.choose_provider(options.session.provider) == provider_names.CPU:
-        return BasisRelighter(subject)
+        return BasisRelighter(subject, options)
     relighter = OnnxBasisRelighter(subject, options)
     if relighter.provider != provider_names.CPU:
         return relighter
-    log.warning("relighting stays on the CPU, with NumPy: %s", relighter.session.why)
-    return BasisRelighter(subject)
+    log.warning("relighting stays on the CPU: %s", relighter.session.why)
+    return BasisRelighter(subject, options)
