@@ -12,7 +12,9 @@ import cv2
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-OPENCV_THREADS = 2
+OPENCV_THREADS = 1
+"""The camera's own threads keep two cores at work. A second thread of OpenCV's would shorten a stage, but waking it and
+waiting for it costs a third of a run of the face mesh network a picture."""
 BLAS_THREADS = 1
 """OpenBLAS's threads spin while they wait: two of them save a millisecond on an idle machine, but cost thirty when a
 call app uses the other core."""
@@ -27,7 +29,7 @@ def limit_threads() -> None:
 
     The threads of ONNX Runtime are set in the options of each session.
     """
-    cv2.setNumThreads(min(os.cpu_count() or 1, OPENCV_THREADS))
+    cv2.setNumThreads(OPENCV_THREADS)
     threadpool_limits(limits=BLAS_THREADS, user_api="blas")
     retain_large_allocations()
 

@@ -53,7 +53,6 @@ def bench(
 
     from relit_camera.app.demo import demo_files
     from relit_camera.app.wiring import session_options
-    from relit_camera.base.concurrency.threads import limit_threads
     from relit_camera.base.errors import NotFoundError
     from relit_camera.cli.arguments import load_command_settings, parse_background, parse_mode, parse_size
     from relit_camera.devices.sources.source_factory import open_source
@@ -79,7 +78,6 @@ def bench(
         settings = settings.model_copy(update={"subject": settings.subject or str(demo_files.SUBJECT)})
     if tracker is not None:
         settings = settings.model_copy(update={"tracker": settings.tracker.model_copy(update={"name": tracker})})
-    limit_threads()
     result: dict[str, Any] = {"machine": machine_info()}
     # Open everything before the long measurements, so that missing files are reported at once.
     scene_controller = SceneController(settings.storage)
