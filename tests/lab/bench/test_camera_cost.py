@@ -13,14 +13,13 @@ from relit_camera.base.config.look import BlurBackground, Mode, NoBackground
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import ModelError, RelitError
 from relit_camera.base.models.model_store import model_path
-from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
 from relit_camera.base.video.video_readers import VideoReader, probe_video
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.lab.bench.bench_source import MAX_FRAMES, prepare_video
 from relit_camera.lab.bench.camera_cost import CameraCost, StageCost, measure_cameras
 from relit_camera.lab.bench.camera_process import CameraProcess
 from relit_camera.lab.bench.cost_text import cost_text
-from relit_camera.lab.bench.mesh_run import MeshRun, stand_in_network
+from relit_camera.lab.bench.mesh_run import MeshRun
 from tests.cli.relit_command import CLIP_FPS, CLIP_SIZE, Material, call, write_material
 
 SECONDS = 2.0
@@ -154,9 +153,8 @@ def test_the_stand_in_takes_as_long_as_the_face_mesh() -> None:
         model_path("face_mesh")
     except ModelError as error:
         pytest.skip(str(error))
-    mesh, other = MeshRun(), MeshRun()
-    other._session = open_session(stand_in_network(), "stand-in", SessionOptions("cpu"))
-    other._feeds = {"image": np.full((1, 3, 256, 256), 0.5, np.float32)}
+    mesh, other = MeshRun(), MeshRun(stand_in=True)
+    assert (mesh.network, other.network) == ("face_mesh", "stand-in")
     for _ in range(4):
         mesh.sample()
         other.sample()
@@ -166,7 +164,7 @@ def test_the_stand_in_takes_as_long_as_the_face_mesh() -> None:
 def test_bench_measures_each_combination(monkeypatch: pytest.MonkeyPatch, material: Material) -> None:
     asked = []
 
-    def measure(settings: RelitSettings, fps: float, seconds: float) -> CameraCost:
+    def measure(settings: RelitSettings, fps: float, seconds: float, mesh: MeshRun) -> CameraCost:
         asked.append((settings.output.width, settings.look.mode, settings.look.background, fps, seconds))
         return COST
 

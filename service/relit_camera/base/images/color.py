@@ -17,8 +17,8 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 CHROMA_MATRIX = np.array(
     [[-37.797, -74.203, 112.0, 128 * 255], [112.0, -93.786, -18.214, 128 * 255], [0, 0, 0, 0]], dtype=np.float32
 ) / np.float32(255)
-"""U, V and 0 of R, G, B from 0 to 255 (ITU-R BT.601, limited range). The third row is for `cv2.transform`, which takes a
-tenth of the time for three channels of three."""
+"""U, V and 0 of R, G, B from 0 to 255 (ITU-R BT.601, limited range). The third row is for `cv2.transform`, which takes
+a tenth of the time for three channels of three."""
 
 Gamma = str | float
 """Transfer curve of a picture's code values: "srgb", "linear", or the exponent of a power law."""

@@ -97,6 +97,8 @@ def measure_cameras(
     backgrounds: Sequence[Background],
     source_fps: float | None,
     seconds: float,
+    *,
+    stand_in: bool = False,
 ) -> Iterator[CameraCost]:
     """Measure a camera of each combination, one after another, in their order.
 
@@ -107,6 +109,7 @@ def measure_cameras(
         backgrounds: of the look.
         source_fps: frames a second of a video file; its own if None.
         seconds: how long each is measured.
+        stand_in: take the stand-in for the face mesh network also where that is installed.
 
     Raises:
         RelitError: the video cannot be read, or a camera cannot run.
@@ -124,7 +127,7 @@ def measure_cameras(
                 "output": settings.output.model_copy(update={**place, "sink": "null"}),
                 "look": settings.look.model_copy(update={"mode": mode, "background": background}),
             }
-            yield measure_camera(settings.model_copy(update=changed), fps, seconds)
+            yield measure_camera(settings.model_copy(update=changed), fps, seconds, MeshRun(stand_in=stand_in))
 
 
 def bundled_settings(settings: RelitSettings) -> RelitSettings:
@@ -138,15 +141,14 @@ def bundled_settings(settings: RelitSettings) -> RelitSettings:
     return settings.model_copy(update=changed)
 
 
-def measure_camera(settings: RelitSettings, source_fps: float, seconds: float) -> CameraCost:
+def measure_camera(settings: RelitSettings, source_fps: float, seconds: float, mesh: MeshRun) -> CameraCost:
     """Run a camera in a process of its own, warm it up, and measure it for some seconds; nobody views its preview.
 
-    The face mesh network runs beside it once a second, in this process, so that both see the same machine.
+    The network of `mesh` runs beside it once a second, in this process, so that both see the same machine.
 
     Raises:
         RelitError: the camera cannot run, or makes no pictures.
     """
-    mesh = MeshRun()
     with CameraProcess(settings) as camera:
         time.sleep(WARM_UP_S)
         before, began_s, threads_before = camera.status(), camera.processor_s, camera.thread_s
