@@ -148,13 +148,13 @@ def test_a_mesh_run_is_the_median_of_those_that_count() -> None:
 
 
 @pytest.mark.real_time
-def test_the_stand_in_takes_as_long_as_the_face_mesh() -> None:
+def test_the_substitute_takes_as_long_as_the_face_mesh() -> None:
     try:
         model_path("face_mesh")
     except ModelError as error:
         pytest.skip(str(error))
-    mesh, other = MeshRun(), MeshRun(stand_in=True)
-    assert (mesh.network, other.network) == ("face_mesh", "stand-in")
+    mesh, other = MeshRun(), MeshRun(substitute=True)
+    assert (mesh.network, other.network) == ("face_mesh", "substitute")
     for _ in range(4):
         mesh.sample()
         other.sample()

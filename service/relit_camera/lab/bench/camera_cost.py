@@ -98,7 +98,7 @@ def measure_cameras(
     source_fps: float | None,
     seconds: float,
     *,
-    stand_in: bool = False,
+    substitute: bool = False,
 ) -> Iterator[CameraCost]:
     """Measure a camera of each combination, one after another, in their order.
 
@@ -109,7 +109,7 @@ def measure_cameras(
         backgrounds: of the look.
         source_fps: frames a second of a video file; its own if None.
         seconds: how long each is measured.
-        stand_in: take the stand-in for the face mesh network also where that is installed.
+        substitute: take the substitute for the face mesh network also where that is installed.
 
     Raises:
         RelitError: the video cannot be read, or a camera cannot run.
@@ -127,7 +127,7 @@ def measure_cameras(
                 "output": settings.output.model_copy(update={**place, "sink": "null"}),
                 "look": settings.look.model_copy(update={"mode": mode, "background": background}),
             }
-            yield measure_camera(settings.model_copy(update=changed), fps, seconds, MeshRun(stand_in=stand_in))
+            yield measure_camera(settings.model_copy(update=changed), fps, seconds, MeshRun(substitute=substitute))
 
 
 def bundled_settings(settings: RelitSettings) -> RelitSettings:

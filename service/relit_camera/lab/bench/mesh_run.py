@@ -25,13 +25,13 @@ class MeshRun:
     """The network, and the processor times of its runs.
 
     Attributes:
-        network: `face_mesh`; or `stand-in`, where the public networks are not installed: a network of the same kinds of
-            layers that takes about as long, with random weights.
+        network: `face_mesh`; or `substitute`, where the public networks are not installed: a network of the same kinds
+            of layers that takes about as long, with random weights.
     """
 
-    def __init__(self, *, stand_in: bool = False) -> None:
-        """Open the network; the stand-in where that is wanted, for figures that must be comparable everywhere."""
-        self.network, self._session = _open_network(stand_in)
+    def __init__(self, *, substitute: bool = False) -> None:
+        """Open the network; the substitute where that is wanted, for figures that must be comparable everywhere."""
+        self.network, self._session = _open_network(substitute)
         (name, spec), *_ = self._session.inputs.items()
         self._feeds = {name: np.full([size or 1 for size in spec.shape], 0.5, np.float32)}
         self._seconds: list[float] = []
@@ -55,19 +55,19 @@ class MeshRun:
         return 1e3 * median(self._seconds)
 
 
-def _open_network(stand_in: bool) -> tuple[str, Session]:
+def _open_network(substitute: bool) -> tuple[str, Session]:
     options = SessionOptions("cpu")
-    if not stand_in:
+    if not substitute:
         with suppress(ModelError):
             return "face_mesh", open_session(model_path("face_mesh"), "face_mesh", options)
-    return "stand-in", open_session(_stand_in_network(), "stand-in", options)
+    return "substitute", open_session(_substitute_network(), "substitute", options)
 
 
-STAND_IN_LAYERS = ((16, 2, 10), (32, 2, 14), (64, 2, 14), (128, 2, 14), (128, 2, 14), (128, 2, 14))
-"""Of each step of the stand-in: channels, stride, and pairs of a depthwise and a pointwise convolution."""
+SUBSTITUTE_LAYERS = ((16, 2, 10), (32, 2, 14), (64, 2, 14), (128, 2, 14), (128, 2, 14), (128, 2, 14))
+"""Of each step of the substitute: channels, stride, and pairs of a depthwise and a pointwise convolution."""
 
 
-def _stand_in_network() -> bytes:
+def _substitute_network() -> bytes:
     """An ONNX network that costs what the face mesh network costs: separable convolutions of (1, 3, 256, 256)."""
     rng = np.random.default_rng(0)
     nodes: list[NodeProto] = []
@@ -94,14 +94,14 @@ def _stand_in_network() -> bytes:
         return f"{name}.r"
 
     value, given = "image", 3
-    for channels, stride, pairs in STAND_IN_LAYERS:
+    for channels, stride, pairs in SUBSTITUTE_LAYERS:
         value, given = convolve(value, channels, given, 3, stride, 1 if given == 3 else given), channels
         for _ in range(pairs):
             value = convolve(value, channels, channels, 3, 1, channels)
             value = convolve(value, channels, channels, 1, 1, 1)
     graph = helper.make_graph(
         nodes,
-        "stand-in",
+        "substitute",
         [helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, 3, 256, 256])],
         [helper.make_tensor_value_info(value, TensorProto.FLOAT, None)],
         weights,
