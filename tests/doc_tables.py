@@ -14,6 +14,8 @@ from pathlib import Path
 
 import grimp
 
+from tests import recorded_cost
+
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PACKAGE = "relit_camera"
@@ -83,6 +85,7 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "imports-live": partial(_imports_text, f"{PACKAGE}.live"),
     "imports-capture": partial(_imports_text, f"{PACKAGE}.capture"),
     "plug-ins": _plug_ins_text,
+    **recorded_cost.TABLES,
 }
 
 

@@ -8,6 +8,7 @@ import pytest
 
 Row = tuple[str, ...]
 TABLES = {
+    "what a picture costs, in runs of a network like the face mesh": ("mode", "now", "recorded", "recorded at"),
     "faults survived": ("fault", "longest gap between frames", "lasted"),
     "readers of the virtual camera": ("reader", "v4l2loopback", "saw"),
 }

@@ -22,8 +22,8 @@ from relit_camera.devices.sinks.sink import NullSink
 from relit_camera.devices.sources.playback_source import PlaybackSource, TimedImage
 from relit_camera.devices.sources.source import Source, SourceInfo
 from relit_camera.face.face_state import FaceState, Tracker
-from relit_camera.lab.bench.live_benchmark import SyntheticTracker
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
+from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.subject import Subject

@@ -13,7 +13,8 @@ from pydantic import SecretStr
 
 from relit_camera.api.app import PANEL_FOLDER, create_app
 from relit_camera.api.middleware.token_authentication import SESSION_COOKIE
-from relit_camera.api.server.http_server import ApiServer, open_listener, start_api_server
+from relit_camera.api.server.http_server import ApiServer, start_api_server
+from relit_camera.api.server.listener import open_listener
 from relit_camera.base.config.settings import RelitSettings, ServerSettings
 from relit_camera.base.errors import ConfigError
 from tests.api.api_client import Client, check_problem

@@ -109,6 +109,50 @@ def test_viewers_of_one_variant_share_each_encoding(camera: FakeCamera, monkeypa
     assert all(len(same) == 1 for same in files.values())
 
 
+def test_encoding_takes_a_small_share_of_a_core(camera: FakeCamera, monkeypatch: pytest.MonkeyPatch) -> None:
+    encodings = []
+
+    def slow(picture: DisplayImage, variant: PreviewVariant) -> bytes:
+        end = time.thread_time() + 0.02
+        while time.thread_time() < end:
+            pass
+        encodings.append(variant)
+        return b"jpeg"
+
+    monkeypatch.setattr(module, "encode_preview", slow)
+
+    async def view() -> None:
+        feed = PreviewBroadcaster(camera)
+        with feed.subscribe(PreviewVariant()), feed.subscribe(PreviewVariant(width=160)):
+            await asyncio.sleep(2.0)
+
+    asyncio.run(view())
+    made_in_2_s = 2.0 * module.ENCODING_SHARE / 0.02
+    assert 2 <= len(encodings) <= made_in_2_s + 2 + 1  # the first of each stream comes at once
+
+
+def test_nothing_is_encoded_without_viewers(camera: FakeCamera, monkeypatch: pytest.MonkeyPatch) -> None:
+    encodings = []
+
+    def counted(picture: DisplayImage, variant: PreviewVariant) -> bytes:
+        encodings.append(variant)
+        return b"jpeg"
+
+    monkeypatch.setattr(module, "encode_preview", counted)
+
+    async def view_and_leave() -> int:
+        feed = PreviewBroadcaster(camera)
+        with feed.subscribe(PreviewVariant()) as channel:
+            await see(channel, 2)
+        await asyncio.sleep(0.1)  # what had begun ends
+        left = len(encodings)
+        await asyncio.sleep(0.5)
+        return left
+
+    left = asyncio.run(view_and_leave())
+    assert len(encodings) == left > 0
+
+
 def test_a_slow_viewer_skips_pictures_and_delays_nobody(camera: FakeCamera) -> None:
     async def view() -> tuple[list[int], list[int]]:
         feed = PreviewBroadcaster(camera)

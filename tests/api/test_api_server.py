@@ -15,7 +15,8 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
-from relit_camera.api.server.http_server import ApiServer, ServerAddress, open_listener, start_api_server
+from relit_camera.api.server.http_server import ApiServer, ServerAddress, start_api_server
+from relit_camera.api.server.listener import open_listener
 from relit_camera.base.config.settings import ServerSettings
 from relit_camera.base.errors import ConfigError, PortInUseError
 from tests.api.fake_camera import FakeCamera

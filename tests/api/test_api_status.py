@@ -27,7 +27,8 @@ def test_status_tells_everything(client: Client, camera: FakeCamera) -> None:
     assert status["fps"] == {"camera": 29.9, "pipeline": 29.8, "published": 30.0}
     assert status["latency_ms"] == {"p50": 31.0, "p95": 44.0}
     assert status["stage_ms"] == {"track": {"p50": 5.0, "p95": 7.5}}
-    assert status["frames"] == {"published": 900, "dropped": 3, "repeated": 4}
+    assert status["frames"] == {"published": 900, "dropped": 3, "repeated": 4, "composed": 899}
+    assert status["stage_processor_s"] == {"track": 7.5}
     assert status["providers"] == {"face_mesh": "CPUExecutionProvider"}
     assert status["degraded"][0]["cure"] == "install the GPU variant"
     assert status["degraded"][0]["code"] == "provider-fallback"
@@ -69,7 +70,9 @@ def test_metrics_are_what_the_status_says(client: Client, camera: FakeCamera) ->
     assert samples["relit_fps", "published"] == 30.0
     assert samples["relit_latency_seconds", "0.95"] == 0.044
     assert samples["relit_stage_seconds", "0.5", "track"] == 0.005
+    assert samples["relit_stage_processor_seconds_total", "track"] == 7.5
     assert samples["relit_frames_total", "dropped"] == 3
+    assert samples["relit_frames_total", "composed"] == 899
     assert samples["relit_state", "searching"] == 1
     assert samples["relit_state", "live"] == 0
     assert samples["relit_degraded",] == 0

@@ -19,8 +19,8 @@ from relit_camera.base.images.image_types import Frame
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.cli.main import run
 from relit_camera.face.tracking.track_recording import TrackRecorder
-from relit_camera.lab.bench.live_benchmark import SyntheticTracker
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
+from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import write_subject
 

@@ -18,8 +18,8 @@ from relit_camera.base.images.image_types import Alpha, Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.lab.bench.live_benchmark import SyntheticTracker
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
+from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask

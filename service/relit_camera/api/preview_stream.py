@@ -31,6 +31,10 @@ MAX_VIEWERS = 256
 """Viewers at a time: each is an open connection, and a process may usually have 1024 files open."""
 MAX_FRAMES_SENT_PER_S = 1000
 """Pictures a second to all viewers together: with more viewers each gets fewer, so that the camera keeps its cores."""
+ENCODING_SHARE = 0.05
+"""Of a core, for encoding for all viewers together: where that takes longer, they get fewer pictures."""
+COST_SMOOTHING = 0.9
+"""Share of the earlier ones in the mean of what an encoding costs."""
 FRAME_WAIT_S = 0.25
 """Wait for a picture this long before checking whether to end."""
 PREVIEW_JPEG_QUALITY = 82
@@ -64,6 +68,7 @@ class PreviewStream:
 
     Attributes:
         viewers: number of viewers.
+        encoding_s: processor time of making one picture, a mean of the last ones; 0 before the first.
         ended: whether `run` has ended: no more pictures come.
     """
 
@@ -76,6 +81,7 @@ class PreviewStream:
             fps: gives the pictures a second that may be made now; the variant's if not given.
         """
         self.viewers = 0
+        self.encoding_s = 0.0
         self.ended = False
         self._camera = camera
         self._variant = variant
@@ -112,7 +118,14 @@ class PreviewStream:
 
     def _make(self) -> EncodedFrame | None:
         published = self._camera.picture(self._newest.count, FRAME_WAIT_S)
-        return None if published is None else EncodedFrame(published[0], encode_preview(published[1], self._variant))
+        if published is None:
+            return None
+        began_s = time.thread_time()
+        made = EncodedFrame(published[0], encode_preview(published[1], self._variant))
+        took_s = time.thread_time() - began_s
+        earlier_s = self.encoding_s or took_s
+        self.encoding_s = COST_SMOOTHING * earlier_s + (1 - COST_SMOOTHING) * took_s
+        return made
 
     def _wake(self) -> None:
         self._frame_arrived.set()
@@ -156,9 +169,7 @@ class PreviewBroadcaster:
         if self._limiter is None:  # threads apart from those of the other operations
             self._limiter = CapacityLimiter(MAX_VARIANTS)
         if variant not in self._streams:
-            created = PreviewStream(
-                self._camera, variant, lambda: min(variant.fps, MAX_FRAMES_SENT_PER_S / max(1, self.viewers))
-            )
+            created = PreviewStream(self._camera, variant, lambda: self._fps(variant, created))
             self._streams[variant] = created, asyncio.get_running_loop().create_task(created.run(self._limiter))
         stream, task = self._streams[variant]
         stream.viewers += 1
@@ -169,6 +180,12 @@ class PreviewBroadcaster:
             if stream.viewers == 0:
                 del self._streams[variant]
                 task.cancel()
+
+    def _fps(self, variant: PreviewVariant, stream: PreviewStream) -> float:
+        """Pictures a second of a stream: those wanted, or fewer where sending or encoding would take too much."""
+        sent = MAX_FRAMES_SENT_PER_S / max(1, self.viewers)
+        share = ENCODING_SHARE / max(1, len(self._streams))
+        return min(variant.fps, sent, share / max(stream.encoding_s, 1e-6))
 
 
 def encode_preview(picture: DisplayImage, variant: PreviewVariant) -> bytes:

@@ -212,6 +212,7 @@ class CameraService:
             fps=Rates(self._loop.camera_rate.rate(), self._loop.pipeline_rate.rate(), self._publisher.fps),
             latency_ms=self._publisher.latency_ms,
             stage_ms=pipeline.timer.percentiles(),
+            stage_processor_s=pipeline.timer.processor_s(),
             frames=replace(counts, dropped=counts.dropped + self._loop.skipped + self._supervisor.dropped),
             providers={session.name: session.provider for session in sessions} | pipeline.providers,
             degraded=[*self._board.degradations(), *pipeline.troubles, *slower],

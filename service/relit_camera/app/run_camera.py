@@ -18,8 +18,7 @@ from pathlib import Path
 
 import typer
 
-from relit_camera.api.app import create_app
-from relit_camera.api.server.http_server import open_listener, start_api_server
+from relit_camera.api.server.listener import open_listener
 from relit_camera.app.camera_service import CameraService
 from relit_camera.app.config_reload import apply_edited_settings
 from relit_camera.app.startup_checks import check_before_devices
@@ -109,6 +108,10 @@ def run_camera(
         cleanup.push(partial(_exit_if_threads_hang, camera_service))
         cleanup.callback(camera_service.stop)
         camera_service.start()
+        # The web framework is loaded while the first picture is made.
+        from relit_camera.api.app import create_app
+        from relit_camera.api.server.http_server import start_api_server
+
         server = start_api_server(create_app(camera_service, settings), settings.server, listener=listener)
         cleanup.callback(server.stop)
         freeze_gc()

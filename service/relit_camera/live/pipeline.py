@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+from relit_camera.base.concurrency.threads import return_freed_memory
 from relit_camera.base.config.look import Mode
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import Frame
@@ -205,4 +206,5 @@ class Pipeline:
             timer=self.timer,
         )
         self._active = _ActiveMode(subject, name, relighter, self._modes[name](context))
+        return_freed_memory()  # what opening models and unpacking the subject took for a moment
         return self._active.mode

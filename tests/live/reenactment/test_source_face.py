@@ -13,7 +13,7 @@ from relit_camera.base.images.image_types import Frame
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.tracking.track_recording import RecordedTracker, TrackRecorder
 from relit_camera.face.tracking.trackers import TrackerOptions
-from relit_camera.lab.bench.live_benchmark import SyntheticTracker
+from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.live.reenactment.source_image import find_source_face
 from tests.live.people import LIVE_NEUTRAL, SCHEME, Blind, person
 

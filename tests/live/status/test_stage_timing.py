@@ -1,4 +1,5 @@
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -35,6 +36,33 @@ def test_stages_are_timed_apart_and_kept_in_order() -> None:
     timer.add("relight", 0.001)
     assert timer.lap_ms() == {"relight": 1.0}  # a stage that did not run again is left out
     assert timer.lap_ms() == {}
+
+
+def burn(seconds: float) -> None:
+    end = time.thread_time() + seconds
+    while time.thread_time() < end:
+        pass
+
+
+def test_processor_time_is_that_of_the_stage_alone() -> None:
+    timer = StageTimer()
+    with timer.stage("compose"):
+        burn(0.02)
+        time.sleep(0.1)  # is no processor time
+        with timer.stage("matte"):
+            burn(0.04)
+    with timer.stage("matte"):
+        burn(0.01)
+    assert timer.processor_s() == pytest.approx({"compose": 0.02, "matte": 0.05}, abs=0.005)
+
+
+def test_processor_time_of_other_threads_is_theirs() -> None:
+    timer = StageTimer()
+    with timer.stage("light"):
+        other = threading.Thread(target=burn, args=(0.05,))
+        other.start()
+        other.join()
+    assert timer.processor_s()["light"] < 0.02
 
 
 def test_a_stage_that_raises_is_not_counted() -> None:

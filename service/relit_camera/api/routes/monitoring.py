@@ -70,6 +70,11 @@ class _StatusCollector:
                 stages.add_metric([stage, quantile], seconds)
         yield stages
 
+        used = CounterMetricFamily("relit_stage_processor_seconds", "Processor time of each stage", labels=["stage"])
+        for stage, seconds in status.stage_processor_s.items():
+            used.add_metric([stage], seconds)
+        yield used
+
         tracker = GaugeMetricFamily(
             "relit_tracker_state", "1 for the tracker's present state", labels=["name", "state"]
         )

@@ -18,9 +18,6 @@ READ_TIMEOUT_S = 10.0
 """A client that has not sent a complete request, the first or a further one, is disconnected after this long. A body
 may take as long for each `MIN_BODY_BYTES_PER_TIMEOUT`."""
 MIN_BODY_BYTES_PER_TIMEOUT = 16 << 10
-SEND_BUFFER_BYTES = 256 << 10
-"""Bytes that the system buffers for a client: enough for a picture or two. By itself it would buffer some megabytes
-for each client that does not read, and show slow clients pictures that are seconds old."""
 
 
 class AwaitedInput(Enum):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import errno
-import os
 import socket
 import threading
 import time
@@ -16,15 +14,14 @@ from fastapi import FastAPI
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from relit_camera.api.problem_details import problem_response_from
-from relit_camera.api.server.connection_timeouts import SEND_BUFFER_BYTES, TimeoutHttpProtocol
-from relit_camera.base.config.access_token import read_token
+from relit_camera.api.server.connection_timeouts import TimeoutHttpProtocol
+from relit_camera.api.server.listener import open_listener
 from relit_camera.base.config.settings import ServerSettings
-from relit_camera.base.errors import ConfigError, NotReadyError, PortInUseError, RelitError
+from relit_camera.base.errors import NotReadyError, RelitError
 
 START_TIMEOUT_S = 10.0
 SHUTDOWN_GRACE_S = 1
 """When the server stops, answers may take this long to end before they are aborted."""
-LISTEN_BACKLOG = 128
 
 
 @dataclass(frozen=True)
@@ -116,39 +113,6 @@ class _ShutdownResponder:
                 await problem_response_from(NotReadyError("the camera is stopping", "start it again"))(
                     scope, receive, send
                 )
-
-
-def open_listener(settings: ServerSettings) -> socket.socket:
-    """Bind the address, so that no other program can; `start_api_server` answers on it. Port 0 takes any free one.
-
-    Raises:
-        PortInUseError: another program listens there.
-        ConfigError: the address does not exist on this machine, the port needs rights, or the address can be reached
-            from other machines and there is no token (`read_token`).
-    """
-    read_token(settings)
-    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
-    where = f"port {settings.port} on {settings.host}"
-    try:
-        listener = socket.create_server((settings.host, settings.port), family=family, backlog=LISTEN_BACKLOG)
-        listener.setsockopt(
-            socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES
-        )  # of the connections that it accepts
-        return listener
-    except OSError as error:
-        if error.errno == errno.EADDRINUSE:
-            cure = (
-                "another program listens there (an open Relit Camera?): end it, or choose another with --port; "
-                + _FREE_PORT_HINT
-            )
-            raise PortInUseError(f"{where} is in use", cure) from error
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        raise ConfigError(
-            f"{where} cannot be used: {reason}", f"choose another with --host and --port; {_FREE_PORT_HINT}"
-        ) from error
-
-
-_FREE_PORT_HINT = "--port 0 picks a free one"
 
 
 def start_api_server(app: FastAPI, settings: ServerSettings, listener: socket.socket | None = None) -> ApiServer:

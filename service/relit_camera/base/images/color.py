@@ -15,9 +15,10 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 """Rec. 709 luminance weights of linear R, G, B."""
 
 CHROMA_MATRIX = np.array(
-    [[-37.797, -74.203, 112.0, 128 * 255], [112.0, -93.786, -18.214, 128 * 255]], dtype=np.float32
+    [[-37.797, -74.203, 112.0, 128 * 255], [112.0, -93.786, -18.214, 128 * 255], [0, 0, 0, 0]], dtype=np.float32
 ) / np.float32(255)
-"""U and V of R, G, B from 0 to 255 (ITU-R BT.601, limited range)."""
+"""U, V and 0 of R, G, B from 0 to 255 (ITU-R BT.601, limited range). The third row is for `cv2.transform`, which takes
+a tenth of the time for three channels of three."""
 
 Gamma = str | float
 """Transfer curve of a picture's code values: "srgb", "linear", or the exponent of a power law."""
@@ -157,5 +158,6 @@ def rgb_to_i420(image: DisplayImage) -> NDArray[np.uint8]:
     planes: NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_RGB2YUV_I420).reshape(-1)
     half = cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
     chroma = cv2.transform(half, CHROMA_MATRIX)
-    planes[height * width :].reshape(2, height // 2, width // 2)[:] = chroma.transpose(2, 0, 1)
+    for channel, plane in enumerate(planes[height * width :].reshape(2, height // 2, width // 2)):
+        cv2.extractChannel(chroma, channel, plane)
     return planes

@@ -29,18 +29,11 @@ def demo(
     from relit_camera.app.demo.tour import DemoRunner, tour_at
     from relit_camera.app.run_camera import run_camera
     from relit_camera.base.config.settings import OutputSettings
-    from relit_camera.base.errors import DeviceError, ModelError
-    from relit_camera.base.models.model_store import model_path
+    from relit_camera.base.errors import DeviceError
     from relit_camera.cli.arguments import load_command_settings
     from relit_camera.devices.sinks.sink import NullSink, Sink
     from relit_camera.devices.sinks.sink_factory import open_sink
     from relit_camera.live.status.camera_status import CameraState
-
-    def installed(*models: str) -> bool:
-        try:
-            return all(model_path(name) for name in models)
-        except ModelError:
-            return False
 
     def camera_or_nothing(output: OutputSettings) -> Sink:
         try:
@@ -49,8 +42,7 @@ def demo(
             typer.echo(f"No virtual camera, so the page alone shows it: {error.what} (relit doctor tells the cure)")
             return NullSink((output.width, output.height))
 
-    tracker = "mesh" if installed("face_mesh", "face_detector_yunet") else f"recorded:{demo_files.TRACK}"
-    matte = "selfie" if installed("selfie_landscape", "selfie_square") else f"recorded:{demo_files.MATTES}"
+    tracker = demo_files.tracker_of_clip()
     if tracker != "mesh":
         typer.echo("No public models (relit models pull gets them): the clip's own record tells where the face is")
     settings = load_command_settings(
@@ -58,7 +50,7 @@ def demo(
         source={"source": str(demo_files.CLIP)},
         subject=str(demo_files.SUBJECT),
         tracker={"name": tracker},
-        matte=matte,
+        matte=demo_files.matte_of_clip(),
         server={"host": host, "port": port},
     )
     _, look = tour_at(0.0)

@@ -1,1 +1,1 @@
-"""Benchmarks: relighting (thesis, Tables 6.1 and 6.2) and each stage of the live pipeline."""
+"""Benchmarks: what a picture of the running camera costs, and relighting (thesis, Tables 6.1 and 6.2)."""

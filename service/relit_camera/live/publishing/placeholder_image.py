@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_files import read_display
@@ -48,25 +48,34 @@ def _draw(size: tuple[int, int], reason: str) -> DisplayImage:
     width, height = size
     unit = min(width * 9 / 16, height)
     middle = height * 0.40
-    canvas = uint8_from_linear(_ball(width, height, (width / 2, middle), unit * 0.13))
+    canvas = _ball(width, height, (width / 2, middle), unit * 0.13).copy()
     _write(canvas, TITLE, middle + unit * 0.255, unit * 0.052, TITLE_COLOR)
     _write(canvas, reason.encode("ascii", "replace").decode(), middle + unit * 0.345, unit * 0.028, REASON_COLOR)
     return canvas
 
 
-def _ball(width: int, height: int, center: tuple[float, float], radius: float) -> NDArray[np.float32]:
-    x = ((np.arange(width, dtype=np.float32) + 0.5 - center[0]) / radius)[None, :]
-    y = ((center[1] - np.arange(height, dtype=np.float32) - 0.5) / radius)[:, None]
-    squared = x**2 + y**2
-    image = BACKGROUND_COLOR + 0.035 * np.exp(squared / -9)[..., None] * KEY_COLOR
-    rows, columns = np.nonzero(squared < (1 + 1 / radius) ** 2)
-    squared = squared[rows, columns]
-    normals = np.stack([x[0, columns], y[rows, 0], np.sqrt(np.maximum(1 - squared, 0))], axis=-1)
-    key = np.maximum(normals @ (KEY_DIRECTION / np.linalg.norm(KEY_DIRECTION)), 0)[:, None] * KEY_COLOR
-    rim = np.maximum(normals @ (RIM_DIRECTION / np.linalg.norm(RIM_DIRECTION)), 0)[:, None] * RIM_COLOR
-    covered = np.clip((1 - np.sqrt(squared)) * radius + 0.5, 0, 1)[:, None]
-    image[rows, columns] += covered * (0.006 + 0.62 * key + 1.2 * rim - image[rows, columns])
-    return np.asarray(image, np.float32)
+@lru_cache(maxsize=1)
+def _ball(width: int, height: int, center: tuple[float, float], radius: float) -> DisplayImage:
+    """The picture without text; kept, for the camera draws several placeholders of one size."""
+    x = (np.arange(width, dtype=np.float32) + np.float32(0.5 - center[0])) / np.float32(radius)
+    y = (np.float32(center[1] - 0.5) - np.arange(height, dtype=np.float32)) / np.float32(radius)
+    glow = np.float32(0.035) * np.outer(np.exp(y**2 / -9), np.exp(x**2 / -9))
+    image = np.empty((height, width, 3), np.uint8)
+    for channel, (background, key) in enumerate(zip(BACKGROUND_COLOR, KEY_COLOR, strict=True)):
+        image[..., channel] = uint8_from_linear(background + glow * key)
+    # The ball's own square: one pixel more than its diameter.
+    columns, rows = (slice(*np.searchsorted(np.sort(axis), (-1 - 1 / radius, 1 + 1 / radius))) for axis in (x, y))
+    rows = slice(height - rows.stop, height - rows.start)  # y falls
+    x, y = x[columns], y[rows]
+    squared = x[None, :] ** 2 + y[:, None] ** 2
+    normals = np.stack([*np.broadcast_arrays(x[None, :], y[:, None]), np.sqrt(np.maximum(1 - squared, 0))], axis=-1)
+    key_light = np.maximum(normals @ (KEY_DIRECTION / np.linalg.norm(KEY_DIRECTION)), 0)[..., None] * KEY_COLOR
+    rim_light = np.maximum(normals @ (RIM_DIRECTION / np.linalg.norm(RIM_DIRECTION)), 0)[..., None] * RIM_COLOR
+    covered = np.clip((1 - np.sqrt(squared)) * radius + 0.5, 0, 1)[..., None]
+    behind = BACKGROUND_COLOR + glow[rows, columns, None] * KEY_COLOR
+    ball = behind + covered * (0.006 + 0.62 * key_light + 1.2 * rim_light - behind)
+    image[rows, columns] = uint8_from_linear(ball.astype(np.float32))
+    return image
 
 
 def _write(canvas: DisplayImage, text: str, baseline: float, cap_height: float, ink: tuple[int, int, int]) -> None:

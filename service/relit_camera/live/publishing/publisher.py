@@ -135,8 +135,9 @@ class Publisher:
 
     @property
     def counts(self) -> FrameCounts:
-        """Pictures written, pictures dropped for newer ones, and repetitions among those written."""
-        return FrameCounts(self._published, self._newest.dropped + self._overtaken, self._repeated)
+        """Pictures written, pictures dropped for newer ones, repetitions among those written, and pictures put in."""
+        dropped = self._newest.dropped + self._overtaken
+        return FrameCounts(self._published, dropped, self._repeated, self.pictures.count)
 
     @property
     def fps(self) -> float:

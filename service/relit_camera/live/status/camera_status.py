@@ -81,11 +81,19 @@ class Percentiles:
 
 @dataclass(frozen=True)
 class FrameCounts:
-    """Since the start: pictures sent, frames passed over for newer ones, pictures sent again for want of a new one."""
+    """Counts since the start.
+
+    Attributes:
+        published: pictures sent.
+        dropped: frames passed over for newer ones.
+        repeated: pictures sent again for want of a new one; counted in `published` too.
+        composed: pictures made, sent or not.
+    """
 
     published: int
     dropped: int
     repeated: int
+    composed: int = 0
 
 
 @dataclass(frozen=True)
@@ -102,7 +110,10 @@ class CameraStatus:
     latency_ms: Percentiles
     """From a frame's arrival to its publication."""
     stage_ms: dict[str, Percentiles]
+    """How long each stage takes."""
     frames: FrameCounts
+    stage_processor_s: dict[str, float] = field(default_factory=dict)
+    """Processor time that each stage has used since the start, without that of stages within it."""
     providers: dict[str, str] = field(default_factory=dict)
     """Name of each open model → the execution provider that is proven to run it, such as `cpu`; and `relighter NAME`,
     the relighter at work → `numpy` or such a provider."""

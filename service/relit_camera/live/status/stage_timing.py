@@ -52,17 +52,24 @@ class StageTimer:
         self._windows: dict[str, DurationWindow] = {}
         self._latest: dict[str, float] = {}
         self._running: list[str] = []
+        self._processor_s: dict[str, float] = {}
+        self._within = threading.local()
         self._lock = threading.Lock()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Time the body of a with-statement; a body that raises is not counted."""
-        start = self._now()
+        """Time the body of a with-statement; of one that raises only the processor time is counted."""
+        start, processor_start = self._now(), time.thread_time()
+        around_s, self._within.seconds = getattr(self._within, "seconds", 0.0), 0.0
         self._running.append(name)
         try:
             yield
         finally:
             self._running.remove(name)
+            used_s = time.thread_time() - processor_start
+            own_s, self._within.seconds = used_s - self._within.seconds, around_s + used_s
+            with self._lock:
+                self._processor_s[name] = self._processor_s.get(name, 0.0) + own_s
         self.add(name, self._now() - start)
 
     def running(self) -> list[str]:
@@ -75,6 +82,11 @@ class StageTimer:
             window = self._windows.setdefault(name, DurationWindow(self._length))
             self._latest[name] = seconds * 1e3
         window.add(seconds)
+
+    def processor_s(self) -> dict[str, float]:
+        """Processor seconds that each stage has used in its thread so far, without those of stages within it."""
+        with self._lock:
+            return dict(self._processor_s)
 
     def percentiles(self) -> dict[str, Percentiles]:
         """Median and 95th percentile of every stage in milliseconds, in the order the stages were first timed."""

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from importlib.metadata import PackageNotFoundError
-from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from relit_camera.base.config.look import Look
-from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings, StorageSettings
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.base.rotations import angles_from_rotation
-from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_camera.lab.bench.live_benchmark import SyntheticTracker, benchmark_live
 from relit_camera.lab.bench.machine_info import machine_info
 from relit_camera.lab.bench.relighting_benchmark import benchmark_gpu_transfer, benchmark_relighting, median_ms
 from relit_camera.lab.bench.synthetic_subject import LIGHT_COUNT, synthetic_subject
-from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 
 
 def test_relighting_is_compared_in_one_run() -> None:
@@ -73,19 +68,3 @@ def test_the_machine_is_named() -> None:
     # With a GPU the module comes from another package.
     with patch("importlib.metadata.version", side_effect=PackageNotFoundError("onnxruntime")):
         assert machine_info()["onnxruntime"]
-
-
-def test_every_live_stage_has_both_figures(tmp_path: Path) -> None:
-    settings = RelitSettings(
-        source=SourceSettings(source="pattern", width=128, height=96),
-        output=OutputSettings(sink="null", width=128, height=96),
-        storage=StorageSettings(data_dir=tmp_path),
-    )
-    scene_controller = SceneController(settings.storage)
-    scene_controller.show_subject("bench", synthetic_subject(48, 48))
-    scene_controller.set_look(Look())
-    result = benchmark_live(settings, scene_controller, open_source(settings.source), SyntheticTracker(), 0.5)
-    assert {"track", "light", "relight", "move", "compose", "capture_to_publish"} <= result["live"].keys()
-    for stage in result["live"].values():
-        assert 0 < stage["p50_ms"] <= stage["p95_ms"]  # type: ignore[index]
-    assert result["live_run"]["degraded"] == []

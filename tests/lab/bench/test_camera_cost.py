@@ -1,0 +1,180 @@
+"""The benchmark of the running camera measures what it says, on a small one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from relit_camera.base.config.look import BlurBackground, Mode, NoBackground
+from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.errors import ModelError, RelitError
+from relit_camera.base.models.model_store import model_path
+from relit_camera.base.video.video_readers import VideoReader, probe_video
+from relit_camera.base.video.video_writer import VideoWriter
+from relit_camera.lab.bench.bench_source import MAX_FRAMES, prepare_video
+from relit_camera.lab.bench.camera_cost import CameraCost, StageCost, measure_cameras
+from relit_camera.lab.bench.camera_process import CameraProcess
+from relit_camera.lab.bench.cost_text import cost_text
+from relit_camera.lab.bench.mesh_run import MeshRun
+from tests.cli.relit_command import CLIP_FPS, CLIP_SIZE, Material, call, write_material
+
+SECONDS = 2.0
+
+
+@pytest.fixture(scope="module")
+def material(tmp_path_factory: pytest.TempPathFactory) -> Material:
+    return write_material(tmp_path_factory.mktemp("bench"))
+
+
+def settings_of(material: Material, tmp_path: Path) -> RelitSettings:
+    return RelitSettings.model_validate(
+        {
+            "source": {"source": str(material.clip)},
+            "subject": str(material.subject),
+            "tracker": {"name": material.tracker},
+            "storage": {"data_dir": str(tmp_path)},
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def cost(material: Material, tmp_path_factory: pytest.TempPathFactory) -> CameraCost:
+    settings = settings_of(material, tmp_path_factory.mktemp("data"))
+    (only,) = measure_cameras(settings, [CLIP_SIZE], [Mode.REENACT], [NoBackground()], None, SECONDS)
+    return only
+
+
+@pytest.mark.slow
+@pytest.mark.real_time
+def test_the_process_costs_what_its_threads_cost(cost: CameraCost) -> None:
+    assert 0.5 * SECONDS * CLIP_FPS < cost.composed + cost.dropped < 1.5 * SECONDS * CLIP_FPS
+    assert {"track", "light", "relight", "follow", "move", "compose"} <= cost.stages.keys()
+    in_stages = sum(stage.processor_ms for stage in cost.stages.values())
+    assert cost.outside_ms == pytest.approx(cost.processor_ms - in_stages)
+    assert cost.outside_ms > 0
+    # The kernel counts a process and each of its threads; the stages are timed within the threads.
+    assert sum(cost.threads_ms.values()) == pytest.approx(cost.processor_ms, rel=0.2)
+    of_first_half = sum(cost.stages[name].processor_ms for name in ("track", "light", "relight"))
+    assert cost.threads_ms["pipeline"] > 0.7 * of_first_half
+    assert cost.mesh_runs == pytest.approx(cost.processor_ms / cost.mesh_run_ms)
+    assert cost.degraded == []
+
+
+@pytest.mark.slow
+@pytest.mark.real_time
+def test_every_stage_has_both_times(cost: CameraCost) -> None:
+    for stage in cost.stages.values():
+        assert 0 < stage.p50_ms <= stage.p95_ms
+    assert 0 < cost.latency_p50_ms <= cost.latency_p95_ms
+    assert 50 < cost.resident_mb < 2000
+    assert cost.first_picture_s > 0.2
+    assert json.loads(json.dumps(cost.as_json()))["stages"]["track"]["processor_ms"] > 0
+
+
+def test_a_camera_that_cannot_run_says_why(material: Material, tmp_path: Path) -> None:
+    settings = settings_of(material, tmp_path).model_copy(update={"subject": str(tmp_path / "none.relit")})
+    with pytest.raises(RelitError, match=r"none\.relit"):
+        CameraProcess(settings)
+
+
+COST = CameraCost(
+    mode="ratio",
+    background="blur",
+    tracker="mesh",
+    size=(1280, 720),
+    source_fps=30.0,
+    composed=270,
+    dropped=30,
+    processor_ms=20.0,
+    mesh_runs=4.0,
+    mesh_run_ms=5.0,
+    mesh_network="face_mesh",
+    stages={"track": StageCost(7.5, 1.5, 8.0, 9.5)},
+    outside_ms=12.5,
+    threads_ms={"pipeline": 7.5, "camera": 0.001},
+    latency_p50_ms=33.0,
+    latency_p95_ms=41.0,
+    resident_mb=290.0,
+    first_picture_s=2.31,
+    degraded=["matte: is slow"],
+)
+
+
+def test_the_text_says_the_figures() -> None:
+    lines = cost_text(COST).splitlines()
+    cells = {line[2:22].strip(): line[22:].split() for line in lines}
+    assert lines[0] == "ratio, background blur, 1280x720, tracker mesh"
+    assert cells["track"] == ["7.50", "1.50", "8.0", "9.5"]
+    assert cells["outside the stages"] == ["12.50", "2.50"]
+    assert cells["whole process"] == ["20.00", "4.00"]
+    assert cells["capture to publish"] == ["33.0", "41.0"]
+    text = "\n".join(lines)
+    assert "threads, in mesh runs: pipeline 1.50\n" in text
+    assert "30 dropped (10 %)" in text
+    assert "290 MB; first picture 2.3 s" in text
+    assert "degraded: matte: is slow" in text
+    assert "none dropped" in cost_text(replace(COST, dropped=0))
+
+
+def test_the_source_has_the_size_and_rate_of_the_camera(tmp_path: Path) -> None:
+    video = tmp_path / "film.mp4"
+    with VideoWriter(video, (128, 96), 30.0) as writer:
+        for index in range(MAX_FRAMES + 5):
+            writer.write(np.full((96, 128, 3), index % 200 + 20, np.uint8))
+    assert prepare_video(video, tmp_path, (128, 96), None) == (video, 30.0)
+    assert prepare_video(video, tmp_path, None, None) == (video, 30.0)
+    copy, fps = prepare_video(video, tmp_path, (256, 144), 10.0)
+    info = probe_video(copy)
+    assert (info.width, info.height, info.fps, fps, info.frames) == (256, 144, 10.0, 10.0, MAX_FRAMES)
+    with VideoReader(copy) as reader:
+        frames = [frame for frame in reader if frame.index in (0, 100)]
+    assert [round(frame.image.mean()) for frame in frames] == pytest.approx([20, 120], abs=3)
+    assert frames[1].time_s == pytest.approx(10.0)
+    uncut, _ = prepare_video(video, tmp_path, None, 15.0)  # a recorded track belongs to all of it
+    assert probe_video(uncut).frames == MAX_FRAMES + 5
+
+
+def test_a_mesh_run_is_the_median_of_those_that_count() -> None:
+    mesh = MeshRun()
+    mesh.sample()
+    first = mesh.ms
+    mesh.sample()
+    assert mesh.runs == 12
+    assert mesh.ms == pytest.approx(first, rel=1.0)
+
+
+@pytest.mark.real_time
+def test_the_substitute_takes_as_long_as_the_face_mesh() -> None:
+    try:
+        model_path("face_mesh")
+    except ModelError as error:
+        pytest.skip(str(error))
+    mesh, other = MeshRun(), MeshRun(substitute=True)
+    assert (mesh.network, other.network) == ("face_mesh", "substitute")
+    for _ in range(4):
+        mesh.sample()
+        other.sample()
+    assert other.ms == pytest.approx(mesh.ms, rel=0.3)
+
+
+def test_bench_measures_each_combination(monkeypatch: pytest.MonkeyPatch, material: Material) -> None:
+    asked = []
+
+    def measure(settings: RelitSettings, fps: float, seconds: float, mesh: MeshRun) -> CameraCost:
+        asked.append((settings.output.width, settings.look.mode, settings.look.background, fps, seconds))
+        return COST
+
+    monkeypatch.setattr("relit_camera.lab.bench.camera_cost.measure_camera", measure)
+    answer = call(
+        *("bench", "--json", "--no-relighting", "--seconds", "3", "--source-fps", "12", "--size", "128x96"),
+        *("--video", material.clip, "--tracker", material.tracker, "--subject", material.subject),
+    )
+    assert answer.code == 0, answer.err
+    assert json.loads(answer.out)["camera"] == [COST.as_json()] * 4
+    none, blur = NoBackground(), BlurBackground()
+    assert asked == [(128, mode, background, 12.0, 3.0) for mode in Mode for background in (none, blur)]
+    assert "4.00" in call("bench", "--no-relighting", "--mode", "ratio", "--background", "none").out

@@ -1,0 +1,25 @@
+"""What a picture costs now, beside the last record; more than twice as much fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.recorded_cost import measure_short, recorded
+
+MOST = 2.0
+"""Times the record. Less tells nothing on a machine that others use too: it is printed, and people judge it."""
+
+
+@pytest.mark.slow
+@pytest.mark.real_time
+def test_a_picture_costs_about_what_it_did(note_row: Callable[[str, tuple[str, ...]], None], tmp_path: Path) -> None:
+    record = recorded()
+    before = {cost["mode"]: cost["mesh_runs"] for cost in record["short"]}
+    for cost in measure_short(tmp_path):
+        figures = (f"{cost.mesh_runs:.1f}", f"{before[cost.mode]:.1f}", f"{record['commit']}, {record['date']}")
+        note_row("what a picture costs, in runs of a network like the face mesh", (cost.mode, *figures))
+        assert cost.degraded == []
+        assert cost.mesh_runs < MOST * before[cost.mode]
