@@ -1,4 +1,4 @@
-"""The layout of `service/relit_camera`: few entries in a folder, short modules, standard names that occur once."""
+"""The layout of both packages: few entries in a folder, short modules, standard names that occur once in a package."""
 
 from __future__ import annotations
 
@@ -8,13 +8,17 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[1] / "service" / "relit_camera"
+SERVICE = Path(__file__).resolve().parents[1] / "service"
+PACKAGES = (SERVICE / "relit_camera", SERVICE / "relit_studio")
 MAX_ENTRIES = 12
 MAX_LINES = 400
-ONE_A_COMMAND = {"cli/commands"}
+ONE_A_COMMAND = {"relit_camera/cli/commands"}
 """Folders that hold one module for each command line command, however many there are."""
 SHARED_NAMES = {"__init__", "__main__", "main"}
-SAME_WORD = {"subject": {"subject/subject.py", "cli/commands/subject.py"}}
+SAME_WORD = {
+    "subject": {"relit_camera/subject/subject.py", "relit_camera/cli/commands/subject.py"},
+    "person": {"relit_studio/people/person.py", "relit_studio/commands/person.py"},
+}
 """Modules of the same name that are both rightly called so: a command and what it is about."""
 
 OLD_CLASSES = frozenset(
@@ -33,7 +37,7 @@ OLD_NAMES = frozenset(
 
 
 def modules() -> list[Path]:
-    return sorted(PACKAGE.rglob("*.py"))
+    return sorted(path for package in PACKAGES for path in package.rglob("*.py"))
 
 
 def folders() -> list[Path]:
@@ -41,7 +45,7 @@ def folders() -> list[Path]:
 
 
 def name_of(path: Path) -> str:
-    return path.relative_to(PACKAGE).as_posix()
+    return path.relative_to(SERVICE).as_posix()
 
 
 def entries(folder: Path) -> list[str]:
@@ -49,7 +53,7 @@ def entries(folder: Path) -> list[str]:
     return sorted(
         path.name
         for path in folder.iterdir()
-        if path != PACKAGE / "plugins.py"  # not a topic: what plug-ins import, from everywhere
+        if path != SERVICE / "relit_camera/plugins.py"  # not a topic: what plug-ins import, from everywhere
         if (path.suffix == ".py" and path.name != "__init__.py") or (path / "__init__.py").exists()
     )
 
@@ -86,11 +90,12 @@ def test_a_module_is_short() -> None:
 
 
 def test_a_module_s_name_occurs_once() -> None:
-    by_name: dict[str, set[str]] = {}
+    by_name: dict[tuple[Path, str], set[str]] = {}
     for path in modules():
         if path.stem not in SHARED_NAMES:
-            by_name.setdefault(path.stem, set()).add(name_of(path))
-    assert {name: paths for name, paths in by_name.items() if len(paths) > 1 and paths != SAME_WORD.get(name)} == {}
+            package = next(package for package in PACKAGES if package in path.parents)
+            by_name.setdefault((package, path.stem), set()).add(name_of(path))
+    assert [paths for (_, name), paths in by_name.items() if len(paths) > 1 and paths != SAME_WORD.get(name)] == []
 
 
 @pytest.mark.parametrize("path", modules(), ids=name_of)

@@ -6,6 +6,7 @@ import inspect
 import pkgutil
 import re
 import subprocess
+import tomllib
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import get_args
@@ -111,6 +112,13 @@ def test_the_readme_begins_with_targets_that_the_makefile_has() -> None:
     named = re.findall(r"^\s*make ([a-z-]+)", (ROOT / "README.md").read_text(), re.MULTILINE)
     assert named[:2] == ["demo", "test"]
     assert set(named) <= targets
+
+
+def test_every_module_with_settings_of_its_own_for_mypy_exists() -> None:
+    overrides = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["mypy"]["overrides"]
+    named = [name for override in overrides for name in override["module"] if name.startswith(("tests.", "scripts."))]
+    exact = [name for name in named if not name.endswith(".*")]
+    assert [name for name in exact if not (ROOT / name.replace(".", "/")).with_suffix(".py").is_file()] == []
 
 
 def test_no_file_is_large() -> None:

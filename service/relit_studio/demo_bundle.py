@@ -21,10 +21,10 @@ from relit_camera.face.tracking.track_recording import read_track
 from relit_camera.live.compositing.matting import write_mattes
 from relit_camera.subject.compression.webp_packing import pack_subject
 from relit_camera.subject.subject_file import write_subject
+from relit_studio.base.progress import Progress, no_progress
 from relit_studio.cycles.exr import read_rgba
-from relit_studio.progress import Progress, no_progress
 
-_MOST_BYTES = {demo_files.SUBJECT.name: 8_000_000, demo_files.CLIP.name: 4_000_000}
+MAX_BYTES = {demo_files.SUBJECT.name: 8_000_000, demo_files.CLIP.name: 4_000_000}
 _MATTE_SHRINK = 2
 
 
@@ -49,10 +49,10 @@ def make_bundle(field: Path, clip: Path, out: Path, components: int, progress: P
     with TemporaryDirectory(prefix=".bundle.", dir=out) as name:
         made = _write(field, clip, frames, Path(name), components, progress)
         for path in made:
-            most = _MOST_BYTES.get(path.name)
-            if most and path.stat().st_size > most:
+            max_bytes = MAX_BYTES.get(path.name)
+            if max_bytes and path.stat().st_size > max_bytes:
                 raise InputError(
-                    f"{path.name} would have {path.stat().st_size / 1e6:.1f} MB; the demo's may have {most / 1e6:.0f}",
+                    f"{path.name} would have {path.stat().st_size / 1e6:.1f} MB; it may have {max_bytes / 1e6:.0f}",
                     "keep fewer components, or render smaller pictures",
                 )
         return [path.replace(out / path.name) for path in made]

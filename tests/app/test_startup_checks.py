@@ -6,17 +6,26 @@ import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from relit_camera.app.run_camera import run_camera
+from relit_camera.app.startup_checks import check_before_devices
+from relit_camera.app.wiring import make_pipeline
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
-from relit_camera.base.errors import DeviceError, RelitError
+from relit_camera.base.errors import ConfigError, DeviceError, RelitError
+from relit_camera.devices.on_demand import on_demand_source
 from relit_camera.devices.sinks.sink import Sink
 from relit_camera.devices.sources.source import Source
+from relit_camera.live.compositing import matting
 from tests.cli.relit_command import Material, write_material
-from tests.small_camera import memory_source
+from tests.small_camera import SteadyTracker, memory_source
+
+PLUGINS = Path(__file__).parents[1] / "plugins"
+"""Where the example package is, some plug-ins of which fail."""
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +86,15 @@ def test_sound_settings_reach_the_devices(material: Material, tmp_path: Path) ->
         ({"tracker": {"name": "magic"}}, "no tracker .*'magic'"),
         ({"relight": {"name": "magic"}}, "no relighter .*'magic'"),
         ({"reenact": {"name": "magic"}}, "no reenactor .*'magic'"),
+        ({"relight": {"name": "basis:3"}}, "relighter basis takes no argument, and got '3'; name it 'basis'"),
+        ({"reenact": {"name": "first-order:7"}}, "reenactor first-order takes no argument, and got '7'"),
+        ({"relight": {"name": "broken"}}, "relighter 'broken' of the package relit-example-plugin cannot be loaded"),
+        ({"reenact": {"name": "broken"}}, "reenactor 'broken' of the package relit-example-plugin cannot be loaded"),
+        ({"tracker": {"name": "raising"}}, "tracker 'raising' of the package relit-example-plugin cannot be opened"),
+        (
+            {"inference": {"provider": "openvino", "strict": True}, "relight": {"name": "onnx-basis"}},
+            "cannot run on openvino: the installed ONNX Runtime was built without it; `relit doctor` says how",
+        ),
         ({"tracker": {"name": "recorded:none.json"}}, r"none\.json"),
         ({"reenact": {"name": "onnx:none.onnx"}}, r"none\.onnx does not exist"),
         ({"reenact": {"model": "none.onnx"}}, r"none\.onnx does not exist"),
@@ -88,12 +106,43 @@ def test_sound_settings_reach_the_devices(material: Material, tmp_path: Path) ->
     ],
 )
 def test_faults_are_found_before_a_device_is_opened(
-    changes: dict[str, Any], words: str, material: Material, tmp_path: Path
+    changes: dict[str, Any], words: str, material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.syspath_prepend(PLUGINS)
     devices = Devices()
     with pytest.raises(RelitError, match=words):
         run(material, tmp_path, devices, changes)
     assert devices.opened == []
+
+
+@pytest.mark.parametrize("system", ["darwin", "win32"])
+def test_on_demand_where_no_system_tells_the_readers_is_found_before_a_device_is_opened(
+    system: str, material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    devices = Devices()
+    monkeypatch.setattr(on_demand_source, "sys", SimpleNamespace(platform=system))
+    with pytest.raises(ConfigError, match="only Linux tells who reads a virtual camera; leave it out"):
+        run(material, tmp_path, devices, {"source": {"on_demand": True}})
+    assert devices.opened == []
+    with pytest.raises(DeviceError, match="the sink was reached"):  # a file and `null` need nobody to tell
+        run(material, tmp_path, devices, {"source": {"on_demand": True}, "output": {"sink": "null"}})
+
+
+def test_recorded_mattes_are_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[Path] = []
+    real = matting.RecordedMatting
+
+    def note(path: Path) -> matting.RecordedMatting:
+        read.append(path)
+        return real(path)
+
+    monkeypatch.setattr(matting, "RecordedMatting", note)
+    matting.write_mattes(tmp_path / "mattes.npz", [np.ones((4, 4), np.float32)])
+    settings = RelitSettings(matte=f"recorded:{tmp_path / 'mattes.npz'}")
+    check_before_devices(settings)
+    for _ in range(2):  # another worker's as well
+        make_pipeline(settings, SteadyTracker(), (160, 90))
+    assert read == [tmp_path / "mattes.npz"]
 
 
 def test_a_panorama_file_that_is_missing_is_found_before_a_device_is_opened(material: Material, tmp_path: Path) -> None:

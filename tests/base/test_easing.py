@@ -9,10 +9,10 @@ from relit_camera.base.easing import ease_out_cubic, interpolate_keyframes, smoo
 
 
 def test_a_change_grows_from_nothing_to_all_and_is_fast_at_first() -> None:
-    shares = np.array([ease_out_cubic(time_s, 2.0) for time_s in np.linspace(0, 2, 21)])
-    assert shares[0] == 0
-    assert shares[-1] == 1
-    steps = np.diff(shares)
+    fractions = np.array([ease_out_cubic(time_s, 2.0) for time_s in np.linspace(0, 2, 21)])
+    assert fractions[0] == 0
+    assert fractions[-1] == 1
+    steps = np.diff(fractions)
     assert (steps > 0).all()
     assert (np.diff(steps) < 0).all()
 

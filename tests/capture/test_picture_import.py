@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import ImageError, LightsError
+from relit_camera.base.images.image_files import read_display
 from relit_camera.capture.lights_file import read_lights
 from relit_camera.capture.picture_import import import_samples
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
@@ -29,7 +30,7 @@ def test_pictures_come_back_linear(lights: Path) -> None:
 
 
 def test_gamma_is_applied(lights: Path) -> None:
-    code = cv2.imread(str(lights.parent / "005.png"))[..., ::-1] / 255
+    code = read_display(lights.parent / "005.png") / 255
     np.testing.assert_allclose(import_samples(lights, "linear").pictures[5], code, atol=1e-6)
     np.testing.assert_allclose(import_samples(lights, 2.2).pictures[5], code**2.2, atol=1e-6)
 
@@ -90,7 +91,9 @@ def test_pictures_too_small_for_a_subject_are_refused(tmp_path: Path, size: tupl
 
 
 def test_pictures_that_are_black_where_the_matte_is_are_refused(lights: Path) -> None:
-    outside = 255 - cv2.imread(str(lights.parent / "matte.png"), cv2.IMREAD_GRAYSCALE)
+    matte = cv2.imread(str(lights.parent / "matte.png"), cv2.IMREAD_GRAYSCALE)
+    assert matte is not None
+    outside = 255 - matte
     cv2.imwrite(str(lights.parent / "matte.png"), outside)
     with pytest.raises(LightsError, match=r"black where matte.png is white; .* check matte.png"):
         import_samples(lights)

@@ -7,7 +7,6 @@ import os
 import resource
 import shutil
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,6 +28,7 @@ from tests.cli.relit_command import (
     start,
     write_material,
 )
+from tests.small_camera import wait_until
 from tests.synthetic import sphere_samples, write_lights
 
 
@@ -236,7 +236,7 @@ def test_damaged_subject(damage: object, material: Material, out: Path, tmp_path
 
 def test_missing_subject(material: Material, out: Path) -> None:
     relight(out / "nobody.relit", out, light="0,0").complains("nobody")
-    replay(material, out, subject="nobody").complains("nobody", "stored are")
+    replay(material, out, subject="nobody").complains("nobody", "there are")
 
 
 # Tracks and models
@@ -308,9 +308,7 @@ def test_a_command_told_to_end_leaves_nothing(out: Path, tmp_path: Path) -> None
         "replay", long.clip, "--subject", long.subject, "--environment", "studio", "--tracker", long.tracker,
         "--out", out / "x.mp4", folder=tmp_path,
     )  # fmt: skip
-    until = time.monotonic() + 60
-    while not files(out) and process.poll() is None and time.monotonic() < until:
-        time.sleep(0.02)
+    wait_until(lambda: bool(files(out)) or process.poll() is not None, 60)
     process.terminate()
     assert process.communicate(timeout=30) == ("", "")
     assert process.returncode == 143

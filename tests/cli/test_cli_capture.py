@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from relit_camera.subject.subject_file import HEADER_KEY, read_subject
 from tests.capture.film.generated_film import FOCAL_PX, write_film
 from tests.capture.film.pipeline import unusable_films as films
 from tests.cli.relit_command import Answer, call, files, finish, start
+from tests.small_camera import wait_until
 from tests.synthetic import sphere_samples
 
 PATIENCE_S = 100
@@ -91,11 +91,9 @@ def test_options_are_followed_and_told(built: Built) -> None:
 
 def test_a_build_that_is_killed_goes_on_to_the_same_subject(built: Built, tmp_path: Path) -> None:
     process = start(*command(built.film, tmp_path, *KNOWN), folder=built.film.parent)
-    patience = time.monotonic() + PATIENCE_S
-    while not (tmp_path / "me.relit.partial" / SAMPLES_FILE_NAME).exists():
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < patience
-        time.sleep(0.01)
+    samples = tmp_path / "me.relit.partial" / SAMPLES_FILE_NAME
+    wait_until(lambda: samples.exists() or process.poll() is not None, PATIENCE_S)
+    assert process.poll() is None, process.communicate()
     process.kill()
     process.communicate()
     assert not (tmp_path / "me.relit").exists()

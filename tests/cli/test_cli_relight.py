@@ -84,8 +84,8 @@ def test_white_environment_gives_the_sum_picture(name: str, shared: Path, tmp_pa
     directions = np.array([light.direction for light in listed])
     weights = open_method("barycentric").weights(directions, texel_directions().reshape(-1, 3))  # type: ignore[attr-defined]
     truth = sum(
-        share * read_linear(light.path, gamma)
-        for light, share in zip(listed, weights @ texel_solid_angles().ravel(), strict=True)
+        fraction * read_linear(light.path, gamma)
+        for light, fraction in zip(listed, weights @ texel_solid_angles().ravel(), strict=True)
     )
     quality = psnr(np.load(out), np.asarray(truth, np.float32), matte_of(lights))
     print(f"{name}: {quality:.1f} dB from the sum")

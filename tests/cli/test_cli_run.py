@@ -7,14 +7,16 @@ import socket
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
 import pytest
 
+from relit_camera.live.publishing.publisher import RETRY_S
 from tests.cli.relit_command import Material, call, finish, start
+from tests.small_camera import wait_until
 
 pytestmark = pytest.mark.real_time
 
@@ -44,6 +46,15 @@ def running(
     finally:
         process.kill()
         process.communicate()
+
+
+def wait_for_uptime(http: httpx.Client, uptime_s: float) -> None:
+    """Wait until the camera has run for so long by its own clock, however slow the machine is."""
+    wait_until(lambda: bool(http.get("status").json()["uptime_s"] >= uptime_s), START_S)
+
+
+def wait_for_state(http: httpx.Client, state: str) -> None:
+    wait_until(lambda: bool(http.get("status").json()["state"] == state), START_S)
 
 
 class Viewer(threading.Thread):
@@ -96,11 +107,9 @@ def test_light_changes_while_it_runs_and_the_clip_loops(material: Material, tmp_
         assert first.startswith(b"\xff\xd8")
         body = {"environment": None, "lamps": [{"azimuth_deg": 90}], "transition_s": 0}
         assert http.put("lighting", json=body).status_code == 200
-        deadline = time.monotonic() + START_S
-        # The clip lasts two seconds.
-        while (status := http.get("status").json())["uptime_s"] < 3.5 or status["state"] != "live":
-            assert time.monotonic() < deadline, status
-            time.sleep(0.2)
+        wait_for_uptime(http, 3.5)  # the clip lasts two seconds
+        wait_for_state(http, "live")
+        status = http.get("status").json()
         assert status["frames"]["published"] > 20
         assert status["degraded"] == []
         assert status["source"].startswith("file ")
@@ -109,18 +118,11 @@ def test_light_changes_while_it_runs_and_the_clip_loops(material: Material, tmp_
 
 def test_on_demand_the_source_waits_for_a_viewer(material: Material, tmp_path: Path) -> None:
     with running(material, tmp_path, "--on-demand") as (_, http):
-
-        def wait_for(state: str) -> None:
-            deadline = time.monotonic() + START_S
-            while http.get("status").json()["state"] != state:
-                assert time.monotonic() < deadline, http.get("status").json()
-                time.sleep(0.1)
-
-        wait_for("released")
+        wait_for_state(http, "released")
         published = http.get("status").json()["frames"]["published"]
         assert http.get("snapshot.jpg").status_code == 200
-        wait_for("live")
-        wait_for("released")  # five seconds later
+        wait_for_state(http, "live")
+        wait_for_state(http, "released")  # five seconds later
         assert http.get("status").json()["frames"]["published"] > published + 40
         assert http.get("status").json()["degraded"] == []
 
@@ -134,14 +136,12 @@ def test_environment_of_a_file_lights_this_run(material: Material, tmp_path: Pat
 def test_a_disk_that_is_full_loses_the_file_not_the_camera(material: Material, tmp_path: Path) -> None:
     recording = tmp_path / "recording.mp4"
     with running(material, tmp_path, "--sink", recording, full_at=20) as (process, http):
-        deadline = time.monotonic() + START_S
-        while not (status := http.get("status").json())["degraded"]:
-            assert time.monotonic() < deadline
-            time.sleep(0.2)
+        wait_until(lambda: bool(http.get("status").json()["degraded"]), START_S)
+        status = http.get("status").json()
         assert status["degraded"][0]["what"] == "sink failed"
         assert "recording.mp4: File too large" in status["degraded"][0]["why"]
         assert http.get("snapshot.jpg").status_code == 200
-        time.sleep(1.5)  # the publisher has tried again
+        wait_for_uptime(http, status["uptime_s"] + RETRY_S + 0.5)  # the publisher has tried again
         assert http.get("status").json()["state"] == "live"
         process.send_signal(signal.SIGTERM)
         assert process.wait(START_S) == 1
@@ -175,7 +175,7 @@ def test_missing_virtual_camera(material: Material, tmp_path: Path) -> None:
 def test_missing_subject_model_and_track(material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
     for changed, words in (
-        (("--subject", "nobody"), ("nobody", "stored are")),
+        (("--subject", "nobody"), ("nobody", "there are")),
         (("--tracker", "mesh"), ("relit models pull",)),
         (("--tracker", "recorded:none.json"), ("none.json",)),
         (("--environment", "stuido"), ("stuido", "studio")),
@@ -192,12 +192,6 @@ def test_the_configuration_is_edited_while_it_runs(material: Material, tmp_path:
     def told(process_http: httpx.Client) -> str:
         return " ".join(f"{each['what']}: {each['why']}" for each in process_http.get("status").json()["degraded"])
 
-    def wait(condition: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + START_S
-        while not condition():
-            assert time.monotonic() < deadline, told(http)
-            time.sleep(0.1)
-
     with running(material, tmp_path, config=config) as (process, http):
         assert http.put("background", json={"kind": "color", "color": "#102030"}).status_code == 200
         for wrong, why in (
@@ -208,16 +202,16 @@ def test_the_configuration_is_edited_while_it_runs(material: Material, tmp_path:
             ("\0\xff", "mine.yaml"),
         ):
             config.write_text(wrong, encoding="latin-1")
-            wait(lambda why=why: why in told(http))  # type: ignore[misc]
+            wait_until(lambda why=why: why in told(http), START_S)  # type: ignore[misc]
             assert http.get("lighting").json()["environment"] == "studio"  # kept as it was
         config.unlink()
-        wait(lambda: "no configuration file" in told(http))
+        wait_until(lambda: "no configuration file" in told(http), START_S)
         assert http.put("lighting", json={"environment": "studio", "saturation": 0.5}).status_code == 200
         config.write_text("look: {lighting: {environment: sunset}}\noutput: {fps: 25}\n", encoding="utf-8")
-        wait(lambda: http.get("lighting").json()["environment"] == "sunset")
+        wait_until(lambda: http.get("lighting").json()["environment"] == "sunset", START_S)
         assert http.get("lighting").json()["saturation"] == 0.5  # set by the API, not edited
         assert "output counts from the next start" in told(http)
         assert http.get("background").json()["color"] == "#102030"  # what was not edited stays as it was set
         config.write_text("look: {lighting: {environment: party}}\n", encoding="utf-8")
-        wait(lambda: http.get("lighting").json()["environment"] == "party" and told(http) == "")
+        wait_until(lambda: http.get("lighting").json()["environment"] == "party" and told(http) == "", START_S)
         assert process.poll() is None

@@ -20,8 +20,9 @@ from relit_camera.devices.sinks.sink import NullSink, SinkInfo
 from relit_camera.devices.sinks.sink_factory import open_sink, published_label
 from relit_camera.devices.sinks.video_file_sink import VideoFileSink
 from relit_camera.devices.sinks.virtual_camera_sink import VirtualCameraSink
-from relit_camera.devices.sources.pattern_source import draw_pattern, read_number
+from relit_camera.devices.sources.pattern_source import draw_pattern
 from tests.devices.fake_devices import FakeTree
+from tests.vm.guest.pattern_number import read_number
 
 SIZE = (320, 180)
 

@@ -11,13 +11,14 @@ from relit_camera.base.errors import DeviceError, IllegalTransitionError, ImageE
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.devices.device_discovery import DeviceFolders
-from relit_camera.devices.sources.pattern_source import draw_pattern, pattern_source, read_number
+from relit_camera.devices.sources.pattern_source import draw_pattern, pattern_source
 from relit_camera.devices.sources.playback_source import PlaybackSource
 from relit_camera.devices.sources.source import TRANSITIONS, SourceInfo, SourceState, SourceStateMachine
 from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.devices.sources.webcam_source import BACKOFF_S, WebcamSource, stall_timeout
 from tests.devices.fake_devices import FakeCapture, FakeTree
 from tests.small_camera import WAIT_S, wait_until
+from tests.vm.guest.pattern_number import read_number
 
 S = SourceState
 INFO = SourceInfo("test", "test", (64, 48), 50.0)
@@ -238,6 +239,17 @@ def test_a_picture_file_is_a_source(tmp_path):
     assert frames[1].index > frames[0].index
     assert (frames[1].image == image).all()
     assert source.describe().kind == "still"
+    source.close()
+
+
+@pytest.mark.parametrize("name", ["pattern", "webcam"])
+def test_a_file_that_exists_comes_before_a_plug_in_of_its_name(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with VideoWriter(tmp_path / "clip.mp4", (320, 180), 25) as writer:
+        writer.write(draw_pattern((320, 180), 3), 0.0)
+    (tmp_path / "clip.mp4").rename(name)
+    source = open_source(settings(name))
+    assert (source.describe().kind, source.describe().id) == ("file", name)
     source.close()
 
 

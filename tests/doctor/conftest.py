@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from tests.doctor.fake_host import FakeMachine
@@ -10,7 +12,7 @@ C920 = "usb-046d_HD_Pro_Webcam_C920_2B31-video-index0"
 
 
 @pytest.fixture(autouse=True)
-def own_folders(tmp_path, monkeypatch):
+def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep everything of the user's in folders of the test."""
     monkeypatch.setenv("RELIT_STORAGE__DATA_DIR", str(tmp_path / "data"))
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "models"))
@@ -22,7 +24,7 @@ def own_folders(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def machine(tmp_path):
+def machine(tmp_path: Path) -> FakeMachine:
     """A machine as it should be."""
     machine = FakeMachine(tmp_path / "machine")
     machine.tree.add_webcam(2, "HD Pro Webcam C920", by_id=C920)
@@ -34,6 +36,6 @@ def machine(tmp_path):
 
 
 @pytest.fixture
-def bare(tmp_path):
+def bare(tmp_path: Path) -> FakeMachine:
     """A machine with nothing of the kind."""
     return FakeMachine(tmp_path / "bare")

@@ -65,15 +65,15 @@ FIREFOX = DeviceUser(30, "firefox", ("/usr/bin/firefox",))
 RELIT = DeviceUser(40, "python3", ("/venv/bin/python3", "/venv/bin/relit", "run"))
 
 
-def nobody_may(path, mode):
+def nobody_may(path: str, mode: int) -> bool:
     return False
 
 
-def everybody_may(path, mode):
+def everybody_may(path: str, mode: int) -> bool:
     return True
 
 
-def expect(finding: Finding, state: Severity, *words: str):
+def expect(finding: Finding, state: Severity, *words: str) -> None:
     """Of that state; the words are in what was seen or its cure. What is not ok has a cure, what is ok has none."""
     assert finding.state is state, finding
     for word in words:

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from relit_camera.doctor.camera_access import check_browsers
 from relit_camera.doctor.report import Severity
-from tests.doctor.fake_host import expect
+from tests.doctor.fake_host import FakeMachine, expect
 
 CHROME = "com.google.Chrome"
 METADATA = "app/{}/current/active/metadata"
 
 
-def flatpak(machine, app, devices, folder="var/lib/flatpak"):
+def flatpak(machine: FakeMachine, app: str, devices: str, folder: str = "var/lib/flatpak") -> None:
     machine.write(f"{folder}/{METADATA.format(app)}", f"[Application]\nname={app}\n\n[Context]\ndevices={devices}\n")
 
 
-def test_none_is_fine(machine, tmp_path):
+def test_none_is_fine(machine: FakeMachine, tmp_path: Path) -> None:
     expect(check_browsers(machine.host, tmp_path), Severity.OK, "none in a sandbox")
 
 
-def test_a_flatpak_with_all_devices_is_fine_and_one_without_is_named(machine, tmp_path):
+def test_a_flatpak_with_all_devices_is_fine_and_one_without_is_named(machine: FakeMachine, tmp_path: Path) -> None:
     flatpak(machine, "org.mozilla.firefox", "dri;all;")
     expect(check_browsers(machine.host, tmp_path), Severity.OK)
     flatpak(machine, CHROME, "dri;")
@@ -30,7 +32,7 @@ def test_a_flatpak_with_all_devices_is_fine_and_one_without_is_named(machine, tm
 
 
 @pytest.mark.parametrize("name", [CHROME, "global"])
-def test_an_override_opens_it(machine, tmp_path, name):
+def test_an_override_opens_it(machine: FakeMachine, tmp_path: Path, name: str) -> None:
     home = machine.root / "home/me"
     flatpak(machine, CHROME, "dri;", "home/me/.local/share/flatpak")
     home = home.relative_to(machine.root)
@@ -39,11 +41,11 @@ def test_an_override_opens_it(machine, tmp_path, name):
     expect(check_browsers(machine.host, home), Severity.OK)
 
 
-def test_a_damaged_file_is_as_none(machine, tmp_path):
+def test_a_damaged_file_is_as_none(machine: FakeMachine, tmp_path: Path) -> None:
     machine.write(f"var/lib/flatpak/{METADATA.format(CHROME)}", "][")
     expect(check_browsers(machine.host, tmp_path), Severity.WARNING, CHROME)
 
 
-def test_snaps_are_a_hint(machine, tmp_path):
+def test_snaps_are_a_hint(machine: FakeMachine, tmp_path: Path) -> None:
     (machine.root / "snap/chromium").mkdir(parents=True)
     expect(check_browsers(machine.host, tmp_path), Severity.OK, "sudo snap connect chromium:camera")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from relit_camera.base.config.settings import OutputSettings, SourceSettings
@@ -14,27 +16,27 @@ from tests.doctor.fake_host import FIREFOX, RELIT, FakeMachine, everybody_may, e
 # The virtual camera.
 
 
-def test_a_virtual_camera_as_it_should_be(machine):
+def test_a_virtual_camera_as_it_should_be(machine: FakeMachine) -> None:
     expect(check_virtual_camera(OutputSettings(), machine.host, everybody_may), Severity.OK, "Relit Camera", "video10")
 
 
-def test_without_the_module_the_cure_loads_it(bare):
+def test_without_the_module_the_cure_loads_it(bare: FakeMachine) -> None:
     finding = check_virtual_camera(OutputSettings(), bare.host, everybody_may)
     expect(finding, Severity.PROBLEM, "not loaded", "sudo modprobe v4l2loopback", 'card_label="Relit Camera"')
 
 
-def test_another_label_is_named(machine):
+def test_another_label_is_named(machine: FakeMachine) -> None:
     finding = check_virtual_camera(OutputSettings(label="Studio"), machine.host, everybody_may)
     expect(finding, Severity.PROBLEM, "'Studio'", "there are 'Relit Camera'", 'card_label="Studio"')
 
 
-def test_without_exclusive_caps_browsers_do_not_list_it(machine):
+def test_without_exclusive_caps_browsers_do_not_list_it(machine: FakeMachine) -> None:
     machine.load_module(exclusive_caps="N,N,N,N,N,N,N,N")
     finding = check_virtual_camera(OutputSettings(), machine.host, everybody_may)
     expect(finding, Severity.WARNING, "Chrome", "modprobe -r v4l2loopback", "exclusive_caps=1")
 
 
-def test_exclusive_caps_count_for_each_device(machine):
+def test_exclusive_caps_count_for_each_device(machine: FakeMachine) -> None:
     machine.tree.add_loopback(9, "OBS Virtual Camera")
     machine.load_module(exclusive_caps="Y,N,N,N,N,N,N,N")  # ours is the second now
     expect(check_virtual_camera(OutputSettings(), machine.host, everybody_may), Severity.WARNING, "exclusive_caps")
@@ -42,7 +44,7 @@ def test_exclusive_caps_count_for_each_device(machine):
     expect(check_virtual_camera(OutputSettings(), machine.host, everybody_may), Severity.OK)
 
 
-def test_who_may_use_the_node_is_said(machine):
+def test_who_may_use_the_node_is_said(machine: FakeMachine) -> None:
     expect(
         check_virtual_camera(OutputSettings(), machine.host, nobody_may),
         Severity.PROBLEM,
@@ -52,20 +54,22 @@ def test_who_may_use_the_node_is_said(machine):
     )
 
 
-def test_no_virtual_camera_is_needed_for_a_file(bare):
+def test_no_virtual_camera_is_needed_for_a_file(bare: FakeMachine) -> None:
     for sink in ("null", "out.mp4"):
         finding = check_virtual_camera(OutputSettings(sink=sink), bare.host, nobody_may)
         expect(finding, Severity.OK, "not needed", sink)
 
 
-def test_a_node_given_as_sink_is_examined(machine):
+def test_a_node_given_as_sink_is_examined(machine: FakeMachine) -> None:
     node = machine.tree.add_loopback(11, "Spare", size=(1280, 720))
     machine.load_module(exclusive_caps="Y,Y")
     finding = check_virtual_camera(OutputSettings(sink=node), machine.host, everybody_may)
     expect(finding, Severity.OK, "Spare", "video11", "in use at 1280x720")
 
 
-def test_a_node_that_is_no_virtual_camera_is_a_problem_though_there_is_one(machine, tmp_path):
+def test_a_node_that_is_no_virtual_camera_is_a_problem_though_there_is_one(
+    machine: FakeMachine, tmp_path: Path
+) -> None:
     node = str(machine.tree.dev / "video97")
     finding = check_virtual_camera(OutputSettings(sink=node), machine.host, everybody_may)
     expect(finding, Severity.PROBLEM, "video97 is no virtual camera", "choose one of", "'Relit Camera'")
@@ -77,11 +81,11 @@ def test_a_node_that_is_no_virtual_camera_is_a_problem_though_there_is_one(machi
 # The webcam.
 
 
-def test_a_webcam_is_named_with_its_node(machine):
+def test_a_webcam_is_named_with_its_node(machine: FakeMachine) -> None:
     expect(check_webcam(SourceSettings(), machine.host, everybody_may), Severity.OK, "HD Pro Webcam C920", "video2")
 
 
-def test_no_webcam_and_an_unknown_one_are_problems(machine, bare):
+def test_no_webcam_and_an_unknown_one_are_problems(machine: FakeMachine, bare: FakeMachine) -> None:
     expect(check_webcam(SourceSettings(), bare.host, everybody_may), Severity.PROBLEM, "no webcam", "--source FILE")
     expect(
         check_webcam(SourceSettings(source="usb-other"), machine.host, everybody_may),
@@ -91,7 +95,7 @@ def test_no_webcam_and_an_unknown_one_are_problems(machine, bare):
     )
 
 
-def test_our_own_camera_is_no_webcam_whatever_it_is_called(machine):
+def test_our_own_camera_is_no_webcam_whatever_it_is_called(machine: FakeMachine) -> None:
     machine.tree.add_loopback(12, "Studio")
     source = SourceSettings(source="Studio")
     expect(check_webcam(source, machine.host, everybody_may), Severity.OK, "video12")
@@ -99,7 +103,7 @@ def test_our_own_camera_is_no_webcam_whatever_it_is_called(machine):
     expect(finding, Severity.PROBLEM, "film itself")
 
 
-def test_who_may_read_the_webcam_is_said(machine):
+def test_who_may_read_the_webcam_is_said(machine: FakeMachine) -> None:
     expect(
         check_webcam(SourceSettings(), machine.host, nobody_may),
         Severity.PROBLEM,
@@ -108,7 +112,7 @@ def test_who_may_read_the_webcam_is_said(machine):
     )
 
 
-def test_no_webcam_is_needed_for_a_file_or_the_pattern(bare, tmp_path):
+def test_no_webcam_is_needed_for_a_file_or_the_pattern(bare: FakeMachine, tmp_path: Path) -> None:
     clip = tmp_path / "clip.mp4"
     clip.touch()
     for source in (str(clip), "pattern"):
@@ -119,7 +123,7 @@ def test_no_webcam_is_needed_for_a_file_or_the_pattern(bare, tmp_path):
 # Who has them open, and who may.
 
 
-def test_a_webcam_that_another_program_has_open_is_named_with_it(machine):
+def test_a_webcam_that_another_program_has_open_is_named_with_it(machine: FakeMachine) -> None:
     node = str(machine.tree.dev / "video2")
     machine.open_by(node, FIREFOX)
     finding = check_webcam(SourceSettings(), machine.host, everybody_may)
@@ -128,19 +132,19 @@ def test_a_webcam_that_another_program_has_open_is_named_with_it(machine):
     expect(check_webcam(SourceSettings(), machine.host, everybody_may), Severity.OK, "read by relit (process 40)")
 
 
-def test_who_has_the_virtual_camera_open_is_listed(machine):
+def test_who_has_the_virtual_camera_open_is_listed(machine: FakeMachine) -> None:
     machine.open_by(str(machine.tree.dev / "video10"), FIREFOX, RELIT)
     finding = check_virtual_camera(OutputSettings(), machine.host, everybody_may)
     expect(finding, Severity.OK, "opened by firefox (process 30), relit (process 40)")
 
 
-def test_the_groups_to_join_are_those_of_shut_devices(machine):
+def test_the_groups_to_join_are_those_of_shut_devices(machine: FakeMachine) -> None:
     assert groups_to_join(machine.tree, everybody_may) == ()
     group = (machine.tree.dev / "video2").group()
     assert groups_to_join(machine.tree, nobody_may) == (group,)
 
 
-def test_another_system_has_obs_studios_camera(tmp_path):
+def test_another_system_has_obs_studios_camera(tmp_path: Path) -> None:
     other = FakeMachine(tmp_path / "mac", is_linux=False)
     expect(check_virtual_camera(OutputSettings(), other.host, everybody_may), Severity.OK, "install OBS Studio")
 

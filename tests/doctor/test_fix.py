@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -16,7 +17,7 @@ from relit_camera.doctor import fix as fixing
 from relit_camera.doctor.fix import apply_fixes, user_config_file
 from relit_camera.doctor.kernel_module import root_commands
 from relit_camera.doctor.models_and_subject import check_subject
-from relit_camera.doctor.report import FileOutcome, Severity
+from relit_camera.doctor.report import FileOutcome, FixedFile, FixResult, Severity
 from relit_camera.doctor.run_checks import run_checks
 from relit_camera.doctor.systemd_unit import check_service, is_unmodified, unit_path, unit_text
 from relit_camera.subject.subject_file import write_subject
@@ -27,22 +28,24 @@ CAMERA = OutputSettings()
 
 
 @pytest.fixture
-def settings(tmp_path):
+def settings(tmp_path: Path) -> RelitSettings:
     return RelitSettings(storage={"data_dir": tmp_path / "data"})
 
 
-def states(done):
+def states(done: FixResult) -> dict[str, FileOutcome]:
     return {Path(file.path).name: file.state for file in done.files}
 
 
-def everything(folder):
+def everything(folder: Path) -> dict[Path, str | None]:
     return {path: path.read_text() if path.is_file() else None for path in folder.rglob("*")}
 
 
 # The user's own files.
 
 
-def test_what_is_missing_is_written_and_the_second_time_nothing(machine, settings, tmp_path):
+def test_what_is_missing_is_written_and_the_second_time_nothing(
+    machine: FakeMachine, settings: RelitSettings, tmp_path: Path
+) -> None:
     first = apply_fixes(settings, machine.host, everybody_may)
     assert set(states(first)) == {
         "subjects", "environments", "backgrounds", "presets", "models", "config.yaml", "relit-camera.service",
@@ -55,21 +58,23 @@ def test_what_is_missing_is_written_and_the_second_time_nothing(machine, setting
     assert everything(tmp_path) == before
 
 
-def test_the_configuration_that_it_writes_is_right_and_holds_the_defaults(machine, settings, monkeypatch):
+def test_the_configuration_that_it_writes_is_right_and_holds_the_defaults(
+    machine: FakeMachine, settings: RelitSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
     apply_fixes(settings, machine.host, everybody_may)
     monkeypatch.delenv("RELIT_STORAGE__DATA_DIR")
     monkeypatch.delenv("RELIT_SERVER__PORT")
     assert load_settings(user_config_file()).model_dump() == RelitSettings().model_dump()
 
 
-def test_a_configuration_of_the_users_own_stays(machine, settings):
+def test_a_configuration_of_the_users_own_stays(machine: FakeMachine, settings: RelitSettings) -> None:
     user_config_file().parent.mkdir(parents=True)
     user_config_file().write_text("subject: me\n")
     assert states(apply_fixes(settings, machine.host, everybody_may))["config.yaml"] is FileOutcome.UNCHANGED
     assert user_config_file().read_text() == "subject: me\n"
 
 
-def test_an_old_unit_of_ours_is_renewed(machine, settings):
+def test_an_old_unit_of_ours_is_renewed(machine: FakeMachine, settings: RelitSettings) -> None:
     unit_path().parent.mkdir(parents=True)
     unit_path().write_text(unit_text(Path("/old/place/relit")))
     expect(check_service(machine.host), Severity.WARNING, "another installation", "--fix")
@@ -78,7 +83,9 @@ def test_an_old_unit_of_ours_is_renewed(machine, settings):
     expect(check_service(machine.host), Severity.OK, str(unit_path()))
 
 
-def test_a_unit_that_a_person_changed_is_kept_and_the_difference_shown(machine, settings):
+def test_a_unit_that_a_person_changed_is_kept_and_the_difference_shown(
+    machine: FakeMachine, settings: RelitSettings
+) -> None:
     apply_fixes(settings, machine.host, everybody_may)
     mine = unit_path().read_text().replace("WatchdogSec=30", "WatchdogSec=90")
     unit_path().write_text(mine)
@@ -91,11 +98,11 @@ def test_a_unit_that_a_person_changed_is_kept_and_the_difference_shown(machine, 
     expect(check_service(machine.host), Severity.OK, "changed or written by you")
 
 
-def unit_after_fix(settings, machine):
+def unit_after_fix(settings: RelitSettings, machine: FakeMachine) -> FixedFile:
     return next(f for f in apply_fixes(settings, machine.host, everybody_may).files if f.path == str(unit_path()))
 
 
-def test_a_folder_in_the_units_place_is_said(machine, settings):
+def test_a_folder_in_the_units_place_is_said(machine: FakeMachine, settings: RelitSettings) -> None:
     unit_path().mkdir(parents=True)
     found = unit_after_fix(settings, machine)
     assert found.state is FileOutcome.FAILED
@@ -103,10 +110,12 @@ def test_a_folder_in_the_units_place_is_said(machine, settings):
     expect(check_service(machine.host), Severity.WARNING, "cannot be read: Is a directory", "move it away")
 
 
-def test_a_unit_that_cannot_be_read_is_said(machine, settings, monkeypatch):
+def test_a_unit_that_cannot_be_read_is_said(
+    machine: FakeMachine, settings: RelitSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
     apply_fixes(settings, machine.host, everybody_may)
 
-    def refuse(path, *_, **__):
+    def refuse(path: Path, *_: object, **__: object) -> NoReturn:
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr(Path, "read_text", refuse)
@@ -115,14 +124,16 @@ def test_a_unit_that_cannot_be_read_is_said(machine, settings, monkeypatch):
     assert "Permission denied" in found.note
 
 
-def test_a_unit_that_is_no_text_is_the_users_own(machine, settings):
+def test_a_unit_that_is_no_text_is_the_users_own(machine: FakeMachine, settings: RelitSettings) -> None:
     unit_path().parent.mkdir(parents=True)
     unit_path().write_bytes(b"\xff\xfe[Unit]")
     assert unit_after_fix(settings, machine).state is FileOutcome.KEPT
     expect(check_service(machine.host), Severity.OK, "changed or written by you")
 
 
-def test_links_that_lead_nowhere_are_the_users_own(machine, settings, tmp_path):
+def test_links_that_lead_nowhere_are_the_users_own(
+    machine: FakeMachine, settings: RelitSettings, tmp_path: Path
+) -> None:
     for path in (unit_path(), user_config_file()):
         path.parent.mkdir(parents=True)
         path.symlink_to(tmp_path / "away")
@@ -135,7 +146,7 @@ def test_links_that_lead_nowhere_are_the_users_own(machine, settings, tmp_path):
     assert not (tmp_path / "away").exists()
 
 
-def test_with_a_faulty_configuration_no_folders_are_made(machine, tmp_path):
+def test_with_a_faulty_configuration_no_folders_are_made(machine: FakeMachine, tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text("look: [")
     before = {each for each in tmp_path.rglob("*") if each.is_dir()}
@@ -146,21 +157,25 @@ def test_with_a_faulty_configuration_no_folders_are_made(machine, tmp_path):
     assert made <= {*user_config_file().parents, *unit_path().parents}
 
 
-def test_what_cannot_be_written_is_said_and_the_rest_goes_on(machine, settings, tmp_path):
+def test_what_cannot_be_written_is_said_and_the_rest_goes_on(
+    machine: FakeMachine, settings: RelitSettings, tmp_path: Path
+) -> None:
     (tmp_path / "config").write_text("a file where the folder should be")
     found = states(apply_fixes(settings, machine.host, everybody_may))
     assert found["config.yaml"] is found["relit-camera.service"] is FileOutcome.FAILED
     assert found["subjects"] is FileOutcome.WRITTEN
 
 
-def test_elsewhere_there_is_no_unit(settings, tmp_path):
+def test_elsewhere_there_is_no_unit(settings: RelitSettings, tmp_path: Path) -> None:
     done = apply_fixes(settings, FakeMachine(tmp_path / "mac", is_linux=False).host, everybody_may)
     assert "relit-camera.service" not in states(done)
     assert done.root_commands == ()
     assert done.user_commands == ("relit models pull",)
 
 
-def test_models_are_offered_not_pulled(machine, settings, monkeypatch):
+def test_models_are_offered_not_pulled(
+    machine: FakeMachine, settings: RelitSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
     done = apply_fixes(settings, machine.host, everybody_may)
     assert done.user_commands == (
         "relit models pull",
@@ -172,11 +187,11 @@ def test_models_are_offered_not_pulled(machine, settings, monkeypatch):
 # The lines for root.
 
 
-def test_a_machine_as_it_should_be_needs_none(machine):
+def test_a_machine_as_it_should_be_needs_none(machine: FakeMachine) -> None:
     assert root_commands(CAMERA, machine.host) == ()
 
 
-def test_a_bare_machine_needs_four(bare):
+def test_a_bare_machine_needs_four(bare: FakeMachine) -> None:
     lines = root_commands(CAMERA, bare.host, ("video",))
     assert len(lines) == 5
     assert lines[0].startswith("sudo apt install v4l2loopback-dkms")
@@ -186,7 +201,7 @@ def test_a_bare_machine_needs_four(bare):
     assert lines[4].startswith('sudo usermod -aG video "$USER"')
 
 
-def test_the_lines_do_what_they_say(bare):
+def test_the_lines_do_what_they_say(bare: FakeMachine) -> None:
     """Run by a shell with `sudo tee` writing into the made-up machine, they leave nothing to write."""
     (bare.root / "etc/modprobe.d").mkdir(parents=True)
     (bare.root / "etc/modules-load.d").mkdir(parents=True)
@@ -202,7 +217,7 @@ def test_the_lines_do_what_they_say(bare):
         assert not any("tee" in line for line in root_commands(settings, bare.host))
 
 
-def test_loaded_without_our_device_it_is_loaded_anew(bare):
+def test_loaded_without_our_device_it_is_loaded_anew(bare: FakeMachine) -> None:
     bare.add_kernel(RELEASE, with_module=True)
     bare.load_module("0.15.0")
     bare.tree.add_loopback(0, "Dummy video device (0x0000)")
@@ -211,14 +226,14 @@ def test_loaded_without_our_device_it_is_loaded_anew(bare):
     assert lines[-1] == "sudo modprobe -r v4l2loopback && sudo modprobe v4l2loopback"
 
 
-def test_another_programs_options_are_left_to_the_person(bare):
+def test_another_programs_options_are_left_to_the_person(bare: FakeMachine) -> None:
     bare.load_at_boot("OBS Virtual Camera", "obs.conf")
     lines = root_commands(CAMERA, bare.host)
     assert not any("tee /etc/modprobe.d" in line for line in lines)
     assert any(line.startswith("# ") and "obs.conf" in line for line in lines)
 
 
-def test_groups_are_those_of_the_nodes(machine, settings):
+def test_groups_are_those_of_the_nodes(machine: FakeMachine, settings: RelitSettings) -> None:
     lines = apply_fixes(settings, machine.host, nobody_may).root_commands
     assert [line for line in lines if "usermod" in line]
     no_camera = RelitSettings(output={"sink": "null"}, storage=settings.storage.model_dump())
@@ -228,7 +243,7 @@ def test_groups_are_those_of_the_nodes(machine, settings):
 # The unit.
 
 
-def test_a_stamp_tells_a_changed_unit():
+def test_a_stamp_tells_a_changed_unit() -> None:
     text = unit_text(Path("/home/me/.local/bin/relit"))
     assert is_unmodified(text)
     assert not is_unmodified(text.replace("RestartSec=10", "RestartSec=4"))
@@ -236,19 +251,19 @@ def test_a_stamp_tells_a_changed_unit():
     assert not is_unmodified("")
 
 
-def test_systemd_never_gives_up_starting_it():
+def test_systemd_never_gives_up_starting_it() -> None:
     unit, service = unit_text(Path("/usr/bin/relit")).split("[Service]")
     assert "StartLimitIntervalSec=0\n" in unit
     assert "Burst" not in unit
     assert "Restart=on-failure\nRestartSec=10\n" in service
 
 
-def test_odd_paths_are_quoted_for_systemd():
+def test_odd_paths_are_quoted_for_systemd() -> None:
     assert 'ExecStart="/home/a b/100%%/relit" run' in unit_text(Path("/home/a b/100%/relit"))
 
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
-def test_systemd_finds_no_fault_with_the_unit(tmp_path):
+def test_systemd_finds_no_fault_with_the_unit(tmp_path: Path) -> None:
     command = tmp_path / "a folder" / "relit"
     command.parent.mkdir()
     command.write_text("#!/bin/sh\n")
@@ -272,7 +287,7 @@ def test_systemd_finds_no_fault_with_the_unit(tmp_path):
 # The subject, and the command.
 
 
-def test_the_subject_is_looked_at(settings, tmp_path):
+def test_the_subject_is_looked_at(settings: RelitSettings, tmp_path: Path) -> None:
     expect(check_subject(settings), Severity.WARNING, "none is chosen", "relit capture build")
     settings.storage.subjects.mkdir(parents=True)
     write_subject(settings.storage.subjects / "me.relit", small_subject())
@@ -282,14 +297,14 @@ def test_the_subject_is_looked_at(settings, tmp_path):
         check_subject(settings.model_copy(update={"subject": "you"})),
         Severity.PROBLEM,
         "no subject 'you'",
-        "stored are",
+        "there are: me",
     )
     (tmp_path / "half.relit").write_bytes(b"half")
     broken = settings.model_copy(update={"subject": str(tmp_path / "half.relit")})
     expect(check_subject(broken), Severity.PROBLEM, "half.relit")
 
 
-def test_the_command_fixes_and_says_so_in_text_and_json(monkeypatch, machine):
+def test_the_command_fixes_and_says_so_in_text_and_json(monkeypatch: pytest.MonkeyPatch, machine: FakeMachine) -> None:
     monkeypatch.setattr("relit_camera.doctor.run_checks.Host", lambda: machine.host)
     text = call("doctor", "--fix").out
     assert "written    " in text
@@ -300,7 +315,7 @@ def test_the_command_fixes_and_says_so_in_text_and_json(monkeypatch, machine):
     assert json.loads(call("doctor", "--json").out)["fix"] is None
 
 
-def test_without_fix_nothing_is_written(machine, monkeypatch, tmp_path):
+def test_without_fix_nothing_is_written(machine: FakeMachine, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("relit_camera.doctor.run_checks.Host", lambda: machine.host)
     monkeypatch.setattr(fixing, "apply_fixes", lambda *_: pytest.fail("not asked for"))
     before = everything(tmp_path)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from relit_camera.base.config.settings import OutputSettings
@@ -12,11 +14,11 @@ from tests.doctor.fake_host import RELEASE, FakeMachine, expect
 CAMERA = OutputSettings()
 
 
-def test_a_loaded_module_is_fine_with_its_version(machine):
+def test_a_loaded_module_is_fine_with_its_version(machine: FakeMachine) -> None:
     expect(check_module(CAMERA, machine.host), Severity.OK, "0.15.0", RELEASE)
 
 
-def test_the_version_that_does_not_tell_is_debian_12s(bare):
+def test_the_version_that_does_not_tell_is_debian_12s(bare: FakeMachine) -> None:
     bare.load_module()
     expect(check_module(CAMERA, bare.host), Severity.OK, "0.12 or older")
 
@@ -32,12 +34,12 @@ def test_the_version_that_does_not_tell_is_debian_12s(bare):
         ("nixos", "github.com/v4l2loopback"),
     ],
 )
-def test_each_distribution_has_its_own_line(tmp_path, distribution, command):
+def test_each_distribution_has_its_own_line(tmp_path: Path, distribution: str, command: str) -> None:
     machine = FakeMachine(tmp_path, distribution)
     expect(check_module(CAMERA, machine.host), Severity.PROBLEM, "is not installed", command)
 
 
-def test_installed_but_not_loaded(bare):
+def test_installed_but_not_loaded(bare: FakeMachine) -> None:
     bare.add_kernel(RELEASE, with_module=True)
     finding = check_module(CAMERA, bare.host)
     expect(finding, Severity.PROBLEM, "not loaded", "sudo modprobe v4l2loopback", 'card_label="Relit Camera"')
@@ -45,7 +47,7 @@ def test_installed_but_not_loaded(bare):
 
 
 @pytest.mark.parametrize("on", [True, False])
-def test_secure_boot_is_told_from_the_firmware(bare, on):
+def test_secure_boot_is_told_from_the_firmware(bare: FakeMachine, on: bool) -> None:
     bare.add_kernel(RELEASE, with_module=True)
     bare.set_secure_boot(on)
     finding = check_module(CAMERA, bare.host)
@@ -53,25 +55,25 @@ def test_secure_boot_is_told_from_the_firmware(bare, on):
     assert ("mokutil --import" in finding.cure) is on
 
 
-def test_installed_for_another_kernel(bare):
+def test_installed_for_another_kernel(bare: FakeMachine) -> None:
     bare.add_kernel("6.1.0-40-amd64", with_module=True)
     finding = check_module(CAMERA, bare.host)
     expect(finding, Severity.PROBLEM, "not built for", RELEASE, "6.1.0-40-amd64", "linux-headers", "dkms autoinstall")
 
 
-def test_source_without_a_build(bare):
+def test_source_without_a_build(bare: FakeMachine) -> None:
     bare.write("var/lib/dkms/v4l2loopback/0.12.7/source", "")
     expect(check_module(CAMERA, bare.host), Severity.PROBLEM, "not built for", "dkms autoinstall")
 
 
-def test_a_container_is_told_from_a_bare_machine(tmp_path):
+def test_a_container_is_told_from_a_bare_machine(tmp_path: Path) -> None:
     machine = FakeMachine(tmp_path)
     (tmp_path / f"lib/modules/{RELEASE}/modules.dep").unlink()
     (tmp_path / f"lib/modules/{RELEASE}").rmdir()
     expect(check_module(CAMERA, machine.host), Severity.PROBLEM, "a container", "on the host")
 
 
-def test_nothing_is_needed_for_a_file_or_elsewhere(bare, tmp_path):
+def test_nothing_is_needed_for_a_file_or_elsewhere(bare: FakeMachine, tmp_path: Path) -> None:
     other = FakeMachine(tmp_path / "mac", is_linux=False)
     for settings, host in ((OutputSettings(sink="null"), bare.host), (CAMERA, other.host)):
         expect(check_module(settings, host), Severity.OK, "not needed")
@@ -81,17 +83,17 @@ def test_nothing_is_needed_for_a_file_or_elsewhere(bare, tmp_path):
 # After a restart.
 
 
-def test_the_two_files_make_it_come_back(machine):
+def test_the_two_files_make_it_come_back(machine: FakeMachine) -> None:
     expect(check_load_at_boot(CAMERA, machine.host), Severity.OK, "relit-camera.conf")
 
 
-def test_no_options_no_camera_after_a_restart(bare):
+def test_no_options_no_camera_after_a_restart(bare: FakeMachine) -> None:
     expect(
         check_load_at_boot(CAMERA, bare.host), Severity.WARNING, "sudo tee /etc/modprobe.d/relit-camera.conf", "options"
     )
 
 
-def test_options_alone_do_not_load_it(bare):
+def test_options_alone_do_not_load_it(bare: FakeMachine) -> None:
     bare.load_at_boot()
     (bare.root / "etc/modules-load.d/relit-camera.conf").unlink()
     expect(
@@ -101,12 +103,12 @@ def test_options_alone_do_not_load_it(bare):
     expect(check_load_at_boot(CAMERA, bare.host), Severity.OK)
 
 
-def test_a_commented_line_does_not_count(bare):
+def test_a_commented_line_does_not_count(bare: FakeMachine) -> None:
     bare.write("etc/modprobe.d/relit-camera.conf", "# options v4l2loopback devices=1\n")
     expect(check_load_at_boot(CAMERA, bare.host), Severity.WARNING, "no options")
 
 
-def test_another_programs_options_are_not_overwritten(bare):
+def test_another_programs_options_are_not_overwritten(bare: FakeMachine) -> None:
     bare.load_at_boot("OBS Virtual Camera", "obs.conf")
     expect(check_load_at_boot(CAMERA, bare.host), Severity.WARNING, "obs.conf", "'Relit Camera'")
     bare.load_at_boot()

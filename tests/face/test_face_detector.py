@@ -56,3 +56,20 @@ def test_the_face_near_the_last_one_is_preferred_to_the_larger(face_models: Path
     assert followed.box[0] > width
     assert followed.box[2] == pytest.approx(box_width / 2, rel=0.2)
     assert followed.eyes[0, 0] < followed.eyes[1, 0]  # the subject's right eye is at the picture's left
+
+
+def test_a_look_nearby_finds_the_same_face_and_no_other(face_models: Path, portrait: np.ndarray) -> None:
+    height, width = portrait.shape[:2]
+    both = np.zeros((2 * height, 3 * width, 3), np.uint8)
+    both[:height, :width] = portrait
+    detector = FaceDetector(face_models / "face_detector_yunet.onnx")
+    whole = detector.detect(both)
+    assert whole is not None
+    nearby = detector.detect_nearby(both, whole.box)
+    assert nearby is not None
+    assert intersection_over_union(nearby.box, whole.box) > 0.7
+    span = np.linalg.norm(whole.eyes[0] - whole.eyes[1])
+    assert np.linalg.norm(nearby.eyes - whole.eyes, axis=1).max() < 0.15 * span
+    x, y, box_width, box_height = whole.box
+    assert detector.detect_nearby(both, (x + 2 * width, y + height, box_width, box_height)) is None
+    assert detector.detect_nearby(both, (10 * width, y, box_width, box_height)) is None

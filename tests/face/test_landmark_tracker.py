@@ -8,7 +8,7 @@ import pytest
 from relit_camera.base.images.image_types import Frame
 from relit_camera.face.face_state import LOST, FaceStatus
 from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
-from relit_camera.face.tracking.face_detector import Detection
+from relit_camera.face.tracking.face_detector import Box, Detection, is_same_face
 from relit_camera.face.tracking.landmark_tracker import LandmarkPrediction, LandmarkTracker
 from tests.face.faces import SCHEME, SIZE, face
 
@@ -61,9 +61,18 @@ class FakeDetector:
     def __init__(self, world: World) -> None:
         self.world = world
         self.calls = 0
+        self.nearby_calls = 0
+
+    def detect_nearby(self, image: np.ndarray, box: Box) -> Detection | None:
+        self.nearby_calls += 1
+        found = self._truth()
+        return found if found is not None and is_same_face(found.box, box) else None
 
     def detect(self, image: np.ndarray, near: object = None) -> Detection | None:
         self.calls += 1
+        return self._truth()
+
+    def _truth(self) -> Detection | None:
         if self.world.points is None or not self.world.detectable:
             return None
         return Detection(bounding_box(self.world.points), SCHEME.eye_centers(self.world.points), 0.9)
@@ -105,7 +114,7 @@ def test_the_detector_is_asked_to_begin_and_then_every_few_frames() -> None:
     rig = Rig(check_every=5)
     for _ in range(11):
         assert rig.step() == (FaceStatus.FOUND, 0)
-    assert rig.detector.calls == 3
+    assert (rig.detector.calls, rig.detector.nearby_calls) == (1, 2)
 
 
 def test_no_face_is_lost_and_searched_in_every_frame() -> None:
@@ -129,11 +138,11 @@ def test_a_face_that_goes_is_lost_at_once() -> None:
 def test_after_a_large_motion_it_looks_twice_and_has_it_checked() -> None:
     rig = Rig()
     rig.step()
-    reads, calls = rig.network.reads, rig.detector.calls
+    reads, calls = rig.network.reads, rig.detector.nearby_calls
     rig.world.points = FACE + np.array([0.4 * EYE_SPAN, 0], np.float32)
     assert rig.step() == (FaceStatus.FOUND, 0)
     assert rig.network.reads == reads + 2
-    assert rig.detector.calls == calls + 1
+    assert rig.detector.nearby_calls == calls + 1
 
 
 def test_a_mesh_that_slipped_is_seeded_anew_although_it_is_sure() -> None:
@@ -161,6 +170,7 @@ def test_another_face_is_taken_over_only_when_the_first_stays_away() -> None:
     rig.detector.detect = lambda image, near=None: Detection(  # type: ignore[method-assign]
         bounding_box(other), SCHEME.eye_centers(other), 0.9
     )
+    rig.detector.detect_nearby = lambda image, box: None  # type: ignore[method-assign]
     statuses = [rig.step()[0] for _ in range(8)]
     assert statuses == [FaceStatus.UNCERTAIN] * 8
     rig.world.points = other

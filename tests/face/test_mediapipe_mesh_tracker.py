@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.base.errors import InputError, ModelError
+from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.base.rotations import rotation_from_angles
@@ -98,12 +98,6 @@ def test_missing_models_name_their_cure(
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     with pytest.raises(ModelError, match="relit models pull"):
         kind()
-
-
-@pytest.mark.parametrize("kind", [MeshTracker, OpenSeeFaceTracker])
-def test_an_argument_is_refused(kind: type[MeshTracker | OpenSeeFaceTracker]):
-    with pytest.raises(InputError, match="takes no argument, and got 'x'"):
-        kind(TrackerOptions(argument="x"))
 
 
 @pytest.mark.parametrize("kind", [MeshTracker, OpenSeeFaceTracker])

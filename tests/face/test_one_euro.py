@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from relit_camera.base.rotations import angles_from_rotation, rotation_from_angles
 from relit_camera.face.motion.one_euro_filter import OneEuroFilter, OneEuroParameters, RotationOneEuroFilter
@@ -129,6 +130,10 @@ def test_reset_forgets() -> None:
     assert smooth(np.array([9.0]), 0.1)[0] == 9
 
 
+def turned_by(smooth: RotationOneEuroFilter, angles: list[float], time_s: float) -> Rotation:
+    return Rotation.from_matrix(smooth(rotation_from_angles(*angles).as_matrix(), time_s))
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_turn_about_one_axis_is_filtered_as_its_angle(axis: int):
     settings = OneEuroParameters(min_cutoff_hz=1.5, beta=0.2, dead_band=0.3)
@@ -136,11 +141,11 @@ def test_a_turn_about_one_axis_is_filtered_as_its_angle(axis: int):
     for index, angle in enumerate(np.cumsum(np.random.default_rng(7).normal(0, 1.0, 60))):
         angles = [0.0, 0.0, 0.0]
         angles[axis] = angle
-        turned = angles_from_rotation(turns(rotation_from_angles(*angles), index / RATE))
+        turned = angles_from_rotation(turned_by(turns, angles, index / RATE))
         assert turned[axis] == pytest.approx(numbers(np.array([angle]), index / RATE)[0], abs=1e-6)
 
 
 def test_a_turn_goes_the_short_way() -> None:
     smooth = RotationOneEuroFilter(OneEuroParameters(min_cutoff_hz=1.0))
-    smooth(rotation_from_angles(179), 0.0)
-    assert abs(angles_from_rotation(smooth(rotation_from_angles(-179), 1 / RATE)).yaw) > 178.9
+    turned_by(smooth, [179], 0.0)
+    assert abs(angles_from_rotation(turned_by(smooth, [-179], 1 / RATE)).yaw) > 178.9

@@ -65,7 +65,7 @@ def test_a_subject_file_is_spoilt_while_in_use(
     file = tmp_path / "me.relit"
     write_subject(file, small_subject())
     with watched_camera(tmp_path / "data") as watched:
-        watched.camera.scene_controller.load_subject_file(file)
+        watched.camera.scene_controller.load_configured_subject(str(file))
         watched.goes_on(20)
         watched.begin()
         spoil(file)

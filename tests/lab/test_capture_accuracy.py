@@ -96,7 +96,7 @@ def test_frames_taken_for_others_are_counted(compare: Compare, report: Document)
     report["frames"][2]["kind"] = "rejected"
     report["frames"][4]["kind"] = "bright"
     errors = compare(report)
-    assert (errors.used, errors.wrongly_bright, errors.used_share) == (9, 1, 0.9)
+    assert (errors.used, errors.wrongly_bright, errors.used_fraction) == (9, 1, 0.9)
     assert len(errors.direction_deg) == 9
 
 

@@ -12,7 +12,7 @@ from relit_camera.base.errors import InputError, LightsError
 from relit_camera.lab.evaluate.field.candidates import BLACK_RING_METHOD, method_candidates
 from relit_camera.lab.evaluate.field.field_evaluation import FieldReport, evaluate_field
 from relit_camera.lab.evaluate.field.field_report import field_json, field_page, field_text
-from relit_camera.lab.evaluate.field.ghost_shadows import find_shadow_transitions, mid_tone_share
+from relit_camera.lab.evaluate.field.ghost_shadows import find_shadow_transitions, mid_tone_fraction
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
 from relit_camera.lab.evaluate.field.sample_points import SamplePoint, face_sample_points, parse_sample_point
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
@@ -78,8 +78,8 @@ def test_a_half_way_mixture_is_all_mid_tone() -> None:
     for between in spots:
         halves[between.light, between.decided] = ((between.low + between.high) / 2)[:, None]
     assert sum(int(between.decided.sum()) for between in spots) > 20
-    assert mid_tone_share(spots, halves) == 1
-    assert mid_tone_share(spots, np.zeros_like(halves)) == 0
+    assert mid_tone_fraction(spots, halves) == 1
+    assert mid_tone_fraction(spots, np.zeros_like(halves)) == 0
 
 
 def test_perfect_prediction_has_no_error() -> None:

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from relit_camera.base.errors import NotFoundError
+from relit_camera.base.errors import InputError
 from relit_camera.base.images.image_files import decode_display
 from relit_camera.lab.evaluate.report import html_page
 from relit_camera.lab.evaluate.report.html_page import (
@@ -76,10 +76,10 @@ def test_without_the_packages_a_report_is_refused_before_any_work(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(html_page, "find_spec", lambda name: None if name == "matplotlib" else object())
-    with pytest.raises(NotFoundError, match=r"need matplotlib; .*relit-camera\[evaluate\]"):
+    with pytest.raises(InputError, match="need matplotlib; `relit doctor` says how"):
         require_report_packages()
     answer = call("evaluate", "video", "none.mp4", "--truth", "none.mp4", "--out", tmp_path / "page.html")
-    answer.complains("relit-camera[evaluate]")
+    answer.complains("matplotlib", "relit doctor")
     assert not list(tmp_path.iterdir())
 
 

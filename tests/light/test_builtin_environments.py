@@ -58,6 +58,7 @@ def test_each_wraps_at_its_sides(name: str) -> None:
 def test_each_thumbnail_shows_something(name: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     data = EnvironmentStore(tmp_path_factory.mktemp("store")).thumbnail(name)
     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert picture is not None
     assert picture.std() > 15
     assert 20 < np.median(picture) < 220
     assert (picture > 250).mean() < 0.15

@@ -5,11 +5,13 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
 import OpenEXR
 import pytest
+from numpy.typing import NDArray
 
 from relit_camera.base.errors import PanoramaError
 from relit_camera.base.images.color import srgb_decode
@@ -61,7 +63,7 @@ def test_hdr(tmp_path: Path) -> None:
     "names", [("R", "G", "B"), ("light.R", "light.G", "light.B"), ("red", "green", "blue"), ("R", "G", "B", "A")]
 )
 def test_exr_of_any_layer_and_precision(tmp_path: Path, dtype: type, names: tuple[str, ...]) -> None:
-    image = (picture() * 9).astype(dtype)
+    image: NDArray[np.floating] = (picture() * 9).astype(dtype)
     planes = [*np.moveaxis(image, -1, 0), np.ones((16, 32), dtype)]
     path = write_exr(tmp_path / "a.exr", dict(zip(names, planes, strict=False)))
     np.testing.assert_array_equal(read_panorama(path, axes="map").radiance, image.astype(np.float32))
@@ -75,7 +77,7 @@ def test_exr_with_luminance_only(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("dtype", "top"), [(np.uint8, 255), (np.uint16, 65535)])
 def test_png_is_linearised(tmp_path: Path, dtype: type, top: int) -> None:
-    coded = (picture() * 0.9 * top).astype(dtype)
+    coded: NDArray[np.unsignedinteger] = (picture() * 0.9 * top).astype(dtype)
     read = read_panorama(write_coded(tmp_path / "a.png", coded), axes="map")
     np.testing.assert_allclose(read.radiance, srgb_decode(coded / top), atol=1e-6)
     assert read.clipped_fraction == 0
@@ -96,7 +98,8 @@ def test_to_the_right_of_the_file_s_middle_lies_minus_x(tmp_path: Path) -> None:
     bright_left = np.full((32, 64, 3), 0.1, np.float32)
     bright_left[:, 12:20] = 5
     path = write_hdr(tmp_path / "a.hdr", bright_left)
-    for axes, side in (("picture", 1), ("map", -1)):
+    conventions: tuple[tuple[Literal["picture", "map"], int], ...] = (("picture", 1), ("map", -1))
+    for axes, side in conventions:
         light_map = resample_to_light_map(read_panorama(path, axes=axes).radiance)
         lit, dark = (irradiance(light_map, (sign * side, 0, 0))[0] for sign in (1, -1))
         assert lit > 3 * dark
@@ -244,7 +247,9 @@ def test_radiance_from_elsewhere_is_checked_alike() -> None:
 @pytest.mark.parametrize("name", SHARED_MAPS)
 def test_real_maps_keep_their_energy(shared: Path, name: str) -> None:
     path = shared / "light" / f"{name}.hdr"
-    raw = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)[..., ::-1].astype(np.float64)
+    read = cv2.imread(str(path), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_COLOR)
+    assert read is not None
+    raw = read[..., ::-1].astype(np.float64)
     expected = np.einsum("ijc,ij->c", raw, texel_solid_angles(*raw.shape[:2]))
     np.testing.assert_allclose(total(resample_to_light_map(read_panorama(path).radiance)), expected, rtol=1e-3)
 

@@ -112,7 +112,7 @@ def test_what_is_no_light_is_refused_and_leaves_what_was(store: EnvironmentStore
 def test_unknown_names_list_close_ones(store: EnvironmentStore) -> None:
     with pytest.raises(NotFoundError, match="did you mean 'studio'"):
         store.load("stdio")
-    with pytest.raises(NotFoundError, match="stored are: studio, window"):
+    with pytest.raises(NotFoundError, match="there are: studio, window"):
         store.remove("zzzzzz")
     with pytest.raises(NotFoundError):
         store.thumbnail("nothing")
@@ -159,6 +159,7 @@ def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
 def test_thumbnails_are_small_jpegs_as_seen_from_inside(store: EnvironmentStore, tmp_path: Path) -> None:
     store.add("room", hdr(tmp_path / "a.hdr", 0.05, right=20))
     picture = cv2.imdecode(np.frombuffer(store.thumbnail("room"), np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
     assert picture.shape == (128, 256, 3)
     # As the file: bright right half.
     assert picture[:, 192].mean() > picture[:, 64].mean() + 50

@@ -118,7 +118,7 @@ def test_a_lamp_keeps_its_place_and_its_energy(texel: tuple[int, int], seed: int
 
 
 def energy_beside_a_witness(texel: tuple[int, int], rotation: Rotation) -> float:
-    """Share of its energy that a lamp keeps beside much more light, even, from the far third of the sphere.
+    """Fraction of its energy that a lamp keeps beside much more light, even, from the far third of the sphere.
 
     The whole map is renormalised, which that light decides: what the rotation itself takes from the lamp shows. (A
     second lamp as witness could hide it: at the antipodes every error is the same.)
@@ -132,7 +132,7 @@ def energy_beside_a_witness(texel: tuple[int, int], rotation: Rotation) -> float
 
 @given(texels, seeds)
 @settings(max_examples=80)
-def test_two_lamps_of_one_map_keep_their_shares(texel: tuple[int, int], seed: int) -> None:
+def test_two_lamps_of_one_map_keep_their_fractions(texel: tuple[int, int], seed: int) -> None:
     rotation = Rotation.random(rng=np.random.default_rng(seed))
     assert energy_beside_a_witness(texel, rotation) == pytest.approx(1, abs=0.01)
 

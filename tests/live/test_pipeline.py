@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 from functools import partial
 
@@ -13,11 +14,12 @@ from relit_camera.app.wiring import make_follower, make_pipeline, mode_factories
 from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
 from relit_camera.base.config.settings import InferenceSettings, RelitSettings
 from relit_camera.base.errors import ModelError, SubjectError
-from relit_camera.base.images.image_types import Frame
+from relit_camera.base.images.image_types import Frame, Mask
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.lab.bench.live_benchmark import SyntheticTracker
+from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
@@ -252,3 +254,35 @@ def test_the_relighter_at_work_is_named_for_the_status() -> None:
     assert made.providers == {}
     made.process(frame(), scene())
     assert made.providers == {"relighter basis": "numpy"}
+
+
+class Everywhere:
+    """A matting that sees the person in every pixel."""
+
+    def matte(self, frame: Frame) -> Mask:
+        return np.ones(frame.image.shape[:2], np.float32)
+
+
+def test_it_says_when_models_are_opened() -> None:
+    """For a subject, for a mode, and when a live person must first be parted from the room."""
+    tracker, said = SteadyTracker(), []
+    follower = make_follower(CPU.tracker, tracker)
+    made = Pipeline(tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere)
+    made.on_opening = lambda: said.append("opening")
+    blurred, other = scene(mode=Mode.RATIO, background={"kind": "blur"}), synthetic_subject(64, 80)
+    ratio = scene(mode=Mode.RATIO)
+    for wanted in (scene(), scene(), ratio, blurred, blurred, scene(), replace(scene(), subject=other)):
+        made.process(frame(), wanted)
+        said.append("picture")
+    made.close()
+    opened = ["opening", "picture"]
+    assert said == [*opened, "picture", *opened, *opened, "picture", *opened, *opened]
+
+
+def test_closing_it_ends_its_thread() -> None:
+    before = set(threading.enumerate())
+    made = pipeline()
+    made.process(frame(), scene())
+    assert {thread.name for thread in set(threading.enumerate()) - before} == {"warp-planner_0"}
+    made.close()
+    assert set(threading.enumerate()) == before

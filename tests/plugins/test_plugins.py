@@ -6,6 +6,8 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import httpx
 import numpy as np
@@ -15,7 +17,8 @@ from relit_camera import plugins
 from relit_camera.app.wiring import make_pipeline, make_tracker, require_plugins
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.config.settings_loader import load_settings
-from relit_camera.base.errors import ConfigError, InputError, NotFoundError
+from relit_camera.base.errors import ConfigError, InputError, NotFoundError, PluginError
+from relit_camera.base.images.image_types import Frame
 from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.capture.reflectance.method_registry import METHODS
 from relit_camera.capture.subject_builder import build_subject
@@ -24,6 +27,9 @@ from relit_camera.devices.sources.source_factory import SOURCES, open_source
 from relit_camera.face.tracking.trackers import TRACKERS, open_tracker
 from relit_camera.live.reenactment.reenactor import REENACTORS
 from relit_camera.live.scene.scene import Scene
+from relit_camera.live.status.camera_status import DegradationCode
+from relit_camera.live.status.event_hub import EventHub
+from relit_camera.live.status.status_board import StatusBoard
 from relit_camera.subject.relighting.relighter import RELIGHTERS
 from tests.cli.relit_command import Material, call, start
 from tests.small_camera import small_subject, wait_until
@@ -153,21 +159,70 @@ def test_two_packages_with_one_name_are_both_named(tmp_path: Path, monkeypatch: 
     (other / "entry_points.txt").write_text("[relit_camera.trackers]\nexample = relit_example_plugin:CentralFace\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ConfigError, match="several packages have a tracker 'example': other-package, relit-example"):
-        TRACKERS.require("example")
+        TRACKERS.load("example")
+
+
+@pytest.mark.usefixtures("installed")
+def test_a_plug_in_that_cannot_be_made_is_no_fault_of_ours(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level("DEBUG", "relit_camera"), pytest.raises(PluginError) as caught:
+        open_tracker("raising")
+    assert str(caught.value) == (
+        "tracker 'raising' of the package relit-example-plugin cannot be opened: "
+        "ZeroDivisionError: a fault of the example's; "
+        "tell its author, with the traceback that --log-level debug shows; or choose another"
+    )
+    assert "relit_example_plugin/__init__.py" in caplog.text
+    with pytest.raises(InputError, match="takes no argument"):  # what it says itself stays as it is
+        REENACTORS.load("example:1")[0](cast(plugins.ReenactorContext, SimpleNamespace(argument="1")))
+
+
+@pytest.mark.usefixtures("installed")
+def test_a_plug_in_that_fails_later_is_told_from_a_fault_of_ours() -> None:
+    board = StatusBoard(EventHub())
+    frame = Frame(np.zeros((2, 2, 3), np.uint8), 0, 0.0, 0.0)
+    with pytest.raises(FileNotFoundError) as caught:
+        open_tracker("raising:later").track(frame)
+    board.report(DegradationCode.PICTURE_FAILED, caught.value)
+    (degradation,) = board.degradations()
+    assert degradation.cure == "this is a fault of the plug-in package relit-example-plugin: tell its author"
+    board.report(DegradationCode.PICTURE_FAILED, ZeroDivisionError("not raised in a plug-in"))
+    (degradation,) = board.degradations()
+    assert degradation.cure == "this is a fault of ours: report it"
+
+
+def test_a_command_names_the_package_whose_plug_in_fails(
+    material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(FOLDER))
+    process = start("track", material.clip, "--out", tmp_path / "t.json", "--tracker", "raising:later", folder=tmp_path)
+    _, errors = process.communicate()
+    assert process.returncode == 1
+    assert "Traceback" in errors
+    assert errors.endswith("relit: this is a fault of the plug-in package relit-example-plugin: tell its author\n")
 
 
 WITHOUT_ARGUMENT: list[Callable[[], object]] = [
     lambda: open_source(RelitSettings.model_validate({"source": {"source": "pattern:3"}}).source),
     lambda: open_sink(RelitSettings.model_validate({"output": {"sink": "null:3"}}).output),
-    lambda: RELIGHTERS.load("basis")[0](small_subject(), plugins.RelighterOptions(argument="3")),
     lambda: build_subject(sphere_samples(40, 16), "nearest:3", "sphere"),
 ]
 
 
-@pytest.mark.parametrize("opening", WITHOUT_ARGUMENT, ids=["source", "sink", "relighter", "method"])
+@pytest.mark.parametrize("opening", WITHOUT_ARGUMENT, ids=["source", "sink", "method"])
 def test_an_argument_that_is_not_taken_is_an_error(opening: Callable[[], object]) -> None:
     with pytest.raises(InputError, match="takes no argument, and got '3'"):
         opening()
+
+
+@pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.kind)
+def test_what_is_built_in_takes_an_argument_only_if_its_group_says_so(group: PluginGroup) -> None:
+    assert set(group.with_argument) <= set(group.names())
+    for name in group.names():
+        if name in group.with_argument:
+            assert group.load(f"{name}:3")[1] == "3"
+        else:
+            with pytest.raises(InputError, match=f"{name} takes no argument, and got '3'; name it '{name}'"):
+                group.load(f"{name}:3")
 
 
 def test_the_public_names_stay() -> None:

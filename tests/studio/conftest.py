@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from relit_studio.mannequin.__main__ import main
-from relit_studio.people.face_model import read_face_model
-from relit_studio.people.hair_strands import Hairs
-from relit_studio.people.identity import identity_weights
-from relit_studio.people.named_people import NAMED_PEOPLE
+from relit_studio.people.clothing.shirt import Shirt
+from relit_studio.people.face.face_model import read_face_model
+from relit_studio.people.face.identity import identity_weights
+from relit_studio.people.hair.hair_strands import Hairs
 from relit_studio.people.people_assets import PeopleAssets
 from relit_studio.people.person import Person
-from relit_studio.people.shirt import Shirt
+from relit_studio.people.traits.named_people import NAMED_PEOPLE
 
 NOTHING = np.zeros((0, 3))
 NO_FACES = np.zeros((0, 3), np.intp)

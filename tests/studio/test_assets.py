@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from relit_camera.base.errors import NotFoundError, StorageError
-from relit_studio.assets.manifest import Manifest, manifest
-from relit_studio.assets.store import asset, assets_folder, fetch_assets
+from relit_studio.base.assets.manifest import Manifest, manifest
+from relit_studio.base.assets.store import asset, assets_folder, fetch_assets
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +46,7 @@ def test_a_disk_that_is_full_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyP
         raise OSError(errno.ENOSPC, "full")
 
     scan = [file for file in manifest().files if file.urls]
-    monkeypatch.setattr("relit_studio.assets.store.manifest", lambda: Manifest(credits={}, files=tuple(scan)))
+    monkeypatch.setattr("relit_studio.base.assets.store.manifest", lambda: Manifest(credits={}, files=tuple(scan)))
     monkeypatch.setattr("pooch.retrieve", full)
     with pytest.raises(StorageError, match=r"cannot write .*LeePerrySmith\.glb"):
         fetch_assets()

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import DeviceError, InputError
-from relit_studio.camera import Camera
+from relit_studio.base.resume import keep_settings
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.cycles_environment import create_environment, environment_python
 from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene, Strands, write_job
 from relit_studio.cycles.runner import render
-from relit_studio.resume import keep_settings
 
 FAKE = """
 import json, pathlib, sys
@@ -102,8 +102,8 @@ def test_a_worker_that_does_not_end_is_ended(
     tmp_path: Path, worker: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with Path(worker[1]).open("a") as program:
-        program.write("import os, time\nos.close(1)\ntime.sleep(60)\n")
-    monkeypatch.setattr("relit_studio.cycles.runner._WAIT_S", 1.0)
+        program.write("import os, signal\nos.close(1)\nsignal.pause()\n")
+    monkeypatch.setattr("relit_studio.cycles.runner.WAIT_S", 1.0)
     assert list(render(scene(), Camera(64), Quality(), pictures(tmp_path / "out", 1), command=worker)) == ["0.exr"]
 
 
@@ -123,7 +123,8 @@ def test_an_environment_that_cannot_be_made_is_said(tmp_path: Path, monkeypatch:
     python.write_text("#!/bin/sh\necho ensurepip is not available\nexit 1\n")
     python.chmod(0o755)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr("relit_studio.cycles.cycles_environment._python311", lambda: str(python))
+    monkeypatch.setattr("sys.executable", str(python))
+    monkeypatch.setattr("shutil.which", lambda _: str(python))
     with pytest.raises(DeviceError, match="cannot make an environment: ensurepip is not available"):
         create_environment()
 

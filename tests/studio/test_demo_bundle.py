@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenEXR
@@ -12,13 +13,28 @@ import pytest
 
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.image_types import Frame
+from relit_camera.capture.subject_builder import build_subject
 from relit_camera.face.tracking.track_recording import read_track
 from relit_camera.live.compositing.matting import RecordedMatting
+from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import read_subject
 from relit_studio import demo_bundle
 from relit_studio.demo_bundle import make_bundle
 
 SIDE = 96
+BUILT: list[Subject] = []
+
+
+@pytest.fixture(autouse=True)
+def build_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Build the subject in the first test that needs it; all give the same pictures."""
+
+    def build(*arguments: Any) -> Subject:
+        if not BUILT:
+            BUILT.append(build_subject(*arguments))
+        return BUILT[0]
+
+    monkeypatch.setattr(demo_bundle, "build_subject", build)
 
 
 @pytest.fixture
@@ -82,7 +98,7 @@ def test_a_folder_of_something_else_is_refused(rendered: tuple[Path, Path], tmp_
 def test_what_is_too_large_to_ship_is_said(
     rendered: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(demo_bundle._MOST_BYTES, "adam.relit", 1000)
+    monkeypatch.setitem(demo_bundle.MAX_BYTES, "adam.relit", 1000)
     with pytest.raises(InputError, match=r"adam\.relit would have .* MB"):
         make_bundle(*rendered, tmp_path / "out", 6)
     assert list((tmp_path / "out").iterdir()) == []

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from relit_camera.face.head_pose import HeadPose, project
-from relit_studio.camera import Camera
+from relit_studio.cameras.studio_camera import Camera
 
 
 def test_points_fall_where_the_service_projects_them() -> None:

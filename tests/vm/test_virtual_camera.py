@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from relit_camera.devices.sources.pattern_source import draw_pattern, read_number
+from relit_camera.devices.sources.pattern_source import draw_pattern
 from tests.vm.camera import SIZE, Camera, relit, running, without_models
 from tests.vm.conftest import NEWEST
+from tests.vm.guest.pattern_number import read_number
 from tests.vm.machine import Machine, MachineError
 from tests.vm.readers import FRAMES, NODE, READERS, Watcher, difference, finds_label
 

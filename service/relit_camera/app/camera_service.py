@@ -42,7 +42,7 @@ from relit_camera.live.supervision.pipeline_supervisor import PipelineSupervisor
 
 RELEASED_MESSAGE = "the webcam is off until somebody looks"
 """What the placeholder says in on-demand mode."""
-HANGING_THREAD_PREFIXES = ("source-", "camera", "pipeline", "renderer", "publisher")
+HANGING_THREAD_PREFIXES = ("source-", "camera", "pipeline", "renderer", "warp-planner", "publisher")
 """Threads that may be inside a driver or a network."""
 
 

@@ -75,6 +75,7 @@ def replay(
         size = (reader.info.width // 2 * 2, reader.info.height // 2 * 2)
         writer = files.enter_context(VideoWriter(out, size, reader.info.fps, threads=2)) if out else None
         pipeline = pipeline_for(size)
+        files.callback(pipeline.close)
         for frame in reader:
             rendered = pipeline.process(frame, scene_at(frame.time_s))
             frames.append(ReplayedFrame(frame.index, frame.time_s, rendered.motion, pipeline.timer.lap_ms()))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
+from dataclasses import replace
+from functools import lru_cache, partial
 
 from relit_camera.base.config.look import Mode
 from relit_camera.base.config.settings import InferenceSettings, RelitSettings, TrackerSettings
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.motion.face_follower import FaceFollower, FaceFollowerSettings
+from relit_camera.face.motion.one_euro_filter import FACE_SMOOTHING
 from relit_camera.face.tracking.trackers import TRACKERS, TrackerOptions, open_tracker
 from relit_camera.live.compositing.matting import matting_factory
 from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderMode
@@ -28,18 +30,23 @@ def session_options(inference: InferenceSettings) -> SessionOptions:
     return SessionOptions(inference.provider, inference.threads, inference.strict)
 
 
+open_matting = lru_cache(maxsize=1)(matting_factory)
+"""`matting_factory`; recorded mattes, up to a gigabyte, are read once and not by each check and pipeline anew."""
+
+
 def require_plugins(settings: RelitSettings) -> None:
-    """Check that the tracker, relighter and reenactor that the settings name are installed, without opening them.
+    """Import the tracker, relighter and reenactor that the settings name, without opening them.
 
     Sources and sinks are checked by opening them: their names may be files or devices as well.
 
     Raises:
         NotFoundError: one is not installed; the cure lists those that are.
-        ConfigError: several packages have one of that name.
+        ConfigError: several packages have one of that name, or it cannot be imported.
+        InputError: one that is built in takes no argument.
     """
-    TRACKERS.require(settings.tracker.name)
-    RELIGHTERS.require(settings.relight.name)
-    REENACTORS.require(settings.reenact.reenactor)
+    TRACKERS.load(settings.tracker.name)
+    RELIGHTERS.load(settings.relight.name)
+    REENACTORS.load(settings.reenact.reenactor)
 
 
 def make_tracker(settings: RelitSettings) -> Tracker:
@@ -59,8 +66,8 @@ def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, in
 
     Raises:
         NotFoundError: no relighter, reenactor or matte of the settings' name.
-        ConfigError: several packages have a plug-in of that name.
-        InputError: `recorded:FILE` names no recorded mattes.
+        ConfigError: several packages have a plug-in of that name, or it cannot be imported.
+        InputError: `recorded:FILE` names no recorded mattes; or a built-in plug-in takes no argument.
     """
     require_plugins(settings)
     session = session_options(settings.inference)
@@ -70,19 +77,18 @@ def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, in
         size,
         mode_factories(settings),
         partial(open_relighter, settings.relight.name, session=session),
-        matting_factory(settings.matte, session),
+        open_matting(settings.matte, session),
     )
 
 
 def make_follower(settings: TrackerSettings, tracker: Tracker) -> FaceFollower:
     """What smooths the tracker's faces into motion, as the settings say."""
-    rotation = FaceFollowerSettings().rotation
     return FaceFollower(
         tracker.scheme,
         FaceFollowerSettings(
             reach_yaw_deg=settings.reach_yaw_deg,
             reach_pitch_deg=settings.reach_pitch_deg,
-            rotation=type(rotation)(rotation.min_cutoff_hz, rotation.beta, settings.dead_band_deg),
+            rotation=replace(FACE_SMOOTHING.rotation, dead_band=settings.dead_band_deg),
         ),
     )
 

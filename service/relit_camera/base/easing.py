@@ -35,8 +35,8 @@ def smoothstep(value: ArrayLike, low: float = 0.0, high: float = 1.0) -> NDArray
 
     Elementwise, in the precision of `value`. With `low` above `high` the curve falls instead of rising.
     """
-    share = np.clip((np.asarray(value) - low) / (high - low), 0, 1)
-    return np.asarray(share * share * (3 - 2 * share))
+    fraction = np.clip((np.asarray(value) - low) / (high - low), 0, 1)
+    return np.asarray(fraction * fraction * (3 - 2 * fraction))
 
 
 def interpolate_keyframes(position: float, keys: Sequence[tuple[float, float]]) -> float:
@@ -46,5 +46,5 @@ def interpolate_keyframes(position: float, keys: Sequence[tuple[float, float]]) 
     """
     positions, values = np.array(keys).T
     after = int(np.clip(np.searchsorted(positions, position, side="right"), 1, len(keys) - 1))
-    share = smoothstep(position, positions[after - 1], positions[after])
-    return float(values[after - 1] + (values[after] - values[after - 1]) * share)
+    fraction = smoothstep(position, positions[after - 1], positions[after])
+    return float(values[after - 1] + (values[after] - values[after - 1]) * fraction)

@@ -16,6 +16,7 @@ RelitError                       what is wrong, and what cures it
 │   └── UnsupportedByDriverError the device's driver is too old for what it is asked
 ├── PortInUseError               another program listens on the port
 ├── StorageError                 a file cannot be written (disk full, no permission)
+├── PluginError                  a plug-in of another package fails: its author can mend it
 ├── PipelineHangError            a frame took so long that its thread was given up
 ├── ConflictError                API: the thing is in use, built in, or has that name already (409)
 ├── TooLargeError                API: the request's body is too large (413)
@@ -106,6 +107,10 @@ class PortInUseError(RelitError):
 
 class StorageError(RelitError):
     """A file could not be written."""
+
+
+class PluginError(RelitError):
+    """A plug-in of another package fails in a way that only its author can mend."""
 
 
 class PipelineHangError(RelitError):

@@ -5,12 +5,20 @@ https://packaging.python.org/en/latest/specifications/entry-points/
 
 from __future__ import annotations
 
+import logging
+import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, distributions, entry_points
 from typing import Any, Generic, TypeVar
 
-from relit_camera.base.errors import ConfigError, InputError, NotFoundError
+from relit_camera.base.errors import ConfigError, InputError, NotFoundError, PluginError, RelitError
 
+log = logging.getLogger(__name__)
+
+OWN_PACKAGE = "relit-camera"
+GROUP_PREFIX = "relit_camera."
+"""How the names of all groups begin."""
 Factory = TypeVar("Factory")
 
 
@@ -21,10 +29,13 @@ class PluginGroup(Generic[Factory]):
     Attributes:
         group: the entry-point group, such as `relit_camera.trackers`.
         kind: one plug-in in words, such as `tracker`, for messages.
+        with_argument: names of those built in that take an argument; the others that are built in take none. What
+            plug-ins of other packages take they check themselves.
     """
 
     group: str
     kind: str
+    with_argument: tuple[str, ...] = ()
 
     def names(self) -> list[str]:
         """List the names of all that are installed, sorted."""
@@ -34,33 +45,30 @@ class PluginGroup(Generic[Factory]):
         """Whether `NAME` or `NAME:ARGUMENT` names one that is installed."""
         return bool(entry_points(group=self.group, name=text.partition(":")[0]))
 
-    def require(self, text: str) -> None:
-        """Check, without importing anything, that `NAME` or `NAME:ARGUMENT` names just one that is installed.
-
-        Raises:
-            NotFoundError: none of that name is installed.
-            ConfigError: two packages announce that name.
-        """
-        self._entry_point(text.partition(":")[0])
-
     def load(self, text: str) -> tuple[Factory, str]:
         """Import what `NAME` or `NAME:ARGUMENT` names; returns it and the argument, empty where there is none.
+
+        What it returns for a plug-in of another package raises PluginError, which names the package, for everything but
+        a `RelitError` that the plug-in raises when it is called.
 
         Raises:
             NotFoundError: none of that name is installed.
             ConfigError: two packages announce that name, or the plug-in cannot be imported.
+            InputError: it is built in, and takes no argument.
         """
         name, _, argument = text.partition(":")
         point = self._entry_point(name)
+        is_ours = _package(point) == OWN_PACKAGE
+        if is_ours and name not in self.with_argument:
+            require_no_argument(self.kind, name, argument)
         try:
             loaded: Any = point.load()
         except Exception as error:  # a package of somebody else's may fail in any way
             raise ConfigError(
-                f"{self.kind} '{name}' of the package {_package(point)} cannot be loaded: "
-                f"{type(error).__name__}: {error}",
+                f"{self.kind} '{name}' of the package {_package(point)} cannot be loaded: {_one_line(error)}",
                 "update or uninstall that package",
             ) from error
-        return loaded, argument
+        return loaded if is_ours else self._guarded(loaded, point), argument
 
     def _entry_point(self, name: str) -> EntryPoint:
         points = list(entry_points(group=self.group, name=name))
@@ -70,6 +78,23 @@ class PluginGroup(Generic[Factory]):
             packages = ", ".join(sorted(_package(point) for point in points))
             raise ConfigError(f"several packages have a {self.kind} '{name}': {packages}", "uninstall all but one")
         return points[0]
+
+    def _guarded(self, factory: Callable[..., Any], point: EntryPoint) -> Any:
+        """The factory of another package, whose faults are told to be that package's."""
+
+        def make(*args: Any, **options: Any) -> Any:
+            try:
+                return factory(*args, **options)
+            except RelitError:
+                raise
+            except Exception as error:
+                log.debug("%s '%s' has failed", self.kind, point.name, exc_info=error)
+                raise PluginError(
+                    f"{self.kind} '{point.name}' of the package {_package(point)} cannot be opened: {_one_line(error)}",
+                    "tell its author, with the traceback that --log-level debug shows; or choose another",
+                ) from error
+
+        return make
 
 
 def require_no_argument(kind: str, name: str, argument: str) -> None:
@@ -82,5 +107,26 @@ def require_no_argument(kind: str, name: str, argument: str) -> None:
         raise InputError(f"{kind} {name} takes no argument, and got '{argument}'", f"name it '{name}'")
 
 
+def package_at_fault(error: BaseException) -> str | None:
+    """The package of a plug-in, not ours, whose code was running when the error was raised; None if there is none.
+
+    It is found by the error's traceback. What our code makes of a plug-in's wrong result cannot be told from a fault of
+    ours, and gives None.
+    """
+    authors = {
+        point.module.partition(".")[0]: distribution.name
+        for distribution in distributions()
+        for point in distribution.entry_points
+        if point.group.startswith(GROUP_PREFIX) and distribution.name != OWN_PACKAGE
+    }
+    modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
+    found = (authors.get(module.partition(".")[0]) for module in reversed(modules))
+    return next((package for package in found if package is not None), None)
+
+
 def _package(point: EntryPoint) -> str:
     return point.dist.name if point.dist else "unknown"
+
+
+def _one_line(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"

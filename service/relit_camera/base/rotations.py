@@ -7,9 +7,12 @@ point: yaw 90° takes the nose (0, 0, 1) to (1, 0, 0).
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 
@@ -28,9 +31,15 @@ def rotation_from_angles(yaw_deg: float, pitch_deg: float = 0.0, roll_deg: float
 
 def angles_from_rotation(rotation: Rotation) -> Angles:
     """Yaw, pitch and roll in degrees; yaw and roll in ±180, pitch in ±90."""
-    matrix = rotation.as_matrix()
+    (_, _, nose_x), (up_x, up_y, nose_y), (_, _, nose_z) = rotation.as_matrix().tolist()
     # Closed form instead of `as_euler`, which warns at the gimbal lock that a garbage pose may well reach.
-    pitch = np.degrees(np.arcsin(np.clip(-matrix[1, 2], -1.0, 1.0)))
-    yaw = np.degrees(np.arctan2(matrix[0, 2], matrix[2, 2]))
-    roll = np.degrees(np.arctan2(matrix[1, 0], matrix[1, 1]))
-    return Angles(float(yaw), float(pitch), float(roll))
+    pitch = math.asin(max(-1.0, min(-nose_y, 1.0)))
+    return Angles(math.degrees(math.atan2(nose_x, nose_z)), math.degrees(pitch), math.degrees(math.atan2(up_x, up_y)))
+
+
+def rotation_from_matrix(matrix: NDArray[np.float64]) -> Rotation:
+    """The rotation of a matrix (3, 3) that is one but for rounding.
+
+    A third of the time of `Rotation.from_matrix`; OpenCV takes turns below 0.0006° for none.
+    """
+    return Rotation.from_rotvec(cv2.Rodrigues(matrix)[0][:, 0])

@@ -6,6 +6,7 @@ import errno
 import logging
 import signal
 import sys
+import traceback
 from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
@@ -117,8 +118,14 @@ def run() -> None:
         sys.exit(1)
     except BrokenPipeError:
         sys.exit(1)
-    except OSError as error:
-        if error.errno != errno.ENAMETOOLONG:  # which only a name given by a person can cause
+    except Exception as error:
+        from relit_camera.base.plugin_groups import package_at_fault
+
+        if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:  # only a name given by a person causes it
+            print(f"relit: cannot use {error.filename}: the name is too long; choose a shorter one", file=sys.stderr)
+        elif (package := package_at_fault(error)) is not None:
+            traceback.print_exc()
+            print(f"relit: this is a fault of the plug-in package {package}: tell its author", file=sys.stderr)
+        else:
             raise
-        print(f"relit: cannot use {error.filename}: the name is too long; choose a shorter one", file=sys.stderr)
         sys.exit(1)

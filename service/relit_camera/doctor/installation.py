@@ -53,7 +53,8 @@ def check_packages() -> Finding:
         seen = f"{' and '.join(twice)} are both installed and own the same folder"
         return warning("packages", seen, f"run: pip uninstall {' '.join(twice)}, then install the one that you want")
     if not wrong:
-        return ok("packages", f"{len(needed)} packages, {', '.join(map(_name_and_version, ('onnxruntime', 'numpy')))}")
+        versions = ", ".join(map(_name_and_version, ("onnxruntime", "numpy")))
+        return ok("packages", f"{len(needed)} packages, {versions}{_missing_for_reports(wanted)}")
     return problem("packages", "; ".join(wrong), f"run: pip install --upgrade {PACKAGE_NAME}")
 
 
@@ -95,6 +96,15 @@ def _needed_python() -> SpecifierSet:
         return SpecifierSet(metadata.metadata(PACKAGE_NAME)["Requires-Python"])
     except metadata.PackageNotFoundError:
         return SpecifierSet(">=3.11")
+
+
+def _missing_for_reports(wanted: list[Requirement]) -> str:
+    """What to install for HTML reports, after the rest of the finding; empty where nothing is missing."""
+    extra = [each for each in wanted if each.marker and each.marker.evaluate({"extra": "evaluate"})]
+    missing = [each.name for each in extra if not _installed_names(each.name)]
+    if not missing:
+        return ""
+    return f"; HTML reports of `relit evaluate` need {' and '.join(missing)}: pip install '{PACKAGE_NAME}[evaluate]'"
 
 
 def _package_error(requirement: Requirement) -> str:

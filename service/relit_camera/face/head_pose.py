@@ -64,9 +64,8 @@ def fit_pose(
     """
     focal = focal_px or guess_focal(size)
     camera = np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1]])
-    rigid = list(scheme.rigid)
-    model = scheme.canonical[rigid] * _CV_FROM_OURS
-    pixels = landmarks[rigid].astype(np.float64)
+    model = scheme.rigid_canonical * _CV_FROM_OURS
+    pixels = landmarks[scheme.rigid_indices].astype(np.float64)
     if not np.isfinite(pixels).all():
         return None
     try:

@@ -67,6 +67,7 @@ class Pipeline:
 
     Attributes:
         timer: how long each stage took.
+        on_opening: called before models are opened, which may take long: those of a subject or mode, or of the matte.
     """
 
     def __init__(
@@ -78,7 +79,7 @@ class Pipeline:
         open_relighter: Callable[[Subject], Relighter],
         open_matte: Callable[[], Matting],
     ) -> None:
-        """Set up; the first frame of a subject opens its models.
+        """Set up; the first frame of a subject opens its models. `close` ends the thread that it starts.
 
         Args:
             tracker: measures the face in each frame.
@@ -89,13 +90,15 @@ class Pipeline:
             open_matte: called when a live person must first be parted from the room.
         """
         self.timer = StageTimer()
+        self.on_opening: Callable[[], None] = lambda: None
         self._tracker = tracker
         self._follower = follower
         self._size = size
         self._modes = modes
         self._open_relighter = open_relighter
         self._light = LightTransition()
-        self._compositor = Compositor(size, open_matte, self.timer)
+        self._open_matte = open_matte
+        self._compositor = Compositor(size, self._opened_matte, self.timer)
         self._executor = ThreadPoolExecutor(1, "warp-planner")
         self._active: _ActiveMode | None = None
         self._mismatch: _MismatchedSubject | None = None
@@ -115,6 +118,10 @@ class Pipeline:
     def reset_neutral(self) -> None:
         """Take the neutral face anew. May be called from any thread."""
         self._follower.reset_neutral()
+
+    def close(self) -> None:
+        """End the thread that plans warps, after the plan that it is at. No frame can be begun afterwards."""
+        self._executor.shutdown()
 
     def process(self, frame: Frame, scene: Scene) -> RenderedFrame:
         """Make the picture of one live frame: begin it, and finish it at once.
@@ -160,6 +167,10 @@ class Pipeline:
         live = fit_frame(frame, self._size)
         return RenderedFrame(self._compositor.composite_live(linear_from_display(live.image), live, scene), None, scene)
 
+    def _opened_matte(self) -> Matting:
+        self.on_opening()
+        return self._open_matte()
+
     def _mode_for(self, asked: Mode) -> Mode:
         """The mode asked for, or the fallback where that has found the live face not to be this subject's."""
         return FALLBACK_MODE if self._mismatch is not None and asked is self._mismatch.found_in else asked
@@ -182,6 +193,7 @@ class Pipeline:
         same_subject = active is not None and active.subject is subject
         if active is not None and same_subject and active.name is name:
             return active.mode
+        self.on_opening()
         relighter = active.relighter if active is not None and same_subject else self._open_relighter(subject)
         context = ModeContext(
             subject=subject,

@@ -70,10 +70,6 @@ class SubjectStore(NamedFiles):
             NotFoundError: neither a stored name nor a file.
             SubjectError: the file is damaged, or too large.
         """
-        if self.names_file(name_or_path):
+        if name_or_path not in self.names() and Path(name_or_path).exists():
             return self.load_file(Path(name_or_path))
         return name_or_path, self.load(name_or_path)
-
-    def names_file(self, name_or_path: str) -> bool:
-        """Whether what a person named is a file, and no stored subject: those come first."""
-        return name_or_path not in self.names() and Path(name_or_path).exists()

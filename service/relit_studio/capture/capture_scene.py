@@ -11,20 +11,20 @@ from relit_camera.base.images.image_types import LinearImage
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.exposure import WHITE_BALL_LUMINANCE, auto_exposure_scale
 from relit_camera.light.light_map import LightMap
-from relit_studio.capture.ball_reflection import Room, room_in_balls, torch_in_ball
-from relit_studio.capture.captured_person import Person
-from relit_studio.capture.flash_timing import FlashSchedule, RollingShutter
-from relit_studio.capture.head_motion import HeadMotion, Motion
-from relit_studio.capture.mirror_ball import MirrorBall
-from relit_studio.capture.torch import HandPath, Torch
-from relit_studio.pinhole import Pinhole
+from relit_studio.cameras.pinhole import Pinhole
+from relit_studio.capture.ball.ball_reflection import Room, room_in_balls, torch_in_ball
+from relit_studio.capture.ball.mirror_ball import MirrorBall
+from relit_studio.capture.flash.flash_timing import FlashSchedule, RollingShutter
+from relit_studio.capture.flash.torch import HandPath, Torch
+from relit_studio.capture.persons.captured_person import Person
+from relit_studio.capture.persons.head_motion import HeadMotion, Motion
 
 _BALLS_AT = ((0.7, 0.46), (-0.7, 0.4))
-"""Positions of the balls at the head's distance, right and up, as shares of half the picture."""
+"""Positions of the balls at the head's distance, right and up, as fractions of half the picture."""
 _BALLS_BEFORE_CM = (3.0, 1.5)
 """Distance of the balls in front of the head's origin."""
 _BALL_SIZE = 0.16
-"""A ball's radius as a share of what half the shorter side spans."""
+"""A ball's radius as a fraction of what half the shorter side spans."""
 _POLISHED = np.array([0.86, 0.85, 0.83], np.float32)
 
 
@@ -36,7 +36,7 @@ class Timing:
         seconds: length of the video.
         fps: frames a second.
         flash_hz: the torch's frequency by its own clock, which is off by `clock_error`: the phase drifts.
-        duty: share of each period that it is on.
+        duty: fraction of each period that it is on.
         exposure_s: of each row.
         readout_s: from the first row's exposure to the last one's.
     """
@@ -64,8 +64,8 @@ class FrameState:
         time_s: its presentation time, the start of its first row's exposure.
         motion: of the head.
         torch: its position and aim, whether it is on or off.
-        lit: share (height,) of each row's exposure for which it is on.
-        knots: the same share as exact knots, see `RollingShutter.lit_knots`.
+        lit: fraction (height,) of each row's exposure for which it is on.
+        knots: the same fraction as exact knots, see `RollingShutter.lit_knots`.
     """
 
     index: int
@@ -109,12 +109,12 @@ class Scene:
     def frame_state(self, index: int) -> FrameState:
         """State at frame `index`."""
         time_s = index / self.timing.fps
-        lit = self.shutter.lit_share(self.schedule, index)
+        lit = self.shutter.lit_fraction(self.schedule, index)
         knots = self.shutter.lit_knots(self.schedule, index)
         return FrameState(index, time_s, self._head.at(time_s), self._hand.at(time_s), lit, knots)
 
     def light(self, state: FrameState) -> LinearImage:
-        """Linear light at the camera (height, width, 3); each row contains its own share of the torch's light."""
+        """Linear light at the camera (height, width, 3); each row contains its own fraction of the torch's light."""
         without, torch = self.parts(state)
         return without + torch * state.lit[:, None, None].astype(np.float32)
 

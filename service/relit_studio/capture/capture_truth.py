@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_studio.camera_simulation import Gains
-from relit_studio.capture.ball_reflection import highlight_px
+from relit_studio.cameras.camera_simulation import Gains
+from relit_studio.cameras.pinhole import Pinhole
+from relit_studio.capture.ball.ball_reflection import highlight_px
+from relit_studio.capture.ball.mirror_ball import MirrorBall
 from relit_studio.capture.capture_scene import FrameState, Scene
-from relit_studio.capture.captured_person import to_rest
-from relit_studio.capture.flash_timing import flash_state
-from relit_studio.capture.mirror_ball import MirrorBall
+from relit_studio.capture.flash.flash_timing import flash_state
+from relit_studio.capture.flash.torch import BEAM_EXPONENT, RADIUS_CM, REFERENCE_CM
+from relit_studio.capture.persons.captured_person import to_rest
 from relit_studio.capture.phone import SENSOR, Stages
-from relit_studio.capture.torch import BEAM_EXPONENT, RADIUS_CM, REFERENCE_CM
-from relit_studio.pinhole import Pinhole
 
 VERSION = 1
 
@@ -80,7 +80,7 @@ def frame_truth(scene: Scene, state: FrameState, gains: Gains, face: NDArray) ->
         "flash": {
             "state": flash_state(state.lit),
             "lit_share": float(state.lit.mean()),
-            "lit_rows_px_share": [[round(row, 4), round(share, 6)] for row, share in state.knots],
+            "lit_rows_px_share": [[round(row, 4), round(fraction, 6)] for row, fraction in state.knots],
         },
         "head": {
             "pose_deg": motion.angles._asdict(),

@@ -12,7 +12,7 @@ from typing import Any
 from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
-from relit_studio.camera_simulation import Gains
+from relit_studio.cameras.camera_simulation import Gains
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
-from relit_studio.camera_simulation import AutoControls, Gains, Sensor
+from relit_studio.cameras.camera_simulation import AutoControls, Gains, Sensor
 
 SENSOR = Sensor(white=0.85, shot=1.5e-4, read=1.2e-3)
 _AUTO_CONTROLS = AutoControls(pull=0.10, momentum=0.72, exposure_limit_ev=0.6, balance_limit=0.25)

@@ -12,15 +12,15 @@ from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.base.video.video_writer import VideoWriter
-from relit_studio.camera_simulation import Gains
+from relit_studio.base.progress import Progress, no_progress
+from relit_studio.cameras.camera_simulation import Gains
+from relit_studio.cameras.pinhole import Pinhole
+from relit_studio.capture.ball.mirror_ball import MirrorBall
 from relit_studio.capture.capture_scene import Scene
 from relit_studio.capture.capture_truth import capture_truth, frame_truth
 from relit_studio.capture.frame_store import FinishedFrame, FrameStore
 from relit_studio.capture.lossless_writer import LosslessWriter
-from relit_studio.capture.mirror_ball import MirrorBall
 from relit_studio.capture.phone import Phone, Stages
-from relit_studio.pinhole import Pinhole
-from relit_studio.progress import Progress, no_progress
 
 _CRF = 20
 _STILL_FRAMES, _BALL_FRAMES = 12, 6

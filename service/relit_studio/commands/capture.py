@@ -35,9 +35,9 @@ def capture(
     """Film a person under a blinking hand-held torch, a mirror ball beside them. Run it again to go on."""
     from relit_camera.cli.arguments import parse_size
     from relit_studio.capture.capture_scene import Scene, Timing, dimmed
-    from relit_studio.capture.captured_person import Person
-    from relit_studio.capture.field_person import FieldPerson
-    from relit_studio.capture.mannequin_person import MannequinPerson, phone_camera
+    from relit_studio.capture.persons.captured_person import Person
+    from relit_studio.capture.persons.field_person import FieldPerson
+    from relit_studio.capture.persons.mannequin_person import MannequinPerson, phone_camera
     from relit_studio.capture.phone import Stages
     from relit_studio.capture.recording import record
 

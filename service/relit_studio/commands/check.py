@@ -16,7 +16,8 @@ from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.cli.arguments import parse_numbers
 from relit_camera.face.tracking.face_detector import FaceDetector
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
-from relit_studio.camera import Camera
+from relit_studio.base.resume import keep_settings
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.commands.options import (
     Environment,
     Out,
@@ -28,10 +29,9 @@ from relit_studio.commands.options import (
     quality_of,
     shown_progress,
 )
-from relit_studio.detectability import check_detectability, detectability_table
 from relit_studio.people.posture import Posture
-from relit_studio.resume import keep_settings
-from relit_studio.still import finish_stills
+from relit_studio.stills.detectability import check_detectability, detectability_table
+from relit_studio.stills.portrait import finish_stills
 
 _TRACKERS = ("mesh", "openseeface")
 
@@ -46,7 +46,7 @@ def check(
     samples: Samples = None,
     threads: Threads = 2,
 ) -> None:
-    """Render people in several poses, run the public face models on them, and write shares and errors to check.json.
+    """Render people in several poses, run the public face models on them, and write fractions and errors to check.json.
 
     Finished pictures are kept. The models are those of `relit models pull`.
     """

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from relit_studio.assets.manifest import manifest
-from relit_studio.assets.store import assets_folder, fetch_assets
+from relit_studio.base.assets.manifest import manifest
+from relit_studio.base.assets.store import assets_folder, fetch_assets
 from relit_studio.people.people_assets import people_assets
 
 

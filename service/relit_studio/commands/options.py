@@ -11,13 +11,13 @@ import typer
 
 from relit_camera.cli.progress import progress_bar
 from relit_camera.light.environments.environment_store import EnvironmentStore
+from relit_studio.base.progress import Progress
 from relit_studio.cycles.job import Quality
 from relit_studio.drive.painted_rooms import ROOMS, paint_room
 from relit_studio.drive.room import Room
-from relit_studio.people.named_people import find_traits
 from relit_studio.people.people_assets import people_assets
 from relit_studio.people.person import Person, make_person
-from relit_studio.progress import Progress
+from relit_studio.people.traits.named_people import find_traits
 
 PersonName = Annotated[str, typer.Option("--person", help="adam, bea, cem, or a number for a random person.")]
 Out = Annotated[Path, typer.Option("--out", help="Folder to write to.", metavar="DIR")]

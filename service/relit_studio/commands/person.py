@@ -10,7 +10,7 @@ import typer
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.rotations import Angles
 from relit_camera.base.storage.atomic_files import atomic_path
-from relit_studio.camera import Camera
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.commands.options import (
     Environment,
     PersonName,
@@ -24,9 +24,9 @@ from relit_studio.commands.options import (
     quality_of,
     shown_progress,
 )
-from relit_studio.people.expressions import find_expression
+from relit_studio.people.face.expressions import find_expression
 from relit_studio.people.posture import Posture
-from relit_studio.still import render_stills
+from relit_studio.stills.portrait import render_stills
 
 
 def person(

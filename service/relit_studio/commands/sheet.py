@@ -10,7 +10,8 @@ from relit_camera.base.images.contact_sheet import contact_sheet
 from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.rotations import Angles
 from relit_camera.cli.arguments import parse_numbers
-from relit_studio.camera import Camera
+from relit_studio.base.resume import keep_settings
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.commands.options import (
     Environment,
     Out,
@@ -23,10 +24,9 @@ from relit_studio.commands.options import (
     quality_of,
     shown_progress,
 )
-from relit_studio.people.expressions import find_expression
+from relit_studio.people.face.expressions import find_expression
 from relit_studio.people.posture import Posture
-from relit_studio.resume import keep_settings
-from relit_studio.still import finish_stills
+from relit_studio.stills.portrait import finish_stills
 
 
 def sheet(

@@ -12,7 +12,7 @@ from filelock import FileLock
 
 from relit_camera.base.errors import DeviceError
 from relit_camera.base.storage.atomic_files import make_folder
-from relit_studio.assets.store import cache_folder
+from relit_studio.base.assets.store import cache_folder
 
 BPY = "4.5.15"
 PYTHON = "3.11"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.storage.atomic_files import atomic_path, make_folder, write_atomic
-from relit_studio.camera import Camera
+from relit_studio.cameras.studio_camera import Camera
 
 JOB_FILE = "job.json"
 

@@ -8,20 +8,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.images.image_files import write_display
 from relit_camera.base.storage.atomic_files import make_folder
-from relit_studio.assets.store import cache_folder
+from relit_studio.base.assets.store import cache_folder
 from relit_studio.cycles.accessory_objects import extra_materials, extra_objects, extra_shape
 from relit_studio.cycles.job import Material, Mesh, Scene, Shape, Strands
-from relit_studio.people.eyes import LIMBUS_CM, eye_map, eye_picture, lid_shade
-from relit_studio.people.face_model import CORNEA_MATERIALS, Part
-from relit_studio.people.geometry import Floats, vertices_of
-from relit_studio.people.hair import HANGING
+from relit_studio.people.face.eyes import LIMBUS_CM, eye_map, eye_picture, lid_shade
+from relit_studio.people.face.face_model import CORNEA_MATERIALS, Part
+from relit_studio.people.geometry import vertices_of
+from relit_studio.people.hair.head_hair import HANGING
+from relit_studio.people.hair.scalp import scalp
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
-from relit_studio.people.scalp import scalp
-from relit_studio.people.skin import folds_picture, lips, oil, skin_picture
-from relit_studio.people.traits import Traits
+from relit_studio.people.skin.skin_texture import folds_picture, lips, oil, skin_picture
+from relit_studio.people.traits.person_traits import Traits
 
 _SKIN = (Part.FACE, Part.HEAD, Part.MOUTH, Part.SOCKET_LEFT, Part.SOCKET_RIGHT)
 _PARTS: dict[str, tuple[Part, ...]] = {
@@ -103,11 +104,11 @@ class Figure:
     def _mesh(
         self,
         name: str,
-        vertices: Floats,
+        vertices: Float64Array,
         slots: NDArray,
         materials: tuple[str, ...],
-        uv: Floats | None = None,
-        attributes: dict[str, Floats] | None = None,
+        uv: Float64Array | None = None,
+        attributes: dict[str, Float64Array] | None = None,
         subdivision: int = 1,
     ) -> Mesh:
         """A part of the face model with the vertices that it uses; arrays are given for the whole model."""

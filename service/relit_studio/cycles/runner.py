@@ -13,12 +13,13 @@ from pathlib import Path
 import relit_studio
 from relit_camera.base.errors import DeviceError
 from relit_camera.base.storage.atomic_files import make_folder
-from relit_studio.camera import Camera
+from relit_studio.base.progress import Progress, no_progress
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.cycles_environment import environment_python
 from relit_studio.cycles.job import Picture, Quality, Scene, write_job
-from relit_studio.progress import Progress, no_progress
 
-_WAIT_S = 10.0
+WAIT_S = 10.0
+"""How long a worker that says no more, or that was told to end, may take to end."""
 
 
 def render(
@@ -72,7 +73,7 @@ def _reports(command: Sequence[str], errors: Path) -> Iterator[dict[str, str]]:
             if line.startswith('{"picture"'):
                 yield json.loads(line)
         try:
-            failed = process.wait(_WAIT_S)
+            failed = process.wait(WAIT_S)
         except subprocess.TimeoutExpired:
             return  # No more output. `render` checks whether pictures are missing.
         if failed:
@@ -97,7 +98,7 @@ def _process(command: Sequence[str], stderr: int) -> Iterator[subprocess.Popen[s
         if process.poll() is None:
             process.terminate()
             try:
-                process.wait(_WAIT_S)
+                process.wait(WAIT_S)
             except subprocess.TimeoutExpired:
                 process.kill()
-                process.wait(_WAIT_S)
+                process.wait(WAIT_S)

@@ -15,7 +15,7 @@ from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImag
 from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.face.tracking.track_recording import TrackRecorder
-from relit_studio.assets.manifest import manifest
+from relit_studio.base.assets.manifest import manifest
 from relit_studio.cycles.exr import read_rgba
 from relit_studio.drive.performance import FPS
 from relit_studio.drive.room import Room

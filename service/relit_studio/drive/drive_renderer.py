@@ -6,7 +6,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from relit_camera.base.storage.atomic_files import make_folder
-from relit_studio.camera import Camera
+from relit_studio.base.progress import Progress, no_progress
+from relit_studio.base.resume import keep_settings
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.job import Picture, Quality
 from relit_studio.cycles.runner import render
 from relit_studio.drive.clip_files import write_clip
@@ -15,8 +17,6 @@ from relit_studio.drive.performances.talk import TALK
 from relit_studio.drive.room import Room
 from relit_studio.drive.take import Take
 from relit_studio.people.person import Person
-from relit_studio.progress import Progress, no_progress
-from relit_studio.resume import keep_settings
 
 _CHUNK = 12
 """Frames rendered in one run of the worker."""

@@ -1,4 +1,4 @@
-"""Visible share of a face: the part that is neither occluded nor outside the picture."""
+"""Visible fraction of a face: the part that is neither occluded nor outside the picture."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_studio.camera import Camera
-from relit_studio.mannequin.rasterizer import nearness_buffer
-from relit_studio.people.geometry import Floats, Indices
+from relit_camera.base.array_types import Float64Array, Indices
+from relit_studio.cameras.studio_camera import Camera
+from relit_studio.mannequin.rendering.rasterizer import nearness_buffer
 
 _HEIGHT = 180
 """Height of the depth picture in which visibility is measured, pixels."""
@@ -19,7 +19,7 @@ _WIDER = 5
 _SLACK_CM = 0.3
 """Largest depth behind another surface at which a point still counts as visible."""
 
-Surface = tuple[Floats, Indices]
+Surface = tuple[Float64Array, Indices]
 """Vertices (n, 3) in room axes and triangles (m, 3)."""
 
 
@@ -28,17 +28,17 @@ class Visibility:
     """Visibility of a face.
 
     Attributes:
-        covered_share: occluded share of the face's side toward the camera.
-        visible_share: share of that side that is neither occluded nor outside the picture.
+        covered_fraction: occluded fraction of the face's side toward the camera.
+        visible_fraction: fraction of that side that is neither occluded nor outside the picture.
         hidden: (count,) which points are occluded or outside the picture.
     """
 
-    covered_share: float
-    visible_share: float
+    covered_fraction: float
+    visible_fraction: float
     hidden: NDArray[np.bool_]
 
 
-def visibility(camera: Camera, face: Surface, before: Sequence[Surface], points: Floats) -> Visibility:
+def visibility(camera: Camera, face: Surface, before: Sequence[Surface], points: Float64Array) -> Visibility:
     """Measure how much of a face is visible.
 
     Args:
@@ -59,8 +59,8 @@ def visibility(camera: Camera, face: Surface, before: Sequence[Surface], points:
     inside[:, (_WIDER // 2) * inner : (_WIDER // 2 + 1) * inner] = True
     total = max(int(seen.sum()), 1)
     return Visibility(
-        covered_share=float(covered.sum() / total),
-        visible_share=float((seen & inside & ~covered).sum() / total),
+        covered_fraction=float(covered.sum() / total),
+        visible_fraction=float((seen & inside & ~covered).sum() / total),
         hidden=_hidden(wide, points, cover) | ~_within(camera, points),
     )
 
@@ -72,7 +72,7 @@ def _nearness(camera: Camera, surface: Surface) -> NDArray[np.float32]:
     return nearness_buffer(points.astype(np.float32), triangles.astype(np.int64), *camera.size)
 
 
-def _hidden(camera: Camera, points: Floats, cover: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _hidden(camera: Camera, points: Float64Array, cover: NDArray[np.float32]) -> NDArray[np.bool_]:
     """Which points (count,) are occluded."""
     rows, columns = cover.shape
     x, y = camera.project(points).astype(int).T
@@ -80,7 +80,7 @@ def _hidden(camera: Camera, points: Floats, cover: NDArray[np.float32]) -> NDArr
     return np.asarray(nearest > 1 / (camera.distance_cm - points[:, 2] - _SLACK_CM))
 
 
-def _within(camera: Camera, points: Floats) -> NDArray[np.bool_]:
+def _within(camera: Camera, points: Float64Array) -> NDArray[np.bool_]:
     x, y = camera.project(points).T
     width, height = camera.size
     return np.asarray((x >= 0) & (x < width) & (y >= 0) & (y < height))

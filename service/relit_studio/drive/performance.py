@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_studio.people.posture import Posture
-from relit_studio.props.held_objects import Gesture
+from relit_studio.people.props.held_objects import Gesture
 
 FPS = 24
 

@@ -17,7 +17,7 @@ from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.compositing.alpha_compositing import over, unpremultiply
 from relit_camera.live.compositing.environment_view import EnvironmentView
-from relit_studio.camera import Camera
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.job import PanoramaLight
 
 _BLUR = 0.05

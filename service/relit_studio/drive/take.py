@@ -8,17 +8,17 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import Delaunay
 
-from relit_studio.camera import Camera
+from relit_camera.base.array_types import Float64Array, Indices
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.job import Scene, Shape
 from relit_studio.cycles.person_objects import Figure
 from relit_studio.drive.face_visibility import Surface, Visibility, visibility
 from relit_studio.drive.performance import ActorState, Performance
-from relit_studio.people.face_model import Part
-from relit_studio.people.geometry import Floats, Indices
-from relit_studio.people.landmarks import landmarks
-from relit_studio.people.mesh478_points import mesh_points
+from relit_studio.people.face.face_model import Part
+from relit_studio.people.face.landmarks import landmarks
+from relit_studio.people.face.mesh478_points import mesh_points
 from relit_studio.people.person import Person
-from relit_studio.props.held_objects import HeldObjects
+from relit_studio.people.props.held_objects import HeldObjects
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +55,11 @@ class Take:
             shape[f"{each.name}.matrix"] = shift @ shape.get(f"{each.name}.matrix", np.eye(4))
         return shape
 
-    def landmarks(self, actor: ActorState, scheme: str) -> Floats:
+    def landmarks(self, actor: ActorState, scheme: str) -> Float64Array:
         """Points (count, 3) of a landmark scheme in room axes."""
         return np.asarray(landmarks(self.person, actor.posture)[scheme] + actor.shift_cm)
 
-    def visibility(self, actor: ActorState, points: Floats) -> Visibility:
+    def visibility(self, actor: ActorState, points: Float64Array) -> Visibility:
         """Visibility of the face, and of points (count, 3) on it."""
         vertices = self.person.vertices(actor.posture) + actor.shift_cm
         return visibility(self.camera, (vertices, self._face), self._occluders(actor), points)
@@ -76,7 +76,7 @@ class Take:
     def _face(self) -> Indices:
         """Triangles of the face, inside the outline of its landmarks in the frontal view."""
         model = self.person.model
-        oval = Delaunay(mesh_points(model).of(model.vertices)[:, :2])
+        oval = Delaunay(mesh_points(model).interpolate(model.vertices)[:, :2])
         triangles = model.triangles(Part.FACE)
         middles = model.vertices[triangles].mean(axis=1)
         return triangles[oval.find_simplex(middles[:, :2]) >= 0]

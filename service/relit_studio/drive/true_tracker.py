@@ -11,17 +11,17 @@ from relit_camera.base.images.image_types import Frame
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_studio.camera import Camera
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.drive.performance import ActorState
 from relit_studio.drive.take import Take
-from relit_studio.people.expressions import Expression
-from relit_studio.people.landmarks import canonical_origin
+from relit_studio.people.face.expressions import Expression
+from relit_studio.people.face.landmarks import canonical_origin
 from relit_studio.people.person import Person
 from relit_studio.people.posture import turned
 
 _BROW_INNER = "browInnerUp"
 _LOST, _UNCERTAIN = 0.35, 0.65
-"""Visible shares of the face below which its state is lost, and below which it is uncertain."""
+"""Visible fractions of the face below which its state is lost, and below which it is uncertain."""
 
 
 @dataclass(eq=False)
@@ -43,10 +43,10 @@ class TruthTracker:
 def true_state(take: Take, actor: ActorState, scheme: str = "mesh478") -> FaceState:
     """Face state as a perfect tracker gives it; eye and mouth openings are measured in the picture.
 
-    Its confidence is the share of the face that is visible: with little of it the face is uncertain, then lost.
+    Its confidence is the fraction of the face that is visible: with little of it the face is uncertain, then lost.
     """
     points = take.landmarks(actor, scheme)
-    visible = take.visibility(actor, points).visible_share
+    visible = take.visibility(actor, points).visible_fraction
     if visible < _LOST:
         return LOST
     known, seen = landmark_scheme(scheme), take.camera.project(points)
@@ -74,9 +74,9 @@ def frame_truth(take: Take, time_s: float) -> dict[str, Any]:
         "expression": dict(actor.posture.expression),
         "landmarks66_px": take.camera.project(points).astype(float).round(3).tolist(),
         "landmarks66_hidden": np.flatnonzero(seen.hidden).tolist(),
-        "found": seen.visible_share >= _LOST,
-        "visible_share": round(seen.visible_share, 4),
-        "covered_share": round(seen.covered_share, 4),
+        "found": seen.visible_fraction >= _LOST,
+        "visible_share": round(seen.visible_fraction, 4),
+        "covered_share": round(seen.covered_fraction, 4),
     }
 
 

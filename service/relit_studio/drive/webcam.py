@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.color import luminance, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
-from relit_studio.camera_simulation import AutoControls, Gains, Sensor
-from relit_studio.random_walk import RandomWalk
+from relit_studio.base.random_walk import RandomWalk
+from relit_studio.cameras.camera_simulation import AutoControls, Gains, Sensor
 
 SENSOR = Sensor(white=0.25, shot=3e-4, read=1.2e-3)
 """Sensor suited to a room by day; in a dark room gain and noise rise."""
@@ -19,9 +19,9 @@ _AUTO_CONTROLS = AutoControls(pull=0.035, momentum=0.6, exposure_limit_ev=2.5, b
 _WANTED = 0.25
 """Target luminance of the middle of the picture."""
 _MIDDLE = 0.2
-"""Size of the metered middle: standard deviation of its weights as a share of each side."""
+"""Size of the metered middle: standard deviation of its weights as a fraction of each side."""
 _TRUST = 0.5
-"""Share of the picture's change of tint that white balance attributes to the light."""
+"""Fraction of the picture's change of tint that white balance attributes to the light."""
 _DRIFT, _DRIFT_HZ = 0.04, (0.03, 0.2)
 """White balance drift: RMS of the logarithms of the red and blue gains, and the band of frequencies."""
 _WARM_FRAMES = 240

@@ -9,14 +9,14 @@ import numpy as np
 
 from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.light.directions import texel_directions
-from relit_studio.camera import Camera
+from relit_studio.base.progress import Progress, no_progress
+from relit_studio.base.resume import keep_settings
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene
 from relit_studio.cycles.runner import render
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
 from relit_studio.field.transport_solver import BELOW_AXIS_CM, DISTANCE_CM, HEIGHT_CM, SolverSettings
-from relit_studio.mannequin.olat import light_names, lights_text
-from relit_studio.progress import Progress, no_progress
-from relit_studio.resume import keep_settings
+from relit_studio.mannequin.outputs.olat import light_names, lights_text
 
 
 def solver_scene_for_cycles(surfaces: Surfaces) -> Scene:

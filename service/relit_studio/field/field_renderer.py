@@ -13,18 +13,18 @@ from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_files import write_display
 from relit_camera.base.storage.atomic_files import atomic_path, write_atomic
 from relit_camera.light.directions import fibonacci_directions
-from relit_studio.assets.manifest import manifest
-from relit_studio.camera import Camera
+from relit_studio.base.assets.manifest import manifest
+from relit_studio.base.progress import Progress, no_progress
+from relit_studio.base.resume import keep_settings
+from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.exr import Passes, read_passes
 from relit_studio.cycles.job import DistantLight, Picture, Quality, Scene
 from relit_studio.cycles.person_objects import Figure
 from relit_studio.cycles.runner import render
-from relit_studio.mannequin.olat import gray, light_names, lights_text
-from relit_studio.people.landmarks import canonical_origin, landmarks
+from relit_studio.mannequin.outputs.olat import gray, light_names, lights_text
+from relit_studio.people.face.landmarks import canonical_origin, landmarks
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture
-from relit_studio.progress import Progress, no_progress
-from relit_studio.resume import keep_settings
 
 _PASSES = "passes.exr"
 _PASSES_SAMPLES = 96

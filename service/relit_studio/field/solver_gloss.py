@@ -42,12 +42,12 @@ def glossy(normals: Values, views: Values, light: ArrayLike, f0: Values, alpha: 
 
 
 def gloss_albedo(f0: Values, alpha: Values, cosine: NDArray) -> Values:
-    """Directional albedo (count,) of the gloss: share of uniform light that it reflects to the camera."""
+    """Directional albedo (count,) of the gloss: fraction of uniform light that it reflects to the camera."""
     scale, rise = _lobe_integrals()
     steps = scale.shape[0] - 1
     place = np.stack([np.clip(alpha, 0, 1) * steps, np.clip(cosine, 0, 1) * steps])
-    shares = [map_coordinates(table, place, order=1, mode="nearest") for table in (scale, rise)]
-    return np.asarray(np.where(f0 > 0, f0 * shares[0] + shares[1], 0), np.float32)
+    fractions = [map_coordinates(table, place, order=1, mode="nearest") for table in (scale, rise)]
+    return np.asarray(np.where(f0 > 0, f0 * fractions[0] + fractions[1], 0), np.float32)
 
 
 @lru_cache(maxsize=1)
@@ -63,11 +63,11 @@ def _lobe_integrals(steps: int = 24, directions: int = 8192) -> tuple[NDArray, N
     for column, facing in enumerate(np.maximum(grid, 0.02)):
         half = light + [np.sqrt(1 - facing**2), 0, facing]
         half /= np.linalg.norm(half, axis=1, keepdims=True)
-        share = (1 - np.clip((half * light).sum(axis=1), 0, 1)) ** 5
+        fraction = (1 - np.clip((half * light).sum(axis=1), 0, 1)) ** 5
         for row, alpha in enumerate(np.maximum(grid, 0.05)):
             lobe = _lobe(half[:, 2], light[:, 2], facing, alpha)
             # Mean over the hemisphere, 2π; white-wall units have the factor π.
-            scale[row, column], rise[row, column] = 2 * np.mean(lobe * (1 - share)), 2 * np.mean(lobe * share)
+            scale[row, column], rise[row, column] = 2 * np.mean(lobe * (1 - fraction)), 2 * np.mean(lobe * fraction)
     return scale, rise
 
 

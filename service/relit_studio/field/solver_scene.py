@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_studio.mannequin.figure import Posture, mannequin
-from relit_studio.mannequin.mesh import Triangles
+from relit_studio.mannequin.shape.figure import Posture, mannequin
+from relit_studio.mannequin.shape.mesh import Triangles
 
 Values = NDArray[np.float32]
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from relit_camera.light.directions import fibonacci_directions
-from relit_studio.mannequin.mesh import Triangles
-from relit_studio.mannequin.rasterizer import fragments
-from relit_studio.mannequin.shading import axes_along
+from relit_studio.mannequin.rendering.rasterizer import fragments
+from relit_studio.mannequin.rendering.shading import axes_along
+from relit_studio.mannequin.shape.mesh import Triangles
 
 Values = NDArray[np.float32]
 
@@ -26,9 +26,9 @@ class Transport:
     """Diffuse exchange of light between vertices.
 
     Attributes:
-        form_factors: (vertices, vertices) float32: share of vertex i's cosine-weighted hemisphere that the surface at
-            vertex j fills. Rows sum to 1 - sky - (share of back faces).
-        sky: (vertices,) float32, the share that is open.
+        form_factors: (vertices, vertices) float32: fraction of vertex i's cosine-weighted hemisphere that the surface
+            at vertex j fills. Rows sum to 1 - sky - (fraction of back faces).
+        sky: (vertices,) float32, the fraction that is open.
     """
 
     form_factors: sparse.csr_array
@@ -65,10 +65,10 @@ def transport(vertices: Values, triangles: Triangles, directions: int, size: int
         lowest = ~upward & np.append(True, pixel[1:] != pixel[:-1])
         open_ends += np.bincount(vertex[highest | lowest], minlength=count)
         heard += np.bincount(vertex, minlength=count)
-    share = 1 / np.maximum(heard, 1)
+    fraction = 1 / np.maximum(heard, 1)
     rows, columns = np.concatenate(receivers), np.concatenate(senders)
-    seen_by = sparse.coo_array((share[rows].astype(np.float32), (rows, columns)), shape=(count, count)).tocsr()
-    return Transport(seen_by, np.asarray(open_ends * share, np.float32))
+    seen_by = sparse.coo_array((fraction[rows].astype(np.float32), (rows, columns)), shape=(count, count)).tocsr()
+    return Transport(seen_by, np.asarray(open_ends * fraction, np.float32))
 
 
 def bounce_light(light: Values, albedo: Values, between: Transport, bounces: int) -> Values:

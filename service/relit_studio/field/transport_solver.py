@@ -20,16 +20,16 @@ from relit_camera.base.images.image_files import write_display, write_linear
 from relit_camera.base.images.image_types import LinearImage, Mask
 from relit_camera.base.storage.atomic_files import atomic_path, write_atomic
 from relit_camera.light.directions import texel_directions
+from relit_studio.base.progress import Progress, no_progress
+from relit_studio.base.resume import keep_settings
+from relit_studio.cameras.pinhole import Pinhole
 from relit_studio.field.solver_gloss import gloss_albedo, glossy
 from relit_studio.field.solver_scene import Surfaces, mannequin_surfaces
 from relit_studio.field.solver_transport import Transport, bounce_light, transport
-from relit_studio.mannequin.figure import Posture, mannequin
-from relit_studio.mannequin.olat import gray, light_names, lights_text
-from relit_studio.mannequin.rasterizer import Hits, rasterize
-from relit_studio.mannequin.shading import ShadowMap
-from relit_studio.pinhole import Pinhole
-from relit_studio.progress import Progress, no_progress
-from relit_studio.resume import keep_settings
+from relit_studio.mannequin.outputs.olat import gray, light_names, lights_text
+from relit_studio.mannequin.rendering.rasterizer import Hits, rasterize
+from relit_studio.mannequin.rendering.shading import ShadowMap
+from relit_studio.mannequin.shape.figure import Posture, mannequin
 
 Values = NDArray[np.float32]
 

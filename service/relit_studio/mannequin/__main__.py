@@ -31,12 +31,12 @@ from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
-from relit_studio.mannequin.distant_lights import room
-from relit_studio.mannequin.driving_clip import CLIP_SIZE, write_clip
-from relit_studio.mannequin.mannequin_field import write_field
-from relit_studio.mannequin.mannequin_performance import FPS, FRAMES, frame_times, posture_at
-from relit_studio.mannequin.olat import write_olat
-from relit_studio.mannequin.relit_clip import write_relit
+from relit_studio.mannequin.outputs.driving_clip import CLIP_SIZE, write_clip
+from relit_studio.mannequin.outputs.mannequin_field import write_field
+from relit_studio.mannequin.outputs.mannequin_performance import FPS, FRAMES, frame_times, posture_at
+from relit_studio.mannequin.outputs.olat import write_olat
+from relit_studio.mannequin.outputs.relit_clip import write_relit
+from relit_studio.mannequin.rendering.distant_lights import room
 
 
 def generate(

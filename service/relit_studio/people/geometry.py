@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from relit_camera.base.array_types import Float64Array, Indices
 
 
-def unit(vectors: ArrayLike) -> Floats:
+def unit(vectors: ArrayLike) -> Float64Array:
     """Vectors (..., 3) scaled to length 1; zero vectors stay zero."""
     values = np.asarray(vectors, np.float64)
     return np.asarray(values / (np.linalg.norm(values, axis=-1, keepdims=True) + 1e-9))
@@ -29,7 +28,7 @@ def vertices_of(faces: NDArray) -> Indices:
     return np.unique(faces[faces >= 0]).astype(np.intp)
 
 
-def vertex_normals(vertices: Floats, triangles: Indices) -> Floats:
+def vertex_normals(vertices: Float64Array, triangles: Indices) -> Float64Array:
     """Unit normals (vertices, 3), weighted by area; zero where no triangle is."""
     flat = _crosses(vertices, triangles)
     summed = np.zeros_like(vertices)
@@ -38,12 +37,12 @@ def vertex_normals(vertices: Floats, triangles: Indices) -> Floats:
     return unit(summed)
 
 
-def areas(vertices: Floats, triangles: Indices) -> Floats:
+def areas(vertices: Float64Array, triangles: Indices) -> Float64Array:
     """Area (n,) of each triangle."""
     return np.asarray(np.linalg.norm(_crosses(vertices, triangles), axis=1) / 2)
 
 
-def _crosses(vertices: Floats, triangles: Indices) -> Floats:
+def _crosses(vertices: Float64Array, triangles: Indices) -> Float64Array:
     """Normal (n, 3) of each triangle, with twice its area as length."""
     corners = vertices[triangles]
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -53,15 +52,15 @@ class SurfacePoints(NamedTuple):
     """Points attached to a mesh by barycentric coordinates: vertex indices (n, 3) and weights (n, 3)."""
 
     corners: Indices
-    weights: Floats
+    weights: Float64Array
 
-    def of(self, values: NDArray) -> Floats:
+    def interpolate(self, values: NDArray) -> Float64Array:
         """Values (n, k) at the points, of values (vertices, k); or (n,) of (vertices,)."""
         picked = np.asarray(values, np.float64)[self.corners]
         return np.asarray(np.einsum("nc,nc...->n...", self.weights, picked))
 
 
-def scatter(triangles: Indices, density: Floats, count: int, rng: np.random.Generator) -> SurfacePoints:
+def scatter(triangles: Indices, density: Float64Array, count: int, rng: np.random.Generator) -> SurfacePoints:
     """`count` random points, triangles chosen in proportion to `density` (n,), uniform within each."""
     chosen = rng.choice(len(triangles), count, p=density / density.sum())
     first, second = rng.random((2, count))
@@ -73,10 +72,10 @@ class Similarity(NamedTuple):
     """Similarity transform x ↦ scale · rotation x + offset."""
 
     scale: float
-    rotation: Floats
-    offset: Floats
+    rotation: Float64Array
+    offset: Float64Array
 
-    def apply(self, points: NDArray) -> Floats:
+    def apply(self, points: NDArray) -> Float64Array:
         """Move points (n, 3)."""
         return np.asarray(self.scale * points @ self.rotation.T + self.offset)
 
@@ -89,7 +88,7 @@ class Similarity(NamedTuple):
         )
 
 
-def fit_similarity(source: Floats, target: Floats) -> Similarity:
+def fit_similarity(source: Float64Array, target: Float64Array) -> Similarity:
     """Least-squares similarity transform from points (n, 3) to other points (n, 3) (Umeyama 1991)."""
     middle, goal = source.mean(axis=0), target.mean(axis=0)
     left, strength, right = np.linalg.svd((target - goal).T @ (source - middle))
@@ -99,13 +98,13 @@ def fit_similarity(source: Floats, target: Floats) -> Similarity:
     return Similarity(scale, rotation, goal - scale * rotation @ middle)
 
 
-def find_nearest(tree: cKDTree, points: Floats, count: int = 1) -> tuple[Floats, Indices]:
+def find_nearest(tree: cKDTree, points: Float64Array, count: int = 1) -> tuple[Float64Array, Indices]:
     """Distance and index of the tree's nearest point for each point (n, k): (n,), or (n, count) for several."""
     distance, index = tree.query(points, k=count)
     return np.asarray(distance), np.asarray(index)
 
 
-def neighbor_mean(values: Floats, pairs: Indices) -> tuple[Floats, NDArray[np.bool_]]:
+def neighbor_mean(values: Float64Array, pairs: Indices) -> tuple[Float64Array, NDArray[np.bool_]]:
     """Mean (n, k) over each vertex's neighbors in `pairs` (m, 2), and (n,) which vertices have any."""
     summed, count = np.zeros_like(values), np.zeros(len(values))
     np.add.at(summed, pairs[:, 0], values[pairs[:, 1]])

@@ -10,15 +10,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import atomic_path, make_folder, write_atomic
-from relit_studio.assets.store import asset, cache_folder
-from relit_studio.people.face_model import FaceModel, read_face_model
-from relit_studio.people.geometry import Floats, Indices
-from relit_studio.people.scan import read_scan
-from relit_studio.people.scan_pictures import clean_pictures
-from relit_studio.people.scan_registration import register
+from relit_studio.base.assets.store import asset, cache_folder
+from relit_studio.people.face.face_model import FaceModel, read_face_model
+from relit_studio.people.skin.head_scan import read_scan
+from relit_studio.people.skin.scan_pictures import clean_pictures
+from relit_studio.people.skin.scan_registration import register
 
 _VERSION = 1
 """Version of the cached files; increased when their content changes."""
@@ -36,8 +36,8 @@ class PeopleAssets:
     """
 
     model: FaceModel
-    uv: Floats
-    body: Floats
+    uv: Float64Array
+    body: Float64Array
     body_triangles: Indices
     folder: Path
 

@@ -6,22 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from relit_studio.people.beard import grow_beard
-from relit_studio.people.brows import grow_brows
-from relit_studio.people.expressions import Expression
-from relit_studio.people.eyes import turn_eyes
-from relit_studio.people.face_model import FaceModel, Part
-from relit_studio.people.geometry import Floats
-from relit_studio.people.glasses import Glasses, fit_glasses
-from relit_studio.people.hair import FLATTENS_EARS, grow_hair
-from relit_studio.people.hair_strands import Hairs
-from relit_studio.people.identity import neutral_face
-from relit_studio.people.lashes import grow_lashes
+from relit_camera.base.array_types import Float64Array
+from relit_studio.people.clothing.glasses import Glasses, fit_glasses
+from relit_studio.people.clothing.shirt import Shirt, sew_shirt
+from relit_studio.people.face.expressions import Expression
+from relit_studio.people.face.eyes import turn_eyes
+from relit_studio.people.face.face_model import FaceModel, Part
+from relit_studio.people.face.identity import neutral_face
+from relit_studio.people.hair.beard import grow_beard
+from relit_studio.people.hair.brows import grow_brows
+from relit_studio.people.hair.hair_strands import Hairs
+from relit_studio.people.hair.head_hair import FLATTENS_EARS, grow_hair
+from relit_studio.people.hair.lashes import grow_lashes
+from relit_studio.people.hair.scalp import ears
 from relit_studio.people.people_assets import PeopleAssets
 from relit_studio.people.posture import Posture, follows_head, rigid_motion, turned
-from relit_studio.people.scalp import ears
-from relit_studio.people.shirt import Shirt, sew_shirt
-from relit_studio.people.traits import Traits
+from relit_studio.people.traits.person_traits import Traits
 
 _SHIRT_HAIR_CM = -10.5
 """Height below which cloth is an obstacle for long hair."""
@@ -42,7 +42,7 @@ class Person:
 
     traits: Traits
     people_assets: PeopleAssets
-    neutral: Floats
+    neutral: Float64Array
     hair: Hairs
     shirt: Shirt
     glasses: Glasses | None = None
@@ -52,11 +52,11 @@ class Person:
         """The face model."""
         return self.people_assets.model
 
-    def face(self, expression: Expression) -> Floats:
+    def face(self, expression: Expression) -> Float64Array:
         """Vertices (count, 3) of the upright head in an expression."""
         return turn_eyes(self.model, self.neutral + self.model.displacement(expression), expression)
 
-    def vertices(self, posture: Posture) -> Floats:
+    def vertices(self, posture: Posture) -> Float64Array:
         """Vertices (count, 3) in room axes; those of the head move rigidly, the neck's in part."""
         return turned(self.face(posture.expression), posture.rotation, follows_head(self.neutral))
 
@@ -76,11 +76,11 @@ class Person:
         face = self.face(posture.expression)
         return _turned_hairs(grow_lashes(self.model, face, self.traits.seed, self.traits.lashes), posture)
 
-    def head_motion(self, posture: Posture) -> Floats:
+    def head_motion(self, posture: Posture) -> Float64Array:
         """Rigid motion (4, 4) of hair and glasses with the head in this posture."""
         return rigid_motion(posture.rotation)
 
-    def hair_points(self, posture: Posture) -> Floats:
+    def hair_points(self, posture: Posture) -> Float64Array:
         """Points of hair that reaches the shoulders, in room axes; its lower part does not turn with the head."""
         flat = self.hair.points.reshape(-1, 3)
         moved = turned(flat, posture.rotation, follows_head(flat))

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Angles, rotation_from_angles
-from relit_studio.people.expressions import NEUTRAL, Expression
-from relit_studio.people.geometry import Floats
+from relit_studio.people.face.expressions import NEUTRAL, Expression
 
 PIVOT = np.array([0.0, -4.0, -1.0])
 """Center of the head's rotation in the neck, in head axes, centimeters."""
@@ -29,20 +29,20 @@ class Posture:
         return rotation_from_angles(*self.angles)
 
 
-def follows_head(points: Floats) -> Floats:
+def follows_head(points: Float64Array) -> Float64Array:
     """Share (n,) of the head's rotation that points at rest (n, 3) follow: 1 on the head, 0 below the neck."""
     return smoothstep(points[:, 1] + 0.25 * points[:, 2], -12.5, -6.5)
 
 
-def turned(points: Floats, rotation: Rotation, share: Floats | None = None) -> Floats:
-    """Points (n, 3) rotated about the pivot in the neck, by the part `share` (n,) of the rotation where given."""
+def turned(points: Float64Array, rotation: Rotation, fraction: Float64Array | None = None) -> Float64Array:
+    """Points (n, 3) rotated about the pivot in the neck, by the part `fraction` (n,) of the rotation where given."""
     offset = points - PIVOT
-    if share is None:
+    if fraction is None:
         return np.asarray(rotation.apply(offset) + PIVOT)
-    return np.asarray(Rotation.from_rotvec(share[:, None] * rotation.as_rotvec()).apply(offset) + PIVOT)
+    return np.asarray(Rotation.from_rotvec(fraction[:, None] * rotation.as_rotvec()).apply(offset) + PIVOT)
 
 
-def rigid_motion(rotation: Rotation) -> Floats:
+def rigid_motion(rotation: Rotation) -> Float64Array:
     """The head's rotation about the pivot as a matrix (4, 4)."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation.as_matrix()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, Protocol
 
 import pytest
 import yaml
@@ -13,8 +15,14 @@ from relit_camera.base.config.settings_loader import config_path, load_settings
 from relit_camera.base.errors import ConfigError
 
 
+class WriteConfig(Protocol):
+    """Writes a configuration file into the test's folder and returns its path."""
+
+    def __call__(self, text: str, name: str = "mine.yaml") -> Path: ...
+
+
 @pytest.fixture(autouse=True)
-def clean(tmp_path, monkeypatch):
+def clean(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No variables of ours, no file in the usual places."""
     for name in [name for name in os.environ if name.startswith("RELIT_")]:
         monkeypatch.delenv(name)
@@ -25,8 +33,8 @@ def clean(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def write(tmp_path):
-    def write(text, name="mine.yaml"):
+def write(tmp_path: Path) -> WriteConfig:
+    def write(text: str, name: str = "mine.yaml") -> Path:
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
@@ -35,32 +43,38 @@ def write(tmp_path):
     return write
 
 
-def values(settings):
+def values(settings: RelitSettings) -> dict[str, Any]:
     return settings.model_dump()
 
 
-def test_without_a_file_the_defaults_hold():
+def test_without_a_file_the_defaults_hold() -> None:
     assert config_path() is None
     assert values(load_settings()) == values(RelitSettings())
 
 
 @pytest.mark.parametrize("text", ["", "# nothing\n", "server:\n", "server:\n  # port: 9\nsubject:\n", "{}"])
-def test_a_file_or_section_without_values_changes_nothing(write, text):
+def test_a_file_or_section_without_values_changes_nothing(write: WriteConfig, text: str) -> None:
     assert values(load_settings(write(text))) == values(RelitSettings())
 
 
-def test_the_file_is_found_where_it_is_usual(tmp_path, write, monkeypatch):
+def test_the_file_is_found_where_it_is_usual(
+    tmp_path: Path, write: WriteConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
     user = write("log_level: error\n", "user/relit-camera/config.yaml")
     assert config_path() == user
     here = write("log_level: debug\n", "here/config.yaml")
-    assert config_path().resolve() == here
+    found = config_path()
+    assert found is not None
+    assert found.resolve() == here
     named = write("log_level: warning\n")
     monkeypatch.setenv("RELIT_CONFIG", str(named))
     assert load_settings().log_level == "warning"
     assert config_path(here) == here
 
 
-def test_yaml_gives_way_to_the_environment_and_that_to_the_command_line(write, monkeypatch):
+def test_yaml_gives_way_to_the_environment_and_that_to_the_command_line(
+    write: WriteConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = write("server:\n  port: 1000\nlog_level: debug\noutput:\n  fps: 25\n")
     assert load_settings(path).server.port == 1000
     monkeypatch.setenv("RELIT_SERVER__PORT", "2000")
@@ -73,7 +87,7 @@ def test_yaml_gives_way_to_the_environment_and_that_to_the_command_line(write, m
     assert settings.output.width == 1280
 
 
-def test_parts_of_one_topic_come_from_all_three_places(write, monkeypatch):
+def test_parts_of_one_topic_come_from_all_three_places(write: WriteConfig, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write("output:\n  width: 640\n  height: 480\n  label: Mine\n")
     monkeypatch.setenv("RELIT_OUTPUT__HEIGHT", "360")
     output = load_settings(path, {"output": {"sink": "null"}}).output
@@ -112,7 +126,7 @@ def test_parts_of_one_topic_come_from_all_three_places(write, monkeypatch):
         ("nonsense:\n", 1, ["nonsense", "not permitted"]),
     ],
 )
-def test_errors_name_file_line_key_and_value(write, text, line, words):
+def test_errors_name_file_line_key_and_value(write: WriteConfig, text: str, line: int, words: Sequence[str]) -> None:
     path = write(text)
     with pytest.raises(ConfigError) as error:
         load_settings(path)
@@ -124,19 +138,19 @@ def test_errors_name_file_line_key_and_value(write, text, line, words):
     assert error.value.cure
 
 
-def test_broken_yaml_is_said_with_its_line(write):
+def test_broken_yaml_is_said_with_its_line(write: WriteConfig) -> None:
     path = write("server:\n  port: [1\nlog_level: info\n")
     with pytest.raises(ConfigError, match=rf"{path} line [234]: .*; correct the YAML"):
         load_settings(path)
 
 
 @pytest.mark.parametrize("text", ["- one\n- two\n", "just words\n", "3\n"])
-def test_a_file_that_is_no_mapping_is_refused(write, text):
+def test_a_file_that_is_no_mapping_is_refused(write: WriteConfig, text: str) -> None:
     with pytest.raises(ConfigError, match="expected keys and values"):
         load_settings(write(text))
 
 
-def test_a_missing_unreadable_or_binary_file_is_refused(tmp_path, monkeypatch):
+def test_a_missing_unreadable_or_binary_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ConfigError, match=r"no configuration file at .*none\.yaml"):
         load_settings(tmp_path / "none.yaml")
     monkeypatch.setenv("RELIT_CONFIG", str(tmp_path / "gone.yaml"))
@@ -150,7 +164,9 @@ def test_a_missing_unreadable_or_binary_file_is_refused(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("text", ["", "server:\n  host: localhost\n", "server:\n  port: 9000\n"])
-def test_a_wrong_value_in_the_environment_names_its_variable_and_not_the_file(write, monkeypatch, text):
+def test_a_wrong_value_in_the_environment_names_its_variable_and_not_the_file(
+    write: WriteConfig, monkeypatch: pytest.MonkeyPatch, text: str
+) -> None:
     path = write(text)
     monkeypatch.setenv("RELIT_SERVER__PORT", "many")
     with pytest.raises(ConfigError, match=r"environment variable RELIT_SERVER__PORT: server\.port: .*many") as error:
@@ -158,40 +174,41 @@ def test_a_wrong_value_in_the_environment_names_its_variable_and_not_the_file(wr
     assert path.name not in str(error.value)
 
 
-def test_a_sink_may_be_called_null_without_quotes(write):
+def test_a_sink_may_be_called_null_without_quotes(write: WriteConfig) -> None:
     assert load_settings(write("output:\n  sink: null\n")).output.sink == "null"
 
 
 @pytest.mark.parametrize("name", ["RELIT_PORT", "RELIT_SERVERPORT", "RELIT_X__Y"])
-def test_an_unknown_variable_is_refused(monkeypatch, name):
+def test_an_unknown_variable_is_refused(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setenv(name, "1")
     with pytest.raises(ConfigError, match=f"{name} is no setting; known are: .*server"):
         load_settings()
 
 
-def test_an_unknown_key_below_a_known_one_is_refused(monkeypatch):
+def test_an_unknown_key_below_a_known_one_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELIT_SERVER__PROT", "1")
     with pytest.raises(ConfigError, match=r"server\.prot"):
         load_settings()
 
 
-def test_variables_that_are_no_settings_are_allowed(monkeypatch, tmp_path):
+def test_variables_that_are_no_settings_are_allowed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path))
     monkeypatch.setenv("RELIT_SHARED", str(tmp_path))
     assert values(load_settings()) == values(RelitSettings())
 
 
-def test_a_wrong_value_on_the_command_line_is_refused():
+def test_a_wrong_value_on_the_command_line_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"command line: server\.port: .*70000"):
         load_settings(None, {"server": {"port": 70000}})
 
 
-def test_settings_cannot_be_changed():
+def test_settings_cannot_be_changed() -> None:
+    settings = load_settings()
     with pytest.raises(ValueError, match="frozen"):
-        load_settings().log_level = "debug"
+        settings.log_level = "debug"  # type: ignore[misc]  # what the test is about
 
 
-def test_the_file_in_the_repository_is_right_and_says_the_defaults():
+def test_the_file_in_the_repository_is_right_and_says_the_defaults() -> None:
     """It is where users begin: every key that it names is a key, with the value that holds without it."""
     path = Path(__file__).parents[3] / "config.yaml"
     given = yaml.safe_load(path.read_text(encoding="utf-8")) or {}

@@ -49,6 +49,6 @@ def test_what_cannot_be_laid_out_is_refused() -> None:
     with pytest.raises(ImageError, match="no pictures"):
         contact_sheet([[None], []])
     with pytest.raises(ImageError, match="contact sheet has shape"):
-        contact_sheet([[flat(3).astype(np.float32)]])  # type: ignore[list-item]
+        contact_sheet([[flat(3).astype(np.float32)]])
     with pytest.raises(ValueError, match="1 row labels for 2 rows"):
         contact_sheet([[flat(1)], [flat(2)]], ["only"])

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from relit_camera.base.images.image_files import read_display
 from relit_camera.base.models.model_manifest import public_manifest
 from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
 from relit_camera.base.models.tflite.tflite_converter import convert_tflite_to_onnx
@@ -42,7 +43,7 @@ def both(name: str, folder: Path) -> tuple[Session, Session]:
 
 def portrait(folder: Path, height: int, width: int) -> NDArray[np.float32]:
     """A person's head and shoulders, RGB 0..1, stretched to (1, height, width, 3)."""
-    picture = cv2.imread(str(folder / "portraits" / "astronaut.png"))[:300, 80:380, ::-1]
+    picture = read_display(folder / "portraits" / "astronaut.png")[:300, 80:380]
     return cv2.resize(picture.astype(np.float32) / 255, (width, height))[None]
 
 

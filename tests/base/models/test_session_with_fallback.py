@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,12 @@ from onnx import TensorProto, helper, numpy_helper
 
 from relit_camera.base.errors import ConfigError, DeviceError, ModelError
 from relit_camera.base.models import onnx_runtime, provider_names, session_with_fallback
-from relit_camera.base.models.session_with_fallback import SessionOptions, open_session, session_report
+from relit_camera.base.models.session_with_fallback import (
+    SessionOptions,
+    open_session,
+    require_provider,
+    session_report,
+)
 
 
 def graph_bytes(shape: list[int | str] | None = None, element: int = TensorProto.FLOAT, ir_version: int = 10) -> bytes:
@@ -71,8 +77,17 @@ def test_a_model_of_open_size_is_not_fed_blindly() -> None:
     assert open_session(graph_bytes(["batch", "size"]), "open").report.warm_up_ms is None
 
 
-def test_the_threads_are_explicit_and_do_not_spin() -> None:
-    options = open_session(graph_bytes(), "small", SessionOptions(threads=2))._runtime.get_session_options()
+def test_the_threads_are_explicit_and_do_not_spin(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[onnxruntime.SessionOptions] = []
+    real = onnxruntime.InferenceSession
+
+    def remember(model: object, options: onnxruntime.SessionOptions, **rest: object) -> onnxruntime.InferenceSession:
+        given.append(options)
+        return real(model, options, **rest)
+
+    monkeypatch.setattr(onnxruntime, "InferenceSession", remember)
+    open_session(graph_bytes(), "small", SessionOptions(threads=2))
+    (options,) = given
     assert (options.intra_op_num_threads, options.inter_op_num_threads) == (2, 1)
     for pool in ("intra", "inter"):
         assert options.get_session_config_entry(f"session.{pool}_op.allow_spinning") == "0"
@@ -103,19 +118,37 @@ def test_auto_takes_the_cpu_where_nothing_better_was_built_in(monkeypatch: pytes
     assert (opened.requested, opened.provider, opened.why) == ("auto", "cpu", "")
 
 
-def pretend_cuda(monkeypatch: pytest.MonkeyPatch, placement: dict[str, int]) -> None:
-    """An ONNX Runtime that was built with CUDA, accepts it, and places the nodes so."""
+@dataclass
+class Driver:
+    """The driver of an accelerator. Once it was reset, no session runs there any more."""
+
+    was_reset: bool = False
+
+
+def pretend_cuda(monkeypatch: pytest.MonkeyPatch, placement: dict[str, int]) -> Driver:
+    """An ONNX Runtime that was built with CUDA, accepts it, and places the nodes so; with its driver."""
+    driver = Driver()
     available = ["CUDAExecutionProvider", "CPUExecutionProvider"]
     real = onnxruntime.InferenceSession
 
     def accept(model: object, options: object, providers: list[str], **rest: int) -> onnxruntime.InferenceSession:
         assert providers in (available, available[1:])
-        return real(model, options, providers=available[1:], **rest)
+        runtime = real(model, options, providers=available[1:], **rest)
+        run = runtime.run
+
+        def run_if_possible(*arguments: object) -> object:
+            if driver.was_reset and providers == available:
+                raise RuntimeError("CUDA failure 719: unspecified launch failure")
+            return run(*arguments)
+
+        runtime.run = run_if_possible
+        return runtime
 
     monkeypatch.setattr(onnxruntime, "get_available_providers", lambda: available)
     monkeypatch.setattr(onnxruntime, "InferenceSession", accept)
     monkeypatch.setattr(session_with_fallback, "node_placement", lambda _: placement)
     monkeypatch.setattr(provider_names, "preload", lambda _: "")
+    return driver
 
 
 @pytest.mark.parametrize(
@@ -155,28 +188,15 @@ def test_an_accelerator_that_fails_to_run_degrades(monkeypatch: pytest.MonkeyPat
     assert (opened.provider, opened.why) == ("cpu", "cuda: CUDA out of memory")
 
 
-class FailsLater:
-    """A runtime on an accelerator that works until its driver is reset."""
-
-    def __init__(self, real: onnxruntime.InferenceSession) -> None:
-        self.real, self.broken = real, False
-
-    def run(self, *arguments: object) -> object:
-        if self.broken:
-            raise RuntimeError("CUDA failure 719: unspecified launch failure")
-        return self.real.run(*arguments)
-
-
 def test_an_accelerator_that_fails_on_the_way_is_left_for_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend_cuda(monkeypatch, {"cuda": 2})
+    driver = pretend_cuda(monkeypatch, {"cuda": 2})
     opened = open_session(graph_bytes(), "small", SessionOptions("cuda"))
-    opened._runtime = runtime = FailsLater(opened._runtime)  # type: ignore[assignment]
     image = np.ones((1, 3), np.float32)
     assert opened.run({"image": image})["total"].tolist() == [[9, 13, 17]]
     with pytest.raises(ModelError, match="it takes image"):
         opened.run({"image": image[0]})
     assert opened.provider == "cuda"  # wrong feeds are not the accelerator's fault
-    runtime.broken = True
+    driver.was_reset = True
     assert opened.run({"image": image})["total"].tolist() == [[9, 13, 17]]
     assert opened.provider == "cpu"
     assert "719" in opened.why
@@ -185,11 +205,41 @@ def test_an_accelerator_that_fails_on_the_way_is_left_for_the_cpu(monkeypatch: p
     assert opened.run({"image": image})["total"].tolist() == [[9, 13, 17]]
 
 
+def test_a_model_that_can_be_made_again_is_not_kept_for_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    driver = pretend_cuda(monkeypatch, {"cuda": 2})
+    freed: list[str] = []
+
+    class Model(bytes):
+        def __del__(self) -> None:
+            freed.append("freed")
+
+    made = []
+
+    def make() -> bytes:
+        made.append("made")
+        return Model(graph_bytes())
+
+    opened = open_session(make, "small", SessionOptions("cuda"))
+    gc.collect()
+    assert (made, freed) == (["made"], ["freed"])
+    driver.was_reset = True
+    assert opened.run({"image": np.ones((1, 3), np.float32)})["total"].tolist() == [[9, 13, 17]]
+    assert (opened.provider, made) == ("cpu", ["made", "made"])
+
+
+def test_what_a_provider_needs_is_known_before_a_model_is_opened() -> None:
+    require_provider(SessionOptions("auto", strict=True))
+    require_provider(SessionOptions(missing_provider()))
+    with pytest.raises(DeviceError, match=r"cannot run on \w+: the installed .* was built without it; `relit doctor`"):
+        require_provider(SessionOptions(missing_provider(), strict=True))
+    with pytest.raises(ConfigError, match="unknown provider 'magic'"):
+        require_provider(SessionOptions("magic"))
+
+
 def test_strict_does_not_go_on_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
-    pretend_cuda(monkeypatch, {"cuda": 2})
+    driver = pretend_cuda(monkeypatch, {"cuda": 2})
     opened = open_session(graph_bytes(), "small", SessionOptions("cuda", strict=True))
-    opened._runtime = runtime = FailsLater(opened._runtime)  # type: ignore[assignment]
-    runtime.broken = True
+    driver.was_reset = True
     with pytest.raises(ModelError, match="719"):
         opened.run({"image": np.ones((1, 3), np.float32)})
     assert opened.provider == "cuda"

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
+import onnx
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
@@ -110,17 +111,17 @@ def test_pooling_of_the_whole_picture() -> None:
 
 
 UNARY: dict[str, Callable[[Array], Array]] = {
-    "HARD_SWISH": lambda x: x * np.clip(x + 3, 0, 6) / 6,
-    "LOGISTIC": lambda x: 1 / (1 + np.exp(-x)),
+    "HARD_SWISH": lambda x: x * np.clip(x + 3, 0, 6) / np.float32(6),
+    "LOGISTIC": lambda x: np.reciprocal(1 + np.exp(-x)),
     "NEG": np.negative,
     "RELU": lambda x: np.maximum(x, 0),
 }
-POSITIVE: dict[str, Callable[[Array], Array]] = {"RSQRT": lambda x: 1 / np.sqrt(x), "SQRT": np.sqrt}
+POSITIVE: dict[str, Callable[[Array], Array]] = {"RSQRT": lambda x: np.reciprocal(np.sqrt(x)), "SQRT": np.sqrt}
 
 
 @pytest.mark.parametrize("kind", [*UNARY, *POSITIVE])
 def test_functions_of_one_input(kind: str) -> None:
-    feed = noise(2, 7) * 4 if kind in UNARY else np.abs(noise(2, 7)) + 0.1
+    feed: Array = noise(2, 7) * 4 if kind in UNARY else np.abs(noise(2, 7)) + np.float32(0.1)
     np.testing.assert_allclose(single(kind, feed, [], (2, 7)), {**UNARY, **POSITIVE}[kind](feed), rtol=1e-5, atol=1e-6)
 
 
@@ -146,6 +147,48 @@ def test_prelu_with_slopes_above_one() -> None:
     feed, slopes = noise(1, 3, 3, 4) * 10, np.array([[[19.8, 1.0, -0.5, 0.2]]], np.float32)
     expected = np.where(feed > 0, feed, slopes * feed)
     np.testing.assert_allclose(single("PRELU", feed, [slopes], feed.shape), expected, rtol=1e-5, atol=1e-4)
+
+
+def bottleneck(channels: int) -> tuple[bytes, Array, Array]:
+    """A network of 1×1 convolution, PReLU, depthwise and 1×1 convolution; a picture; and the true result."""
+    writer, picture, slopes = NetworkWriter(), noise(1, 5, 4, 6), noise(1, 1, channels, seed=1) * 5
+    into, into_bias = noise(channels, 1, 1, 6, seed=2), noise(channels, seed=3)
+    each, each_bias = noise(1, 3, 3, channels, seed=4), noise(channels, seed=5)
+    out, out_bias = noise(7, 1, 1, channels, seed=6), noise(7, seed=7)
+    inner = [writer.computed(*picture.shape), *(writer.computed(1, 5, 4, channels) for _ in range(3))]
+    result = writer.computed(1, 5, 4, 7)
+    convolution = {"StrideH": 1, "StrideW": 1, "Padding": SAME}
+    depthwise = {**convolution, "DepthMultiplier": 1}
+
+    def constants(*arrays: Array) -> list[int]:
+        return [writer.constant(array) for array in arrays]
+
+    writer.operators = [
+        Operator("CONV_2D", [inner[0], *constants(into, into_bias)], [inner[1]], ("Conv2DOptions", convolution)),
+        Operator("PRELU", [inner[1], *constants(slopes)], [inner[2]]),
+        Operator(
+            "DEPTHWISE_CONV_2D",
+            [inner[2], *constants(each, each_bias)],
+            [inner[3]],
+            ("DepthwiseConv2DOptions", depthwise),
+        ),
+        Operator("CONV_2D", [inner[3], *constants(out, out_bias)], [result], ("Conv2DOptions", convolution)),
+    ]
+    truth = np.einsum("byxc,oc->byxo", picture, into[:, 0, 0]) + into_bias
+    truth = np.where(truth > 0, truth, slopes * truth)
+    truth = np.einsum("yxchw,hwc->yxc", windows(truth, (3, 3), 1, SAME), each[0])[None] + each_bias
+    truth = np.einsum("byxc,oc->byxo", truth, out[:, 0, 0]) + out_bias
+    return convert_tflite_to_onnx(writer.write([0], [result]), "tiny", ["image"], ["result"]), picture, truth
+
+
+@pytest.mark.parametrize(("channels", "products"), [(4, 0), (8, 0), (9, 2)])
+def test_prelu_between_convolutions_of_few_channels_becomes_part_of_them(channels: int, products: int) -> None:
+    data, picture, truth = bottleneck(channels)
+    kinds = [node.op_type for node in onnx.load_from_string(data).graph.node]
+    assert kinds.count("Mul") == products
+    assert "PRelu" not in kinds
+    result = open_session(data, "tiny", SessionOptions("cpu")).run({"image": picture})["result"]
+    np.testing.assert_allclose(result, truth, rtol=1e-4, atol=1e-4)
 
 
 @pytest.mark.parametrize("kind", ["MEAN", "SUM"])
@@ -214,6 +257,11 @@ ARRANGEMENTS: dict[str, tuple[Operator, list[NDArray], Callable[[Array], Array]]
         Operator("PAD", [], []),
         [np.array([[0, 0], [1, 0], [0, 2], [3, 4]], np.int32)],
         lambda x: np.pad(x, [(0, 0), (1, 0), (0, 2), (3, 4)]),
+    ),
+    "pad of channels": (
+        Operator("PAD", [], []),
+        [np.array([[0, 0], [0, 0], [0, 0], [3, 4]], np.int32)],
+        lambda x: np.pad(x, [(0, 0), (0, 0), (0, 0), (3, 4)]),
     ),
     "concatenation": (
         Operator("CONCATENATION", [], [], ("ConcatenationOptions", {"Axis": -1})),

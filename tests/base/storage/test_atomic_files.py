@@ -15,13 +15,13 @@ from relit_camera.base.errors import StorageError
 from relit_camera.base.storage.atomic_files import atomic_path, remove_unfinished_files, write_atomic
 
 WRITER = """
-import sys, time
+import sys
 from pathlib import Path
 from relit_camera.base.storage import atomic_path
 with atomic_path(Path(sys.argv[1])) as temporary:
     temporary.write_bytes(b"half")
     print("at work", flush=True)
-    time.sleep(60)
+    sys.stdin.read()
 """
 
 
@@ -30,7 +30,9 @@ def names(folder: Path) -> list[str]:
 
 
 def killed_writer(target: Path) -> subprocess.Popen[str]:
-    writer = subprocess.Popen([sys.executable, "-c", WRITER, str(target)], stdout=subprocess.PIPE, text=True)
+    writer = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(target)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
     assert writer.stdout is not None
     assert writer.stdout.readline() == "at work\n"
     return writer

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -90,14 +91,49 @@ def test_reserved_names_are_refused(files: NamedFiles) -> None:
 
 
 def test_the_error_offers_similar_names_or_all(files: NamedFiles) -> None:
-    with pytest.raises(NotFoundError, match="no tune 'march'; stored are: none"):
+    with pytest.raises(NotFoundError, match="no tune 'march'; there are: none"):
         files.path("march")
     files.write("march", ".mid", "m")
     files.write("aria", ".mid", "m")
     with pytest.raises(NotFoundError, match="no tune 'marsh'; did you mean 'march'\\?"):
         files.path("marsh")
-    with pytest.raises(NotFoundError, match="no tune 'x'; stored are: aria, march"):
+    with pytest.raises(NotFoundError, match="no tune 'x'; there are: aria, march"):
         files.path("x")
+
+
+ENVIRONMENTS = ("studio", "window", "sunset", "night-street", "party", "overcast")
+
+
+@pytest.fixture
+def environments(tmp_path: Path) -> NamedFiles:
+    made = NamedFiles(tmp_path / "environments", "environment", [".hdr"])
+    for name in ENVIRONMENTS:
+        made.write(name, ".hdr", "x")
+    return made
+
+
+def slips(name: str) -> Iterator[str]:
+    """What a hand makes of a name: a letter lost, doubled, replaced, two swapped; upper case, another dash, an end."""
+    for at, letter in enumerate(name):
+        yield name[:at] + name[at + 1 :]
+        yield name[:at] + letter + name[at:]
+        yield name[:at] + "e" + name[at + 1 :]
+        yield name[:at] + name[at + 1 : at + 2] + letter + name[at + 2 :]
+    yield from (name.upper(), name.capitalize(), f"{name}s", f"the {name}", f"{name}.hdr", name[: len(name) // 2 + 1])
+    yield from (name.replace("-", other) for other in (" ", "", "_"))
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_a_slip_of_the_hand_is_understood(name: str, environments: NamedFiles) -> None:
+    for slip in set(slips(name)) - {name}:
+        with pytest.raises(NotFoundError, match=f"did you mean '{name}'"):
+            environments.path(slip)
+
+
+@pytest.mark.parametrize("name", ["library", "forest", "night-club", "bar", "desert", "day", "beach", "church", "me"])
+def test_another_word_is_no_slip(name: str, environments: NamedFiles) -> None:
+    with pytest.raises(NotFoundError, match=f"no environment '{name}'; there are: night-street, overcast"):
+        environments.path(name)
 
 
 def test_a_folder_that_cannot_be_created_is_said(tmp_path: Path) -> None:

@@ -1,15 +1,19 @@
+from collections.abc import Sequence
+from pathlib import Path
+
 import av
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from relit_camera.base.errors import VideoError
-from relit_camera.base.images.color import linear_from_uint8, srgb_decode
-from relit_camera.base.video.video_readers import LinearVideoReader, LumaVideoReader, VideoReader
+from relit_camera.base.images.color import Gamma, linear_from_uint8, srgb_decode
+from relit_camera.base.video.video_readers import LinearVideoFrame, LinearVideoReader, LumaVideoReader, VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 
 
-def lossless(path, planes, pixel_format):
+def lossless(path: Path, planes: Sequence[NDArray[np.uint16]], pixel_format: str) -> Path:
     """One FFV1 frame of 10-bit planes (h, w), as they are."""
     height, width = planes[0].shape
     with av.open(str(path), "w") as container:
@@ -27,13 +31,13 @@ def lossless(path, planes, pixel_format):
     return path
 
 
-def only_frame(path, **options):
-    with LinearVideoReader(path, **options) as video:
+def only_frame(path: Path, *, gamma: Gamma = "srgb", longer_side: int | None = None) -> LinearVideoFrame:
+    with LinearVideoReader(path, gamma, longer_side=longer_side) as video:
         (frame,) = video
     return frame
 
 
-def test_ten_bits_of_rgb_arrive_whole(tmp_path):
+def test_ten_bits_of_rgb_arrive_whole(tmp_path: Path) -> None:
     codes = np.arange(1024, dtype=np.uint16).reshape(16, 64)
     path = lossless(tmp_path / "deep.mkv", [codes, codes[::-1], codes.T.reshape(16, 64)], "gbrp10le")
     image = only_frame(path, gamma="linear").image
@@ -42,7 +46,7 @@ def test_ten_bits_of_rgb_arrive_whole(tmp_path):
     assert np.abs(image * 1023 - np.stack([red, green, blue], axis=2)).max() < 0.05
 
 
-def test_ten_bits_of_luma_arrive_whole(tmp_path):
+def test_ten_bits_of_luma_arrive_whole(tmp_path: Path) -> None:
     luma = np.clip(np.arange(1024).reshape(16, 64), 64, 940).astype(np.uint16)
     grey = np.full_like(luma, 512)
     path = lossless(tmp_path / "deep.mkv", [luma, grey, grey], "yuv444p10le")
@@ -50,7 +54,7 @@ def test_ten_bits_of_luma_arrive_whole(tmp_path):
     assert np.abs(image * 876 - (luma[..., None] - 64.0)).max() < 0.1
 
 
-def test_light_is_that_of_the_frames_that_people_see(tmp_path):
+def test_light_is_that_of_the_frames_that_people_see(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     rng = np.random.default_rng(2)
     times = [0.0, 0.04, 0.11, 0.2]
@@ -65,7 +69,7 @@ def test_light_is_that_of_the_frames_that_people_see(tmp_path):
         np.testing.assert_allclose(linear.image, linear_from_uint8(frame.image), atol=1e-6)
 
 
-def test_a_small_picture_holds_the_means_of_the_large_one(tmp_path):
+def test_a_small_picture_holds_the_means_of_the_large_one(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     steps = np.kron(np.arange(0, 240, 20, dtype=np.uint8).reshape(3, 4), np.ones((64, 64), np.uint8))
     with VideoWriter(path, (256, 192), 30, crf=4) as video:
@@ -77,7 +81,7 @@ def test_a_small_picture_holds_the_means_of_the_large_one(tmp_path):
     assert only_frame(path, longer_side=999).image.shape == (192, 256, 3)  # never up
 
 
-def test_a_turned_video_is_small_and_upright(tmp_path):
+def test_a_turned_video_is_small_and_upright(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     image = np.zeros((64, 128, 3), np.uint8)
     image[:, :64] = 250
@@ -95,12 +99,12 @@ def test_a_turned_video_is_small_and_upright(tmp_path):
     assert small[18:].max() < 0.05
 
 
-def test_what_is_no_video_is_refused(tmp_path):
+def test_what_is_no_video_is_refused(tmp_path: Path) -> None:
     with pytest.raises(VideoError, match="no video"):
         LinearVideoReader(tmp_path / "nowhere.mp4")
 
 
-def test_frames_that_nobody_wants_are_not_made(tmp_path):
+def test_frames_that_nobody_wants_are_not_made(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     with VideoWriter(path, (64, 48), 25, crf=4) as video:
         for index in range(9):
@@ -113,7 +117,7 @@ def test_frames_that_nobody_wants_are_not_made(tmp_path):
 
 
 @pytest.mark.parametrize("bits", [8, 10])
-def test_luma_alone(tmp_path, bits):
+def test_luma_alone(tmp_path: Path, bits: int) -> None:
     path = tmp_path / "clip.mkv"
     if bits == 10:
         luma = np.clip(np.arange(1024).reshape(16, 64), 64, 940).astype(np.uint16)

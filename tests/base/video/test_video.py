@@ -3,6 +3,7 @@ import struct
 import subprocess
 import sys
 import textwrap
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -10,8 +11,10 @@ import av
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from relit_camera.base.errors import ImageError, StorageError, VideoError
+from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.video.video_readers import VideoInfo, VideoReader, probe_video
 from relit_camera.base.video.video_writer import VideoWriter, rational_rate
 
@@ -21,32 +24,32 @@ COLOURS = np.array(
 )
 
 
-def patches(width=256, height=128):
+def patches(width: int = 256, height: int = 128) -> DisplayImage:
     """Flat patches of eight colours, 4 x 2."""
     return np.kron(COLOURS.reshape(2, 4, 3), np.ones((height // 2, width // 4, 1), np.uint8))
 
 
-def patch_centres(image):
+def patch_centres(image: DisplayImage) -> NDArray[np.int_]:
     height, width = image.shape[:2]
     return image[height // 4 :: height // 2, width // 8 :: width // 4].reshape(-1, 3).astype(int)
 
 
-def write(path, images, fps=30.0, **options):
+def write(path: Path, images: Sequence[DisplayImage], fps: float = 30.0, *, crf: int = 18) -> Path:
     height, width = images[0].shape[:2]
-    with VideoWriter(path, (width, height), fps, **options) as video:
+    with VideoWriter(path, (width, height), fps, crf=crf) as video:
         for image in images:
             video.write(image)
     return path
 
 
-def noise(count, width=64, height=48):
+def noise(count: int, width: int = 64, height: int = 48) -> list[DisplayImage]:
     rng = np.random.default_rng(1)
     coarse = rng.integers(0, 256, (count, height // 8, width // 8, 3), dtype=np.uint8)
     return list(np.kron(coarse, np.ones((1, 8, 8, 1), np.uint8)))
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mkv", ".mov"])
-def test_what_is_written_is_read(tmp_path, suffix):
+def test_what_is_written_is_read(tmp_path: Path, suffix: str) -> None:
     images = noise(20)
     path = write(tmp_path / f"clip{suffix}", images, fps=25)
     with VideoReader(path) as video:
@@ -62,7 +65,7 @@ def test_what_is_written_is_read(tmp_path, suffix):
     assert not frames[0].image.flags.writeable
 
 
-def test_colours_survive_a_round_trip(tmp_path):
+def test_colours_survive_a_round_trip(tmp_path: Path) -> None:
     path = write(tmp_path / "clip.mp4", [patches()] * 3, crf=8)
     with VideoReader(path) as video:
         read = patch_centres(list(video)[1].image)
@@ -71,7 +74,7 @@ def test_colours_survive_a_round_trip(tmp_path):
         assert np.abs(patch_centres(list(video)[1].image) - COLOURS).max() <= 4
 
 
-def test_the_file_is_bt709_and_says_so(tmp_path):
+def test_the_file_is_bt709_and_says_so(tmp_path: Path) -> None:
     path = write(tmp_path / "clip.mp4", [patches()], crf=4)
     with av.open(str(path)) as container:
         picture = next(container.decode(video=0))
@@ -92,7 +95,7 @@ def test_the_file_is_bt709_and_says_so(tmp_path):
 
 
 @pytest.mark.parametrize(("size", "matrix"), [((128, 64), 5), ((1280, 720), 1)])
-def test_without_a_named_matrix_size_decides(tmp_path, size, matrix):
+def test_without_a_named_matrix_size_decides(tmp_path: Path, size: tuple[int, int], matrix: int) -> None:
     path = tmp_path / "clip.mkv"
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=30, options={"crf": "4"})
@@ -107,7 +110,7 @@ def test_without_a_named_matrix_size_decides(tmp_path, size, matrix):
 
 
 @pytest.mark.parametrize(("width", "height"), [(65, 48), (64, 47), (65, 47)])
-def test_odd_sizes_gain_a_copy_of_the_last_column_or_row(tmp_path, width, height):
+def test_odd_sizes_gain_a_copy_of_the_last_column_or_row(tmp_path: Path, width: int, height: int) -> None:
     image = np.zeros((height, width, 3), np.uint8)
     image[:, -1] = 250
     path = write(tmp_path / "odd.mp4", [image] * 2, crf=4)
@@ -131,7 +134,7 @@ def test_odd_sizes_gain_a_copy_of_the_last_column_or_row(tmp_path, width, height
         (7.5, Fraction(15, 2)),
     ],
 )
-def test_frame_rates_are_kept_as_fractions(tmp_path, fps, rate):
+def test_frame_rates_are_kept_as_fractions(tmp_path: Path, fps: float, rate: Fraction) -> None:
     assert rational_rate(fps) == rate
     path = write(tmp_path / "clip.mp4", noise(12), fps=fps)
     with av.open(str(path)) as container:
@@ -139,7 +142,7 @@ def test_frame_rates_are_kept_as_fractions(tmp_path, fps, rate):
     assert probe_video(path).fps == pytest.approx(float(rate))
 
 
-def test_times_of_a_varying_rate_survive(tmp_path):
+def test_times_of_a_varying_rate_survive(tmp_path: Path) -> None:
     times = [0.0, 0.1, 0.12, 0.5, 0.55, 1.3]
     path = tmp_path / "clip.mp4"
     with VideoWriter(path, (64, 48), 30) as video:
@@ -149,7 +152,7 @@ def test_times_of_a_varying_rate_survive(tmp_path):
         assert [frame.time_s for frame in video] == pytest.approx(times, abs=1e-3)
 
 
-def test_times_that_do_not_grow_are_moved_apart(tmp_path):
+def test_times_that_do_not_grow_are_moved_apart(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     with VideoWriter(path, (64, 48), 30) as video:
         for image, time_s in zip(noise(3), [0.5, 0.5, 0.4], strict=True):
@@ -161,7 +164,7 @@ def test_times_that_do_not_grow_are_moved_apart(tmp_path):
 
 
 # 16.16 fixed point (a, b, c, d) of ISO/IEC 14496-12, and the turn that an upright reader has to make.
-TURNS = {
+TURNS: dict[str, tuple[tuple[int, int, int, int], Callable[[DisplayImage], NDArray]]] = {
     "upright": ((1, 0, 0, 1), lambda image: image),
     "clockwise": ((0, 1, -1, 0), lambda image: cv2.rotate(image, cv2.ROTATE_90_CLOCKWISE)),
     "upside down": ((-1, 0, 0, -1), lambda image: cv2.rotate(image, cv2.ROTATE_180)),
@@ -171,7 +174,7 @@ TURNS = {
 
 
 @pytest.mark.parametrize("turn", TURNS)
-def test_rotation_flag_is_applied(tmp_path, turn):
+def test_rotation_flag_is_applied(tmp_path: Path, turn: str) -> None:
     matrix, upright = TURNS[turn]
     image = np.kron(COLOURS[:4].reshape(2, 2, 3), np.ones((32, 64, 1), np.uint8))
     path = write(tmp_path / "clip.mp4", [image] * 2, crf=4)
@@ -188,7 +191,7 @@ def test_rotation_flag_is_applied(tmp_path, turn):
     assert np.abs(frame[16::32, 16::32].astype(int) - expected[16::32, 16::32]).max() < 12
 
 
-def gif(path, count=4):
+def gif(path: Path, count: int = 4) -> Path:
     with av.open(str(path), "w") as container:
         stream = container.add_stream("gif", rate=10)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "rgb8"
@@ -198,7 +201,7 @@ def gif(path, count=4):
     return path
 
 
-def test_gifs_are_videos(tmp_path):
+def test_gifs_are_videos(tmp_path: Path) -> None:
     with VideoReader(gif(tmp_path / "clip.gif")) as video:
         frames = list(video)
     assert len(frames) == 4
@@ -206,7 +209,7 @@ def test_gifs_are_videos(tmp_path):
     assert np.abs(frames[2].image[4::8, 4::8].astype(int) - noise(4)[2][4::8, 4::8]).max() < 90  # 256 colours
 
 
-def test_a_reader_reads_once_and_holds_nothing(tmp_path):
+def test_a_reader_reads_once_and_holds_nothing(tmp_path: Path) -> None:
     path = write(tmp_path / "clip.mp4", noise(10))
     with VideoReader(path) as video:
         assert len(list(video)) == 10
@@ -216,11 +219,11 @@ def test_a_reader_reads_once_and_holds_nothing(tmp_path):
     path.unlink()
 
 
-def pictures_alive():
+def pictures_alive() -> int:
     return sum(isinstance(thing, av.VideoFrame) for thing in gc.get_objects())
 
 
-def test_pictures_read_are_freed_at_once(tmp_path):
+def test_pictures_read_are_freed_at_once(tmp_path: Path) -> None:
     path = write(tmp_path / "clip.mp4", noise(30))
     gc.collect()
     gc.disable()
@@ -233,7 +236,7 @@ def test_pictures_read_are_freed_at_once(tmp_path):
     assert max(held) < 15  # of 30: the decoder keeps a few
 
 
-def test_a_missing_file_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(VideoError, match=r"no video at .*nowhere\.mp4"):
         VideoReader(tmp_path / "nowhere.mp4")
     with pytest.raises(VideoError, match="no video"):
@@ -243,21 +246,21 @@ def test_a_missing_file_is_named(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"), [(b"", "is empty"), (b"not a video at all\n" * 90, "cannot be read as a video")]
 )
-def test_what_is_no_video_is_refused(tmp_path, content, message):
+def test_what_is_no_video_is_refused(tmp_path: Path, content: bytes, message: str) -> None:
     path = tmp_path / "clip.mp4"
     path.write_bytes(content)
     with pytest.raises(VideoError, match=message):
         VideoReader(path)
 
 
-def test_a_picture_is_no_video(tmp_path):
+def test_a_picture_is_no_video(tmp_path: Path) -> None:
     path = tmp_path / "picture.png"
     path.write_bytes(cv2.imencode(".png", patches())[1].tobytes())
     with pytest.raises(VideoError, match="is a picture"):
         VideoReader(path)
 
 
-def test_sound_alone_is_no_video(tmp_path):
+def test_sound_alone_is_no_video(tmp_path: Path) -> None:
     path = tmp_path / "sound.mp4"
     with av.open(str(path), "w") as container:
         stream = container.add_stream("aac", rate=44100)
@@ -270,7 +273,7 @@ def test_sound_alone_is_no_video(tmp_path):
 
 
 @pytest.mark.parametrize(("curve", "name"), [(16, "PQ"), (18, "HLG")])
-def test_hdr_is_refused_with_a_cure(tmp_path, curve, name):
+def test_hdr_is_refused_with_a_cure(tmp_path: Path, curve: int, name: str) -> None:
     path = tmp_path / "hdr.mov"
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=30)
@@ -283,7 +286,7 @@ def test_hdr_is_refused_with_a_cure(tmp_path, curve, name):
         VideoReader(path)
 
 
-def test_an_absurd_size_is_refused(tmp_path):
+def test_an_absurd_size_is_refused(tmp_path: Path) -> None:
     with pytest.raises(VideoError, match="20000x40"):
         VideoWriter(tmp_path / "clip.mp4", (20000, 40), 30)
     path = tmp_path / "wide.gif"
@@ -295,8 +298,8 @@ def test_an_absurd_size_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mkv", ".gif", ".avi"])
-@pytest.mark.parametrize("share", [0.5, 0.95])
-def test_a_cut_off_file_is_refused_and_counted(tmp_path, suffix, share):
+@pytest.mark.parametrize("fraction", [0.5, 0.95])
+def test_a_cut_off_file_is_refused_and_counted(tmp_path: Path, suffix: str, fraction: float) -> None:
     path = tmp_path / f"clip{suffix}"
     if suffix == ".gif":
         gif(path, 20)
@@ -311,14 +314,14 @@ def test_a_cut_off_file_is_refused_and_counted(tmp_path, suffix, share):
     whole = path.read_bytes()
     with VideoReader(path) as video:
         assert len(list(video)) == 20
-    path.write_bytes(whole[: int(len(whole) * share)])
+    path.write_bytes(whole[: int(len(whole) * fraction)])
     with pytest.raises(VideoError, match=r"is cut off: \d+ (of \d+ )?frames can be read") as caught:
         VideoReader(path)
     counted = int(caught.value.what.split("cut off: ")[1].split()[0])
     assert 0 <= counted < 20
 
 
-def test_a_cut_off_file_with_its_index_first_is_counted(tmp_path):
+def test_a_cut_off_file_with_its_index_first_is_counted(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     with av.open(str(path), "w", options={"movflags": "faststart"}) as container:
         stream = container.add_stream("libx264", rate=30, options={"crf": "4"})
@@ -332,7 +335,7 @@ def test_a_cut_off_file_with_its_index_first_is_counted(tmp_path):
         VideoReader(path)
 
 
-def test_damage_inside_is_told_after_the_good_frames(tmp_path):
+def test_damage_inside_is_told_after_the_good_frames(tmp_path: Path) -> None:
     path = write(tmp_path / "clip.mp4", noise(40), crf=4)
     data = bytearray(path.read_bytes())
     middle = len(data) // 2
@@ -344,11 +347,11 @@ def test_damage_inside_is_told_after_the_good_frames(tmp_path):
         assert len(list(zip(range(10), video, strict=False))) == 10
 
 
-def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     path.write_bytes(b"old")
 
-    def fail_midway():
+    def fail_midway() -> None:
         with VideoWriter(path, (64, 48), 30) as video:
             video.write(noise(1)[0])
             raise RuntimeError("stop")
@@ -359,19 +362,19 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_no_frames_no_file(tmp_path):
+def test_no_frames_no_file(tmp_path: Path) -> None:
     with VideoWriter(tmp_path / "clip.mp4", (64, 48), 30):
         pass
     assert list(tmp_path.iterdir()) == []
 
 
-def test_pictures_of_another_size_are_refused(tmp_path):
+def test_pictures_of_another_size_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ImageError, match="32x32"), VideoWriter(tmp_path / "clip.mp4", (64, 48), 30) as video:
         video.write(np.zeros((32, 32, 3), np.uint8))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_closed_writer_takes_no_more(tmp_path):
+def test_a_closed_writer_takes_no_more(tmp_path: Path) -> None:
     video = VideoWriter(tmp_path / "clip.mp4", (64, 48), 30)
     video.write(noise(1)[0])
     video.close()
@@ -380,7 +383,7 @@ def test_a_closed_writer_takes_no_more(tmp_path):
         video.write(noise(1)[0])
 
 
-def test_unknown_suffixes_and_folders_are_refused(tmp_path):
+def test_unknown_suffixes_and_folders_are_refused(tmp_path: Path) -> None:
     with pytest.raises(VideoError, match=r"name it with one of \.mkv, \.mov, \.mp4"):
         VideoWriter(tmp_path / "clip.foo", (64, 48), 30)
     with pytest.raises(StorageError, match="create the folder"):
@@ -388,7 +391,7 @@ def test_unknown_suffixes_and_folders_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("limit", [20_000, 200])
-def test_a_full_disk_is_one_clear_error(tmp_path, limit):
+def test_a_full_disk_is_one_clear_error(tmp_path: Path, limit: int) -> None:
     # A limit on file size, in a process of its own, stands for a full disk: the same failing write.
     script = textwrap.dedent(f"""
         import resource, signal, sys
@@ -427,7 +430,7 @@ REAL_CLIPS = {
 
 
 @pytest.mark.parametrize("name", REAL_CLIPS)
-def test_real_clips_are_read_whole(shared, name):
+def test_real_clips_are_read_whole(shared: Path, name: str) -> None:
     width, height, fps, count = REAL_CLIPS[name]
     path: Path = shared / "driving" / name
     previous = -1.0

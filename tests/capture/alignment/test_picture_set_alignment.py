@@ -3,6 +3,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike, NDArray
 
 from relit_camera.base.errors import LightsError
 from relit_camera.capture.alignment import picture_set_alignment
@@ -11,24 +12,24 @@ from relit_camera.capture.alignment.picture_set_alignment import align_samples, 
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, transforms_to_array
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import direction_from_degrees
-from tests.capture.film.moving_face_film import CIRCLE, SIZE, moved, shading, texture, wandering
+from tests.capture.film.moving_face_film import CIRCLE, SIZE, Move, moved, shading, texture, wandering
 
 LIGHTS = [(azimuth, elevation) for elevation in (-30, 0, 30, 60) for azimuth in range(-60, 61, 20)]
 DIRECTIONS = np.array([direction_from_degrees(*light) for light in LIGHTS])
 BLACK, TORN, FOREIGN = 3, 10, 17
 
 
-def disc():
+def disc() -> NDArray[np.float32]:
     x, y = np.arange(SIZE[0]) + 0.5, (np.arange(SIZE[1]) + 0.5)[:, None]
     return (np.hypot(x - CIRCLE.x, y - CIRCLE.y) < CIRCLE.radius).astype(np.float32)
 
 
-def coloured(pictures):
+def coloured(pictures: ArrayLike) -> NDArray[np.float32]:
     return np.repeat(np.asarray(pictures, np.float32)[..., None], 3, axis=-1)
 
 
 @lru_cache
-def scene():
+def scene() -> tuple[list[Move], NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]:
     """A face under 28 lights: how it lay, how strong the strobes were, the pictures, and what they should be."""
     rng = np.random.default_rng(4)
     still = np.stack([texture() * shading(*light) for light in LIGHTS])
@@ -40,7 +41,7 @@ def scene():
     return moves, strobes, coloured(pictures), coloured(still)
 
 
-def off(pictures, still):
+def off(pictures: NDArray[np.float32], still: NDArray[np.float32]) -> float:
     """RMS difference in the face."""
     return float(np.sqrt(np.mean(np.square(pictures - still)[:, disc() > 0])))
 
@@ -109,7 +110,7 @@ def test_light_from_behind_keeps_its_strength() -> None:
 
 
 @pytest.mark.parametrize("strength", [0.6, 1.5])
-def test_one_picture_is_aligned_to_its_prediction(strength):
+def test_one_picture_is_aligned_to_its_prediction(strength: float) -> None:
     moves, _, _, still = scene()
     for index in (2, 12, 24):
         picture = strength * coloured(moved(still[index, ..., 0], moves[index]))

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from relit_camera.capture.alignment.rigid_transform import (
     RigidTransform,
@@ -12,10 +13,11 @@ from relit_camera.capture.alignment.rigid_transform import (
 )
 from tests.capture.film.moving_face_film import SIZE, Move, moved, texture
 
+Points = NDArray[np.float64]
 TURNED = RigidTransform(3.0, 4.0, -2.5)
 
 
-def in_complex_plane(transform, points, size):
+def in_complex_plane(transform: RigidTransform, points: Points, size: tuple[int, int]) -> Points:
     """The same transform, worked out another way: turns are products, up is the imaginary axis."""
     center = np.array(size) / 2
     z = (points[:, 0] - center[0]) - 1j * (points[:, 1] - center[1])
@@ -23,7 +25,7 @@ def in_complex_plane(transform, points, size):
     return np.stack([z.real + center[0], center[1] - z.imag], axis=1)
 
 
-def some_points(count=30, seed=0):
+def some_points(count: int = 30, seed: int = 0) -> Points:
     return np.random.default_rng(seed).uniform(0, 200, (count, 2))
 
 
@@ -62,7 +64,7 @@ def test_a_fit_is_the_least_squares_one() -> None:
     points, noise = some_points(), np.random.default_rng(5).normal(0, 2, (30, 2))
     targets = TURNED.apply(points, SIZE) + noise
 
-    def misfit(row):
+    def misfit(row: NDArray[np.float64]) -> float:
         return float(np.square(RigidTransform(*row).apply(points, SIZE) - targets).sum())
 
     best = transforms_to_array([fit_rigid_transform(points, targets, SIZE)])[0]
@@ -74,7 +76,9 @@ def test_outliers_do_not_count() -> None:
     points = some_points(60)
     targets = TURNED.apply(points, SIZE)
     targets[::4] += np.random.default_rng(6).uniform(8, 30, (15, 2))
-    found, inside = fit_rigid_transform_ransac(points, targets, SIZE, 1.0)
+    fitted = fit_rigid_transform_ransac(points, targets, SIZE, 1.0)
+    assert fitted is not None
+    found, inside = fitted
     assert not inside[::4].any()
     np.testing.assert_allclose(transforms_to_array([found]), transforms_to_array([TURNED]), atol=1e-4)
     assert fit_rigid_transform_ransac(points[:3], targets[:3], SIZE, 1.0) is None
@@ -93,7 +97,7 @@ def test_a_picture_is_moved_as_points_are() -> None:
 def test_between_times() -> None:
     known = [RigidTransform(0, 0, 0), RigidTransform(2, 4, -6)]
     found = interpolate_transforms(np.array([1.0, 1.5, 3.0]), np.array([1.0, 3.0]), known)
-    np.testing.assert_allclose(transforms_to_array(found), [[0, 0, 0], [0.5, 1, -1.5], [2, 4, -6]])
+    np.testing.assert_allclose(transforms_to_array(found), [[0.0, 0.0, 0.0], [0.5, 1.0, -1.5], [2.0, 4.0, -6.0]])
     assert transforms_from_array(transforms_to_array(known)) == known
     assert transforms_to_array([]).shape == (0, 3)
     assert interpolate_transforms(np.array([0.0, 9.0]), np.array([1.0]), known[1:]) == known[1:] * 2
@@ -101,13 +105,13 @@ def test_between_times() -> None:
 
 def test_beyond_the_times_known_it_goes_on_as_it_went() -> None:
     known_s = np.arange(1.0, 3.01, 0.1)
-    known = [RigidTransform(time, 2 * time, -time) for time in known_s]
+    known = [RigidTransform(time, 2 * time, -time) for time in known_s.tolist()]
     found = interpolate_transforms(np.array([0.8, 3.3]), known_s, known)
     np.testing.assert_allclose(transforms_to_array(found), [[0.8, 1.6, -0.8], [3.3, 6.6, -3.3]])
 
 
 @pytest.mark.parametrize("center", [(100.0, 120.0), (30.0, 200.0)])
-def test_about_another_centre(center):
+def test_about_another_centre(center: tuple[float, float]) -> None:
     from relit_camera.capture.film.face_circle import FaceCircle
     from relit_camera.capture.film.stabilization.face_crops import CropWindow
 

@@ -22,7 +22,7 @@ class Blinking:
 
     Attributes:
         fps, seconds, hz, duty, exposure_s, readout_s: as their names say; readout by columns if `sideways`.
-        phase: share of a period that has passed at the beginning.
+        phase: fraction of a period that has passed at the beginning.
         jitter_s: standard deviation of each flash's start.
         uneven_s: standard deviation of each frame's time.
         hunting: how much the gain swings (logarithm); `wall` whether something that the light does not reach shows it.
@@ -48,7 +48,7 @@ class Blinking:
 
 
 def film(scene: Blinking) -> tuple[BrightnessGrid, np.ndarray]:
-    """The brightness, and the lit share (frames, 32) of each row, or column."""
+    """The brightness, and the lit fraction (frames, 32) of each row, or column."""
     rng = np.random.default_rng(scene.seed)
     frames = round(scene.fps * scene.seconds)
     times = np.arange(frames) / scene.fps + np.abs(rng.normal(0, scene.uneven_s, frames))
@@ -59,17 +59,17 @@ def film(scene: Blinking) -> tuple[BrightnessGrid, np.ndarray]:
     moments = (np.arange(_MOMENTS) + 0.5) / _MOMENTS * scene.exposure_s
     clock = times[:, None, None] + scene.readout_s * places[:, None] + moments
     since = clock - starts[np.clip(np.searchsorted(starts, clock) - 1, 0, flashes - 1)]
-    shares = ((since >= 0) & (since < scene.duty / scene.hz)).mean(axis=2)
+    fractions = ((since >= 0) & (since < scene.duty / scene.hz)).mean(axis=2)
     person = np.zeros((ROWS, COLUMNS))
     person[8:, 6:18] = 1 + 0.3 * rng.random((ROWS - 8, 12))
     person[24:, 2:22] = 0.8
     # The light goes about: now one side is nearer to it, now the other.
     side = np.linspace(-1, 1, COLUMNS) * np.sin(0.9 * times)[:, None] * 0.5 + 0.8
     strength = 1 - 0.85 * sum(np.exp(-(((times - lapse) / 0.25) ** 2)) for lapse in scene.lapses)
-    lit = shares[:, None, np.arange(COLUMNS) * 32 // COLUMNS] if scene.sideways else shares[:, :, None]
+    lit = fractions[:, None, np.arange(COLUMNS) * 32 // COLUMNS] if scene.sideways else fractions[:, :, None]
     flash = 0.5 * person * side[:, None, :] * np.broadcast_to(strength, frames)[:, None, None] * lit
     ambient = scene.ambient * np.where(person > 0, 0.5 * person, 1.0 if scene.wall else 0.02)
-    gain = np.exp(scene.hunting * np.sin(2.1 * times) - 0.05 * shares.mean(axis=1) * (scene.hunting > 0))
+    gain = np.exp(scene.hunting * np.sin(2.1 * times) - 0.05 * fractions.mean(axis=1) * (scene.hunting > 0))
     noise = rng.normal(0, 0.0006, (frames, ROWS, COLUMNS))
     cells = np.maximum((ambient + flash) * gain[:, None, None] + noise, 0)
-    return BrightnessGrid(cells.astype(np.float32), times, (540, 720), np.zeros((32, 24, 3), np.uint8)), shares
+    return BrightnessGrid(cells.astype(np.float32), times, (540, 720), np.zeros((32, 24, 3), np.uint8)), fractions

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from relit_camera.capture.geometry.shape_estimation import Geometry, estimate_geometry
-from relit_studio.mannequin.figure import Posture
-from relit_studio.mannequin.mannequin_camera import Camera
-from relit_studio.mannequin.renderer import View
+from relit_studio.mannequin.rendering.mannequin_camera import Camera
+from relit_studio.mannequin.rendering.renderer import View
+from relit_studio.mannequin.shape.figure import Posture
 from tests.capture.geometry.shapes import angles_deg, front_lights
 
 SIZE = 64

@@ -31,7 +31,8 @@ def test_the_outline_tells_which_way_a_body_turns() -> None:
 
 
 def test_the_border_of_the_picture_is_no_outline() -> None:
-    found = complete_normals(np.zeros((24, 24, 3), np.float32), np.zeros((24, 24), np.float32), np.ones((24, 24)))
+    everywhere = np.ones((24, 24), np.float32)
+    found = complete_normals(np.zeros((24, 24, 3), np.float32), np.zeros((24, 24), np.float32), everywhere)
     np.testing.assert_allclose(found, np.tile([0, 0, 1], (24, 24, 1)))
 
 

@@ -27,7 +27,7 @@ def test_a_matte_ball_is_found_exactly(pictures: NDArray[np.float32]) -> None:
     assert not found.confidence[~inside].any()
 
 
-def test_shares_of_light_are_one_where_the_light_is_before_the_surface(pictures: NDArray[np.float32]) -> None:
+def test_fractions_of_light_are_one_where_the_light_is_before_the_surface(pictures: NDArray[np.float32]) -> None:
     truth, matte = ball()
     found = photometric_stereo(pictures, front_lights(), matte)
     cosine = np.einsum("hwc,lc->lhw", truth, front_lights()) * matte

@@ -20,6 +20,10 @@ LIGHTS = 60
 PIXELS = 40
 
 
+def as_float32(values: NDArray[np.float64]) -> NDArray[np.float32]:
+    return values.astype(np.float32)
+
+
 @pytest.fixture
 def terms() -> NDArray[np.float32]:
     random = np.random.default_rng(3)
@@ -29,8 +33,10 @@ def terms() -> NDArray[np.float32]:
     halves = directions + [0, 0, 1]
     halves /= np.linalg.norm(halves, axis=1, keepdims=True)
     margins = random.uniform(-0.5, 1.5, (len(directions), PIXELS))
-    known = (normals @ directions.T, normals @ halves.T, margins.T, directions[:, 2])
-    return appearance_terms(*(np.float32(part) for part in known))
+    cosines, half_cosines = normals @ directions.T, normals @ halves.T
+    return appearance_terms(
+        as_float32(cosines), as_float32(half_cosines), as_float32(margins.T), as_float32(directions[:, 2])
+    )
 
 
 def test_amounts_are_found_again(terms: NDArray[np.float32]) -> None:
@@ -88,8 +94,8 @@ def test_a_few_pictures_that_are_wrong_do_not_count(terms: NDArray[np.float32]) 
 
 def one(cosine: float, half: float, margin: float, toward_camera: float) -> NDArray[np.float32]:
     """The terms (TERMS,) of one light at one pixel."""
-    pair = (np.full((1, 1), value, np.float32) for value in (cosine, half, margin))
-    return appearance_terms(*pair, np.full(1, toward_camera, np.float32))[0, :, 0]
+    single = [np.full((1, 1), value, np.float32) for value in (cosine, half, margin)]
+    return appearance_terms(single[0], single[1], single[2], np.full(1, toward_camera, np.float32))[0, :, 0]
 
 
 def test_what_stands_below_the_horizon_is_dark_but_for_the_light_of_the_surroundings() -> None:

@@ -23,7 +23,7 @@ from relit_camera.capture.reflectance.methods.appearance_field import (
     residual_weights,
 )
 from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
-from relit_camera.capture.reflectance.methods.blend import Blend, choose_model_share
+from relit_camera.capture.reflectance.methods.blend import Blend, choose_model_fraction
 from relit_camera.capture.reflectance.methods.gaussian_process import Kernel
 from relit_camera.capture.reflectance.methods.linear_methods import RadialBasis
 from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import ThesisMethod
@@ -114,14 +114,16 @@ def test_beyond_the_sampled_region_the_blend_is_the_model_and_goes_on() -> None:
 def test_inside_the_region_the_blend_is_the_mean_of_its_parts(samples: OlatSamples) -> None:
     pixels = inside(samples)[:50]
     field = Blend().build(samples)
-    assert 0 < field.share < 1
+    assert 0 < field.fraction < 1
     smooth = np.maximum(RadialBasis().build(samples).at(BETWEEN, pixels), 0)
-    expected = field.share * AppearanceMethod().build(samples).at(BETWEEN, pixels) + (1 - field.share) * smooth
+    expected = field.fraction * AppearanceMethod().build(samples).at(BETWEEN, pixels) + (1 - field.fraction) * smooth
     np.testing.assert_allclose(field.at(BETWEEN, pixels), expected, atol=1e-5)
 
 
-def test_the_model_has_the_larger_share_where_the_shape_tells_the_shadows() -> None:
-    bare, hidden = (choose_model_share(AppearanceMethod().build(make(CAPTURED, SIZE))) for make in (lambert, shadowed))
+def test_the_model_has_the_larger_fraction_where_the_shape_tells_the_shadows() -> None:
+    bare, hidden = (
+        choose_model_fraction(AppearanceMethod().build(make(CAPTURED, SIZE))) for make in (lambert, shadowed)
+    )
     assert bare > hidden
     assert bare > 0.7
 

@@ -34,9 +34,9 @@ def predicted(method: LinearMethod, known: NDArray, queries: NDArray, captured: 
 def test_a_constant_stays_and_fades_to_nothing_beyond_the_region(method: LinearMethod) -> None:
     np.testing.assert_allclose(method.weights(CAPTURED, INSIDE).sum(axis=0), 1, atol=1e-3)
     far = direction_from_degrees([72.5, 110, 180], [0, 0, 0])
-    share = method.weights(CAPTURED, far).sum(axis=0)
-    assert 0.3 < share[0] < 0.7
-    np.testing.assert_array_equal(share[1:], 0)
+    fraction = method.weights(CAPTURED, far).sum(axis=0)
+    assert 0.3 < fraction[0] < 0.7
+    np.testing.assert_array_equal(fraction[1:], 0)
 
 
 def test_a_polynomial_texture_map_is_exact_on_quadratic_polynomials() -> None:

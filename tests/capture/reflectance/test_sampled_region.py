@@ -59,10 +59,10 @@ def test_the_field_fades_over_the_ring_and_stays_the_same_inside() -> None:
     assert after[3].max() == 0
 
 
-def test_the_share_of_a_region_is_one_inside_and_falls_over_the_ring() -> None:
+def test_the_fraction_of_a_region_is_one_inside_and_falls_over_the_ring() -> None:
     captured = cap(120, 50)
-    share = region_coverage(captured, direction_from_degrees([0, 20, 48, 62, 90], [0, 30, 0, 0, 0]), 20)
-    np.testing.assert_allclose(share[:3], 1, atol=1e-6)
-    assert 0.2 < share[3] < 0.8
-    assert share[4] == 0
+    fraction = region_coverage(captured, direction_from_degrees([0, 20, 48, 62, 90], [0, 30, 0, 0, 0]), 20)
+    np.testing.assert_allclose(fraction[:3], 1, atol=1e-6)
+    assert 0.2 < fraction[3] < 0.8
+    assert fraction[4] == 0
     np.testing.assert_allclose(region_coverage(fibonacci_directions(100), captured), 1, atol=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 import pytest
@@ -10,7 +11,6 @@ from numpy.typing import NDArray
 
 from relit_camera.capture.geometry.horizon_map import HorizonMap, compute_horizon_map
 from relit_camera.capture.geometry.shape_estimation import Geometry
-from relit_camera.capture.reflectance.method_registry import ReflectanceMethod
 from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
 from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import (
     LightAdaptation,
@@ -27,9 +27,21 @@ from relit_camera.light.directions import direction_from_degrees
 from relit_camera.subject.reflectance_field import ExactField, texel_vectors
 from tests.lab.lit_sphere import cap, lambert, shadowed, wall_horizon, walled
 
+
+class ExactMethod(Protocol):
+    """A method whose field answers any direction."""
+
+    def build(self, samples: OlatSamples) -> ExactField: ...
+
+
 CAPTURED = cap(110, 60)
-METHODS = [VisibilityInterpolation(), SharpVisibilityInterpolation(), LightAdaptation(), ThesisMethod()]
-PLAIN = SphericalBarycentric()
+METHODS: list[ExactMethod] = [
+    VisibilityInterpolation(),
+    SharpVisibilityInterpolation(),
+    LightAdaptation(),
+    ThesisMethod(),
+]
+PLAIN: ExactMethod = SphericalBarycentric()
 SIZE = 32
 
 
@@ -38,11 +50,11 @@ def samples() -> OlatSamples:
     return shadowed(CAPTURED, SIZE)
 
 
-def each(method: ReflectanceMethod) -> str:
+def each(method: ExactMethod) -> str:
     return type(method).__name__
 
 
-def flat(normal: NDArray[np.float64], size: int = 2) -> Geometry:
+def flat(normal: NDArray[np.floating], size: int = 2) -> Geometry:
     """A plane of one normal that nothing shadows."""
     plane = np.tile(normal.astype(np.float32), (size, size, 1))
     ones = np.ones((size, size), np.float32)
@@ -51,7 +63,7 @@ def flat(normal: NDArray[np.float64], size: int = 2) -> Geometry:
 
 
 @pytest.mark.parametrize("method", METHODS, ids=each)
-def test_a_captured_direction_returns_its_own_picture(method: ReflectanceMethod, samples: OlatSamples) -> None:
+def test_a_captured_direction_returns_its_own_picture(method: ExactMethod, samples: OlatSamples) -> None:
     field = method.build(samples)
     assert isinstance(field, ExactField)
     pixels = np.flatnonzero(samples.matte.ravel())
@@ -60,7 +72,7 @@ def test_a_captured_direction_returns_its_own_picture(method: ReflectanceMethod,
 
 
 @pytest.mark.parametrize("method", METHODS, ids=each)
-def test_texels_are_answered_as_directions_and_nothing_outside(method: ReflectanceMethod, samples: OlatSamples) -> None:
+def test_texels_are_answered_as_directions_and_nothing_outside(method: ExactMethod, samples: OlatSamples) -> None:
     field = method.build(samples)
     start, stop = SIZE * 10 + 12, SIZE * 10 + 20
     dense = field.dense(start, stop)
@@ -72,7 +84,7 @@ def test_texels_are_answered_as_directions_and_nothing_outside(method: Reflectan
 
 
 @pytest.mark.parametrize("method", METHODS, ids=each)
-def test_a_constant_field_stays_constant_where_cosines_do(method: ReflectanceMethod) -> None:
+def test_a_constant_field_stays_constant_where_cosines_do(method: ExactMethod) -> None:
     """All lights on a circle about the plane's normal, and in its middle: there every cosine factor is 1 or alike."""
     constant = replace(lambert(CAPTURED, 2), pictures=np.ones((len(CAPTURED), 2, 2, 3), np.float32))
     field = method.build(replace(constant, known_geometry=flat(np.array([0.0, 0.0, 1.0]))))
@@ -81,9 +93,9 @@ def test_a_constant_field_stays_constant_where_cosines_do(method: ReflectanceMet
 
 
 def ghosts(seen: NDArray, lit: NDArray) -> float:
-    """Share of the spots that are neither in shadow nor lit as brightly as without it, but between."""
-    share = seen / lit
-    return float(np.mean((share > 0.2) & (share < 0.8)))
+    """Fraction of the spots that are neither in shadow nor lit as brightly as without it, but between."""
+    fraction = seen / lit
+    return float(np.mean((fraction > 0.2) & (fraction < 0.8)))
 
 
 def test_the_shadow_of_a_light_between_captured_ones_is_sharper() -> None:
@@ -124,7 +136,8 @@ def test_where_the_shape_is_known_a_shadow_ends_where_it_should() -> None:
     # At the wall's very foot horizons leave what is near to the normal.
     pixels = np.arange(21)
     truth = before_a_wall(between)[:, 0, pixels, 0]
-    error = {m: np.mean((m.build(samples).at(between, pixels)[..., 0] - truth) ** 2) for m in (PLAIN, *METHODS)}
+    methods = (PLAIN, *METHODS)
+    error = {m: np.mean((m.build(samples).at(between, pixels)[..., 0] - truth) ** 2) for m in methods}
     assert error[SharpVisibilityInterpolation()] < 0.2 * error[PLAIN]
     assert error[VisibilityInterpolation()] < 0.75 * error[PLAIN]
     assert error[ThesisMethod()] < 0.75 * error[PLAIN]
@@ -167,8 +180,8 @@ def triangle(
 def test_adaptation_gives_each_corner_its_own_colour_in_every_case(cosines: tuple[float, float, float]) -> None:
     colors = (0.15, 0.9, 0.5)
     for corner in range(3):
-        weights = tuple(np.eye(3)[corner])
-        corners = triangle(weights, colors, cosines)  # type: ignore[arg-type]
+        first, second, third = np.eye(3)[corner].tolist()
+        corners = triangle((first, second, third), colors, cosines)
         seen = interpolate_with_adaptation(corners.weights, corners)
         np.testing.assert_allclose(seen, colors[corner], rtol=1e-4)
 

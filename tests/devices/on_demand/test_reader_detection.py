@@ -126,6 +126,16 @@ def test_the_first_answer_is_no_guess() -> None:
     monitor.close()
 
 
+def test_a_first_question_that_fails_is_asked_again() -> None:
+    watching = Watching()
+    watching.ask.error = ZeroDivisionError("a bug")
+    with pytest.raises(ZeroDivisionError):
+        watching.monitor.has_readers()
+    watching.ask.error, watching.ask.there = None, True
+    assert watching.monitor.has_readers()
+    watching.monitor.close()
+
+
 def test_an_old_driver_is_asked_once_then_proc_is_scanned(caplog: pytest.LogCaptureFixture) -> None:
     watching = Watching()
     watching.ask.error = UnsupportedByDriverError("it is too old")

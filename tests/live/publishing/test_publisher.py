@@ -16,8 +16,6 @@ from relit_camera.live.publishing.publisher import RETRY_S, PublishedPicture, Pu
 from tests.small_camera import wait_until
 from tests.virtual_clock import VirtualClock
 
-pytestmark = pytest.mark.real_time
-
 SIZE = (64, 48)
 
 
@@ -240,6 +238,7 @@ def test_a_slow_sink_delays_ticks_but_is_not_made_up_for() -> None:
 # The thread, in real time.
 
 
+@pytest.mark.real_time
 def test_stopping_is_quick_and_may_be_repeated() -> None:
     clock = VirtualClock()
     sink = RecordingSink(clock)
@@ -252,6 +251,7 @@ def test_stopping_is_quick_and_may_be_repeated() -> None:
     assert Publisher(sink, 30, PLACEHOLDER).stop()  # never started
 
 
+@pytest.mark.real_time
 def test_a_sink_that_hangs_does_not_hold_up_stopping() -> None:
     free = threading.Event()
 

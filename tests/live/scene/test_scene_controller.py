@@ -194,13 +194,13 @@ def test_the_api_chooses_stored_subjects_only(scene_controller: SceneController,
 
 
 def test_a_subject_file_is_shown_under_its_name(scene_controller: SceneController, subject_file: Path) -> None:
-    assert scene_controller.load_subject_file(subject_file).subject_name == "me"
+    assert scene_controller.load_configured_subject(str(subject_file)).subject_name == "me"
     kept = scene_controller.scene
     with pytest.raises(NotFoundError, match=r"none\.relit"):
-        scene_controller.load_subject_file(subject_file.with_name("none.relit"))
+        scene_controller.load_configured_subject(str(subject_file.with_name("none.relit")))
     subject_file.write_bytes(b"damaged")
     with pytest.raises(SubjectError):
-        scene_controller.load_subject_file(subject_file)
+        scene_controller.load_configured_subject(str(subject_file))
     assert scene_controller.scene is kept
 
 
@@ -210,7 +210,7 @@ def test_the_configuration_names_a_stored_subject_or_a_file(
 ) -> None:
     assert scene_controller.load_configured_subject("stored").subject_name == "stored"
     assert scene_controller.load_configured_subject(str(subject_file)).subject_name == "me"
-    with pytest.raises(NotFoundError, match="no subject 'nobody'; stored are: stored"):
+    with pytest.raises(NotFoundError, match="no subject 'nobody'; there are: stored"):
         scene_controller.load_configured_subject("nobody")
     assert scene_controller.load_configured_subject(None).subject is None
 

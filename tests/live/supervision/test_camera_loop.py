@@ -192,6 +192,15 @@ def test_while_the_pipeline_fails_the_fallback_is_shown(camera: LoopUnderTest) -
     assert tuple(kind for kind, _ in camera.events()) == kinds
 
 
+def test_a_late_picture_of_a_frame_before_the_failure_is_no_recovery(camera: LoopUnderTest) -> None:
+    camera.clock.at(0.9, lambda: setattr(camera.supervisor, "late", True))
+    camera.clock.at(1.0, lambda: setattr(camera.supervisor, "fails", True))
+    camera.clock.at(1.5, lambda: setattr(camera.supervisor, "late", False))
+    camera.run(2.0)
+    states = [detail for kind, detail in camera.events() if kind == "state"]
+    assert states == ["live", "standing-in"]
+
+
 def test_a_source_without_frames_is_waited_for_and_says_why(camera: LoopUnderTest) -> None:
     def unplug() -> None:
         camera.source.state, camera.source.reason = SourceState.RECONNECTING, "HD Webcam is unplugged"

@@ -17,6 +17,7 @@ from relit_camera.live.supervision.pipeline_health import (
     FrameFinished,
     FrameStarted,
     HealthLimits,
+    ModelsOpening,
     PictureRendered,
     PipelineHealth,
     ReportFailure,
@@ -182,6 +183,50 @@ def test_the_first_picture_may_take_longer_because_models_are_opened() -> None:
     assert script.arrive(60.1) == (RetireWorker(0), ShowFallback())
 
 
+def test_models_that_are_opened_later_may_take_as_long() -> None:
+    script = working()
+    script.start(100.0)
+    assert script(ModelsOpening(0, 100.1)) == ()
+    assert script.arrive(109.9) == (ShowFallback(),)
+    assert script.arrive(110.1) == (ReportHang(0), ShowFallback())
+    assert script.arrive(159.9) == (ShowFallback(),)
+    assert script.arrive(160.1) == (RetireWorker(0), ShowFallback())
+
+
+def test_once_the_models_are_open_a_hang_is_reported_after_two_seconds_again() -> None:
+    script = working()
+    script.start(100.0)
+    script(ModelsOpening(0, 100.1))
+    assert script.render(130.0, begun_at=100.0) == ()  # nothing was reported
+    script.start(130.0)
+    script.render(130.1, begun_at=130.0)
+    script.start(131.0)
+    assert script.arrive(133.1) == (ReportHang(0), ShowFallback())
+
+
+def test_a_picture_of_the_frame_before_does_not_end_the_patience() -> None:
+    """It is rendered in the worker's other thread, while the models are opened for the next frame."""
+    script = working()
+    script.start(99.9)
+    script(FrameFinished(0))
+    script.start(100.0)
+    script(ModelsOpening(0, 100.1))
+    script(PictureRendered(0, 100.2, begun_at=99.9))
+    assert script.arrive(109.9) == (ShowFallback(),)
+
+
+def test_models_that_a_retired_worker_opens_change_nothing() -> None:
+    script = working()
+    script.start(10.0)
+    script.arrive(20.1)
+    script.arrive(20.2)
+    script.start(20.2, worker=1)
+    script.render(21.0, worker=1)
+    before = script.health
+    assert script(ModelsOpening(0, 22.0)) == ()
+    assert script.health == before
+
+
 def test_each_abandoned_worker_doubles_the_patience_with_the_next() -> None:
     script, at = working(HealthLimits(first_frame_factor=1, max_abandoned_workers=10)), 0.0
     for worker, patience in enumerate((10, 20, 40, 80, 160, 160)):
@@ -326,6 +371,7 @@ def possible_events(health: PipelineHealth, at: float) -> Iterator[Event]:
     yield FrameArrived(at, 1)
     for worker in workers:
         yield FrameStarted(worker, at)
+        yield ModelsOpening(worker, at)
         yield FrameFinished(worker)
         yield PictureRendered(worker, at, at)
         yield PictureRendered(worker, at, at - 1.5)
@@ -353,7 +399,7 @@ def test_every_order_of_up_to_nine_events() -> None:
     assert {len(health.abandoned) for health in reached} == {0, 1, 2}
 
 
-@given(st.lists(st.tuples(st.integers(0, 20), st.sampled_from([0.01, 0.5, 1.0, 2.5, 5.0, 30.0])), max_size=60))
+@given(st.lists(st.tuples(st.integers(0, 22), st.sampled_from([0.01, 0.5, 1.0, 2.5, 5.0, 30.0])), max_size=60))
 def test_any_long_order_of_events(choices: list[tuple[int, float]]) -> None:
     health, at = PipelineHealth(), 0.0
     for choice, pause in choices:

@@ -20,6 +20,7 @@ from relit_camera.live.supervision.pipeline_health import (
     FrameFinished,
     FrameStarted,
     HealthLimits,
+    ModelsOpening,
     PictureRendered,
     WorkerEnded,
 )
@@ -77,6 +78,8 @@ class FakeWorker:
         clock, begun_at = self._simulation.clock, self._simulation.clock.now()
         self._busy = True
         self._post(FrameStarted(self.number, begun_at))
+        if self._simulation.opens_models:
+            self._post(ModelsOpening(self.number, begun_at))
         error, scene = self._simulation.error, self._scene()
         clock.at(self._simulation.render_s, lambda: self.end(frame, begun_at, scene, error))
 
@@ -103,6 +106,7 @@ class Simulation:
     Attributes:
         render_s: how long a frame takes that begins now.
         error: what a frame that begins now ends with.
+        opens_models: whether a frame that begins now opens models.
         shown: when a picture was published or a fallback shown, and which: ("picture", worker) or ("fallback", -1).
         published: the indices of the frames whose pictures were published.
         troubles: when which error was reported; None for recovery.
@@ -112,6 +116,7 @@ class Simulation:
         self.clock = VirtualClock()
         self.start = self.clock.now()
         self.render_s, self.error = RENDER_S, cast(Exception | None, None)
+        self.opens_models = False
         self.scene = Scene(Look())
         self.workers: list[FakeWorker] = []
         self.shown: list[tuple[float, str, int]] = []
@@ -244,6 +249,21 @@ def test_a_hang_shows_the_fallback_after_two_seconds_and_another_worker_after_te
     assert simulation.longest_gap_s() < 2.1
     assert [worker.number for worker in simulation.workers] == [0, 1]
     assert simulation.shown[-1][1:] == ("picture", 1)
+
+
+def test_a_subject_whose_models_open_slowly_is_no_hang() -> None:
+    simulation = Simulation()
+    simulation.at(10.0, render_s=45.0, opens_models=True)
+    simulation.at(11.0, render_s=RENDER_S, opens_models=False)
+    simulation.run(120.0)
+    assert simulation.reported() == [(20.1, "PipelineHangError"), (55.1, "recovered")]
+    assert len(simulation.workers) == 1
+    assert simulation.longest_gap_s() < 2.1
+    simulation.at(130.0, render_s=HANG)  # with the models open the patience is ten seconds again
+    simulation.at(131.0, render_s=RENDER_S)
+    simulation.run(150.0)
+    assert simulation.reported()[2:] == [(132.1, "PipelineHangError"), (140.1, "recovered")]
+    assert len(simulation.workers) == 2
 
 
 def test_a_retired_worker_that_ends_late_shows_and_says_nothing() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import cast
 
 import numpy as np
@@ -21,6 +21,7 @@ from relit_camera.live.supervision.pipeline_health import (
     FrameFailed,
     FrameFinished,
     FrameStarted,
+    ModelsOpening,
     PictureRendered,
     WorkerEnded,
 )
@@ -36,9 +37,11 @@ def frame(index: int) -> Frame:
 
 
 class FakePipeline:
-    """Raises or waits in either half, by frame index."""
+    """Raises or waits in either half, by frame index; opens models for frame 9."""
 
     def __init__(self) -> None:
+        self.on_opening: Callable[[], None] = pytest.fail
+        self.closed = False
         self.begun: list[int] = []
         self.error_at: dict[int, Exception] = {}
         self.hold_begin: dict[int, threading.Event] = {}
@@ -46,6 +49,8 @@ class FakePipeline:
 
     def begin(self, frame: Frame, scene: object) -> RenderTask:
         self.begun.append(frame.index)
+        if frame.index == 9:
+            self.on_opening()
         if frame.index in self.hold_begin:
             self.hold_begin[frame.index].wait(WAIT_S)
         if frame.index in self.error_at:
@@ -57,6 +62,9 @@ class FakePipeline:
             return RenderedFrame(IMAGE, None, SCENE)
 
         return render
+
+    def close(self) -> None:
+        self.closed = True
 
 
 class Working:
@@ -112,6 +120,25 @@ def test_a_frame_is_started_finished_and_rendered(working: Working) -> None:
     assert finished.worker == picture[0].worker == 3
     assert picture[1] == 5
     assert picture[0].begun_at == started.at <= picture[0].at
+
+
+def test_models_that_are_opened_are_told_before_the_frame_is_done(working: Working) -> None:
+    working.worker.submit_frame(frame(9))
+    started, opening = working.next(), working.next()
+    assert isinstance(started, FrameStarted)
+    assert isinstance(opening, ModelsOpening)
+    assert opening.worker == 3
+    assert opening.at >= started.at
+    assert working.next_kinds(2) == {"FrameFinished", "picture 9"}
+
+
+def test_a_closed_worker_closes_its_pipeline(working: Working) -> None:
+    working.worker.submit_frame(frame(0))
+    assert working.next_kinds(3) == {"FrameStarted", "FrameFinished", "picture 0"}
+    assert not working.pipeline.closed
+    working.worker.close()
+    assert working.next() == WorkerEnded(3)
+    assert working.pipeline.closed
 
 
 def test_the_next_frame_is_begun_while_one_is_rendered_and_no_more(working: Working) -> None:

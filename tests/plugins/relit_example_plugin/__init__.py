@@ -57,6 +57,22 @@ class CentralFace:
         """Nothing is kept between frames."""
 
 
+class RaisingFace:
+    """A tracker with a fault: it cannot be made; with the argument `later`, the fault shows with the first frame."""
+
+    name, scheme = "raising", "mesh478"
+
+    def __init__(self, options: TrackerOptions) -> None:
+        if options.argument != "later":
+            raise ZeroDivisionError("a fault of the example's")
+
+    def track(self, frame: Frame) -> FaceState:
+        return FaceState(**np.load(str(frame.index)))  # raised in NumPy, called from here
+
+    def reset(self) -> None:
+        """Nothing is kept between frames."""
+
+
 class NearestLight:
     """A reflectance method: light from a direction is that of the nearest light that was captured."""
 

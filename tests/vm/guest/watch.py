@@ -11,8 +11,7 @@ import time
 from pathlib import Path
 
 import cv2
-
-from relit_camera.devices.sources.pattern_source import read_number
+from pattern_number import read_number  # type: ignore[import-not-found]  # beside this file
 
 node, out, count = sys.argv[1], sys.argv[2], int(sys.argv[3]) if len(sys.argv) > 3 else 0
 capture = cv2.VideoCapture(int(node.removeprefix("/dev/video")), cv2.CAP_V4L2)

@@ -34,6 +34,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+Model = Path | bytes | Callable[[], bytes]
+"""An ONNX model: its file, its bytes, or what makes the bytes. While an accelerator runs the model, its bytes stay in
+memory for the CPU to take over; what makes them is called anew then, which suits large models."""
+
 _LOG_FATAL = 4
 """Least severity that ONNX Runtime prints: anything less arrives as an exception or shows in the placement."""
 
@@ -156,8 +160,23 @@ def session_report() -> list[SessionReport]:
     return sorted(reports, key=lambda report: report.name)
 
 
-def open_session(model: Path | bytes, name: str, options: SessionOptions | None = None) -> Session:
-    """Open an ONNX model (a file, or its bytes), prove its provider and warm it up.
+def require_provider(options: SessionOptions) -> None:
+    """Check what can be known of a provider before a model is opened; that it works shows only then.
+
+    Raises:
+        ConfigError: there is no such provider.
+        DeviceError: strict, and the installed ONNX Runtime was built without it.
+    """
+    provider = provider_names.choose_provider(options.provider)
+    if options.strict:
+        try:
+            _require_built_in(provider)
+        except _ProviderRejectedError as error:
+            raise DeviceError(f"models cannot run on {provider}: {error}", _REJECTED_CURE) from error
+
+
+def open_session(model: Model, name: str, options: SessionOptions | None = None) -> Session:
+    """Open an ONNX model, prove its provider and warm it up.
 
     A provider that is missing, does not load, or takes fewer than half of the nodes is replaced by the CPU, and the
     session's `why` says so; with `options.strict` that is an error.
@@ -183,22 +202,28 @@ def open_session(model: Path | bytes, name: str, options: SessionOptions | None 
                 "restart the camera to try it again",
             )
     except _ProviderRejectedError as error:
-        cure = f"`relit doctor` says how to install it; or set the provider to {provider_names.CPU}"
         if options.strict:
-            raise DeviceError(f"model {name} cannot run on {wanted}: {error}", cure) from error
-        session = _open_on_provider(model, name, provider_names.CPU, options, why=f"{wanted}: {error}", cure=cure)
+            raise DeviceError(f"model {name} cannot run on {wanted}: {error}", _REJECTED_CURE) from error
+        session = _open_on_provider(model, name, provider_names.CPU, options, f"{wanted}: {error}", _REJECTED_CURE)
     with _open_sessions_lock:
         _open_sessions.add(session)
     return session
+
+
+_REJECTED_CURE = f"`relit doctor` says how to install it; or set the provider to {provider_names.CPU}"
 
 
 class _ProviderRejectedError(Exception):
     """The provider does not run this model; the message is the reason."""
 
 
-def _open_verified(model: Path | bytes, name: str, provider: str, options: SessionOptions) -> Session:
+def _require_built_in(provider: str) -> None:
     if provider not in provider_names.available_providers():
         raise _ProviderRejectedError("the installed ONNX Runtime was built without it")
+
+
+def _open_verified(model: Model, name: str, provider: str, options: SessionOptions) -> Session:
+    _require_built_in(provider)
     missing = provider_names.preload(provider)
     try:
         session = _open_on_provider(model, name, provider, options)
@@ -216,7 +241,7 @@ def _open_verified(model: Path | bytes, name: str, provider: str, options: Sessi
 
 
 def _open_on_provider(
-    model: Path | bytes, name: str, provider: str, options: SessionOptions, why: str = "", cure: str = ""
+    model: Model, name: str, provider: str, options: SessionOptions, why: str = "", cure: str = ""
 ) -> Session:
     import onnxruntime
     from onnxruntime.capi.onnxruntime_pybind11_state import InvalidProtobuf, NoModel, NoSuchFile
@@ -225,7 +250,7 @@ def _open_on_provider(
     onnxruntime.set_default_logger_severity(_LOG_FATAL)
     try:
         runtime = onnxruntime.InferenceSession(
-            model,
+            model() if callable(model) else model,
             runtime_options(options.threads),
             providers=list(
                 dict.fromkeys([provider_names.full_name(provider), provider_names.full_name(provider_names.CPU)])

@@ -185,9 +185,9 @@ def _source_color_encoding(picture: Any) -> dict[str, Any]:
     if picture.format.is_rgb or picture.format.name in ("pal8", "gray"):
         return {}
     hd = max(picture.width / 16, picture.height / 9) * 9 > 576
-    usual = BT709 if hd else BT601
+    default = BT709 if hd else BT601
     full = picture.color_range == ColorRange.JPEG.value or picture.format.name.startswith("yuvj")
     return {
-        "src_colorspace": SWSCALE_MATRICES.get(picture.colorspace, usual),
+        "src_colorspace": SWSCALE_MATRICES.get(picture.colorspace, default),
         "src_color_range": ColorRange.JPEG if full else ColorRange.MPEG,
     }

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.geometry.photometric_stereo import photometric_stereo
 from relit_camera.capture.reflectance.appearance_model import appearance_terms, fit_appearance, half_vectors
-
-Floats = NDArray[np.float32]
 
 _UNOCCLUDED_MARGIN = 10.0
 """A margin above the horizon at which nothing hides the light."""
@@ -32,16 +31,16 @@ class OutlierTunables:
     Attributes:
         min_light_z: z of the light from which a prediction is good enough to judge by: light from behind lights rims
             alone.
-        black_share: share of the predicted light below which a picture is black, if it should not be dark.
-        min_expected_share: share of the median predicted light from which a picture should not be dark.
+        black_fraction: fraction of the predicted light below which a picture is black, if it should not be dark.
+        min_expected_fraction: fraction of the median predicted light from which a picture should not be dark.
         max_roughness_ratio: roughness over the set's median above which a picture is torn or noisy.
         min_correlation: with the prediction; below it a picture shows something else.
         correlation_min_z: z of the light from which the correlation counts.
     """
 
     min_light_z: float = -0.2
-    black_share: float = 0.1
-    min_expected_share: float = 0.3
+    black_fraction: float = 0.1
+    min_expected_fraction: float = 0.3
     max_roughness_ratio: float = 4.0
     min_correlation: float = 0.5
     correlation_min_z: float = 0.0
@@ -79,7 +78,7 @@ def predict_pictures(
 
 
 def find_outlier_pictures(
-    light: Floats, predicted: Floats, directions: NDArray[np.float64], matte: Mask
+    light: Float32Array, predicted: Float32Array, directions: NDArray[np.float64], matte: Mask
 ) -> dict[int, str]:
     """Index of each picture that does not belong to the set, with the reason as a text for the user.
 
@@ -91,8 +90,8 @@ def find_outlier_pictures(
     """
     inside = matte > 0.5
     observed, expected = light[:, inside].mean(axis=1), predicted[:, inside].mean(axis=1)
-    share = observed / np.maximum(expected, 1e-9)
-    black = (share < TUNABLES.black_share) & (expected > TUNABLES.min_expected_share * np.median(expected))
+    fraction = observed / np.maximum(expected, 1e-9)
+    black = (fraction < TUNABLES.black_fraction) & (expected > TUNABLES.min_expected_fraction * np.median(expected))
     roughness = _roughness(light) / np.maximum(observed, 1e-3 * float(light.max()) + 1e-9)
     times = roughness / max(float(np.median(roughness)), 1e-9)
     correlation = masked_correlation(light, predicted, matte)
@@ -100,7 +99,7 @@ def find_outlier_pictures(
     reasons = {}
     for index in np.flatnonzero(directions[:, 2] > TUNABLES.min_light_z).tolist():
         if black[index]:
-            reasons[index] = f"black: {share[index]:.0%} of the light expected"
+            reasons[index] = f"black: {fraction[index]:.0%} of the light expected"
         elif times[index] > TUNABLES.max_roughness_ratio:
             reasons[index] = f"torn or noisy: {times[index]:.0f} times as rough as the others"
         elif uncorrelated[index]:
@@ -108,7 +107,7 @@ def find_outlier_pictures(
     return reasons
 
 
-def masked_correlation(light: Floats, predicted: Floats, matte: Mask) -> NDArray[np.float64]:
+def masked_correlation(light: Float32Array, predicted: Float32Array, matte: Mask) -> NDArray[np.float64]:
     """Correlation (lights,) of luminances (lights, height, width) inside a matte; 0 of a flat one."""
     one, other = (pictures[:, matte > 0.5].astype(np.float64) for pictures in (light, predicted))
     one, other = one - one.mean(axis=1, keepdims=True), other - other.mean(axis=1, keepdims=True)
@@ -116,7 +115,7 @@ def masked_correlation(light: Floats, predicted: Floats, matte: Mask) -> NDArray
     return np.asarray((one * other).sum(axis=1) / np.maximum(energy, 1e-12))
 
 
-def _roughness(light: Floats) -> NDArray[np.float64]:
+def _roughness(light: Float32Array) -> NDArray[np.float64]:
     """Mean second difference (lights,) along columns or rows, whichever is larger: torn fields show along columns."""
     down, across = (np.abs(np.diff(light, 2, axis=axis)).mean(axis=(1, 2)) for axis in (1, 2))
     return np.asarray(np.maximum(down, across), np.float64)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.errors import LightsError
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import LinearImage, Mask
@@ -32,8 +33,6 @@ from relit_camera.capture.alignment.template_alignment import (
 )
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 
-Floats = NDArray[np.float32]
-
 MIN_PICTURES = 8
 """Fewer pictures cannot tell motion from shading."""
 
@@ -47,26 +46,26 @@ class AlignmentTunables:
     Attributes:
         largest_side_px: larger pictures are shrunk to this.
         rounds: of `align_across_lights`.
-        shade: summand under the root of light, as a share of the mean light: below it differences count no more.
-        lit_share: a gain is estimated from pixels brighter than this share of the prediction's bright ones,
-        saturated_share: darker than this share of the set's brightest pixel;
-        min_observed_share: and brighter than this share of what is predicted for them, else they are in shadow.
+        shade: summand under the root of light, as a fraction of the mean light: below it differences count no more.
+        lit_fraction: a gain is estimated from pixels brighter than this fraction of the prediction's bright ones,
+        saturated_fraction: darker than this fraction of the set's brightest pixel;
+        min_observed_fraction: and brighter than this fraction of what is predicted for them, else they are in shadow.
         min_lit_pixels: fewer such pixels give no gain.
-        max_shift_share: largest shift as a share of the longer side; someone who keeps still moves less.
+        max_shift_fraction: largest shift as a fraction of the longer side; someone who keeps still moves less.
         min_side_px: in smaller pictures motion cannot be measured.
-        min_improvement: share of the misfit that alignment must remove. It removes 8 to 75 % from photographed sets and
-            2 % at most from rendered ones, which need none: there it takes shading for motion.
+        min_improvement: fraction of the misfit that alignment must remove. It removes 8 to 75 % from photographed sets
+            and 2 % at most from rendered ones, which need none: there it takes shading for motion.
         judged_min_z: z of the lights by which that is judged: shading within 75° of the camera is predicted well.
     """
 
     largest_side_px: int = 256
     rounds: int = 3
     shade: float = 0.02
-    lit_share: float = 0.3
-    saturated_share: float = 0.97
-    min_observed_share: float = 0.1
+    lit_fraction: float = 0.3
+    saturated_fraction: float = 0.97
+    min_observed_fraction: float = 0.1
     min_lit_pixels: int = 100
-    max_shift_share: float = 0.04
+    max_shift_fraction: float = 0.04
     min_side_px: int = 32
     min_improvement: float = 0.05
     judged_min_z: float = 0.25
@@ -97,7 +96,7 @@ class Alignment:
         """Indices of the pictures that are not rejected, ascending."""
         return np.setdiff1d(np.arange(len(self.gains)), list(self.rejected))
 
-    def pictures(self, pictures: Floats) -> Floats:
+    def pictures(self, pictures: Float32Array) -> Float32Array:
         """All pictures (lights, height, width, channels), each transformed and multiplied by its gain."""
         moved = zip(pictures, self.transforms, self.gains.tolist(), strict=True)
         return np.stack([apply_alignment(*each) for each in moved])
@@ -115,7 +114,7 @@ class Alignment:
 
 
 def align_samples(
-    pictures: Floats,
+    pictures: Float32Array,
     directions: NDArray[np.float64],
     matte: Mask,
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -144,7 +143,7 @@ def align_samples(
     return Alignment(tuple(each.scaled(1 / scale) for each in transforms), gains, correlation, rejected)
 
 
-def downscale_for_alignment(pictures: Floats, matte: Mask) -> tuple[Floats, Mask, float]:
+def downscale_for_alignment(pictures: Float32Array, matte: Mask) -> tuple[Float32Array, Mask, float]:
     """Pictures (lights, height, width, 3) and matte, shrunk to the size of comparison, and the scale, 1 at most."""
     scale = min(1.0, TUNABLES.largest_side_px / max(matte.shape))
     return np.stack([shrink(picture, scale) for picture in pictures]), shrink(matte, scale), scale
@@ -169,12 +168,12 @@ def align_to_prediction(picture: LinearImage, predicted: LinearImage, matte: Mas
     shade = TUNABLES.shade * float(there.mean()) + 1e-9
     template = Template(visible_detail(there, shade), without_border(inside), same_light=False)
     transform = template.align(visible_detail(here, shade), RigidTransform()).scaled(1 / scale)
-    if np.hypot(transform.x, transform.y) > TUNABLES.max_shift_share * max(matte.shape):
+    if np.hypot(transform.x, transform.y) > TUNABLES.max_shift_fraction * max(matte.shape):
         transform = RigidTransform()
     return transform, _gain(luminance(apply_alignment(picture, transform)), luminance(predicted), matte, np.inf)
 
 
-def apply_alignment(picture: Floats, transform: RigidTransform, gain: float = 1.0) -> Floats:
+def apply_alignment(picture: Float32Array, transform: RigidTransform, gain: float = 1.0) -> Float32Array:
     """A picture (height, width[, channels]) transformed and multiplied by its gain; never negative."""
     moved = picture if transform == RigidTransform() else warp_to_reference(picture, transform)
     return np.maximum(moved, 0) * np.float32(gain)
@@ -191,9 +190,11 @@ def _without_drift(transforms: list[RigidTransform], directions: NDArray[np.floa
     return transforms_from_array(rows - terms @ np.linalg.lstsq(terms, rows)[0])
 
 
-def _gains(light: Floats, predicted: Floats, directions: NDArray[np.float64], matte: Mask) -> NDArray[np.float64]:
+def _gains(
+    light: Float32Array, predicted: Float32Array, directions: NDArray[np.float64], matte: Mask
+) -> NDArray[np.float64]:
     """Gains (lights,) of pictures (lights, height, width) toward their predictions; 1 for lights from behind."""
-    saturated = TUNABLES.saturated_share * float(light.max())
+    saturated = TUNABLES.saturated_fraction * float(light.max())
     in_front = directions[:, 2] > 0
     gains = np.ones(len(light))
     for index in np.flatnonzero(in_front):
@@ -201,12 +202,12 @@ def _gains(light: Floats, predicted: Floats, directions: NDArray[np.float64], ma
     return np.asarray(gains / np.median(gains[in_front])) if in_front.any() else gains
 
 
-def _gain(light: Floats, predicted: Floats, matte: Mask, saturated: float) -> float:
+def _gain(light: Float32Array, predicted: Float32Array, matte: Mask, saturated: float) -> float:
     """The median ratio of prediction to picture (height, width) over lit pixels; 1 if too few are lit."""
     observed, expected = light[matte > 0.5], predicted[matte > 0.5]
     lit = (
-        (expected > TUNABLES.lit_share * np.percentile(expected, 98))
-        & (observed > TUNABLES.min_observed_share * expected)
+        (expected > TUNABLES.lit_fraction * np.percentile(expected, 98))
+        & (observed > TUNABLES.min_observed_fraction * expected)
         & (observed < saturated)
     )
     return (

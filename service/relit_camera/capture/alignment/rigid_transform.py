@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.images.affine import opencv_affine
 
-Floats = NDArray[np.float64]
 Size = tuple[int, int]
 """Width and height of the picture in pixels."""
 
@@ -35,14 +35,14 @@ class RigidTransform:
     x: float = 0.0
     y: float = 0.0
 
-    def matrix(self, size: Size) -> Floats:
+    def matrix(self, size: Size) -> Float64Array:
         """The (2, 3) matrix that maps points (x, y, 1) of a picture of this size, pixel centers at integers + ½."""
         cosine, sine = np.cos(np.radians(self.rotation_deg)), np.sin(np.radians(self.rotation_deg))
         turn = np.array([[cosine, sine], [-sine, cosine]])  # y goes down
         center = np.array(size) / 2
         return np.concatenate([turn, (center - turn @ center + (self.x, self.y))[:, None]], axis=1)
 
-    def apply(self, points: NDArray, size: Size) -> Floats:
+    def apply(self, points: NDArray, size: Size) -> Float64Array:
         """Points (count, 2) of the frame, mapped to the reference."""
         matrix = self.matrix(size)
         return np.asarray(points @ matrix[:, :2].T + matrix[:, 2])
@@ -97,13 +97,15 @@ def warp_to_reference(picture: NDArray[np.float32], transform: RigidTransform) -
     return warp_affine(picture, transform.matrix((width, height)), (width, height))
 
 
-def warp_affine(picture: NDArray[np.float32], matrix: Floats, size: Size) -> NDArray[np.float32]:
+def warp_affine(picture: NDArray[np.float32], matrix: Float64Array, size: Size) -> NDArray[np.float32]:
     """`picture` resampled to `size` by a (2, 3) matrix from its points to the result's; bicubic, border repeated."""
     moved = cv2.warpAffine(picture, opencv_affine(matrix), size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(moved, np.float32)
 
 
-def interpolate_transforms(times_s: Floats, known_s: Floats, known: Sequence[RigidTransform]) -> list[RigidTransform]:
+def interpolate_transforms(
+    times_s: Float64Array, known_s: Float64Array, known: Sequence[RigidTransform]
+) -> list[RigidTransform]:
     """Transforms at times (count,), linear between those known at ascending times (thesis 4.3.3).
 
     Before the first and after the last they are extrapolated by the trend of the nearest fifth of a second.
@@ -120,12 +122,12 @@ def interpolate_transforms(times_s: Floats, known_s: Floats, known: Sequence[Rig
     return transforms_from_array(between)
 
 
-def transforms_to_array(transforms: Sequence[RigidTransform]) -> Floats:
+def transforms_to_array(transforms: Sequence[RigidTransform]) -> Float64Array:
     """Rows (count, 3) of rotation in degrees, x and y."""
     return np.array([[each.rotation_deg, each.x, each.y] for each in transforms]).reshape(-1, 3)
 
 
-def transforms_from_array(rows: Floats) -> list[RigidTransform]:
+def transforms_from_array(rows: Float64Array) -> list[RigidTransform]:
     """Transforms from rows (count, 3) of rotation in degrees, x and y."""
     return [RigidTransform(*row) for row in rows.tolist()]
 

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.images.resize import shrink
 from relit_camera.capture.alignment.rigid_transform import (
     RigidTransform,
@@ -29,7 +30,6 @@ from relit_camera.capture.alignment.rigid_transform import (
 
 Picture = NDArray[np.float32]
 Pictures = NDArray[np.float32]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -42,14 +42,14 @@ class TemplateTunables:
         residual_stride: every n-th residual enters the estimate of their spread.
         outlier_deviations: residual, in standard deviations, at which a pixel has half its weight.
         similar_pictures: number of pictures from which one is predicted.
-        ridge: of that regression, as a share of the mean diagonal.
+        ridge: of that regression, as a fraction of the mean diagonal.
         fine_blur_px: standard deviation of the blur that removes detail finer than counts.
-        broad_share: side of the squares whose mean is removed from detail, as a share of the picture's.
+        broad_fraction: side of the squares whose mean is removed from detail, as a fraction of the picture's.
         thumbnail_side_px: side of the thumbnails that show shading alone, for the prediction's weights.
         thumbnail_blur_px: standard deviation of their blur.
-        shade: summand under the root of light, as a share of the mean light: below it differences count no more.
+        shade: summand under the root of light, as a fraction of the mean light: below it differences count no more.
         largest_side_px: larger pictures are shrunk to this.
-        border_share: border left out, over which pictures move, as a share of the longer side.
+        border_fraction: border left out, over which pictures move, as a fraction of the longer side.
     """
 
     iterations: int = 12
@@ -59,12 +59,12 @@ class TemplateTunables:
     similar_pictures: int = 16
     ridge: float = 0.02
     fine_blur_px: float = 0.7
-    broad_share: float = 0.15
+    broad_fraction: float = 0.15
     thumbnail_side_px: int = 48
     thumbnail_blur_px: float = 1.0
     shade: float = 0.02
     largest_side_px: int = 256
-    border_share: float = 0.04
+    border_fraction: float = 0.04
 
 
 TUNABLES = TemplateTunables()
@@ -205,8 +205,8 @@ def _one_round(
     gram = coarse @ coarse.T
     aligned = []
     for index, picture in enumerate(pictures):
-        like, shares = _prediction(gram, index, groups)
-        predicted = np.tensordot(shares, moved[like], axes=1).astype(np.float32)
+        like, mixing = predict_from_similar(gram, index, groups)
+        predicted = np.tensordot(mixing, moved[like], axes=1).astype(np.float32)
         shade = TUNABLES.shade * float(moved[index].mean()) + 1e-9
         template = Template(visible_detail(predicted, shade), weights, same_light=False)
         aligned.append(template.align(visible_detail(picture, shade), start[index]))
@@ -216,7 +216,9 @@ def _one_round(
     return transforms_from_array(rows - rows.mean(axis=0) + transforms_to_array(start).mean(axis=0))
 
 
-def _prediction(gram: Floats, index: int, groups: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+def predict_from_similar(
+    gram: Float64Array, index: int, groups: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], Float64Array]:
     """Indices of the pictures most similar to one, and their weights in its prediction, by ridge regression.
 
     Args:
@@ -232,7 +234,7 @@ def _prediction(gram: Floats, index: int, groups: NDArray[np.intp]) -> tuple[NDA
     return like, np.linalg.solve(among + ridge, gram[like, index])
 
 
-def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Floats:
+def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Float64Array:
     """Small blurred pictures (count, values) that show shading without features."""
     size = (min(weights.shape[1], TUNABLES.thumbnail_side_px), min(weights.shape[0], TUNABLES.thumbnail_side_px))
 
@@ -240,8 +242,8 @@ def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Floats:
         return gaussian_blur(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), TUNABLES.thumbnail_blur_px)
 
     # Normalized by the blurred weights, so that the edge is neither darkened nor mixed with what lies outside.
-    share = small(weights)
-    inside = np.sqrt(share) / np.maximum(share, 1e-3)
+    fraction = small(weights)
+    inside = np.sqrt(fraction) / np.maximum(fraction, 1e-3)
     return (
         np.stack([small(picture * weights) * inside for picture in pictures]).reshape(len(pictures), -1).astype(float)
     )
@@ -250,13 +252,13 @@ def _thumbnails(pictures: Pictures, weights: NDArray[np.float32]) -> Floats:
 def visible_detail(light: NDArray[np.float32], shade: float) -> NDArray[np.float32]:
     """Band-pass of the square root of linear light (height, width): features, without noise and broad shading."""
     root = np.sqrt(np.maximum(light, 0) + np.float32(shade))
-    mean = cv2.blur(root, 2 * [round(TUNABLES.broad_share * max(light.shape))])
+    mean = cv2.blur(root, 2 * [round(TUNABLES.broad_fraction * max(light.shape))])
     return np.asarray(gaussian_blur(root, TUNABLES.fine_blur_px) - mean, np.float32)
 
 
 def without_border(weights: NDArray[np.float32]) -> NDArray[np.float32]:
     """Weights (height, width) set to 0 along the border, over which pictures move."""
-    border = max(2, round(TUNABLES.border_share * max(weights.shape)))
+    border = max(2, round(TUNABLES.border_fraction * max(weights.shape)))
     inner = np.zeros_like(weights)
     inner[border:-border, border:-border] = weights[border:-border, border:-border]
     return inner

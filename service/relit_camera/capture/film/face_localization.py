@@ -32,7 +32,7 @@ class LitHeadTunables:
 
     Attributes:
         light_percentile: percentile of the light that flashes add to a cell: wherever they come from, many reach it.
-        min_light: share of the strongest added light from which a cell is lit: hair and clothes are, not the wall
+        min_light: fraction of the strongest added light from which a cell is lit: hair and clothes are, not the wall
             behind.
         head_height: height of a head with its hair above the shoulders, in widths.
         center: distance of the face's center from the crown, in half widths of the head.

@@ -11,9 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.light.directions import bearing_from_direction
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -25,9 +24,9 @@ class HorizonTunables:
         first_step_px: nearest neighbours that count; what nearer ones hide is better given by the normal.
         step_growth: growth of each step of the march, by which distant surface hides light only where it is large.
         outside_px: depth outside the person, far behind every surface.
-        in_shadow: share of the predicted light below which a pixel counts as in shadow. Between this and `in_light` it
-            may be either: a penumbra, or a normal that is somewhat wrong.
-        in_light: share of the predicted light above which a pixel counts as lit.
+        in_shadow: fraction of the predicted light below which a pixel counts as in shadow. Between this and `in_light`
+            it may be either: a penumbra, or a normal that is somewhat wrong.
+        in_light: fraction of the predicted light above which a pixel counts as lit.
         max_shadow_margin_rad: highest margin above the horizon at which darkness is taken for a shadow. Dark pixels
             under higher lights have another cause, such as a wrong normal; taken for shadow they would hide all light
             from behind, which no capture has.
@@ -68,7 +67,7 @@ class HorizonMap:
 
     heights: NDArray[np.float16]
 
-    def margins(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+    def margins(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Float32Array:
         """Height in radians (some, count) of lights (count, 3) above the horizon of row-major pixels (some,)."""
         sectors = self.heights.shape[2]
         height = bearing_from_direction(directions)[1].astype(np.float32)
@@ -77,7 +76,7 @@ class HorizonMap:
         )
 
 
-def sector_weights(directions: NDArray[np.float64], sectors: int) -> Floats:
+def sector_weights(directions: NDArray[np.float64], sectors: int) -> Float32Array:
     """Matrix (sectors, count) that interpolates values of sectors at the bearings of unit vectors (count, 3)."""
     position = bearing_from_direction(directions)[0] / (2 * np.pi) * sectors
     lower = np.floor(position).astype(int)
@@ -88,7 +87,7 @@ def sector_weights(directions: NDArray[np.float64], sectors: int) -> Floats:
     return weights
 
 
-def compute_horizon_map(depth: Floats, sectors: int = TUNABLES.sectors) -> HorizonMap:
+def compute_horizon_map(depth: Float32Array, sectors: int = TUNABLES.sectors) -> HorizonMap:
     """The horizons of a depth map (height, width) in pixels, toward the camera, NaN outside the person.
 
     The surface counts as solid all the way back. Each bearing is searched in steps that grow with the distance.
@@ -142,7 +141,7 @@ def calibrate_horizon_map(horizon: HorizonMap, lit: NDArray[np.float16], directi
     return HorizonMap(heights)
 
 
-def _contradictions(margins: Floats, observed: NDArray[np.float16]) -> Floats:
+def _contradictions(margins: Float32Array, observed: NDArray[np.float16]) -> Float32Array:
     """Move of the horizon in radians that each light (pixels, lights) requires, up positive; 0 for none or unknown."""
     wrongly_dark = (observed > TUNABLES.in_light) & (margins < 0)
     wrongly_lit = (observed < TUNABLES.in_shadow) & (margins > 0) & (margins < TUNABLES.max_shadow_margin_rad)
@@ -151,14 +150,14 @@ def _contradictions(margins: Floats, observed: NDArray[np.float16]) -> Floats:
     )
 
 
-def _bearing_weights(directions: NDArray[np.float64], sectors: int) -> Floats:
+def _bearing_weights(directions: NDArray[np.float64], sectors: int) -> Float32Array:
     """Weight (lights, sectors) of each light for the horizon at each bearing."""
     bearing = bearing_from_direction(directions)[0]
     alignment = np.cos(bearing[:, None] - 2 * np.pi * np.arange(sectors) / sectors)
     return np.asarray(np.exp((alignment - 1) / TUNABLES.bearing_width_rad**2), np.float32)
 
 
-def _spread(values: Floats, size: tuple[int, int]) -> Floats:
+def _spread(values: Float32Array, size: tuple[int, int]) -> Float32Array:
     """Values (pixels, sectors) blurred over the picture: (height, width, sectors)."""
     planes = values.reshape(*size, -1)
     return np.dstack(

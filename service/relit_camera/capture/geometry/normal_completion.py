@@ -8,9 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.images.image_types import Mask
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class NormalCompletionTunables:
 TUNABLES = NormalCompletionTunables()
 
 
-def complete_normals(normals: Floats, confidence: Mask, matte: Mask) -> Floats:
+def complete_normals(normals: Float32Array, confidence: Mask, matte: Mask) -> Float32Array:
     """Unit normals (height, width, 3): unchanged where `confidence` (height, width) is 1, filled in where it is 0.
 
     A body's surface turns away from the camera at its outline, so there the matte's gradient gives the normal (Ikeuchi
@@ -51,7 +50,7 @@ def complete_normals(normals: Floats, confidence: Mask, matte: Mask) -> Floats:
     return np.asarray(filled / np.linalg.norm(filled, axis=2, keepdims=True), np.float32)
 
 
-def pull_push_fill(values: Floats, weight: Mask) -> Floats:
+def pull_push_fill(values: Float32Array, weight: Mask) -> Float32Array:
     """Values (height, width, channels), interpolated from their surroundings where `weight` (height, width) is below 1.
 
     Pull-push on a pyramid (Gortler et al. 1996): weighted means go to coarser levels and fill finer ones where weight
@@ -62,14 +61,14 @@ def pull_push_fill(values: Floats, weight: Mask) -> Floats:
         return values
     half = (max(1, (width + 1) // 2), max(1, (height + 1) // 2))
     summed = cv2.resize(values * weight[..., None], half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0], -1)
-    share = cv2.resize(weight, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0])
-    coarse = pull_push_fill(summed / np.maximum(share, 1e-9)[..., None], np.minimum(4 * share, 1))
+    fraction = cv2.resize(weight, half, interpolation=cv2.INTER_AREA).reshape(half[1], half[0])
+    coarse = pull_push_fill(summed / np.maximum(fraction, 1e-9)[..., None], np.minimum(4 * fraction, 1))
     around = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR).reshape(values.shape)
     known = np.minimum(weight, 1)[..., None]
     return np.asarray(values * known + around * (1 - known), np.float32)
 
 
-def _outline(matte: Mask) -> tuple[Floats, NDArray[np.bool_]]:
+def _outline(matte: Mask) -> tuple[Float32Array, NDArray[np.bool_]]:
     """Normals (height, width, 3) from the matte's gradient, and the mask (height, width) of pixels at its edge."""
     body = (matte > 0.5).astype(np.float32)
     soft = cv2.GaussianBlur(body, (0, 0), TUNABLES.outline_blur_px, borderType=cv2.BORDER_REPLICATE)

@@ -16,7 +16,8 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import LinearOperator, cg, splu
 from scipy.special import expit
 
-Floats = NDArray[np.float32]
+from relit_camera.base.array_types import Float32Array
+
 Values = NDArray[np.float64]
 
 
@@ -53,8 +54,11 @@ class _Side:
 
 
 def integrate_normals(
-    normals: Floats, inside: NDArray[np.bool_], confidence: Floats | None = None, focal_px: float | None = None
-) -> Floats:
+    normals: Float32Array,
+    inside: NDArray[np.bool_],
+    confidence: Float32Array | None = None,
+    focal_px: float | None = None,
+) -> Float32Array:
     """Depth (height, width) float32 in pixels, toward the camera, mean 0; NaN outside.
 
     Args:
@@ -95,7 +99,7 @@ def integrate_normals(
     return result
 
 
-def _slopes(normals: Floats, inside: NDArray[np.bool_], focal_px: float | None) -> tuple[Values, Values, Values]:
+def _slopes(normals: Float32Array, inside: NDArray[np.bool_], focal_px: float | None) -> tuple[Values, Values, Values]:
     """For each pixel inside: z of its normal along the pixel's ray, and that times its slope to the right and up.
 
     In perspective the unknown is −f·log of the distance, whose slopes are -n_x and -n_y over n_z − (n_x·x + n_y·y) / f

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import LinearImage, Mask
-
-Floats = NDArray[np.float32]
 
 BLOCK = 1 << 12
 """Pixels solved at a time: 1 MB an array at 64 lights, which stays in the cache."""
@@ -35,7 +34,7 @@ class PhotometricStereoTunables:
             and what skin deviates from Lambert's law.
         grazing_cosine: cosine below which a light has less weight: there indirect light and errors of direction weigh
             most.
-        noise: of a picture, as a share of the bright values of all pictures: a step of 8 bits.
+        noise: of a picture, as a fraction of the bright values of all pictures: a step of 8 bits.
         half_confidence_deg: expected error of a normal whose confidence is one half.
         oblique_cosine: cosine below which a light tells nothing about what blocks it.
     """
@@ -62,17 +61,17 @@ class PhotometricStereoResult:
         normals: (height, width, 3) float32 unit vectors; (0, 0, 1) where nothing is known.
         albedo: (height, width, 3) float32 linear reflectance, 1 for a white wall.
         confidence: (height, width) float32, 0 unknown to 1 certain, by the expected error of the normal.
-        lit: (lights, height, width) float16, measured light as a share 0..1 of what the normal predicts; NaN where the
-            light is behind the surface or nearly so.
+        lit: (lights, height, width) float16, measured light as a fraction 0..1 of what the normal predicts; NaN where
+            the light is behind the surface or nearly so.
     """
 
-    normals: Floats
+    normals: Float32Array
     albedo: LinearImage
     confidence: Mask
     lit: NDArray[np.float16]
 
 
-def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte: Mask) -> PhotometricStereoResult:
+def photometric_stereo(pictures: Float32Array, directions: NDArray[np.float64], matte: Mask) -> PhotometricStereoResult:
     """Fit Lambert's law to every pixel of the matte.
 
     Args:
@@ -99,9 +98,10 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
         normals[block[known]] = scaled[known] / length[known]
         confidence[block] = np.where(known, 1 / (1 + (error_deg / TUNABLES.half_confidence_deg) ** 2), 0)
         cosine = np.maximum(normals[block] @ toward.T, 0)
-        shares = weights * cosine
+        fractions = weights * cosine
         albedo[block] = (
-            np.einsum("pl,lpc->pc", shares, colors) / np.maximum(np.einsum("pl,pl->p", shares, cosine), 1e-6)[:, None]
+            np.einsum("pl,lpc->pc", fractions, colors)
+            / np.maximum(np.einsum("pl,pl->p", fractions, cosine), 1e-6)[:, None]
         )
         arrived = np.clip(values / np.maximum(length * cosine, 1e-6), 0, 1)
         arrived[(cosine < TUNABLES.oblique_cosine) | ~known[:, None]] = np.nan
@@ -118,7 +118,7 @@ def photometric_stereo(pictures: Floats, directions: NDArray[np.float64], matte:
     )
 
 
-def _fit(values: Floats, toward: Floats, noise: float) -> tuple[Floats, Floats, Floats]:
+def _fit(values: Float32Array, toward: Float32Array, noise: float) -> tuple[Float32Array, Float32Array, Float32Array]:
     """ρ·n (pixels, 3) fitted to values (pixels, lights), the final weights, and the expected error in degrees."""
     unit = np.percentile(values, TUNABLES.unit_percentile, axis=1, keepdims=True).astype(np.float32)
     values = np.asarray(values / np.maximum(unit, 1e-9), np.float32)
@@ -143,7 +143,7 @@ def _fit(values: Floats, toward: Floats, noise: float) -> tuple[Floats, Floats, 
     return (scaled * unit).astype(np.float32), weights, error_deg.astype(np.float32)
 
 
-def _solve(weights: Floats, values: Floats, toward: Floats) -> tuple[Floats, Floats]:
+def _solve(weights: Float32Array, values: Float32Array, toward: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Weighted least squares of ρ·n (pixels, 3), and the inverse (pixels, 3, 3) of its normal matrix."""
     products = (toward[:, :, None] * toward[:, None, :]).reshape(-1, 9)
     # A small multiple of the unit matrix, so that pixels with fewer than three lights have a (poor) solution.

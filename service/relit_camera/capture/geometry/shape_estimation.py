@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.images.image_types import LinearImage, Mask
 from relit_camera.capture.geometry.horizon_map import HorizonMap, calibrate_horizon_map, compute_horizon_map
 from relit_camera.capture.geometry.normal_completion import complete_normals
 from relit_camera.capture.geometry.normal_integration import integrate_normals
 from relit_camera.capture.geometry.photometric_stereo import photometric_stereo
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -28,13 +27,13 @@ class Geometry:
         horizon: which lights the rest of the surface hides from each pixel.
     """
 
-    normals: Floats
+    normals: Float32Array
     albedo: LinearImage
     confidence: Mask
-    depth: Floats
+    depth: Float32Array
     horizon: HorizonMap
 
-    def cosines(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+    def cosines(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Float32Array:
         """n·l, negative behind the surface, of unit vectors (count, 3) at row-major pixels (some,): (some, count)."""
         return self.normals.reshape(-1, 3)[pixels] @ directions.T.astype(np.float32)
 
@@ -44,7 +43,7 @@ class Geometry:
 
 
 def estimate_geometry(
-    pictures: Floats, directions: NDArray[np.float64], matte: Mask, focal_px: float | None = None
+    pictures: Float32Array, directions: NDArray[np.float64], matte: Mask, focal_px: float | None = None
 ) -> Geometry:
     """Normals and albedo by photometric stereo, depth by integration, visibility by horizons and observed shadows.
 

@@ -17,10 +17,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.geometry.shape_estimation import Geometry
-
-Floats = NDArray[np.float32]
 
 TERM_COUNT = 5
 SPECULAR_TERMS = 2, 3
@@ -40,11 +39,11 @@ class AppearanceTunables:
         penumbra_rad: scale of the logistic curve of visibility over the margin above the horizon: about the error of
             the horizons.
         reweighting_rounds: of the robust fit.
-        tolerance: residual at which an observation has half its weight, as a share of the pixel's bright values.
-        tolerance_floor: summand of that residual, as a share of the bright values of all pictures.
+        tolerance: residual at which an observation has half its weight, as a fraction of the pixel's bright values.
+        tolerance_floor: summand of that residual, as a fraction of the bright values of all pictures.
         descent_sweeps: of coordinate descent in the non-negative least squares.
-        ridge: of the normal equations, as a share of their mean diagonal.
-        prior_reach: standard deviation of the blur that averages neighbors' highlights, as a share of the picture's
+        ridge: of the normal equations, as a fraction of their mean diagonal.
+        prior_reach: standard deviation of the blur that averages neighbors' highlights, as a fraction of the picture's
             larger side.
         prior_percentile: of the person's specular amounts; it is the expected difference between neighboring pixels.
         correlated_lights: number of neighboring lights whose errors are so correlated that they count as one.
@@ -70,7 +69,9 @@ class AppearanceTunables:
 TUNABLES = AppearanceTunables()
 
 
-def appearance_terms(cosines: Floats, half_vector_cosines: Floats, margins: Floats, toward_camera: Floats) -> Floats:
+def appearance_terms(
+    cosines: Float32Array, half_vector_cosines: Float32Array, margins: Float32Array, toward_camera: Float32Array
+) -> Float32Array:
     """The five terms (pixels, TERM_COUNT, count) of pixels under lights.
 
     Highlights are Blinn's lobes (1977) with Schlick's Fresnel factor (1994) and the visibility factor of Kelemen
@@ -98,7 +99,7 @@ def appearance_terms(cosines: Floats, half_vector_cosines: Floats, margins: Floa
     return terms
 
 
-def _visible(margins: Floats) -> Floats:
+def _visible(margins: Float32Array) -> Float32Array:
     """Share 0..1 of a light that reaches a pixel, by its margin (pixels, count) in radians above the horizon."""
     visible = margins / np.float32(-TUNABLES.penumbra_rad)
     np.minimum(visible, 30, out=visible)
@@ -107,7 +108,7 @@ def _visible(margins: Floats) -> Floats:
     return np.asarray(np.reciprocal(visible, out=visible))
 
 
-def _lobes(cosines: Floats) -> tuple[Floats, Floats]:
+def _lobes(cosines: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Blinn's lobes: cosines to the power 12, for the sheen of skin, and 60, for wet or oily skin."""
     # By multiplication: `**` with such an exponent takes many times as long.
     fourth = np.square(np.square(cosines))
@@ -122,7 +123,7 @@ def half_vectors(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(halves / np.maximum(np.linalg.norm(halves, axis=1, keepdims=True), 1e-6))
 
 
-def distant_terms(geometry: Geometry, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+def distant_terms(geometry: Geometry, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Float32Array:
     """The terms (pixels, TERM_COUNT, count) of row-major pixels of a shape under distant lights (count, 3)."""
     return appearance_terms(
         geometry.cosines(directions, pixels),
@@ -132,7 +133,9 @@ def distant_terms(geometry: Geometry, directions: NDArray[np.float64], pixels: N
     )
 
 
-def direct_light_fractions(geometry: Geometry, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+def direct_light_fractions(
+    geometry: Geometry, directions: NDArray[np.float64], pixels: NDArray[np.intp]
+) -> Float32Array:
     """Share (pixels, count) of distant lights (count, 3) that reaches row-major pixels directly: 0 shadow, 1 lit."""
     facing = np.clip(geometry.cosines(directions, pixels) / TUNABLES.onset_cosine, 0, 1)
     return np.asarray(_visible(geometry.horizon.margins(directions, pixels)) * facing)
@@ -148,13 +151,13 @@ class SpecularEstimate:
             the variance of what no term explains.
     """
 
-    amounts: Floats
-    precision: Floats
+    amounts: Float32Array
+    precision: Float32Array
 
 
 def fit_appearance(
-    terms: Floats, values: Floats, bright: float, expected: SpecularEstimate | None = None
-) -> tuple[Floats, SpecularEstimate]:
+    terms: Float32Array, values: Float32Array, bright: float, expected: SpecularEstimate | None = None
+) -> tuple[Float32Array, SpecularEstimate]:
     """Amounts of the terms: non-negative least squares, iteratively reweighted so that outliers count little.
 
     Args:
@@ -192,7 +195,7 @@ def fit_appearance(
     return amounts, SpecularEstimate(amounts[:, 0, SPECULAR_TERMS], precision)
 
 
-def _non_negative(products: Floats, projections: Floats) -> Floats:
+def _non_negative(products: Float32Array, projections: Float32Array) -> Float32Array:
     """Non-negative least squares of all pixels at once, by coordinate descent.
 
     Args:

@@ -42,8 +42,8 @@ def directional_coefficients(
     cosines = directions @ captured.T
     nearest = cosines.argmax(axis=1)
     distance_deg = np.degrees(np.arccos(np.clip(cosines.max(axis=1), -1, 1)))
-    share = np.clip(1 - distance_deg / CAPTURED_LIGHT_RADIUS_DEG, 0, 1)
-    return np.asarray(share * subject.light_coefficients[:, nearest] + (1 - share) * from_map, np.float32)
+    fraction = np.clip(1 - distance_deg / CAPTURED_LIGHT_RADIUS_DEG, 0, 1)
+    return np.asarray(fraction * subject.light_coefficients[:, nearest] + (1 - fraction) * from_map, np.float32)
 
 
 def bilinear_map_lookup(directions: NDArray[np.float64]) -> csr_array:
@@ -54,10 +54,10 @@ def bilinear_map_lookup(directions: NDArray[np.float64]) -> csr_array:
     top, left = np.floor(row + 1e-9).astype(int), np.floor(column + 1e-9).astype(int)
     down, right = np.maximum(row - top, 0), np.maximum(column - left, 0)
     entries = []
-    for row_step, row_share in ((0, 1 - down), (1, down)):
-        for column_step, column_share in ((0, 1 - right), (1, right)):
+    for row_step, row_fraction in ((0, 1 - down), (1, down)):
+        for column_step, column_fraction in ((0, 1 - right), (1, right)):
             texel = np.minimum(top + row_step, MAP_HEIGHT - 1) * MAP_WIDTH + (left + column_step) % MAP_WIDTH
-            entries.append((row_share * column_share, texel))
+            entries.append((row_fraction * column_fraction, texel))
     values, texels = (np.concatenate(part) for part in zip(*entries, strict=True))
     rows = np.tile(np.arange(len(directions)), len(entries))
     return csr_array((values, (rows, texels)), shape=(len(directions), MAP_HEIGHT * MAP_WIDTH))

@@ -42,7 +42,7 @@ class TriangleVertices:
     geometry: Geometry
     pixels: NDArray[np.intp]
 
-    def only(self, chosen: NDArray[np.bool_]) -> TriangleVertices:
+    def subset(self, chosen: NDArray[np.bool_]) -> TriangleVertices:
         """The same for the queries chosen by a mask (count,)."""
         return replace(
             self,

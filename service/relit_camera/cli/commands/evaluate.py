@@ -190,13 +190,13 @@ def olat(
         parse_hold_out,
     )
 
-    shares = [parse_hold_out(text) for text in hold_out or ("every=4", "every=2")]
+    hold_outs = [parse_hold_out(text) for text in hold_out or ("every=4", "every=2")]
     results = []
     with _report_file(out) as report_file:
         for path in map(_lights_file, lights):
             samples = subsample_lights(_samples(path, gamma), within_deg)
             name = f"{path.resolve().parent.name}/{path.name}"
-            for every in shares:
+            for every in hold_outs:
                 with progress_bar() as progress:
                     task = progress.add_task(f"{name}, every {every}", total=None)
                     advance = partial(_advance, progress, task)

@@ -165,6 +165,18 @@ class OnDemandSource:
         return source
 
 
+def require_known_readers() -> None:
+    """Check that this system tells who reads a virtual camera.
+
+    Raises:
+        ConfigError: it does not.
+    """
+    if not sys.platform.startswith("linux"):
+        raise ConfigError(
+            "source.on_demand: only Linux tells who reads a virtual camera", "leave it out on this system"
+        )
+
+
 class OnDemandController:
     """Opens the source on demand of a sink: a virtual camera while it is read, a file always, `null` never.
 
@@ -183,11 +195,9 @@ class OnDemandController:
         kind = sink.describe().kind
         if kind not in ("camera", "file", "null"):
             raise ConfigError(f"source.on_demand: a sink of kind '{kind}' does not tell who reads it", "leave it out")
+        if kind == "camera":
+            require_known_readers()
         self._readers = ReaderMonitor(lambda: sink.describe().id) if kind == "camera" else None
-        if self._readers is not None and not sys.platform.startswith("linux"):
-            raise ConfigError(
-                "source.on_demand: only Linux tells who reads a virtual camera", "leave it out on this system"
-            )
         self._demand = DemandMonitor(self._readers.has_readers if self._readers else lambda: kind == "file")
         self.source = OnDemandSource(first, make, self._demand.wanted)
 

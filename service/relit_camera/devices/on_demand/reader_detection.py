@@ -79,8 +79,8 @@ class ReaderMonitor:
     def has_readers(self) -> bool:
         """Whether anybody read it at the last query, at most a second ago."""
         if not self._watching and not self._stopping.is_set():
-            self._watching = True
             self._has_readers = self._query()  # so that the first answer is no guess
+            self._watching = True
             self._thread.start()
         return self._has_readers
 

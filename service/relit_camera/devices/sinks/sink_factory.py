@@ -12,7 +12,7 @@ from pathlib import Path
 
 from relit_camera.base.config.settings import OutputSettings
 from relit_camera.base.errors import InputError
-from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
+from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.base.video.video_writer import VIDEO_SUFFIXES
 from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, DeviceFolders, list_virtual_cameras
 from relit_camera.devices.sinks.sink import NullSink, Sink
@@ -71,20 +71,13 @@ def open_virtual_camera(options: SinkOptions) -> Sink:
     """Open the virtual camera of the label.
 
     Raises:
-        InputError: there is an argument.
         DeviceError: it is missing or in use.
     """
-    require_no_argument("sink", "camera", options.argument)
     return VirtualCameraSink(options.size, options.fps, options.label, tree=options.tree)
 
 
 def open_null(options: SinkOptions) -> Sink:
-    """Open the sink that shows nothing.
-
-    Raises:
-        InputError: there is an argument.
-    """
-    require_no_argument("sink", "null", options.argument)
+    """Open the sink that shows nothing."""
     return NullSink(options.size)
 
 

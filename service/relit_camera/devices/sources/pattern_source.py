@@ -45,26 +45,11 @@ def draw_pattern(size: tuple[int, int], number: int) -> DisplayImage:
     shift = number * max(1, width // 320) % width
     image = np.concatenate([bars[:, shift:], bars[:, :shift]], axis=1)
     number %= 1 << NUMBER_BITS
-    word = number << (NUMBER_CELLS - NUMBER_BITS) | _check_bits(number)
+    word = number << (NUMBER_CELLS - NUMBER_BITS) | check_bits(number)
     bits = [word >> (NUMBER_CELLS - 1 - cell) & 1 for cell in range(NUMBER_CELLS)]
     strip = np.where(bits, 255, 0).astype(np.uint8)[np.arange(width) * NUMBER_CELLS // width]
     image[: height // STRIP_FRACTION] = strip[None, :, None]
     return image
-
-
-def read_number(image: DisplayImage) -> int | None:
-    """Read the number in a picture of the pattern, of any size; None if the check bits do not fit.
-
-    For whoever measures what arrives at the reading end of a virtual camera or in a recording (tests/vm).
-    """
-    height, width = image.shape[:2]
-    centers = (np.arange(NUMBER_CELLS) + 0.5) * width / NUMBER_CELLS
-    half = max(1, width // (NUMBER_CELLS * 4))
-    rows = image[height // (STRIP_FRACTION * 4) : max(1, 3 * height // (STRIP_FRACTION * 4))]
-    means = [rows[:, int(center) - half : int(center) + half].mean() for center in centers]
-    word = int("".join("1" if mean > 127 else "0" for mean in means), 2)
-    number, check = word >> (NUMBER_CELLS - NUMBER_BITS), word & 0xFF
-    return number if check == _check_bits(number) else None
 
 
 @lru_cache(maxsize=1)
@@ -76,6 +61,7 @@ def _draw_bars(size: tuple[int, int]) -> DisplayImage:
     return bars
 
 
-def _check_bits(number: int) -> int:
+def check_bits(number: int) -> int:
+    """The eight check bits of a number."""
     # 0xA5: so neither a black nor a white strip is a number.
     return (number ^ number >> 8 ^ number >> 16) & 0xFF ^ 0xA5

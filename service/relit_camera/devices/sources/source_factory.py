@@ -12,7 +12,7 @@ from pathlib import Path
 from relit_camera.base.config.settings import SourceSettings
 from relit_camera.base.errors import DeviceError, VideoError
 from relit_camera.base.images.image_files import LDR_SUFFIXES
-from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
+from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, VIRTUAL_CAMERA_LABEL, DeviceFolders
 from relit_camera.devices.sources.pattern_source import pattern_source
 from relit_camera.devices.sources.playback_source import file_source, image_source
@@ -39,7 +39,9 @@ class SourceOptions:
     tree: DeviceFolders = SYSTEM_FOLDERS
 
 
-SOURCES: PluginGroup[Callable[[SourceOptions], Source]] = PluginGroup("relit_camera.sources", "source")
+SOURCES: PluginGroup[Callable[[SourceOptions], Source]] = PluginGroup(
+    "relit_camera.sources", "source", with_argument=("webcam",)
+)
 
 
 def open_source(
@@ -47,8 +49,8 @@ def open_source(
 ) -> Source:
     """Make the source that `settings.source` names.
 
-    In this order: a plug-in (`NAME` or `NAME:ARGUMENT`; `webcam` and `pattern` are of them), a picture or video file, a
-    camera's id. Files, pictures and pattern keep their own time; a video begins anew after its end.
+    In this order: a picture or video file that exists, a plug-in (`NAME` or `NAME:ARGUMENT`; `webcam` and `pattern` are
+    of them), a camera's id. Files, pictures and pattern keep their own time; a video begins anew after its end.
 
     Args:
         settings: source, and the size and rate to ask of a camera or pattern.
@@ -64,14 +66,14 @@ def open_source(
     """
     text = settings.source
     options = SourceOptions(text, (settings.width, settings.height), settings.fps, own_label, tree)
-    if SOURCES.has(text):
-        factory, argument = SOURCES.load(text)
-        return factory(replace(options, argument=argument))
     path = Path(text).expanduser()
     if path.is_file():
         if path.suffix.lower() in LDR_SUFFIXES:
             return image_source(path, settings.fps)
         return file_source(path)
+    if SOURCES.has(text):
+        factory, argument = SOURCES.load(text)
+        return factory(replace(options, argument=argument))
     try:
         return open_webcam(options)
     except DeviceError as error:
@@ -94,10 +96,5 @@ def open_webcam(options: SourceOptions) -> Source:
 
 
 def open_pattern(options: SourceOptions) -> Source:
-    """Open the moving test pattern.
-
-    Raises:
-        InputError: there is an argument.
-    """
-    require_no_argument("source", "pattern", options.argument)
+    """Open the moving test pattern."""
     return pattern_source(options.size, options.fps)

@@ -10,8 +10,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,36 +89,59 @@ class LandmarkScheme:
         """Every point of both eyes, irises included."""
         return (*self.right_eye.lids, *self.right_eye.iris, *self.left_eye.lids, *self.left_eye.iris)
 
+    @cached_property
+    def rigid_indices(self) -> NDArray[np.intp]:
+        """`rigid` as an array."""
+        return np.array(self.rigid)
+
+    @cached_property
+    def rigid_canonical(self) -> NDArray[np.float64]:
+        """(rigid, 3) centimetres in head axes: the rigid points on the mean face."""
+        return self.canonical[self.rigid_indices]
+
+    @cached_property
+    def _eye_corners(self) -> NDArray[np.intp]:
+        """(2, 2): outer and inner corner of the right and of the left eye."""
+        return np.array([[eye.outer, eye.inner] for eye in (self.right_eye, self.left_eye)])
+
+    @cached_property
+    def _lid_gaps(self) -> NDArray[np.intp]:
+        """(2, 2, pairs): upper and lower lid of the right and of the left eye."""
+        return np.array([self.right_eye.gap, self.left_eye.gap])
+
+    @cached_property
+    def _lip_gap(self) -> NDArray[np.intp]:
+        """(2, pairs): upper and lower lip."""
+        return np.array(self.lip_gap)
+
     def eye_centers(self, landmarks: Points) -> Points:
         """(2, 2): the middle between the corners of the right and of the left eye."""
-        corners = landmarks[[self.right_eye.outer, self.right_eye.inner, self.left_eye.inner, self.left_eye.outer]]
-        return ((corners[0::2] + corners[1::2]) / 2).astype(np.float32)
+        corners = landmarks[self._eye_corners]
+        return ((corners[:, 0] + corners[:, 1]) / 2).astype(np.float32)
 
     def eye_span(self, landmarks: Points) -> float:
         """Distance of the outer eye corners in pixels, the unit of image-plane errors ("io")."""
-        return _distance(landmarks, self.right_eye.outer, self.left_eye.outer)
+        return max(math.dist(landmarks[self.right_eye.outer], landmarks[self.left_eye.outer]), _SHORTEST)
 
     def eyes_opening(self, landmarks: Points) -> tuple[float, float]:
         """Lid gap over eye width of the right and the left eye: about 0.3 open, under 0.1 shut."""
-        right, left = (
-            _mean_gap(landmarks, eye.gap) / _distance(landmarks, eye.outer, eye.inner)
-            for eye in (self.right_eye, self.left_eye)
-        )
-        return right, left
+        gaps, widths = landmarks[self._lid_gaps], landmarks[self._eye_corners]
+        height = _lengths(gaps[:, 0] - gaps[:, 1]).mean(axis=1)
+        right, left = height / np.maximum(_lengths(widths[:, 0] - widths[:, 1]), _SHORTEST)
+        return float(right), float(left)
 
     def mouth_opening(self, landmarks: Points) -> float:
         """Inner lip gap over the distance of the outer eye corners: 0 closed, 0.5 wide open."""
-        return _mean_gap(landmarks, self.lip_gap) / self.eye_span(landmarks)
+        upper, lower = landmarks[self._lip_gap]
+        return float(_lengths(upper - lower).mean()) / self.eye_span(landmarks)
 
 
-def _mean_gap(landmarks: Points, pairs: tuple[Indices, Indices]) -> float:
-    upper, lower = pairs
-    return float(np.linalg.norm(landmarks[list(upper)] - landmarks[list(lower)], axis=1).mean())
+_SHORTEST = 1e-6
+"""A degenerate face (all points in one place) has openings of 0, not a division by zero."""
 
 
-def _distance(landmarks: Points, first: int, second: int) -> float:
-    # A degenerate face (all points in one place) has openings of 0, not a division by zero.
-    return max(float(np.linalg.norm(landmarks[first] - landmarks[second])), 1e-6)
+def _lengths(ways: Points) -> NDArray[np.float32]:
+    return np.asarray(np.hypot(ways[..., 0], ways[..., 1]))
 
 
 IRIS_RADIUS_CM = 0.585

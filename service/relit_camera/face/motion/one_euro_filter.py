@@ -14,10 +14,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
+Matrix = NDArray[np.float64]
 Vectors = NDArray[np.float64]
 Value = TypeVar("Value")
 
@@ -128,18 +129,21 @@ class OneEuroFilter(_OneEuro[Vectors]):
         return start + way
 
 
-class RotationOneEuroFilter(_OneEuro[Rotation]):
-    """Filters a scipy `Rotation`; speeds and the dead band are in degrees."""
+class RotationOneEuroFilter(_OneEuro[Matrix]):
+    """Filters rotation matrices (3, 3); speeds and the dead band are in degrees.
 
-    def _between(self, start: Rotation, end: Rotation) -> Vectors:
-        return np.asarray((start.inv() * end).as_rotvec(degrees=True))
+    Matrices, since scipy's `Rotation` objects would take more time than all else that is done with a face's motion.
+    """
 
-    def _moved(self, start: Rotation, way: Vectors) -> Rotation:
-        return start * Rotation.from_rotvec(way, degrees=True)
+    def _between(self, start: Matrix, end: Matrix) -> Vectors:
+        return np.asarray(np.degrees(cv2.Rodrigues(start.T @ end)[0][:, 0]))
+
+    def _moved(self, start: Matrix, way: Vectors) -> Matrix:
+        return np.asarray(start @ cv2.Rodrigues(np.radians(way))[0])
 
 
 def _norm(vectors: Vectors) -> Vectors:
-    return np.asarray(np.linalg.norm(vectors, axis=-1, keepdims=True))
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True)))
 
 
 def _low_pass_gain(cutoff_hz: ArrayLike, step_s: float) -> Vectors:

@@ -19,6 +19,10 @@ Box = tuple[float, float, float, float]
 
 _SAME_FACE_OVERLAP = 0.1
 _LOG_ERRORS = 2
+_SURROUNDINGS = 2.5
+_SURROUNDINGS_PX = 128
+"""Side of the surroundings of a face, in sides of its box and in pixels of the network's input."""
+_SMALLEST_REGION_PX = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +38,11 @@ class Detection:
     box: Box
     eyes: Points
     score: float
+
+    def moved(self, x: float, y: float) -> Detection:
+        """The detection in a picture in which it lies further right and down by x and y pixels."""
+        left, top, width, height = self.box
+        return Detection((left + x, top + y, width, height), self.eyes + np.array([x, y], np.float32), self.score)
 
 
 class FaceDetector:
@@ -56,16 +65,31 @@ class FaceDetector:
 
     def detect(self, image: DisplayImage, near: Box | None = None) -> Detection | None:
         """Find the face that overlaps `near` most, or else the largest; None where there is no face."""
+        faces = self._faces(image, self._longer_side)
+        return max(faces, key=lambda face: _detection_priority(face.box, near)) if faces else None
+
+    def detect_nearby(self, image: DisplayImage, box: Box) -> Detection | None:
+        """Find the largest face in the surroundings of `box` alone: a quick check of a face that is there already."""
+        x, y, width, height = box
+        half = _SURROUNDINGS * max(width, height) / 2
+        center_x, center_y = x + width / 2, y + height / 2
+        left, top = max(round(center_x - half), 0), max(round(center_y - half), 0)
+        region = image[top : max(round(center_y + half), 0), left : max(round(center_x + half), 0)]
+        if min(region.shape[:2]) < _SMALLEST_REGION_PX:
+            return None
+        faces = self._faces(region, _SURROUNDINGS_PX)
+        return max((face.moved(left, top) for face in faces), key=lambda face: face.box[2] * face.box[3], default=None)
+
+    def _faces(self, image: DisplayImage, longer_side: int) -> list[Detection]:
         height, width = image.shape[:2]
-        scale = self._longer_side / max(width, height)
+        scale = longer_side / max(width, height)
         small_size = (max(1, round(width * scale)), max(1, round(height * scale)))
         small = cv2.resize(image, small_size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
         self._network.setInputSize(small_size)
         rows = self._network.detect(cv2.cvtColor(small, cv2.COLOR_RGB2BGR))[1]
         if rows is None:
-            return None
-        faces = [_detection(row, width / small_size[0], height / small_size[1]) for row in rows]
-        return max(faces, key=lambda face: _detection_priority(face.box, near))
+            return []
+        return [_detection(row, width / small_size[0], height / small_size[1]) for row in rows]
 
 
 def intersection_over_union(first: Box, second: Box) -> float:

@@ -7,6 +7,7 @@ cut: `FacePatch` notices that the picture has suddenly changed where the face wa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -66,17 +67,14 @@ class FacePatch:
 
     def matches(self, image: DisplayImage) -> bool:
         """Whether the next frame correlates with the thumbnail at the same place."""
-        norms = float(np.linalg.norm(self._pixels) * np.linalg.norm(now := self._thumbnail(image)))
+        now = self._thumbnail(image)
+        norms = math.sqrt(float(self._pixels @ self._pixels) * float(now @ now))
         return float(self._pixels @ now) >= TUNABLES.min_correlation * norms
 
     def _thumbnail(self, image: DisplayImage) -> NDArray[np.float32]:
         """The thumbnail's luma without its mean."""
-        luma = (
-            self._crop.cut(image, TUNABLES.patch_side_px, TUNABLES.patch_side_px)
-            .astype(np.float32)
-            .mean(axis=2)
-            .ravel()
-        )
+        pixels = self._crop.cut(image, TUNABLES.patch_side_px, TUNABLES.patch_side_px)
+        luma = pixels.reshape(-1, 3) @ np.full(3, 1 / 3, np.float32)
         return np.asarray(luma - luma.mean(), dtype=np.float32)
 
 
@@ -203,6 +201,9 @@ class LandmarkTracker:
         """
         self._frames_since_check = 0
         box = bounding_box(reading.points)
+        nearby = self._detector.detect_nearby(image, box)
+        if nearby and is_same_face(nearby.box, box) and self._agrees(reading, nearby):
+            return self._judge(reading, agrees=True)
         detection = self._detector.detect(image, near=box)
         if detection is None or not is_same_face(detection.box, box):
             # The detector misses profiles, so this alone is no proof that the face is gone.
@@ -229,5 +230,5 @@ class LandmarkTracker:
 
     def _moved_far(self, before: Points, now: Points) -> bool:
         scheme = self._network.scheme
-        motion = scheme.eye_centers(now).mean(axis=0) - scheme.eye_centers(before).mean(axis=0)
-        return float(np.linalg.norm(motion)) > TUNABLES.large_motion * scheme.eye_span(now)
+        motion = (scheme.eye_centers(now) - scheme.eye_centers(before)).mean(axis=0)
+        return math.hypot(*motion.tolist()) > TUNABLES.large_motion * scheme.eye_span(now)

@@ -5,6 +5,7 @@ The tables hold the points that the blendshape network takes, and the names of i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -58,10 +59,8 @@ class MeshTracker(LandmarkTracker):
 
         Raises:
             ModelError: a model is missing.
-            InputError: the options carry an argument.
         """
         options = options or TrackerOptions()
-        options.require_no_argument("mesh")
         network = MeshNetwork(
             open_session(model_path("face_mesh"), "face_mesh", options.session),
             open_session(model_path("face_blendshapes"), "face_blendshapes", options.session)
@@ -91,14 +90,13 @@ class MeshNetwork:
 
     def crop_from_points(self, points: Points) -> Crop:
         """Give a square of 1.5 times the longer side of the box around the levelled points."""
-        across = points[_LEFT_EYE] - points[_RIGHT_EYE]
-        angle = float(np.arctan2(across[1], across[0]))
-        cos, sin = np.cos(angle), np.sin(angle)
-        picture_from_level = np.array([[cos, -sin], [sin, cos]], dtype=np.float32)
-        x, y, width, height = bounding_box(points @ picture_from_level)
-        center = picture_from_level @ np.array([x + width / 2, y + height / 2], dtype=np.float32)
+        across_x, across_y = (points[_LEFT_EYE] - points[_RIGHT_EYE]).tolist()
+        angle = math.atan2(across_y, across_x)
+        cos, sin = math.cos(angle), math.sin(angle)
+        x, y, width, height = bounding_box(points @ np.array([[cos, -sin], [sin, cos]], dtype=np.float32))
+        level_x, level_y = x + width / 2, y + height / 2
         side = _MARGIN * max(width, height, 1.0)
-        return Crop((float(center[0]), float(center[1])), side, side, angle)
+        return Crop((cos * level_x - sin * level_y, sin * level_x + cos * level_y), side, side, angle)
 
     def read(self, image: DisplayImage, crop: Crop) -> LandmarkPrediction:
         """Place the 478 points; the confidence is the network's presence."""

@@ -32,10 +32,8 @@ class OpenSeeFaceTracker(LandmarkTracker):
 
         Raises:
             ModelError: a model is missing.
-            InputError: the options carry an argument.
         """
         options = options or TrackerOptions()
-        options.require_no_argument("openseeface")
         network = OpenSeeFaceNetwork(open_session(model_path("openseeface"), "openseeface", options.session))
         detector = FaceDetector(model_path("face_detector_yunet"))
         super().__init__("openseeface", network, detector, options.focal_px, options.check_every)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
+from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.face.face_state import FaceState, Tracker
 
 
@@ -34,16 +34,10 @@ class TrackerOptions:
     blendshapes: bool = True
     check_every: int = 10
 
-    def require_no_argument(self, tracker: str) -> None:
-        """For trackers that take none.
 
-        Raises:
-            InputError: there is an argument.
-        """
-        require_no_argument("tracker", tracker, self.argument)
-
-
-TRACKERS: PluginGroup[Callable[[TrackerOptions], Tracker]] = PluginGroup("relit_camera.trackers", "tracker")
+TRACKERS: PluginGroup[Callable[[TrackerOptions], Tracker]] = PluginGroup(
+    "relit_camera.trackers", "tracker", with_argument=("recorded",)
+)
 
 
 def open_tracker(name: str, options: TrackerOptions | None = None) -> Tracker:

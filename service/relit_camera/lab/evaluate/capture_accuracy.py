@@ -78,8 +78,8 @@ class CaptureErrors:
     focal_ratio: float | None
 
     @property
-    def used_share(self) -> float:
-        """Share of the wholly lit frames that were used."""
+    def used_fraction(self) -> float:
+        """Fraction of the wholly lit frames that were used."""
         return self.used / max(self.true_bright, 1)
 
 
@@ -150,7 +150,7 @@ def capture_json(errors: CaptureErrors) -> dict[str, object]:
     return {
         "frames": errors.frames,
         "bright_frames": errors.true_bright,
-        "used_share": errors.used_share,
+        "used_share": errors.used_fraction,
         "wrongly_bright": errors.wrongly_bright,
         "direction_deg": _statistics(errors.direction_deg),
         "at_ball_deg": _statistics(errors.at_ball_deg),
@@ -184,7 +184,7 @@ def _capture_blocks(errors: CaptureErrors) -> Iterator[Block]:
     yield Paragraph(
         "A video of a person, a mirror ball and a blinking hand-held light was rendered, so that the truth of every "
         f"frame is known. Of {errors.true_bright} frames that the flash lit completely, {errors.used} were used "
-        f"({errors.used_share:.0%}); {errors.wrongly_bright} other frames were classified as bright by mistake."
+        f"({errors.used_fraction:.0%}); {errors.wrongly_bright} other frames were classified as bright by mistake."
     )
     rows = []
     for name, values, unit in _error_rows(errors):

@@ -23,7 +23,7 @@ from relit_camera.lab.evaluate.report.html_page import Block, Heading, Paragraph
 from relit_camera.lab.evaluate.report.plots import heat_maps
 
 _LARGEST_SHOWN_ERROR = 0.3
-"""End of the color scale of the error maps, as a share of white."""
+"""End of the color scale of the error maps, as a fraction of white."""
 
 
 @dataclass(frozen=True)

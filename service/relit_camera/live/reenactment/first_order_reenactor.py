@@ -44,7 +44,6 @@ class FirstOrderReenactor:
     """See `Reenactor`."""
 
     def __init__(self, context: ReenactorContext) -> None:
-        context.require_no_argument("first-order")
         self._face = context.face
         self._size = context.size
         self._person = Cutout(context.subject)

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from relit_camera.base.images.image_types import Frame, LinearImage, Mask
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
+from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.subject.subject import Subject
@@ -35,14 +35,6 @@ class ReenactorContext:
     size: tuple[int, int]
     session: SessionOptions
     argument: str = ""
-
-    def require_no_argument(self, reenactor: str) -> None:
-        """For reenactors that take none.
-
-        Raises:
-            InputError: there is an argument.
-        """
-        require_no_argument("reenactor", reenactor, self.argument)
 
 
 @dataclass(frozen=True)
@@ -81,7 +73,9 @@ class Reenactor(Protocol):
         ...
 
 
-REENACTORS: PluginGroup[Callable[[ReenactorContext], Reenactor]] = PluginGroup("relit_camera.reenactors", "reenactor")
+REENACTORS: PluginGroup[Callable[[ReenactorContext], Reenactor]] = PluginGroup(
+    "relit_camera.reenactors", "reenactor", with_argument=("onnx",)
+)
 
 
 def open_reenactor(name: str, context: ReenactorContext) -> Reenactor:

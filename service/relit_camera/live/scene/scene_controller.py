@@ -83,15 +83,6 @@ class SceneController:
             subject = None if name is None else self.subjects.load(name)
             return self._replace(subject=subject, subject_name=name)
 
-    def load_subject_file(self, path: Path) -> Scene:
-        """Show the subject of a file, under the name of the file. For the command line and the configuration.
-
-        Raises:
-            NotFoundError: there is no such file.
-            SubjectError: it is damaged.
-        """
-        return self.show_subject(*self.subjects.load_file(path))
-
     def load_configured_subject(self, name_or_path: str | None) -> Scene:
         """Show the subject that the command line or the configuration names: a stored one, else a file; or none.
 
@@ -99,9 +90,9 @@ class SceneController:
             NotFoundError: neither a stored name nor a file.
             SubjectError: the file is damaged.
         """
-        if name_or_path is not None and self.subjects.names_file(name_or_path):
-            return self.load_subject_file(Path(name_or_path))
-        return self.choose_stored_subject(name_or_path)
+        if name_or_path is None:
+            return self.choose_stored_subject(None)
+        return self.show_subject(*self.subjects.resolve(name_or_path))
 
     def show_subject(self, name: str, subject: Subject) -> Scene:
         """Show a subject that is not stored, under `name`."""
@@ -188,4 +179,4 @@ class SceneController:
             # A white wall of irradiance 1 reads 1 and has radiance 1/π: with the factor π, background and face match.
             return uint8_from_linear(seen * np.float32(np.pi * auto_exposure_scale(environment.light_map)))
         known = ", ".join(self.background_names()) or "none"
-        raise NotFoundError(f"no background picture '{background.image}'", f"stored are: {known}")
+        raise NotFoundError(f"no background picture '{background.image}'", f"there are: {known}")

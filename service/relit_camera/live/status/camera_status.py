@@ -104,7 +104,8 @@ class CameraStatus:
     stage_ms: dict[str, Percentiles]
     frames: FrameCounts
     providers: dict[str, str] = field(default_factory=dict)
-    """Model name → execution provider that was proven to run it."""
+    """Name of each open model → the execution provider that is proven to run it, such as `cpu`; and `relighter NAME`,
+    the relighter at work → `numpy` or such a provider."""
     degraded: list[Degradation] = field(default_factory=list)
     version: str = ""
     uptime_s: float = 0.0

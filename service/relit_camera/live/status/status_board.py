@@ -6,11 +6,14 @@ import logging
 import threading
 
 from relit_camera.base.errors import RelitError
+from relit_camera.base.plugin_groups import package_at_fault
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.live.status.camera_status import CameraState, Degradation, DegradationCode
 from relit_camera.live.status.event_hub import EventHub
 
 log = logging.getLogger(__name__)
+
+OWN_FAULT_CURE = "this is a fault of ours: report it"
 
 PARTS = {
     DegradationCode.SOURCE_FAILED: "source",
@@ -73,14 +76,15 @@ class StatusBoard:
 
         Args:
             code: one of `PARTS`.
-            error: why. One that is no `RelitError` is a fault in the program, and is logged with its traceback.
+            error: why. One that is no `RelitError` is a fault in the program or in a plug-in, and is logged with its
+                traceback.
         """
+        degradation = None if error is None else _degradation(code, error)
         with self._lock:
-            if error is None:
+            if degradation is None:
                 if self._degradations.pop(code, None) is not None:
                     self.events.publish("recovered", what=PARTS[code], code=str(code))
                 return
-            degradation = _degradation(code, error)
             if self._degradations.get(code) == degradation:
                 return
             self._degradations[code] = degradation
@@ -97,5 +101,6 @@ def _degradation(code: DegradationCode, error: Exception) -> Degradation:
     what = f"{PARTS[code]} failed"
     if isinstance(error, RelitError):
         return Degradation(code=code, what=what, why=error.what, cure=error.cure)
-    why = f"{type(error).__name__}: {error}"
-    return Degradation(code=code, what=what, why=why, cure="this is a fault of ours: report it")
+    package = package_at_fault(error)
+    cure = f"this is a fault of the plug-in package {package}: tell its author" if package else OWN_FAULT_CURE
+    return Degradation(code=code, what=what, why=f"{type(error).__name__}: {error}", cure=cure)

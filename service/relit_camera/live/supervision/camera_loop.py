@@ -144,7 +144,9 @@ class CameraLoop:
         motion = shown.rendered.motion
         face = motion.status if motion else FaceStatus.LOST
         self._board.set_face(face)
-        if shown.frame.index > self._publisher.superseded_index:
+        # A picture of a frame before the one that failed is no recovery: fallbacks follow.
+        failed = self._board.is_degraded(DegradationCode.PICTURE_FAILED)
+        if not failed and shown.frame.index > self._publisher.superseded_index:
             tracked = motion is None or face is not FaceStatus.LOST
             self._board.set_state(CameraState.LIVE if tracked else CameraState.SEARCHING)
 

@@ -22,7 +22,8 @@ class HealthLimits:
         hang_timeout_s: a worker that has been at one frame for longer hangs: the fallback is shown.
         abandon_timeout_s: a worker that has been at one frame for longer is abandoned and another started. The time
             doubles with each abandoned worker in a row.
-        first_frame_factor: a worker's first picture may take so many times as long: models are opened for it.
+        first_frame_factor: the first picture of a worker, and the first after it began to open other models, may take
+            so many times as long.
         max_abandoned_workers: abandoned workers hold memory. With so many, no other is started until one of them ends.
         faults_before_restart: after so many failures in a row that are faults in the program (no `RelitError`), the
             worker's own state is suspected, and another is started.
@@ -51,6 +52,14 @@ class FrameArrived:
 @dataclass(frozen=True)
 class FrameStarted:
     """A worker took a frame and begins to work on it."""
+
+    worker: int
+    at: float
+
+
+@dataclass(frozen=True)
+class ModelsOpening:
+    """A worker begins to open models for the frame that it is at: those of another subject or mode, or a matte."""
 
     worker: int
     at: float
@@ -90,7 +99,7 @@ class WorkerEnded:
     worker: int
 
 
-Event = FrameArrived | FrameStarted | FrameFinished | PictureRendered | FrameFailed | WorkerEnded
+Event = FrameArrived | FrameStarted | ModelsOpening | FrameFinished | PictureRendered | FrameFailed | WorkerEnded
 
 
 # Actions, to be taken in the order given.
@@ -151,7 +160,8 @@ class PipelineHealth:
         started_workers: how many were started so far; the next one gets this number.
         abandoned: workers that were retired and have not ended.
         busy_since: when the worker at work took the frame that it is at; None while it waits for one.
-        has_rendered: whether the worker at work has rendered a picture.
+        opening_at: when the worker at work last began to open models.
+        has_rendered: whether it has rendered a picture of a frame that it took after that.
         failures: frames that failed since the last picture.
         hangs: workers that were abandoned for hanging since the last picture.
         hang_reported: whether a hang was reported since the last picture.
@@ -165,6 +175,7 @@ class PipelineHealth:
     started_workers: int = 0
     abandoned: frozenset[int] = frozenset()
     busy_since: float | None = None
+    opening_at: float = 0.0
     has_rendered: bool = False
     failures: int = 0
     hangs: int = 0
@@ -193,6 +204,8 @@ def next_health(health: PipelineHealth, event: Event, limits: HealthLimits) -> T
         return health, ()
     if isinstance(event, FrameStarted):
         return replace(health, busy_since=event.at), ()
+    if isinstance(event, ModelsOpening):
+        return replace(health, opening_at=event.at, has_rendered=False), ()
     if isinstance(event, FrameFinished):
         return replace(health, busy_since=None), ()
     if isinstance(event, PictureRendered):
@@ -224,7 +237,7 @@ def _after_hang(health: PipelineHealth, busy_s: float, limits: HealthLimits) -> 
     worker = health.worker
     assert worker is not None
     actions: tuple[Action, ...] = ()
-    # Opening models takes seconds: a worker that has rendered nothing yet is not reported so soon.
+    # Opening models takes seconds: a worker that has rendered nothing since is not reported so soon.
     if not health.hang_reported and (health.has_rendered or busy_s > limits.abandon_timeout_s):
         health, actions = replace(health, hang_reported=True), (ReportHang(worker),)
     patience_s = limits.abandon_timeout_s * _backoff(health.hangs, limits)
@@ -237,12 +250,13 @@ def _after_hang(health: PipelineHealth, busy_s: float, limits: HealthLimits) -> 
 
 
 def _after_picture(health: PipelineHealth, event: PictureRendered) -> Transition:
+    # One frame is rendered while the next is begun: the picture may be of a frame before the one that failed, or before
+    # the one for which models are opened.
+    health = replace(health, has_rendered=health.has_rendered or event.begun_at >= health.opening_at)
     if health.failures and event.begun_at < health.failed_frame_at:
-        # One frame is rendered while the next is begun: this is the picture of the one before that failed.
-        return replace(health, has_rendered=True), ()
+        return health, ()
     actions = (ReportRecovery(),) if health.in_trouble else ()
-    recovered = replace(health, has_rendered=True, failures=0, hangs=0, hang_reported=False, restart_due=False)
-    return recovered, actions
+    return replace(health, failures=0, hangs=0, hang_reported=False, restart_due=False), actions
 
 
 def _after_failure(health: PipelineHealth, event: FrameFailed, limits: HealthLimits) -> Transition:

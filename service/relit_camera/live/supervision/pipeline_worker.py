@@ -16,6 +16,7 @@ from relit_camera.live.supervision.pipeline_health import (
     FrameFailed,
     FrameFinished,
     FrameStarted,
+    ModelsOpening,
     PictureRendered,
     WorkerEnded,
 )
@@ -26,9 +27,9 @@ _POLL_S = 0.2
 class PipelineWorker:
     """Renders the frames that `submit_frame` hands over, the newest first. It posts an event at each step.
 
-    While one frame is rendered the next is begun, no more. The events `FrameStarted`, `FrameFinished`,
-    `PictureRendered` and `FrameFailed` come from its threads, and `WorkerEnded` is the last one. After `close` it posts
-    no other event and gives no picture.
+    While one frame is rendered the next is begun, no more. The events `FrameStarted`, `ModelsOpening`,
+    `FrameFinished`, `PictureRendered` and `FrameFailed` come from its threads, and `WorkerEnded` is the last one. After
+    `close` it posts no other event and gives no picture.
 
     Attributes:
         pipeline: the one at work; None until it is made.
@@ -100,6 +101,8 @@ class PipelineWorker:
                     self._begin(frame, begun_at)
                     self._post_unless_closed(FrameFinished(self._number))
             self._renderer.shutdown()
+            if self.pipeline is not None:
+                self.pipeline.close()
         finally:
             self._post(WorkerEnded(self._number))  # else a worker that is given up would count as hanging for ever
 
@@ -107,6 +110,7 @@ class PipelineWorker:
         try:
             if self.pipeline is None:
                 self.pipeline = self._make_pipeline()
+                self.pipeline.on_opening = self._note_opening
             task = self.pipeline.begin(frame, self._scene)
         except Exception as error:  # nothing that one frame does may end the camera
             self._fail(error, begun_at)
@@ -122,6 +126,9 @@ class PipelineWorker:
                 self._on_picture(PictureRendered(self._number, self._clock.now(), begun_at), frame, rendered)
         except Exception as error:
             self._fail(error, begun_at)
+
+    def _note_opening(self) -> None:
+        self._post_unless_closed(ModelsOpening(self._number, self._clock.now()))
 
     def _fail(self, error: Exception, begun_at: float) -> None:
         revision = self._scene().revision

@@ -68,8 +68,7 @@ class BasisRelighter:
     name, provider = "basis", "numpy"
 
     def __init__(self, subject: Subject, options: RelighterOptions | None = None) -> None:
-        """`options` are those of every relighter; it takes no argument."""
-        (options or RelighterOptions()).require_no_argument(self.name)
+        """`options` are those of every relighter, and change nothing here."""
         self._shape = (subject.metadata.height, subject.metadata.width)
         self._coefficients = subject.coefficients
         groups = group_by_rank(subject.basis)

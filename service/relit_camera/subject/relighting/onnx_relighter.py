@@ -5,6 +5,7 @@ On a GPU they stay in its memory, and only the light map and the picture are cop
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -89,14 +90,13 @@ class OnnxBasisRelighter:
     name = "onnx-basis"
 
     def __init__(self, subject: Subject, options: RelighterOptions | None = None) -> None:
-        """Make the subject's graph and open it as `options.session` says; it takes no argument.
+        """Make the subject's graph and open it as `options.session` says.
 
         Raises:
             DeviceError: a strict provider cannot run it.
         """
         options = options or RelighterOptions()
-        options.require_no_argument(self.name)
-        self.session = open_session(basis_graph(subject), "relight-basis", options.session)
+        self.session = open_session(partial(basis_graph, subject), "relight-basis", options.session)
         self._shape = (subject.metadata.height, subject.metadata.width)
 
     @property

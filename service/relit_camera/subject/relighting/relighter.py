@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.base.plugin_groups import PluginGroup, require_no_argument
+from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.light_map import LightMap
 from relit_camera.subject.reflectance_field import TEXELS
@@ -60,14 +60,6 @@ class RelighterOptions:
 
     session: SessionOptions = field(default_factory=SessionOptions)
     argument: str = ""
-
-    def require_no_argument(self, relighter: str) -> None:
-        """For relighters that take none.
-
-        Raises:
-            InputError: there is an argument.
-        """
-        require_no_argument("relighter", relighter, self.argument)
 
 
 RELIGHTERS: PluginGroup[Callable[[Subject, RelighterOptions], Relighter]] = PluginGroup(

@@ -21,7 +21,6 @@ def choose_relighter(subject: Subject, options: RelighterOptions) -> Relighter:
     Raises:
         DeviceError: the provider is strict, and cannot run it.
     """
-    options.require_no_argument("auto")
     if provider_names.choose_provider(options.session.provider) == provider_names.CPU:
         return BasisRelighter(subject)
     relighter = OnnxBasisRelighter(subject, options)

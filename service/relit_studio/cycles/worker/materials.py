@@ -121,8 +121,8 @@ def _cornea(nodes: Nodes, picture: str, limbus_cm: float) -> Any:
     ramp = nodes.add("MapRange", {"Value": radius, "From Min": limbus_cm - 0.06, "From Max": limbus_cm + 0.05})
     # The real cornea bends light onto the iris; here the shell's rim would shade it: it lets all light in.
     opaque = nodes.math("SUBTRACT", 1.0, nodes.add("LightPath").outputs["Is Shadow Ray"])
-    share = nodes.math("MULTIPLY", ramp.outputs[0], opaque)
-    return nodes.finish(nodes.mix_shader(share, _film(nodes, 1.62, 0.06), sclera))
+    fraction = nodes.math("MULTIPLY", ramp.outputs[0], opaque)
+    return nodes.finish(nodes.mix_shader(fraction, _film(nodes, 1.62, 0.06), sclera))
 
 
 def _wet(nodes: Nodes) -> Any:
@@ -135,7 +135,7 @@ def _lens(nodes: Nodes) -> Any:
 
 
 def _film(nodes: Nodes, index: float, roughness: float) -> Socket:
-    """Clear film without refraction, so without noise; it reflects Fresnel's share."""
+    """Clear film without refraction, so without noise; it reflects Fresnel's fraction."""
     fresnel = nodes.add("Fresnel", {"IOR": index}).outputs[0]
     clear = nodes.add("BsdfTransparent").outputs[0]
     gloss = nodes.add("BsdfAnisotropic", {"Roughness": roughness}).outputs[0]
@@ -172,7 +172,7 @@ def _cloth(nodes: Nodes, colour: Color) -> Any:
 
 
 def _hair(nodes: Nodes, melanin: float, redness: float, roughness: float = 0.26, grey: float = 0.0) -> Any:
-    """Hair of the given pigments; the share `grey` of the strands has almost none."""
+    """Hair of the given pigments; the fraction `grey` of the strands has almost none."""
     shader = nodes.add("BsdfHairPrincipled", model="CHIANG", parametrization="MELANIN")
     pigment = nodes.scaled_sum(melanin, (nodes.attribute("shade"), _SHADE))
     if grey:

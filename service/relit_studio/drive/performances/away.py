@@ -5,7 +5,7 @@ from __future__ import annotations
 from relit_camera.base.easing import interpolate_keyframes
 from relit_studio.drive.performance import FPS, ActorState, Performance
 from relit_studio.drive.performances.face_animation import Keys, Syllables, add, blink, look, speak, swaying
-from relit_studio.people.expressions import NEUTRAL
+from relit_studio.people.face.expressions import NEUTRAL
 
 FRAMES = 144
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Angles
-from relit_studio.people.expressions import Expression
-from relit_studio.people.eyes import GAZE_DEG
+from relit_studio.people.face.expressions import Expression
+from relit_studio.people.face.eyes import GAZE_DEG
 from relit_studio.people.posture import Posture
 
 Keys = tuple[tuple[float, float], ...]
@@ -37,21 +37,21 @@ _SWAY_HZ_PHASE = ((0.9, 0.3), (0.7, 2.0), (1.1, 4.4))
 _SWAY_DEG = (0.5, 0.5, 0.4)
 
 
-def add(expression: dict[str, float], weights: Expression, share: float) -> None:
-    """Add a share of some weights to an expression; names without a side apply to both sides."""
+def add(expression: dict[str, float], weights: Expression, fraction: float) -> None:
+    """Add a fraction of some weights to an expression; names without a side apply to both sides."""
     for name, weight in weights.items():
         for each in (name,) if name in _ONE_PIECE else (f"{name}_L", f"{name}_R"):
-            expression[each] = expression.get(each, 0.0) + share * weight
+            expression[each] = expression.get(each, 0.0) + fraction * weight
 
 
 def speak(expression: dict[str, float], syllables: Syllables, time_s: float) -> None:
     """Blend the mouth between the two mouth shapes around the time."""
     times = np.array([time for time, _ in syllables])
     after = int(np.clip(np.searchsorted(times, time_s, side="right"), 1, len(times) - 1))
-    share = float(smoothstep(time_s, times[after - 1], times[after]))
+    fraction = float(smoothstep(time_s, times[after - 1], times[after]))
     before, following = (VISEMES[syllables[index][1]] for index in (after - 1, after))
-    add(expression, before, 1 - share)
-    add(expression, following, share)
+    add(expression, before, 1 - fraction)
+    add(expression, following, fraction)
 
 
 def look(expression: dict[str, float], right_deg: float, down_deg: float) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from relit_camera.base.easing import interpolate_keyframes
 from relit_studio.drive.performance import FPS, ActorState, Performance
 from relit_studio.drive.performances.face_animation import Keys, Syllables, add, blink, look, speak, swaying
-from relit_studio.people.expressions import NEUTRAL
-from relit_studio.props.held_objects import Gesture
+from relit_studio.people.face.expressions import NEUTRAL
+from relit_studio.people.props.held_objects import Gesture
 
 FRAMES = 192
 

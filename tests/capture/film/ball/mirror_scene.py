@@ -146,7 +146,7 @@ def true_normal(scene: MirrorScene, lamp: Vector) -> Vector:
 
 def hand_path(count: int, distance_cm: float, about: Vector) -> list[Vector]:
     """Positions of a lamp that moves up and down from left to right, before and beside the head."""
-    share = (np.arange(count) + 0.5) / count
-    azimuth, elevation = np.radians(-65 + 130 * share), np.radians(25 + 40 * np.sin(2 * np.pi * 2.5 * share))
+    fraction = (np.arange(count) + 0.5) / count
+    azimuth, elevation = np.radians(-65 + 130 * fraction), np.radians(25 + 40 * np.sin(2 * np.pi * 2.5 * fraction))
     way = np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)], -1)
     return list(about + distance_cm * way)

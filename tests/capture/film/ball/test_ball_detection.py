@@ -68,7 +68,7 @@ def test_a_ball_among_other_round_things(frames: list[LinearImage]) -> None:
     center, radius = off(ball.outline, SCENE.outline())
     assert center < 0.02
     assert radius < 0.02
-    assert ball.glints == pytest.approx(0.5)
+    assert ball.highlight_visibility == pytest.approx(0.5)
     assert ball.evidence is not None
     assert ball.evidence > 0.6
 
@@ -110,7 +110,7 @@ def test_a_given_circle_is_taken_as_it_is(frames: list[LinearImage]) -> None:
     given = BallOutline(*SCENE.outline())
     ball = ball_from_outline(sample_frames(frames), given, GIVEN)
     assert ball.outline == given
-    assert ball.glints == pytest.approx(0.5)
+    assert ball.highlight_visibility == pytest.approx(0.5)
     with pytest.raises(CaptureError, match="cut off by the picture's top edge"):
         ball_from_outline(sample_frames(frames), BallOutline(100, 3, 20), GIVEN)
 
@@ -179,7 +179,7 @@ def found(photographs: list[LinearImage]) -> DetectedBall:
 
 def test_a_real_ball(found: DetectedBall, published: tuple[float, float, float]) -> None:
     assert max(off(found.outline, published)) < 0.01
-    assert found.glints == 1
+    assert found.highlight_visibility == 1
 
 
 def test_real_lights_and_never_the_second_highlight(

@@ -171,7 +171,7 @@ def test_the_frequency_is_found_though_it_drifts(hz: float) -> None:
     level = 0.05 + 0.3 * (phase % 1 < 0.5) * (1.2 + np.sin(0.8 * times))
     beat = find_flash_frequency(level, times)
     assert beat.frequency_hz == pytest.approx(hz, rel=0.03)
-    assert beat.share > 0.3
+    assert beat.fraction > 0.3
 
 
 def test_a_video_is_watched_in_linear_light(tmp_path: Path) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.capture.film.lamp.lamp_position import LampTriangulation, estimate_lamp_distances
+from relit_camera.capture.film.lamp.lamp_distance import estimate_lamp_distances
+from relit_camera.capture.film.lamp.light_from_highlight import LampTriangulation
 
 TIMES = np.arange(0, 12, 0.1)
 HEAD = np.array([1.0, -2.0, -60.0])

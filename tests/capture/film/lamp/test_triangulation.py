@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from relit_camera.capture.film.ball.specular_highlight import Highlight
-from relit_camera.capture.film.lamp.lamp_position import BallHighlight, triangulate_lamp
+from relit_camera.capture.film.lamp.light_from_highlight import BallHighlight, triangulate_lamp
 from tests.capture.film.ball.mirror_scene import MirrorScene, highlight_in, view_of
 
 SCENES = [

@@ -40,14 +40,14 @@ def test_gains_are_measured_on_the_wall() -> None:
     found, gains, bright = scene(reached=False)
     expected = gains / np.exp(np.log(gains[bright]).mean(axis=0))
     np.testing.assert_allclose(found.rgb, expected, rtol=0.01)
-    assert found.share > 0.4
+    assert found.fraction > 0.4
     assert found.left < 0.03 < 0.15 < found.left_as_is
     assert found.can_subtract_room
 
 
 def test_where_the_flash_reaches_everything_gains_are_measured_in_dark_frames() -> None:
     found, gains, bright = scene(reached=True)
-    assert found.share == 0
+    assert found.fraction == 0
     assert not found.too_dim
     assert "dark frames" in found.source
     error = np.log(found.rgb[~bright]) - np.log(gains[~bright])
@@ -79,7 +79,7 @@ def before_a_wall(wall: tuple[float, float, float]) -> FrameGains:
 
 def test_gains_are_measured_on_a_wall_in_warm_light_with_little_blue() -> None:
     found = before_a_wall((0.04, 0.025, 0.013))
-    assert found.share > 0.3
+    assert found.fraction > 0.3
     assert not found.too_dim
 
 
@@ -89,7 +89,7 @@ def test_a_dark_room_is_not_taken_for_one_that_the_flash_reaches() -> None:
     light = np.full((60, 24, 18, 3), 0.004) * rng.uniform(0.9, 1.1, (60, 24, 18, 1))
     light[index % 6 < 3, 8:, 5:13] += 0.3
     found = estimate_gains(light.astype(np.float16), index / 30, index % 6 < 3, index // 6)
-    assert found.share == 0
+    assert found.fraction == 0
     assert found.too_dim
 
 

@@ -89,7 +89,7 @@ def test_a_good_film_warns_of_the_missing_detector_only(built: CaptureResult) ->
     ],
 )
 def test_warnings(built: CaptureResult, detector: bool, visible: float, messages: list[str]) -> None:
-    gains = replace(built.findings.gains, share=0.0, visible=visible)
+    gains = replace(built.findings.gains, fraction=0.0, visible=visible)
     amiss = replace(built.findings, gains=gains, detector_installed=detector, eyes_px=None)
     warnings = amiss.warnings[-2:]
     assert all(warning.startswith(start) for warning, start in zip(warnings, messages, strict=True))

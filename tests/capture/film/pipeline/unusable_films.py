@@ -50,10 +50,10 @@ def brighter(codes: Codes, factor: np.ndarray | float) -> Codes:
     return np.asarray(np.clip(codes * np.asarray(factor) ** (1 / GAMMA), 0, 255).round().astype(np.uint8))
 
 
-def partly_lit(codes: Codes, share: np.ndarray) -> Codes:
-    """Of a bright frame this share (frames, rows or 1), the rest of a dark one."""
+def partly_lit(codes: Codes, fraction: np.ndarray) -> Codes:
+    """Of a bright frame this fraction (frames, rows or 1), the rest of a dark one."""
     bright, dark = ((codes[kind][0] / 255) ** GAMMA for kind in (LIT == 1, LIT == 0))
-    light = dark + share[..., None, None] * (bright - dark)
+    light = dark + fraction[..., None, None] * (bright - dark)
     return np.asarray(np.round(255 * light.clip(0, 1) ** (1 / GAMMA)).astype(np.uint8))
 
 
@@ -72,8 +72,8 @@ def too_short(codes: Codes) -> Shot:
 
 def too_fast(codes: Codes) -> Shot:
     """Twelve flashes a second, each exposing some rows only."""
-    _, shares = blinking(Blinking(hz=12, seconds=3))
-    return Shot(partly_lit(codes, shares[:, np.arange(SIZE[1]) * shares.shape[1] // SIZE[1]]))
+    _, fractions = blinking(Blinking(hz=12, seconds=3))
+    return Shot(partly_lit(codes, fractions[:, np.arange(SIZE[1]) * fractions.shape[1] // SIZE[1]]))
 
 
 def mostly_weak(codes: Codes) -> Shot:

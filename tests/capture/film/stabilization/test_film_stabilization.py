@@ -184,11 +184,11 @@ def test_a_picture_is_predicted_from_those_most_like_it_of_other_groups() -> Non
     rng = np.random.default_rng(0)
     coarse = rng.uniform(size=(40, 100)) * rng.uniform(0.5, 2, (40, 1))
     groups = np.arange(40) // 2
-    like, shares = template_alignment._prediction(coarse @ coarse.T, 7, groups)
+    like, weights = template_alignment.predict_from_similar(coarse @ coarse.T, 7, groups)
     cosine = coarse @ coarse[7] / np.linalg.norm(coarse, axis=1) / np.linalg.norm(coarse[7])
     others = [each for each in np.argsort(-cosine) if each not in (6, 7)]
     assert like.tolist() == others[:16]
     # Ridge regression as least squares with more rows.
     ridge = np.sqrt(0.02 * (coarse[like] ** 2).sum() / 16) * np.eye(16)
     wanted = np.linalg.lstsq(np.vstack([coarse[like].T, ridge]), np.append(coarse[7], np.zeros(16)), rcond=None)[0]
-    np.testing.assert_allclose(shares, wanted, rtol=1e-6)
+    np.testing.assert_allclose(weights, wanted, rtol=1e-6)

@@ -59,17 +59,11 @@ def squared_difference(graph: OnnxGraphBuilder, operator: Operator) -> None:
 
 
 def prelu(graph: OnnxGraphBuilder, operator: Operator) -> None:
-    """Keep x where x > 0, else s·x; written s·x + (1 - s)·max(x, 0).
-
-    ONNX Runtime's own PRelu leaves its blocked layout: the face mesh takes three times as long with it. max(x, s·x)
-    would be wrong, since slopes go up to 19.8.
-    """
+    """Keep x where x > 0, else s·x, with a slope s for each channel; `expand_prelus` makes it fast."""
     source, slopes = operator.inputs
     layout = graph.common_layout([source])
-    value, slope = graph.value(source, layout), graph.constant(slopes)
-    scaled = graph.node("Mul", [value, graph.initializer(slope, layout)])
-    rest = graph.node("Mul", [graph.node("Relu", [value]), graph.initializer(np.float32(1) - slope, layout)])
-    graph.bind(operator.outputs[0], graph.node("Add", [scaled, rest]), layout)
+    slope = graph.initializer(graph.constant(slopes), layout)
+    graph.bind(operator.outputs[0], graph.node("PRelu", [graph.value(source, layout), slope]), layout)
 
 
 _SAME_PADDING = 0
@@ -174,14 +168,23 @@ def reduce(onnx_operator: str) -> Callable[[OnnxGraphBuilder, Operator], None]:
 
 
 def pad(graph: OnnxGraphBuilder, operator: Operator) -> None:
-    """Pad with zeros; the pads are (rank, 2): before and after each axis."""
+    """Pad with zeros; the pads are (rank, 2): before and after each axis.
+
+    Channels alone are padded by a convolution, since ONNX Runtime's Pad leaves its blocked layout.
+    """
     source = operator.inputs[0]
     layout = graph.common_layout([source])
-    pads = graph.constant(operator.inputs[1])
+    value, pads = graph.value(source, layout), graph.constant(operator.inputs[1])
     if layout is Layout.CHANNELS_FIRST:
         pads = pads[list(layout.value)]
-    inputs = [graph.value(source, layout), graph.integers(pads.T.ravel().tolist())]
-    graph.bind(operator.outputs[0], graph.node("Pad", inputs), layout)
+        if not pads[[0, 2, 3]].any():
+            channels = graph.shape(source)[3]
+            kept = np.pad(np.eye(channels, dtype=np.float32), [pads[1], (0, 0)])
+            graph.bind(
+                operator.outputs[0], graph.node("Conv", [value, graph.initializer(kept[..., None, None])]), layout
+            )
+            return
+    graph.bind(operator.outputs[0], graph.node("Pad", [value, graph.integers(pads.T.ravel().tolist())]), layout)
 
 
 def concatenation(graph: OnnxGraphBuilder, operator: Operator) -> None:

@@ -23,6 +23,7 @@ from relit_camera.base.models.tflite.operators import (
     transpose_conv_with_bias,
     unary,
 )
+from relit_camera.base.models.tflite.prelu_expansion import expand_prelus
 from relit_camera.base.models.tflite.tflite_reader import Operator, read_tflite
 
 _OPSET = 18
@@ -88,8 +89,10 @@ def convert_tflite_to_onnx(data: bytes, name: str, inputs: Sequence[str], output
         if operator.kind not in OPERATORS:
             raise graph.unsupported(f"it has the operator {operator.kind}")
         OPERATORS[operator.kind](graph, operator)
+    built = graph.build(inputs, outputs)
+    expand_prelus(built)
     model = helper.make_model(
-        graph.build(inputs, outputs),
+        built,
         opset_imports=[helper.make_opsetid("", _OPSET)],
         ir_version=_IR_VERSION,
         producer_name="relit-camera",

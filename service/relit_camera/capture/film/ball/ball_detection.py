@@ -39,14 +39,14 @@ class DetectionTunables:
         inner_radius: radii within which a highlight counts. At 0.9 a mirror ball shows what is 128 degrees off the
             camera's axis; no lamp that lights a face is farther off.
         candidates: circles that are tried.
-        min_visibility: least share of the pictures in which a ball shows the lamp.
-        min_relative_visibility: the same relative to the circle with the largest share.
+        min_visibility: least fraction of the pictures in which a ball shows the lamp.
+        min_relative_visibility: the same relative to the circle with the largest fraction.
         min_significance: least significance of a ball's outline.
-        chance_coverage: share of a circle's line that lies on edges by chance in a busy picture.
+        chance_coverage: fraction of a circle's line that lies on edges by chance in a busy picture.
         cut_off: radii by which an outline may exceed the picture.
-        white_code, max_white: a ball is over-exposed if more than this share of it has codes above this one.
+        white_code, max_white: a ball is over-exposed if more than this fraction of it has codes above this one.
         averages: pictures to which the sample is averaged before its outlines are measured.
-        max_error_ratio: the focal length is taken from the outline if that reduces its error to this share.
+        max_error_ratio: the focal length is taken from the outline if that reduces its error to this fraction.
     """
 
     max_side_px: int = 480
@@ -76,15 +76,15 @@ class DetectedBall:
 
     Attributes:
         outline: in pixels of the frames.
-        evidence: share of the outline that is visible in the pictures. Below about 0.7 the outline may be off by
+        evidence: fraction of the outline that is visible in the pictures. Below about 0.7 the outline may be off by
             several per cent of the radius, and the light by as many degrees. None for a circle that was given.
-        glints: share of the pictures in which the ball shows the lamp.
+        highlight_visibility: fraction of the pictures in which the ball shows the lamp.
         focal: focal length of the camera, corrected by the outline's shape where that is more accurate.
     """
 
     outline: BallOutline
     evidence: float | None
-    glints: float
+    highlight_visibility: float
     focal: FocalLength
 
 
@@ -106,8 +106,8 @@ class HighlightVisibility:
         dark = np.quantile(self._lights, _TUNABLES.dark_quantile, axis=0).astype(np.float32) if enough else None
         self._dark = dark
 
-    def share(self, circle: BallOutline) -> float:
-        """Share of the pictures in which the lamp makes one small place in this circle bright.
+    def fraction(self, circle: BallOutline) -> float:
+        """Fraction of the pictures in which the lamp makes one small place in this circle bright.
 
         Args:
             circle: in pixels of the sample.
@@ -161,7 +161,7 @@ def ball_from_outline(sample: FrameSample, given: BallOutline, focal: FocalLengt
     """
     circle = given.scaled(sample.scale)
     _require_whole(circle, sample)
-    return DetectedBall(given, None, HighlightVisibility(sample).share(circle), focal)
+    return DetectedBall(given, None, HighlightVisibility(sample).fraction(circle), focal)
 
 
 def detect_balls(sample: FrameSample, focal: FocalLength, count: int) -> list[DetectedBall]:
@@ -180,9 +180,9 @@ def detect_balls(sample: FrameSample, focal: FocalLength, count: int) -> list[De
     """
     edges, visibility = edge_map(sample), HighlightVisibility(sample)
     circles = circle_candidates(edges, _TUNABLES.candidates)
-    shares = [visibility.share(circle) for circle in circles]
-    enough = max(_TUNABLES.min_visibility, _TUNABLES.min_relative_visibility * max(shares, default=0.0))
-    showing = [circle for circle, share in zip(circles, shares, strict=True) if share >= enough]
+    fractions = [visibility.fraction(circle) for circle in circles]
+    enough = max(_TUNABLES.min_visibility, _TUNABLES.min_relative_visibility * max(fractions, default=0.0))
+    showing = [circle for circle, fraction in zip(circles, fractions, strict=True) if fraction >= enough]
     fits = _significant([fit_outline_to_edges(edges, circle) for circle in showing])
     if not fits:
         raise _nothing_found(sample, edges, circles)
@@ -205,7 +205,7 @@ def _measure(
     return DetectedBall(
         fit.outline.scaled(1 / sample.scale),
         fit.evidence,
-        visibility.share(fit.outline),
+        visibility.fraction(fit.outline),
         FocalLength(pixels, fit.log_focal_error, source) if better else focal,
     )
 

@@ -23,13 +23,13 @@ class TrackingTunables:
     """How a ball is followed; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
 
     Attributes:
-        iterations: most steps of an alignment.
+        iterations: maximum number of steps of an alignment.
         window_px: side of the square in which the ball is compared; it shows a shift of a hundredth of the radius.
         window_radii: half that side in radii, and so the reach of the search.
         disc_radii: radius of what is compared: the ball with its limb and hardly any background.
-        lamp_codes: pixels brighter than usual by more sRGB codes than this belong to the lamp's mirror image; they are
-            left out, as they would bias the alignment.
-        max_lamp: share of the ball from which they are not left out, being no lamp's.
+        lamp_codes: pixels brighter than in that appearance by more sRGB codes than this belong to the lamp's mirror
+            image; they are left out, as they would bias the alignment.
+        max_lamp: fraction of the ball from which they are not left out, being no lamp's.
         moved_radii: least shift, in radii, that counts: 2 degrees of light.
         hidden_correlation: relative to the film's median, the correlation below which the ball is hidden.
         sure_correlation: correlation below which the whole window is searched.
@@ -59,7 +59,7 @@ class BallObservation:
     Attributes:
         index: of the frame.
         dx, dy: shift from where it was found, in pixels.
-        correlation: with its usual appearance, at most 1.
+        correlation: with its typical appearance, at most 1.
     """
 
     index: int
@@ -75,7 +75,7 @@ class BallEpisode:
     Attributes:
         kind: which of the two.
         first, last: indices of the frames, both included.
-        dx, dy: median shift in pixels from its usual position; 0 where it is hidden.
+        dx, dy: median shift in pixels from its typical position; 0 where it is hidden.
     """
 
     kind: Literal["hidden", "moved"]
@@ -86,10 +86,10 @@ class BallEpisode:
 
 
 class BallTracker:
-    """Aligns a ball's usual appearance to frames of a film."""
+    """Aligns a ball's median appearance to frames of a film."""
 
     def __init__(self, sample: FrameSample, outline: BallOutline) -> None:
-        """Learn the ball's usual appearance.
+        """Learn the ball's median appearance.
 
         Args:
             sample: of the frames in which it was found.
@@ -98,8 +98,8 @@ class BallTracker:
         self._outline = outline
         self._scale = _SIDE_PX / (2 * _TUNABLES.window_radii * outline.radius)
         # The median has no highlight, which is at another place in each frame.
-        usual = linear_from_uint8(np.median(sample.codes, axis=0).astype(np.uint8))
-        self._usual = self._window(usual, sample.scale)
+        appearance = linear_from_uint8(np.median(sample.codes, axis=0).astype(np.uint8))
+        self._appearance = self._window(appearance, sample.scale)
         middle = _SIDE_PX / 2
         rows, columns = np.mgrid[:_SIDE_PX, :_SIDE_PX]
         distance = np.hypot(columns + 0.5 - middle, rows + 0.5 - middle)
@@ -137,7 +137,7 @@ class BallTracker:
 
     def _best_whole_pixel_shift(self, window: Plane) -> tuple[float, float]:
         """Shift in window pixels, to a pixel, at which the ball fits the window best."""
-        template, mask = self._usual[self._box, self._box], self._disc[self._box, self._box].astype(np.float32)
+        template, mask = self._appearance[self._box, self._box], self._disc[self._box, self._box].astype(np.float32)
         fits = cv2.matchTemplate(window, template, cv2.TM_CCOEFF_NORMED, mask=mask)
         _, _, _, place = cv2.minMaxLoc(np.where(np.isfinite(fits), fits, -1))
         return float(place[0] - self._box.start), float(place[1] - self._box.start)
@@ -149,8 +149,8 @@ class BallTracker:
         """
         shift = np.array(start, np.float64)
         disc, flat = self._disc, np.ones(int(self._disc.sum()))
-        down, across = (np.asarray(slope)[disc] for slope in np.gradient(self._usual))
-        template = self._usual[disc]
+        down, across = (np.asarray(slope)[disc] for slope in np.gradient(self._appearance))
+        template = self._appearance[disc]
         correlation = 0.0
         for _ in range(_TUNABLES.iterations):
             shifted = np.array([[1, 0, shift[0]], [0, 1, shift[1]]])
@@ -181,7 +181,7 @@ def _correlation(a: Plane, b: Plane) -> float:
 
 
 def find_episodes(observations: Iterable[BallObservation], radius: float) -> list[BallEpisode]:
-    """Episodes in which a ball was hidden or away from its usual position, in order.
+    """Episodes in which a ball was hidden or away from its typical position, in order.
 
     Args:
         observations: in the order of their frames.
@@ -227,7 +227,7 @@ class ObservedBall:
     """A mirror ball through a film.
 
     Attributes:
-        found: the ball in its usual position.
+        found: the ball in its typical position.
         view: the camera's view of it there.
         episodes: in which it was hidden or moved.
         highlights: of the bright frames about which the face was found, by index.
@@ -239,7 +239,7 @@ class ObservedBall:
     highlights: Mapping[int, Highlight | NoHighlight]
 
     def view_at(self, index: int) -> PinholeView:
-        """The camera's view of the ball in a frame; that of its usual position while it is hidden."""
+        """The camera's view of the ball in a frame; that of its typical position while it is hidden."""
         return self.view.with_outline(outline_at_frame(self.episodes, self.view.outline, index) or self.view.outline)
 
     def highlight(self, index: int) -> Highlight | NoHighlight:

@@ -12,7 +12,7 @@ from relit_camera.capture.film.ball.frame_sample import EdgeMap
 from relit_camera.capture.film.ball.sphere_projection import BallOutline
 
 MIN_RADIUS = 0.025
-"""Least radius of a ball, as a share of the picture's shorter side: a pixel's error on a smaller one is degrees of
+"""Least radius of a ball, as a fraction of the picture's shorter side: a pixel's error on a smaller one is degrees of
 light."""
 
 
@@ -21,14 +21,14 @@ class HoughTunables:
     """Search for circles; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
 
     Attributes:
-        max_radius: largest radius, as a share of the picture's shorter side.
+        max_radius: largest radius, as a fraction of the picture's shorter side.
         radius_step: ratio of successive radii.
         max_side_px: longer side of the picture in which circles are searched.
         min_edge: least strength of an edge that votes.
         max_edges: most edges that vote, the strongest.
         center_error: error of a vote in radii, which sets the blur of the votes.
         peaks_per_radius: most candidates of one radius.
-        min_support: least share of a candidate's line that lies on edges.
+        min_support: least fraction of a candidate's line that lies on edges.
         min_difference: least difference of two candidates' centers and radii together, in radii.
     """
 
@@ -144,7 +144,7 @@ class OutlineFit:
 
     Attributes:
         outline: in pixels of the edge map.
-        coverage: share of the outline inside the picture along which there is an edge on it.
+        coverage: fraction of the outline inside the picture along which there is an edge on it.
     """
 
     outline: BallOutline
@@ -209,8 +209,8 @@ def _consensus(points: _EdgePoints, about: BallOutline) -> BallOutline | None:
         return None
     random = np.random.default_rng(0)
     x, y = points.distance * np.cos(points.angle), points.distance * np.sin(points.angle)
-    share = points.weight / points.weight.sum()
-    three = random.choice(len(x), (_FIT.trials, 3), p=share)
+    fraction = points.weight / points.weight.sum()
+    three = random.choice(len(x), (_FIT.trials, 3), p=fraction)
     equations = np.stack([2 * x[three], 2 * y[three], np.ones(three.shape)], axis=2)
     equations = equations[proper := np.abs(np.linalg.det(equations)) > 1e-3 * about.radius**2]
     squares = (x[three] ** 2 + y[three] ** 2)[proper]

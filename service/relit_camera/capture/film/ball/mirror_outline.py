@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import fmin
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.capture.film.ball.sphere_projection import BallOutline, PinholeView
-
-Floats = NDArray[np.float64]
 
 INSIDE_SAMPLES, OUTSIDE_SAMPLES = 16, 12
 """Samples of a profile on either side of the supposed limb."""
@@ -32,12 +31,12 @@ class ProfileTunables:
 
     Attributes:
         black_error: error of a dark picture: one sRGB code, linear.
-        level_error: error as a share of the brightness.
-        blur_error: error as a share of the contrast, by the unknown part of lens blur and compression.
+        level_error: error as a fraction of the brightness.
+        blur_error: error as a fraction of the contrast, by the unknown part of lens blur and compression.
         reflection_variances: variances per radian of the reflected surroundings that are tried, over that of the error.
         background_variances: variances per sample of the background that are tried, over that of the error, each with
             its negative log prior: a background this near is mostly plain.
-        absorption, absorption_error: share of the light that metal absorbs, and its standard deviation.
+        absorption, absorption_error: fraction of the light that metal absorbs, and its standard deviation.
         level_variance: variance of the unknown brightness, over that of the error: practically unlimited.
         blur_samples: steps per sample distance in which the lens blur is integrated.
     """
@@ -134,7 +133,7 @@ class OutlineProfileModel:
         self._stepped = stepped.reshape(-1, samples).T
         self._step_squared = np.einsum("dku,du->dk", stepped, steps)
 
-    def log_likelihood(self, light: NDArray[np.float32], x: Floats, y: Floats) -> Floats:
+    def log_likelihood(self, light: NDArray[np.float32], x: Float64Array, y: Float64Array) -> Float64Array:
         """Log likelihood (count, shifts) of profiles.
 
         Args:
@@ -167,7 +166,7 @@ class MirrorOutlineFit:
 
     Attributes:
         outline: in pixels.
-        evidence: share of the rays from its center along which the limb is evident where it was found.
+        evidence: fraction of the rays from its center along which the limb is evident where it was found.
         log_focal, log_focal_error: natural logarithm of the focal length in pixels, and its standard error: prior
             knowledge combined with that from the outline's shape.
     """
@@ -203,9 +202,9 @@ def fit_mirror_outline(
     # The stretch of the ellipse is inverse to the square of the focal length, which gives the error of the latter.
     stretch = 2 * np.log(PinholeView(outline, (lights.shape[2], lights.shape[1]), float(np.exp(log_focal))).elongation)
     error = np.sqrt(2) * _OUTLINE.error_px / max(evidence, 0.1) / outline.radius / max(stretch, 1e-9)
-    share = log_focal_error**2 / (log_focal_error**2 + error**2)
-    combined = log_focal + share * float(found[3] - log_focal)
-    return MirrorOutlineFit(outline, evidence, combined, float(log_focal_error * np.sqrt(1 - share)))
+    fraction = log_focal_error**2 / (log_focal_error**2 + error**2)
+    combined = log_focal + fraction * float(found[3] - log_focal)
+    return MirrorOutlineFit(outline, evidence, combined, float(log_focal_error * np.sqrt(1 - fraction)))
 
 
 class _Rays:
@@ -214,7 +213,7 @@ class _Rays:
     An outline is an array of x, y, radius in pixels and the natural logarithm of the focal length in pixels.
     """
 
-    def __init__(self, lights: NDArray[np.float32], model: OutlineProfileModel, base: Floats) -> None:
+    def __init__(self, lights: NDArray[np.float32], model: OutlineProfileModel, base: Float64Array) -> None:
         """Sample profiles along rays from the center of the outline `base`, across its line."""
         angle = (np.arange(_OUTLINE.rays) + 0.5) * 2 * np.pi / _OUTLINE.rays
         self._size, self._base = (lights.shape[2], lights.shape[1]), base
@@ -231,7 +230,7 @@ class _Rays:
         self.peak = float(best.sum())
         self._likely = likely - best
 
-    def best_of_grid(self) -> Floats:
+    def best_of_grid(self) -> Float64Array:
         """The most likely of a grid of outlines about the base, with the base's focal length."""
         across, down, wide = (grid.ravel() for grid in np.meshgrid(_OUTLINE.grid, _OUTLINE.grid, _OUTLINE.grid))
         offset = across[:, None] * np.cos(self._angle) + down[:, None] * np.sin(self._angle) + wide[:, None]
@@ -239,7 +238,7 @@ class _Rays:
         best = int(np.argmax(_robust(value, beyond)))
         return self._base + self._step * np.array([across[best], down[best], wide[best], 0])
 
-    def best_outline(self, start: Floats, prior: tuple[float, float]) -> tuple[Floats, float]:
+    def best_outline(self, start: Float64Array, prior: tuple[float, float]) -> tuple[Float64Array, float]:
         """The most likely outline near a start, and its log likelihood.
 
         Args:
@@ -247,7 +246,7 @@ class _Rays:
             prior: logarithm of the focal length and its standard error.
         """
 
-        def cost(parameters: Floats) -> float:
+        def cost(parameters: Float64Array) -> float:
             prior_cost = 0.5 * ((parameters[3] - prior[0]) / prior[1]) ** 2
             return float(prior_cost - _robust(*self._interpolate(self._offsets(parameters))))
 
@@ -256,19 +255,19 @@ class _Rays:
         best = np.asarray(fmin(cost, start, initial_simplex=simplex, xtol=3e-3, ftol=1e-2, disp=False))
         return best, -cost(best)
 
-    def evidence(self, parameters: Floats) -> float:
-        """Share of all rays that clearly prefer the limb at this outline over other positions."""
+    def evidence(self, parameters: Float64Array) -> float:
+        """Fraction of all rays that clearly prefer the limb at this outline over other positions."""
         value, beyond = self._interpolate(self._offsets(parameters))
         telling = (value - self._likely.mean(axis=1) > _OUTLINE.evidence / _OUTLINE.samples_per_value) & (beyond == 0)
         return float(np.count_nonzero(telling) / _OUTLINE.rays)
 
-    def _offsets(self, parameters: Floats) -> Floats:
+    def _offsets(self, parameters: Float64Array) -> Float64Array:
         """Distance (rays,) of an outline's line outside the base's, in sample distances."""
         moved = parameters[0] - self._base[0], parameters[1] - self._base[1]
         wider = self._line(parameters, self._angle) - self._line(self._base, self._angle)
         return np.asarray((wider + moved[0] * np.cos(self._angle) + moved[1] * np.sin(self._angle)) / self._step)
 
-    def _interpolate(self, offset: Floats) -> tuple[Floats, Floats]:
+    def _interpolate(self, offset: Float64Array) -> tuple[Float64Array, Float64Array]:
         """Log likelihood (..., rays) of a limb at an offset, relative to the best, and the offset's excess."""
         column = (offset - SHIFTS[0]) / (SHIFTS[1] - SHIFTS[0])
         inside = np.clip(column, 0, len(SHIFTS) - 1.001)
@@ -277,7 +276,7 @@ class _Rays:
         value = self._likely[ray, left] * (1 - part) + self._likely[ray, left + 1] * part
         return np.asarray(value), np.abs(column - inside)
 
-    def _line(self, parameters: Floats, angle: Floats) -> Floats:
+    def _line(self, parameters: Float64Array, angle: Float64Array) -> Float64Array:
         """Distance (rays,) of an outline's line from its center, in pixels."""
         x, y, radius, log_focal = parameters
         view = PinholeView(BallOutline(x, y, radius), self._size, float(np.exp(log_focal)))
@@ -286,6 +285,6 @@ class _Rays:
         return np.asarray(radius / np.hypot(np.cos(from_axis) / stretch, np.sin(from_axis) * stretch))
 
 
-def _robust(value: Floats, beyond: Floats) -> Floats:
+def _robust(value: Float64Array, beyond: Float64Array) -> Float64Array:
     """Sum over the rays (last axis) of log likelihoods, with a lower limit for outliers."""
     return np.asarray(np.logaddexp(value - beyond, -_OUTLINE.outlier).sum(axis=-1) - 0.01 * beyond.sum(axis=-1))

@@ -27,13 +27,14 @@ class HighlightTunables:
         max_lit: largest median brightness of the whole ball, relative to the highlight's: a mirror shows a lit room
             but is not lit itself.
         threshold: brightness relative to the highlight's peak from which a pixel belongs to it.
-        core: rays of a glint are cut off if thinner than this share of its thickest place.
-        max_area: largest share of the ball's picture that a lamp's mirror image takes.
+        core: rays of a highlight are cut off if thinner than this fraction of its thickest place.
+        max_area: largest fraction of the ball's picture that a lamp's mirror image takes.
         white: brightness without the lamp from which the lamp does not show.
-        max_white_rim: share of the highlight's rim that may lie on white; with more, its center is fitted as a disc's.
+        max_white_rim: fraction of the highlight's rim that may lie on white; with more, its center is fitted as a
+            disc's.
         min_area: least area relative to the other frames' median; a smaller one is the image of an image.
-        min_visible: least share of a partly hidden disc that must be visible.
-        max_misfit: largest share of the disc's area on which the picture may contradict it.
+        min_visible: least fraction of a partly hidden disc that must be visible.
+        max_misfit: largest fraction of the disc's area on which the picture may contradict it.
         search_radii: half the side of the square that is kept of each frame, in radii: a ball that moves farther is
             not read.
         max_crop_px: longer side of that square in pixels; more of a large ball does not make the direction more exact.
@@ -97,7 +98,7 @@ def find_highlight(
     normals, not of pixel positions, which would draw highlights at the side inward. Of several bright places the one
     with most light counts, without the thin rays that glare or scratches draw out of it; so the far smaller second
     image of a lamp that another mirror shows does not count. A highlight that lies partly on what is white anyway is
-    fitted as a disc of the usual area, if that is known and half of the disc shows.
+    fitted as a disc of the typical area, if that is known and half of the disc shows.
 
     Args:
         light: linear brightness (height, width) float32.
@@ -229,9 +230,9 @@ def fit_occluded_disc(lit: NDArray[np.bool_], known: NDArray[np.bool_], area_px:
     disc = np.clip(radius + 0.5 - np.hypot(x, y), 0, 1).astype(np.float32)
     visible, telling = (lit & known).astype(np.float32), known.astype(np.float32)
     overlap = _correlate(visible, disc)
-    visible_share = _correlate(telling, disc) / float(disc.sum())
+    visible_fraction = _correlate(telling, disc) / float(disc.sum())
     cost = float(visible.sum()) - 2 * overlap + _correlate(telling, disc**2)
-    allowed = np.where(visible_share >= _TUNABLES.min_visible, cost, np.float32(np.inf))
+    allowed = np.where(visible_fraction >= _TUNABLES.min_visible, cost, np.float32(np.inf))
     row, column = np.unravel_index(int(np.argmin(allowed)), cost.shape)
     if not allowed[row, column] <= _TUNABLES.max_misfit * area_px:
         return None

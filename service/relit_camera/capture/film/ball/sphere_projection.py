@@ -45,14 +45,14 @@ class BallOutline:
         """Whether the circles of two outlines overlap or touch."""
         return bool(np.hypot(self.x - other.x, self.y - other.y) <= self.radius + other.radius)
 
-    def pixels_within(self, share: float, size: tuple[int, int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rows and columns (count,) of the pixels whose centers are less than `share` radii from the center.
+    def pixels_within(self, fraction: float, size: tuple[int, int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns (count,) of the pixels whose centers are less than `fraction` radii from the center.
 
         Args:
-            share: reach in radii.
+            fraction: reach in radii.
             size: width and height of the picture.
         """
-        reach = self.radius * share
+        reach = self.radius * fraction
         rows, columns = (
             np.arange(max(0, int(middle - reach)), min(side, int(middle + reach) + 2), dtype=np.intp)
             for middle, side in ((self.y, size[1]), (self.x, size[0]))

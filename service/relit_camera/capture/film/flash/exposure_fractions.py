@@ -1,4 +1,4 @@
-"""Exposure fractions: the share of an exposure for which the flash was on, measured in blocks of the picture.
+"""Exposure fractions: the fraction of an exposure for which the flash was on, measured in blocks of the picture.
 
 They are measured about every edge of the flash, and predicted from a rolling shutter.
 """
@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.sparse import coo_array, csr_array
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.capture.film.flash.flash_schedule import FlashEdges
 from relit_camera.capture.film.flash.flash_signal import BrightnessGrid, FlashSignal
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -24,8 +23,8 @@ class BlockTunables:
 
     Attributes:
         blocks: along either side of what the flash reaches.
-        min_cells: share of the median number of cells below which a block is left out, as a highlight that moves on a
-            ball is.
+        min_cells: fraction of the median number of cells below which a block is left out, as a highlight that moves on
+            a ball is.
         frames: before and after an edge in which fractions are measured.
         min_reach, max_reach: frames about a frame among which the darkest and the brightest are sought.
     """
@@ -46,14 +45,14 @@ class BrightnessBlocks:
 
     Attributes:
         level: (frames, blocks) linear, divided by the gains.
-        place: (blocks, 2) centers x, y as shares of the picture's width and height.
+        place: (blocks, 2) centers x, y as fractions of the picture's width and height.
     """
 
-    level: Floats
-    place: Floats
+    level: Float64Array
+    place: Float64Array
 
     @classmethod
-    def of(cls, brightness: BrightnessGrid, signal: FlashSignal) -> BrightnessBlocks:
+    def from_grid(cls, brightness: BrightnessGrid, signal: FlashSignal) -> BrightnessBlocks:
         """Up to 6 x 6 blocks of the cells that the flash reaches."""
         rows, columns = (np.flatnonzero(signal.reached.any(axis=axis)) for axis in (1, 0))
         cells = []
@@ -68,13 +67,13 @@ class BrightnessBlocks:
         place = [[(x.mean() + 0.5) / width, (y.mean() + 0.5) / height] for y, x in cells]
         return cls(level.astype(np.float64), np.array(place))
 
-    def local_extremes(self, period_frames: float) -> tuple[Floats, Floats]:
+    def local_extremes(self, period_frames: float) -> tuple[Float64Array, Float64Array]:
         """Minimum and maximum (frames, blocks) about each frame: first guesses of the unlit and the lit level."""
         reach = int(np.clip(round(period_frames / 2), _TUNABLES.min_reach, _TUNABLES.max_reach))
         low = minimum_filter1d(self.level, 2 * reach + 1, axis=0)
         return np.asarray(low), np.asarray(maximum_filter1d(self.level, 2 * reach + 1, axis=0))
 
-    def between(self, frames: NDArray[np.intp]) -> Floats:
+    def between(self, frames: NDArray[np.intp]) -> Float64Array:
         """Levels (frames of the film, blocks) interpolated between some frames (count,), at least three.
 
         Each of these but the first and the last is itself replaced by the interpolation between its neighbors.
@@ -92,23 +91,29 @@ class ExposureFractions:
 
     Attributes:
         since: (edges, frames, blocks) seconds from the first guess of the edge to the frame.
-        place: (blocks,) position in the order of readout, as a share of the picture's height (or width).
+        place: (blocks,) position in the order of readout, as a fraction of the picture's height (or width).
         by_columns: whether columns are read one after another, not rows.
         fraction: (edges, frames, blocks) measured: 0 unlit, 1 lit throughout.
         root_weight: (edges, frames, blocks) square roots of their weights.
         rising: (edges,) whether the light goes on.
     """
 
-    since: Floats
-    place: Floats
+    since: Float64Array
+    place: Float64Array
     by_columns: bool
-    fraction: Floats
-    root_weight: Floats
+    fraction: Float64Array
+    root_weight: Float64Array
     rising: NDArray[np.bool_]
 
     @classmethod
-    def of(
-        cls, blocks: BrightnessBlocks, by_columns: bool, times_s: Floats, edges: FlashEdges, unlit: Floats, lit: Floats
+    def from_blocks(
+        cls,
+        blocks: BrightnessBlocks,
+        by_columns: bool,
+        times_s: Float64Array,
+        edges: FlashEdges,
+        unlit: Float64Array,
+        lit: Float64Array,
     ) -> ExposureFractions:
         """Measure fractions about edges.
 
@@ -135,12 +140,12 @@ class ExposureFractions:
         place = blocks.place[:, 0 if by_columns else 1]
         return cls(since, place, by_columns, np.clip(fraction, -0.5, 1.5), np.sqrt(weight), edges.rising)
 
-    def expected(self, exposure_s: float, readout_s: float, offsets: Floats) -> Floats:
+    def expected(self, exposure_s: float, readout_s: float, offsets: Float64Array) -> Float64Array:
         """Predicted fractions (edges, frames, blocks), for edges later than guessed by offsets (edges,) in seconds."""
         lit = np.clip(self._progress(exposure_s, readout_s, offsets), 0, 1)
         return np.where(self.rising[:, None, None], lit, 1 - lit)
 
-    def jacobian(self, exposure_s: float, readout_s: float, offsets: Floats) -> csr_array:
+    def jacobian(self, exposure_s: float, readout_s: float, offsets: Float64Array) -> csr_array:
         """Derivatives (values, 2 + edges) of the weighted `expected` by exposure, readout and each offset."""
         progress = self._progress(exposure_s, readout_s, offsets)
         slope = np.where(self.rising, 1, -1)[:, None, None] * self.root_weight / exposure_s
@@ -153,7 +158,7 @@ class ExposureFractions:
         where = (np.tile(rows, 3), np.concatenate(columns))
         return csr_array(coo_array((values, where), shape=(len(rows), 2 + edges)))
 
-    def _progress(self, exposure_s: float, readout_s: float, offsets: Floats) -> Floats:
+    def _progress(self, exposure_s: float, readout_s: float, offsets: Float64Array) -> Float64Array:
         """Share (edges, frames, blocks) of the exposure after the edge, not limited to 0..1."""
         started = self.since + readout_s * self.place - offsets[:, None, None]
         return np.asarray((started + exposure_s) / exposure_s)

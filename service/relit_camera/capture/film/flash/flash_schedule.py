@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import lombscargle
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.flash.flash_signal import NOISE_FLOOR
-
-Floats = NDArray[np.float64]
 
 MIN_FREQUENCY_HZ = 0.7
 """Slowest flashes that are looked for."""
@@ -24,7 +23,7 @@ MIN_FLASHES = 8
 FULLY_LIT_FRACTION = 0.98
 """A frame is bright if every row has at least this exposure fraction, and dark if every row has at most 1 less this."""
 _SHUTTER_ROWS = np.linspace(0, 1, 33)
-"""Rows (or columns) at which exposure fractions are computed, as shares of the picture's height (or width)."""
+"""Rows (or columns) at which exposure fractions are computed, as fractions of the picture's height (or width)."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +35,10 @@ class BlinkTunables:
         step_hz: distance of the frequencies that are tried.
         window_periods: length of the window in which the darkest and the brightest frame are sought.
         min_height: change of the level, relative to the 90th percentile, that counts as an edge.
-        min_variance_share: least share of the variance that the frequency explains.
+        min_variance_fraction: least fraction of the variance that the frequency explains.
         min_contrast: least ratio of bright to dark.
-        min_step: least share of the whole change that a flash makes from one frame to the next; a slow wave makes less.
+        min_step: least fraction of the whole change that a flash makes from one frame to the next; a slow wave makes
+            less.
         slow_frames: frames per period from which `min_step` applies.
         changing: ratio of brightness over a film in which a light was on all the time.
     """
@@ -47,7 +47,7 @@ class BlinkTunables:
     step_hz: float = 0.02
     window_periods: float = 1.1
     min_height: float = 0.04
-    min_variance_share: float = 0.2
+    min_variance_fraction: float = 0.2
     min_contrast: float = 1.15
     min_step: float = 0.25
     slow_frames: float = 8
@@ -63,14 +63,14 @@ class FlashFrequency:
 
     Attributes:
         frequency_hz: of its fundamental.
-        share: of the variance of the logarithm that the fundamental explains, 0..1.
+        fraction: of the variance of the logarithm that the fundamental explains, 0..1.
     """
 
     frequency_hz: float
-    share: float
+    fraction: float
 
 
-def find_flash_frequency(level: Floats, times_s: Floats) -> FlashFrequency:
+def find_flash_frequency(level: Float64Array, times_s: Float64Array) -> FlashFrequency:
     """The strongest periodic change from 0.7 Hz to half the frame rate, by Lomb-Scargle periodograms.
 
     These need no even frame times (Lomb 1976, Scargle 1982).
@@ -98,7 +98,7 @@ def find_flash_frequency(level: Floats, times_s: Floats) -> FlashFrequency:
     return FlashFrequency(float(frequencies[peak]), float(spectrum[peak]))
 
 
-def _without_trend(times_s: Floats, values: Floats) -> Floats:
+def _without_trend(times_s: Float64Array, values: Float64Array) -> Float64Array:
     """The values less a fitted parabola, as which the slow changes by a moving light and camera gains count."""
     return np.asarray(values - np.polynomial.Polynomial.fit(times_s, values, 2)(times_s))
 
@@ -113,16 +113,16 @@ class FlashEdges:
         frame: (edges,) index of the last frame before the middle of the change.
     """
 
-    times_s: Floats
+    times_s: Float64Array
     rising: NDArray[np.bool_]
     frame: NDArray[np.intp]
 
-    def only(self, some: slice) -> FlashEdges:
+    def subset(self, some: slice) -> FlashEdges:
         """Some of the edges."""
         return FlashEdges(self.times_s[some], self.rising[some], self.frame[some])
 
 
-def find_flash_edges(level: Floats, times_s: Floats, frequency_hz: float) -> FlashEdges:
+def find_flash_edges(level: Float64Array, times_s: Float64Array, frequency_hz: float) -> FlashEdges:
     """Moments at which the level crosses the middle between its local extremes, interpolated between frames.
 
     Args:
@@ -143,17 +143,17 @@ def find_flash_edges(level: Floats, times_s: Floats, frequency_hz: float) -> Fla
     frame, rising = frame[kept], rising[kept]
     # Where the level does not change, it is the middle that crosses it.
     step = level[frame + 1] - level[frame]
-    share = np.divide(middle[frame] - level[frame], step, out=np.full(len(frame), 0.5), where=step != 0)
-    return FlashEdges(times_s[frame] + np.clip(share, 0, 1) * (times_s[frame + 1] - times_s[frame]), rising, frame)
+    fraction = np.divide(middle[frame] - level[frame], step, out=np.full(len(frame), 0.5), where=step != 0)
+    return FlashEdges(times_s[frame] + np.clip(fraction, 0, 1) * (times_s[frame + 1] - times_s[frame]), rising, frame)
 
 
-def _local_extremes(level: Floats, interval_s: float, frequency_hz: float) -> tuple[Floats, Floats]:
+def _local_extremes(level: Float64Array, interval_s: float, frequency_hz: float) -> tuple[Float64Array, Float64Array]:
     """Minimum and maximum (frames,) of the level (frames,) in a window of about a period around each frame."""
     window = max(3, round(_TUNABLES.window_periods / frequency_hz / interval_s))
     return np.asarray(minimum_filter1d(level, window)), np.asarray(maximum_filter1d(level, window))
 
 
-def require_flashing(level: Floats, interval_s: float, beat: FlashFrequency, edges: FlashEdges) -> None:
+def require_flashing(level: Float64Array, interval_s: float, beat: FlashFrequency, edges: FlashEdges) -> None:
     """Check that the level goes up and down as that of a blinking light does, often enough.
 
     Args:
@@ -169,7 +169,7 @@ def require_flashing(level: Floats, interval_s: float, beat: FlashFrequency, edg
     contrast = float(np.median(high / np.maximum(low, 1e-6)))
     step = np.abs(level[edges.frame + 1] - level[edges.frame]) / np.maximum((high - low)[edges.frame], 1e-9)
     slow = 1 / beat.frequency_hz / interval_s >= _TUNABLES.slow_frames
-    blinks = beat.share >= _TUNABLES.min_variance_share and contrast >= _TUNABLES.min_contrast and len(step) > 0
+    blinks = beat.fraction >= _TUNABLES.min_variance_fraction and contrast >= _TUNABLES.min_contrast and len(step) > 0
     if not blinks or (slow and np.median(step) < _TUNABLES.min_step):
         ratio = float(np.percentile(level, 98) / max(np.percentile(level, 2), 1e-6))
         if ratio > _TUNABLES.changing:
@@ -207,8 +207,8 @@ class FlashSchedule:
         on_s, off_s: (flashes,) growing times; at the film's beginning and end extrapolated.
     """
 
-    on_s: Floats
-    off_s: Floats
+    on_s: Float64Array
+    off_s: Float64Array
 
     @property
     def frequency_hz(self) -> float:
@@ -217,21 +217,21 @@ class FlashSchedule:
 
     @property
     def duty(self) -> float:
-        """Share of the time for which the light is on."""
+        """Fraction of the time for which the light is on."""
         return float(np.median(self.off_s - self.on_s)) * self.frequency_hz
 
-    def exposure_fractions(self, times_s: Floats, shutter: RollingShutter) -> Floats:
+    def exposure_fractions(self, times_s: Float64Array, shutter: RollingShutter) -> Float64Array:
         """Share (frames, 33) of the exposure for which the light is on, at 33 rows from the first to the last."""
         start = times_s[:, None] + shutter.readout_s * _SHUTTER_ROWS
         return (self._on_before(start + shutter.exposure_s) - self._on_before(start)) / shutter.exposure_s
 
-    def flash_of(self, times_s: Floats, shutter: RollingShutter) -> NDArray[np.intp]:
+    def flash_of(self, times_s: Float64Array, shutter: RollingShutter) -> NDArray[np.intp]:
         """Number (frames,) of the flash whose middle is nearest to that of each frame."""
         middle = (self.on_s + self.off_s) / 2
         frame = times_s + (shutter.readout_s + shutter.exposure_s) / 2
         return np.asarray(np.abs(frame[:, None] - middle).argmin(axis=1), np.intp)
 
-    def _on_before(self, time_s: Floats) -> Floats:
+    def _on_before(self, time_s: Float64Array) -> Float64Array:
         """Seconds (...) for which the light was on before times (...)."""
         times = np.stack([self.on_s, self.off_s], axis=1).ravel()
         lit = np.concatenate([[0.0], np.cumsum(self.off_s - self.on_s)])

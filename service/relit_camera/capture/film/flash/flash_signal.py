@@ -13,13 +13,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.errors import VideoError
 from relit_camera.base.images.color import Gamma, luminance, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
 from relit_camera.base.video.video_readers import LinearVideoReader
 from relit_camera.capture.film.face_circle import FaceCircle
-
-Floats = NDArray[np.float64]
 
 GRID_CELLS = 32
 """Cells along the longer side."""
@@ -37,13 +36,13 @@ class SignalTunables:
     """Which cells the flash reaches; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
 
     Attributes:
-        min_response: share of the strongest response (logarithm) from which a cell counts as reached by the flash.
+        min_response: fraction of the strongest response (logarithm) from which a cell counts as reached by the flash.
         least_following: percentile of the cells' regression on the flash that stands for the camera's gains alone;
             automatic exposure follows the flash too, mostly against it.
         following_margin: a cell shows the gains if its regression exceeds that by no more.
         reached_everywhere: if the percentile exceeds this, the flash reaches everything.
         min_visible: least mean brightness of a cell that shows the gains.
-        min_unreached: least share of all cells that must show the gains.
+        min_unreached: least fraction of all cells that must show the gains.
     """
 
     min_response: float = 0.5
@@ -126,9 +125,9 @@ class FlashSignal:
             are too few.
     """
 
-    level: Floats
+    level: Float64Array
     reached: NDArray[np.bool_]
-    gains: Floats
+    gains: Float64Array
 
 
 def reached_cells(brightness: BrightnessGrid, circle: FaceCircle | None = None) -> NDArray[np.bool_]:
@@ -165,7 +164,7 @@ def extract_flash_signal(brightness: BrightnessGrid, frequency_hz: float, reache
     return FlashSignal(mean_level(brightness, reached) / gains, reached, gains)
 
 
-def mean_level(brightness: BrightnessGrid, reached: NDArray[np.bool_]) -> Floats:
+def mean_level(brightness: BrightnessGrid, reached: NDArray[np.bool_]) -> Float64Array:
     """Mean brightness (frames,) of the cells of a mask (rows, columns)."""
     return np.asarray(brightness.cells[:, reached].mean(axis=1), np.float64)
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.face_circle import FaceCircle
 from relit_camera.capture.film.flash.exposure_fractions import BrightnessBlocks
@@ -32,9 +32,6 @@ from relit_camera.capture.film.flash.flash_signal import (
 )
 from relit_camera.capture.film.flash.rolling_shutter import fit_rolling_shutter
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-
 MIN_BRIGHT_FRAMES = 8
 """Least bright frames of a film."""
 MIN_FLASH_STRENGTH = 0.4
@@ -46,15 +43,15 @@ class ClassTunables:
     """What frames are good for; `relit evaluate capture` (docs/evaluate.md) shows the effect of a change.
 
     Attributes:
-        edge_error_s, edge_jitter: standard error of an edge, of a steady flash and as a share of its jitter; frames
+        edge_error_s, edge_jitter: standard error of an edge, of a steady flash and as a fraction of its jitter; frames
             nearer to an edge are partial.
-        min_whole_flashes: share of the flashes that must light a whole frame; with fewer, they are too fast.
-        min_lit, min_lit_alone: a block of a bright frame is an outlier with less than this share of the light that its
-            neighbors in time and the rest of the frame make one expect; the second where the frame is the only one of
-            its flash, as the light moves from flash to flash.
-        max_stray: a block of a dark frame is an outlier with more than this share of the flash's light.
+        min_whole_flashes: fraction of the flashes that must light a whole frame; with fewer, they are too fast.
+        min_lit, min_lit_alone: a block of a bright frame is an outlier with less than this fraction of the light that
+            its neighbors in time and the rest of the frame make one expect; the second where the frame is the only one
+            of its flash, as the light moves from flash to flash.
+        max_stray: a block of a dark frame is an outlier with more than this fraction of the flash's light.
         alone_frames: distance to the nearest bright frame beyond which that belongs to another flash.
-        min_height: blocks are not judged where the flash adds less than this share of the median.
+        min_height: blocks are not judged where the flash adds less than this fraction of the median.
         strength_percentile: percentile of the light that a flash adds to the cells: that of what faces it.
         dark_frames: nearest dark frames whose mean is subtracted from a flash.
     """
@@ -97,7 +94,7 @@ class FlashFrame:
         kind: its class.
         reason: why it is rejected, else empty.
         flash: number of the nearest flash, from 0.
-        exposure_fraction: share of its exposure for which the flash was on, mean over the rows, 0..1.
+        exposure_fraction: fraction of its exposure for which the flash was on, mean over the rows, 0..1.
     """
 
     index: int
@@ -123,7 +120,7 @@ class Flashes:
     frames: tuple[FlashFrame, ...]
     schedule: FlashSchedule
     shutter: RollingShutter
-    strength: Floats
+    strength: Float64Array
     signal: FlashSignal
 
     def indices(self, kind: FrameClass) -> Indices:
@@ -131,7 +128,7 @@ class Flashes:
         return np.array([frame.index for frame in self.frames if frame.kind is kind], np.intp)
 
     @property
-    def times_s(self) -> Floats:
+    def times_s(self) -> Float64Array:
         """Presentation times (frames,)."""
         return np.array([frame.time_s for frame in self.frames])
 
@@ -159,7 +156,7 @@ def detect_flashes(brightness: BrightnessGrid, circle: FaceCircle | None = None)
     require_fully_lit_frames(
         schedule.frequency_hz, brightness.interval_s, len(np.unique(flash[bright])) / len(np.unique(flash))
     )
-    reasons = find_outlier_frames(BrightnessBlocks.of(brightness, signal), bright, dark)
+    reasons = find_outlier_frames(BrightnessBlocks.from_grid(brightness, signal), bright, dark)
     strength = relative_flash_strengths(brightness, signal, np.setdiff1d(bright, list(reasons)), dark, flash)
     for index in bright.tolist():
         if strength[flash[index]] < MIN_FLASH_STRENGTH:
@@ -177,7 +174,9 @@ def detect_flashes(brightness: BrightnessGrid, circle: FaceCircle | None = None)
     return Flashes(tuple(frames), schedule, shutter, strength, signal)
 
 
-def _bright_and_dark(times_s: Floats, schedule: FlashSchedule, shutter: RollingShutter) -> tuple[Indices, Indices]:
+def _bright_and_dark(
+    times_s: Float64Array, schedule: FlashSchedule, shutter: RollingShutter
+) -> tuple[Indices, Indices]:
     """Indices of the fully lit frames and of the unlit ones, leaving out those that an edge's error could change."""
     error_s = _TUNABLES.edge_error_s + _TUNABLES.edge_jitter * shutter.jitter_s
     shorter = FlashSchedule(schedule.on_s + error_s, schedule.off_s - error_s).exposure_fractions(times_s, shutter)
@@ -201,11 +200,11 @@ def find_outlier_frames(blocks: BrightnessBlocks, bright: Indices, dark: Indices
     lit, unlit = blocks.between(bright), blocks.between(dark)
     height = np.maximum(lit - unlit, 1e-9)
     clear = height > _TUNABLES.min_height * np.median(height[bright])
-    shares = ((blocks.level - unlit) / height)[bright]
+    fractions = ((blocks.level - unlit) / height)[bright]
     gap = np.diff(bright, prepend=-_TUNABLES.alone_frames - 1, append=2 * bright[-1])
     alone = np.minimum(gap[:-1], gap[1:]) > _TUNABLES.alone_frames
     least = np.where(alone, _TUNABLES.min_lit_alone, _TUNABLES.min_lit)
-    missing = (shares < np.median(shares, axis=1, keepdims=True) * least[:, None]) & clear[bright]
+    missing = (fractions < np.median(fractions, axis=1, keepdims=True) * least[:, None]) & clear[bright]
     of_frame = np.median(blocks.level / np.maximum(unlit, 1e-9), axis=1, keepdims=True)
     stray = ((blocks.level - of_frame * unlit) / height > _TUNABLES.max_stray)[dark]
     outliers = [(bright[missing.any(axis=1)], "bright"), (dark[(stray & clear[dark]).any(axis=1)], "dark")]
@@ -214,7 +213,7 @@ def find_outlier_frames(blocks: BrightnessBlocks, bright: Indices, dark: Indices
 
 def relative_flash_strengths(
     brightness: BrightnessGrid, signal: FlashSignal, bright: Indices, dark: Indices, flash: Indices
-) -> Floats:
+) -> Float64Array:
     """Light (flashes,) that each flash adds, relative to the median; NaN of a flash without a bright frame.
 
     Args:
@@ -243,7 +242,7 @@ def require_fully_lit_frames(frequency_hz: float, interval_s: float, whole: floa
     Args:
         frequency_hz: of the flashes.
         interval_s: from frame to frame.
-        whole: share of the flashes that light a whole frame.
+        whole: fraction of the flashes that light a whole frame.
 
     Raises:
         CaptureError: too few do.

@@ -1,7 +1,7 @@
 """The camera's rolling shutter, and the flash's edges to a fraction of a frame, from partly lit frames.
 
-A row (or column) at share y of the picture is exposed from t + y · readout for `exposure_s`. A light that goes on at
-time a is on for the share clip((t + y · readout + exposure − a) / exposure, 0, 1) of it. Readout and exposure are
+A row (or column) at fraction y of the picture is exposed from t + y · readout for `exposure_s`. A light that goes on at
+time a is on for the fraction clip((t + y · readout + exposure − a) / exposure, 0, 1) of it. Readout and exposure are
 fitted to all edges of a film together; where few frames are partly lit, the nearly regular times of the flashes
 determine the rest.
 """
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, dia_array, hstack, vstack
 from scipy.sparse.linalg import spsolve
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.capture.film.flash.exposure_fractions import BrightnessBlocks, ExposureFractions
 from relit_camera.capture.film.flash.flash_schedule import (
     FULLY_LIT_FRACTION,
@@ -25,8 +26,6 @@ from relit_camera.capture.film.flash.flash_schedule import (
     schedule_from_edges,
 )
 from relit_camera.capture.film.flash.flash_signal import BrightnessGrid, FlashSignal
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ class ShutterTunables:
         fraction_error: standard error of a block's exposure fraction, by motion of light and head between frames.
         jitters_s: standard deviations of the flash's period that are tried: of a steady one, of an app's, and by hand.
             Larger deviations count linearly, not squared, so a flash that jitters is followed where frames show it.
-        usual_exposure: exposure as a share of the frame interval. A flash in step with the frames shows only the
+        typical_exposure: exposure as a fraction of the frame interval. A flash in step with the frames shows only the
             relation of exposure and readout: then this prior decides; else it counts no more than one block.
         iterations: most iterations of the fit.
         tolerance: ratio of the cost to the best at which the steadier flash is preferred.
@@ -51,7 +50,7 @@ class ShutterTunables:
     step_s: float = 0.002
     fraction_error: float = 0.04
     jitters_s: tuple[float, ...] = (0.0001, 0.001, 0.005)
-    usual_exposure: float = 0.5
+    typical_exposure: float = 0.5
     iterations: int = 60
     tolerance: float = 1.25
 
@@ -73,7 +72,7 @@ def fit_rolling_shutter(
     Returns:
         The edges on the clock of the picture's first row (or column), to a fraction of a frame, and the shutter.
     """
-    film = _Film(brightness.times_s, BrightnessBlocks.of(brightness, signal), edges, frequency_hz)
+    film = _Film(brightness.times_s, BrightnessBlocks.from_grid(brightness, signal), edges, frequency_hz)
     beginning = film.beginning(_TUNABLES.trial_edges)
     trials = []
     for by_columns in (False, True):
@@ -92,7 +91,7 @@ def fit_rolling_shutter(
     return fit.refined(best), fit.shutter(best)
 
 
-def _remeasure(fit: _Fit, parameters: Floats) -> tuple[_Fit, Floats]:
+def _remeasure(fit: _Fit, parameters: Float64Array) -> tuple[_Fit, Float64Array]:
     """A fit with fractions measured between the frames that this one finds fully lit and unlit, and its parameters."""
     film = fit.film
     for _ in range(_TUNABLES.rounds):
@@ -117,7 +116,7 @@ class _Film:
         frequency_hz: of the flashes, about.
     """
 
-    times_s: Floats
+    times_s: Float64Array
     blocks: BrightnessBlocks
     edges: FlashEdges
     frequency_hz: float
@@ -138,17 +137,17 @@ class _Film:
             return self
         end = int(self.edges.frame[edges]) + 1
         blocks = replace(self.blocks, level=self.blocks.level[:end])
-        return _Film(self.times_s[:end], blocks, self.edges.only(slice(0, edges)), self.frequency_hz)
+        return _Film(self.times_s[:end], blocks, self.edges.subset(slice(0, edges)), self.frequency_hz)
 
     def first_fractions(self, by_columns: bool) -> ExposureFractions:
         """Fractions between the darkest and the brightest level about each frame."""
         levels = self.blocks.local_extremes(1 / self.frequency_hz / self.interval_s)
-        return ExposureFractions.of(self.blocks, by_columns, self.times_s, self.edges, *levels)
+        return ExposureFractions.from_blocks(self.blocks, by_columns, self.times_s, self.edges, *levels)
 
     def fractions(self, by_columns: bool, dark: NDArray[np.intp], fully_lit: NDArray[np.intp]) -> ExposureFractions:
         """Fractions between the levels of dark and of fully lit frames, given by their indices."""
         levels = self.blocks.between(dark), self.blocks.between(fully_lit)
-        return ExposureFractions.of(self.blocks, by_columns, self.times_s, self.edges, *levels)
+        return ExposureFractions.from_blocks(self.blocks, by_columns, self.times_s, self.edges, *levels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,15 +167,15 @@ class _Fit:
     fractions: ExposureFractions
     jitter_s: float
 
-    def refined(self, parameters: Floats) -> FlashEdges:
+    def refined(self, parameters: Float64Array) -> FlashEdges:
         """The edges with these parameters."""
         return replace(self.film.edges, times_s=self.film.edges.times_s + parameters[2:])
 
-    def shutter(self, parameters: Floats) -> RollingShutter:
+    def shutter(self, parameters: Float64Array) -> RollingShutter:
         """The shutter with these parameters."""
         return RollingShutter(float(parameters[0]), float(parameters[1]), self.fractions.by_columns, self.jitter_s)
 
-    def solve(self, parameters: Floats) -> Floats:
+    def solve(self, parameters: Float64Array) -> Float64Array:
         """The best parameters near these, by the Levenberg-Marquardt method reweighted for outliers.
 
         scipy's `least_squares` would need an iterative solver for these sparse systems and take twenty times as long.
@@ -204,16 +203,16 @@ class _Fit:
             candidate = parameters - spsolve(damped, right)
         return parameters
 
-    def cost(self, parameters: Floats) -> float:
+    def cost(self, parameters: Float64Array) -> float:
         """Robust cost of the exposure fractions alone."""
         return _robust(self._fraction_errors(parameters))
 
-    def _residuals(self, parameters: Floats) -> Floats:
+    def _residuals(self, parameters: Float64Array) -> Float64Array:
         deviations = self.film.clock @ (self.film.edges.times_s + parameters[2:])
-        prior = np.log(parameters[:1] / (_TUNABLES.usual_exposure * self.film.interval_s))
+        prior = np.log(parameters[:1] / (_TUNABLES.typical_exposure * self.film.interval_s))
         return np.concatenate([self._fraction_errors(parameters), deviations / self.jitter_s, prior])
 
-    def _jacobian(self, parameters: Floats) -> csr_array:
+    def _jacobian(self, parameters: Float64Array) -> csr_array:
         of_fractions = self.fractions.jacobian(parameters[0], parameters[1], parameters[2:]) * (
             -1 / _TUNABLES.fraction_error
         )
@@ -221,17 +220,17 @@ class _Fit:
         of_prior = csr_array(([1 / parameters[0]], ([0], [0])), shape=(1, len(parameters)))
         return csr_array(vstack([of_fractions, of_clock, of_prior]))
 
-    def _fraction_errors(self, parameters: Floats) -> Floats:
+    def _fraction_errors(self, parameters: Float64Array) -> Float64Array:
         error = self.fractions.fraction - self.fractions.expected(parameters[0], parameters[1], parameters[2:])
         return np.asarray((self.fractions.root_weight * error).ravel() / _TUNABLES.fraction_error)
 
 
-def _robust(residuals: Floats) -> float:
+def _robust(residuals: Float64Array) -> float:
     """Pseudo-Huber loss: sums squares near 0, absolute values beyond 1."""
     return float(np.sum(np.sqrt(1 + residuals**2) - 1))
 
 
-def _starts(fractions: ExposureFractions, interval_s: float) -> list[Floats]:
+def _starts(fractions: ExposureFractions, interval_s: float) -> list[Float64Array]:
     """Start parameters: for readout upward, at once and downward the best of a few exposures, each edge independent."""
     grid = _offset_grid(interval_s)
     starts = []
@@ -242,26 +241,28 @@ def _starts(fractions: ExposureFractions, interval_s: float) -> list[Floats]:
     return starts
 
 
-def _costs(fractions: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
+def _costs(fractions: ExposureFractions, exposure_s: float, readout_s: float, grid: Float64Array) -> Float64Array:
     """Mean absolute error (offsets, edges) of the fractions, for each offset of a grid (offsets,)."""
     edges, weight = len(fractions.rising), fractions.root_weight**2
     errors = (fractions.fraction - fractions.expected(exposure_s, readout_s, np.full(edges, offset)) for offset in grid)
     return np.array([(weight * np.abs(error)).mean(axis=(1, 2)) for error in errors])
 
 
-def _best_offsets(fractions: ExposureFractions, exposure_s: float, readout_s: float, grid: Floats) -> Floats:
+def _best_offsets(
+    fractions: ExposureFractions, exposure_s: float, readout_s: float, grid: Float64Array
+) -> Float64Array:
     """Best offset (edges,) of each edge on a grid (offsets,); the mean of those that are about equally good."""
     costs = _costs(fractions, exposure_s, readout_s, grid)
     good = costs <= costs.min(axis=0) + 0.002
     return np.asarray((good * grid[:, None]).sum(axis=0) / good.sum(axis=0))
 
 
-def _offset_grid(interval_s: float) -> Floats:
+def _offset_grid(interval_s: float) -> Float64Array:
     """Offsets (offsets,) in seconds from one frame before the first guess of an edge to three after it."""
     return np.arange(-1.2 * interval_s, 3.2 * interval_s, _TUNABLES.step_s)
 
 
-def _clock_rows(times_s: Floats, rising: NDArray[np.bool_], frequency_hz: float) -> csr_array:
+def _clock_rows(times_s: Float64Array, rising: NDArray[np.bool_], frequency_hz: float) -> csr_array:
     """Matrix (sums, edges) whose product with the edge times vanishes for a steady light.
 
     An edge lies between its neighbors of the same kind in proportion to the number of flashes between them, and every

@@ -1,1 +1,1 @@
-"""Where the lamp stood in every frame, relative to the head: position, distance, and whether the light suffices."""
+"""Direction and position of the light in every frame, relative to the head, and whether the light suffices."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.capture.film.ball.sphere_projection import PinholeView
-from relit_camera.capture.film.lamp.lamp_position import radius_at_depth
+from relit_camera.capture.film.lamp.light_from_highlight import radius_at_depth
 
 INTERPUPILLARY_DISTANCE_CM = 6.3
 """Mean distance of adults' pupils, with a standard deviation of 0.36 cm (Dodgson 2004)."""

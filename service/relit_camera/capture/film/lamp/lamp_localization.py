@@ -1,4 +1,8 @@
-"""Where the lamp was in every bright frame: on the ray that a ball reflects, at an assumed or triangulated distance."""
+"""Position of the lamp and direction of its light in every bright frame, from the highlights on one or two balls.
+
+The lamp is on the ray that a ball reflects (`light_from_highlight`), at an assumed or a triangulated distance
+(`lamp_distance`).
+"""
 
 from __future__ import annotations
 
@@ -6,25 +10,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import CaptureError
 from relit_camera.capture.film.ball.ball_tracking import ObservedBall
 from relit_camera.capture.film.ball.specular_highlight import Highlight, NoHighlight
 from relit_camera.capture.film.ball.sphere_projection import Vectors
 from relit_camera.capture.film.lamp.capture_layout import CaptureLayout
-from relit_camera.capture.film.lamp.lamp_position import (
+from relit_camera.capture.film.lamp.lamp_distance import LampDistances, estimate_lamp_distances
+from relit_camera.capture.film.lamp.light_from_highlight import (
     BallHighlight,
-    LampDistances,
     LampTriangulation,
-    estimate_lamp_distances,
     position_at_distance,
     require_lamp_beyond_ball,
     triangulate_lamp,
 )
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class AgreementTunables:
     Attributes:
         max_gap_deg, max_gap_ratio: a frame's rays contradict where their gap exceeds this angle and this multiple of
             the median gap.
-        max_contradicting: share of the frames that may do so now and then, by a hand or a lamp mirrored twice.
+        max_contradicting: fraction of the frames that may do so now and then, by a hand or a lamp mirrored twice.
         min_distance_ratio: least distance of the lamp from the head, over that of the farther ball.
     """
 
@@ -65,8 +65,8 @@ class LampPositions:
     """
 
     index: Indices
-    lamps_cm: Floats
-    at_ball: Floats
+    lamps_cm: Float64Array
+    at_ball: Float64Array
     distances: LampDistances
     triangulated: Mapping[int, LampTriangulation]
     unusable: Mapping[int, str]
@@ -77,13 +77,17 @@ class LampPositions:
         return bool(self.triangulated)
 
     @property
-    def directions(self) -> Floats:
+    def directions(self) -> Float64Array:
         """Unit vectors (count, 3) toward the lamp from the head's middle."""
         return np.asarray(self.lamps_cm / np.linalg.norm(self.lamps_cm, axis=1, keepdims=True))
 
 
 def locate_lamps(
-    balls: Sequence[ObservedBall], bright: Indices, times_s: Floats, layout: CaptureLayout, usual_distance_cm: float
+    balls: Sequence[ObservedBall],
+    bright: Indices,
+    times_s: Float64Array,
+    layout: CaptureLayout,
+    assumed_distance_cm: float,
 ) -> LampPositions:
     """Find the lamp in every bright frame in which a ball shows it.
 
@@ -92,7 +96,7 @@ def locate_lamps(
         bright: growing indices of the bright frames.
         times_s: (frames,) of all frames of the film.
         layout: positions of head and balls.
-        usual_distance_cm: assumed distance of the lamp from the head; of two balls, a rough guess.
+        assumed_distance_cm: assumed distance of the lamp from the head; of two balls, a rough guess.
 
     Raises:
         CaptureError: two balls contradict each other in many frames, or put the lamp no farther than themselves.
@@ -104,12 +108,12 @@ def locate_lamps(
         del highlights[index]
         unusable[index] = "the two balls show the lamp in different places"
     frames = np.array(list(highlights), np.intp)
-    distances = _distances(balls, times_s[frames], frames, triangulated, layout, usual_distance_cm)
+    distances = _distances(balls, times_s[frames], frames, triangulated, layout, assumed_distance_cm)
     lamps, to_lamp = np.empty((len(frames), 3)), np.empty((len(frames), 3))
     for row, (index, of_frame) in enumerate(highlights.items()):
         position = _mean_position(of_frame, layout.head_cm, float(distances.cm[row]))
         ball_cm = balls[0].view_at(index).center * layout.ball_radius_cm
-        require_lamp_beyond_ball(ball_cm, layout.ball_radius_cm, layout.head_cm, usual_distance_cm)
+        require_lamp_beyond_ball(ball_cm, layout.ball_radius_cm, layout.head_cm, assumed_distance_cm)
         lamps[row], to_lamp[row] = position - layout.head_cm, position - ball_cm
     at_ball = to_lamp / np.linalg.norm(to_lamp, axis=1, keepdims=True)
     return LampPositions(frames, lamps, at_ball, distances, triangulated, unusable)
@@ -157,11 +161,11 @@ def _triangulate(highlights: Mapping[int, list[BallHighlight]]) -> tuple[dict[in
 
 def _distances(
     balls: Sequence[ObservedBall],
-    times_s: Floats,
+    times_s: Float64Array,
     frames: Indices,
     triangulated: Mapping[int, LampTriangulation],
     layout: CaptureLayout,
-    usual_cm: float,
+    assumed_cm: float,
 ) -> LampDistances:
     """Distances of the lamp from the head in these frames: assumed with one ball, measured with two.
 
@@ -169,9 +173,9 @@ def _distances(
         CaptureError: two balls put the lamp no farther from the head than the farther of them is.
     """
     if len(balls) == 1:
-        return LampDistances(np.full(len(frames), usual_cm), np.full(len(frames), np.nan))
+        return LampDistances(np.full(len(frames), assumed_cm), np.full(len(frames), np.nan))
     rows = {int(np.searchsorted(frames, index)): each for index, each in triangulated.items()}
-    distances = estimate_lamp_distances(times_s, rows, layout.head_cm, usual_cm)
+    distances = estimate_lamp_distances(times_s, rows, layout.head_cm, assumed_cm)
     reach = max(float(np.linalg.norm(layout.ball_radius_cm * ball.view.center - layout.head_cm)) for ball in balls)
     if len(frames) and distances.cm.min() < _AGREEMENT.min_distance_ratio * reach:
         raise CaptureError(

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array
 from relit_camera.base.errors import CaptureError
 from relit_camera.light.directions import texel_directions, texel_solid_angles
-
-Floats = NDArray[np.float64]
 
 MIN_DIRECTIONS = 40
 """Distinct directions of light that a capture needs."""
@@ -36,23 +34,23 @@ class CoverageTunables:
 _COVERAGE = CoverageTunables()
 
 
-def covered_solid_angle(vectors: Floats) -> float:
+def covered_solid_angle(vectors: Float64Array) -> float:
     """Solid angle in steradians within reach of directions (count, 3) of any length."""
     directions = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     near = (texel_directions() @ directions.T).max(axis=-1) > np.cos(np.radians(_COVERAGE.reach_deg))
     return float(texel_solid_angles()[near].sum())
 
 
-def count_distinct_directions(directions: Floats) -> int:
+def count_distinct_directions(directions: Float64Array) -> int:
     """Number of unit vectors (count, 3), leaving out those within a degree of one that is already counted."""
-    kept: list[Floats] = []
+    kept: list[Float64Array] = []
     for direction in directions:
         if not kept or (np.array(kept) @ direction).max() < np.cos(np.radians(DISTINCT_DEG)):
             kept.append(direction)
     return len(kept)
 
 
-def require_light_coverage(directions: Floats, bright: int) -> None:
+def require_light_coverage(directions: Float64Array, bright: int) -> None:
     """Check that light comes from enough directions, all round the front.
 
     Args:
@@ -79,9 +77,9 @@ def require_light_coverage(directions: Floats, bright: int) -> None:
         raise _too_few(count, bright)
     area = covered_solid_angle(directions)
     if area < _COVERAGE.min_area_sr:
-        share = area / (2 * np.pi)
+        fraction = area / (2 * np.pi)
         raise CaptureError(
-            f"the light covers {share:.0%} of the space before the face",
+            f"the light covers {fraction:.0%} of the space before the face",
             "move it farther: from one ear to the other, from below the chin to above the head",
         )
 

@@ -14,12 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.capture.film.flash.flash_signal import NOISE_FLOOR
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -32,11 +30,11 @@ class GainTunables:
             noise, brighter ones clip.
         least_response: percentile of the cells' response to the flash that stands for no response.
         response_margin: logarithm by which the response of a cell beyond the flash's reach may exceed that.
-        reached_everywhere: the flash reaches everything if that response exceeds this share of the 95th percentile.
-        min_share: least share of all cells that must be beyond the flash's reach.
+        reached_everywhere: the flash reaches everything if that response exceeds this fraction of the 95th percentile.
+        min_fraction: least fraction of all cells that must be beyond the flash's reach.
         max_residual_ratio: cells with a residual beyond this multiple of the median are left out, as something moves
             there.
-        max_room_left: largest share of the room's light that a subtraction may leave.
+        max_room_left: largest fraction of the room's light that a subtraction may leave.
         max_spread: spread of the gains within a frame from which the camera did more than expose and balance.
     """
 
@@ -46,7 +44,7 @@ class GainTunables:
     least_response: float = 5.0
     response_margin: float = 0.06
     reached_everywhere: float = 0.3
-    min_share: float = 0.02
+    min_fraction: float = 0.02
     max_residual_ratio: float = 2.5
     max_room_left: float = 0.5
     max_spread: float = 0.1
@@ -63,16 +61,16 @@ class FrameGains:
         rgb: (frames, 3) of each frame by channel; the geometric mean over the bright frames is 1.
         spread: deviation of a frame's cells from its gain (robust standard deviation of logarithms, median over the
             frames): hardly more than noise where the camera applied nothing but one gain a channel.
-        share: of all cells, those from which the gains were estimated; 0 where too few are beyond the flash's reach.
-        visible: share of all cells that show the room without the flash, neither too dark nor clipped. If it is not
-            small but `share` is 0, the flash reaches everything.
-        left_as_is, left: share of the room's light that remains, of either sign, where a dark frame is subtracted from
-            a bright one as they are, and with gains divided out.
+        fraction: of all cells, those from which the gains were estimated; 0 where too few are beyond the flash's reach.
+        visible: fraction of all cells that show the room without the flash, neither too dark nor clipped. If it is not
+            small but `fraction` is 0, the flash reaches everything.
+        left_as_is, left: fraction of the room's light that remains, of either sign, where a dark frame is subtracted
+            from a bright one as they are, and with gains divided out.
     """
 
-    rgb: Floats
+    rgb: Float64Array
     spread: float
-    share: float
+    fraction: float
     visible: float
     left_as_is: float
     left: float
@@ -80,12 +78,12 @@ class FrameGains:
     @property
     def too_dim(self) -> bool:
         """Whether the room is too dark or too bright to show the gains, rather than reached by the flash."""
-        return not self.share and self.visible < _TUNABLES.min_share
+        return not self.fraction and self.visible < _TUNABLES.min_fraction
 
     @property
     def source(self) -> str:
         """Where the gains are from, for people."""
-        return "what the flash does not reach" if self.share else "dark frames, and time between them"
+        return "what the flash does not reach" if self.fraction else "dark frames, and time between them"
 
     @property
     def can_subtract_room(self) -> bool:
@@ -102,7 +100,7 @@ def downsample_for_gains(frame: LinearImage) -> NDArray[np.float16]:
 
 
 def estimate_gains(
-    cells: NDArray[np.float16], times_s: Floats, bright: NDArray[np.bool_], flash: NDArray[np.intp]
+    cells: NDArray[np.float16], times_s: Float64Array, bright: NDArray[np.bool_], flash: NDArray[np.intp]
 ) -> FrameGains:
     """Gains of bright and dark frames.
 
@@ -119,20 +117,20 @@ def estimate_gains(
     visible &= (least > 0) & (most < _TUNABLES.max_unclipped)
     of_room = np.median(flat[~bright], axis=0).mean(axis=1) > _TUNABLES.min_visible
     unreached = _unreached(flat, times_s, bright, flash, visible)
-    share = float(unreached.mean())
-    if share >= _TUNABLES.min_share:
+    fraction = float(unreached.mean())
+    if fraction >= _TUNABLES.min_fraction:
         room = flat[:, unreached]
         logs, spread = _common_gains(room)
     else:
-        share, room = 0.0, flat[:, visible]
+        fraction, room = 0.0, flat[:, visible]
         logs, spread = _interpolated_gains(room, times_s, bright)
     logs -= logs[bright].mean(axis=0)
     gains = np.exp(logs)
-    judged = np.flatnonzero(bright if share else ~bright)
+    judged = np.flatnonzero(bright if fraction else ~bright)
     left_as_is, left = (
         _room_left(room, each, judged, np.flatnonzero(~bright)) for each in (np.ones_like(gains), gains)
     )
-    return FrameGains(gains, spread, share, float((visible & of_room).mean()), left_as_is, left)
+    return FrameGains(gains, spread, fraction, float((visible & of_room).mean()), left_as_is, left)
 
 
 def require_uniform_gains(spread: float) -> None:
@@ -152,7 +150,11 @@ def require_uniform_gains(spread: float) -> None:
 
 
 def _unreached(
-    flat: NDArray[np.float16], times_s: Floats, bright: NDArray[np.bool_], flash: NDArray[np.intp], visible: NDArray
+    flat: NDArray[np.float16],
+    times_s: Float64Array,
+    bright: NDArray[np.bool_],
+    flash: NDArray[np.intp],
+    visible: NDArray,
 ) -> NDArray[np.bool_]:
     """Mask (cells,) of the visible cells that respond least to the flash; none if all respond."""
     light = np.log(flat.astype(np.float32).mean(axis=2) + np.float32(NOISE_FLOOR))
@@ -172,7 +174,7 @@ def _unreached(
     return np.asarray(visible & (response < low + _TUNABLES.response_margin))
 
 
-def _common_gains(cells: NDArray[np.float16]) -> tuple[Floats, float]:
+def _common_gains(cells: NDArray[np.float16]) -> tuple[Float64Array, float]:
     """Logarithms (frames, 3) of the gains common to all cells (frames, cells, 3), and the cells' spread about them."""
     logs = np.log(cells.astype(np.float32) + np.float32(NOISE_FLOOR))
     logs -= logs.mean(axis=0)
@@ -185,7 +187,9 @@ def _common_gains(cells: NDArray[np.float16]) -> tuple[Floats, float]:
     return gains.astype(np.float64), spread
 
 
-def _interpolated_gains(cells: NDArray[np.float16], times_s: Floats, bright: NDArray[np.bool_]) -> tuple[Floats, float]:
+def _interpolated_gains(
+    cells: NDArray[np.float16], times_s: Float64Array, bright: NDArray[np.bool_]
+) -> tuple[Float64Array, float]:
     """Logarithms (frames, 3) of gains, measured in dark frames and interpolated in bright ones; and the spread."""
     if cells.shape[1] == 0:
         return np.zeros((len(times_s), 3)), 0.0
@@ -194,14 +198,14 @@ def _interpolated_gains(cells: NDArray[np.float16], times_s: Floats, bright: NDA
     return logs, spread
 
 
-def _room_left(cells: NDArray[np.float16], gains: Floats, judged: Indices, dark: Indices) -> float:
-    """Median share of the room's light in cells (frames, cells, 3) that subtracting the nearest dark frame leaves."""
+def _room_left(cells: NDArray[np.float16], gains: Float64Array, judged: Indices, dark: Indices) -> float:
+    """Median fraction of the room's light in cells (frames, cells, 3) that is left without the nearest dark frame."""
     if cells.shape[1] == 0:
         return 1.0
-    shares = []
+    fractions = []
     for index in judged:
         others = dark[dark != index]
         other = others[np.abs(others - index).argmin()]
         light, room = (cells[each].astype(np.float32) / gains[each] for each in (index, other))
-        shares.append(np.median(np.abs(light - room).sum(axis=1) / np.maximum(room.sum(axis=1), NOISE_FLOOR)))
-    return float(np.median(shares))
+        fractions.append(np.median(np.abs(light - room).sum(axis=1) / np.maximum(room.sum(axis=1), NOISE_FLOOR)))
+    return float(np.median(fractions))

@@ -27,11 +27,11 @@ class MatteTunables:
         block_rows: rows of the pictures that are processed at once.
         min_room: room light below which there is only noise, in the pictures' unit.
         min_threshold, max_threshold: limits of the threshold between person and room, relative to the person's ratio.
-        bridge: radius of the opening that cuts bridges between the person and other things, as a share of the
+        bridge: radius of the opening that cuts bridges between the person and other things, as a fraction of the
             picture's width.
-        edge: reach of the soft edge, as a share of the picture's width.
-        opaque: share of the ratio just inside from which a pixel of the edge is opaque.
-        min_face: least share of the face that must belong to the person.
+        edge: reach of the soft edge, as a fraction of the picture's width.
+        opaque: fraction of the ratio just inside from which a pixel of the edge is opaque.
+        min_face: least fraction of the face that must belong to the person.
     """
 
     high: float = 92.0
@@ -76,10 +76,10 @@ def require_face_in_matte(matte: Mask, face: NDArray[np.bool_]) -> None:
     Raises:
         CaptureError: it does not: the flash lights the person hardly more than the room does.
     """
-    share = matte[face].mean()
-    if share < _TUNABLES.min_face:
+    fraction = matte[face].mean()
+    if fraction < _TUNABLES.min_face:
         raise CaptureError(
-            f"the flash lights {share:.0%} of the face: the person cannot be told from the room",
+            f"the flash lights {fraction:.0%} of the face: the person cannot be told from the room",
             "make the room darker, or hold the lamp nearer, about a metre from the face",
         )
 
@@ -105,10 +105,10 @@ def _threshold(ratio: NDArray[np.float32]) -> float:
     """Threshold between the room's ratio and that of the person in the middle, on a log scale (Otsu 1979)."""
     third = [slice(side // 3, 2 * side // 3) for side in ratio.shape]
     of_person = max(float(np.median(ratio[third[0], third[1]])), 1e-6)
-    shares = np.log(np.clip(ratio / of_person, _TUNABLES.min_threshold / 10, 1))
-    codes = cv2.normalize(shares, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8)
+    fractions = np.log(np.clip(ratio / of_person, _TUNABLES.min_threshold / 10, 1))
+    codes = cv2.normalize(fractions, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8)
     code, _ = cv2.threshold(codes, 0, 255, cv2.THRESH_OTSU)
-    between = np.exp(shares.min() + code / 255 * np.ptp(shares))
+    between = np.exp(fractions.min() + code / 255 * np.ptp(fractions))
     return of_person * float(np.clip(between, _TUNABLES.min_threshold, _TUNABLES.max_threshold))
 
 
@@ -129,8 +129,8 @@ def _soft_edge(body: NDArray[np.bool_], ratio: NDArray[np.float32]) -> Mask:
     near = cv2.dilate(body.astype(np.uint8), _ellipse(reach)) > 0
     weight = cv2.GaussianBlur(inner, (0, 0), reach) + np.float32(1e-6)
     inside = cv2.GaussianBlur(ratio * inner, (0, 0), reach) / weight
-    share = np.clip(ratio / np.maximum(_TUNABLES.opaque * inside, 1e-6), 0, 1)
-    return np.where(inner > 0, np.float32(1), np.where(near, share, np.float32(0))).astype(np.float32)
+    fraction = np.clip(ratio / np.maximum(_TUNABLES.opaque * inside, 1e-6), 0, 1)
+    return np.where(inner > 0, np.float32(1), np.where(near, fraction, np.float32(0))).astype(np.float32)
 
 
 def _ellipse(radius: float) -> NDArray[np.uint8]:

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.film.olat.near_field import CaptureLamp, Surface, distant_light_factor, near_field_irradiance
@@ -23,8 +24,6 @@ from relit_camera.capture.geometry.normal_completion import complete_normals
 from relit_camera.capture.geometry.normal_integration import integrate_normals
 from relit_camera.capture.geometry.photometric_stereo import photometric_stereo
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Pictures = NDArray[np.float32]
 
 
@@ -42,7 +41,7 @@ class StrengthTunables:
         correlated_pixels: neighbors that share one error, and so count as one.
         tilt: standard deviation of the tilt, per radian: that of a lamp that points 7 degrees beside the head.
         tilt_rounds: iterations of the robust fit of the tilt.
-        face: half the side of the square whose median depth is the head's, as a share of the picture's side.
+        face: half the side of the square whose median depth is the head's, as a fraction of the picture's side.
         aim: relative deviation from the trend over directions at which a flash counts half, as it points elsewhere.
         trend_rounds: iterations of the robust fit of that trend.
         far: factor of the lamps' distance that makes them practically distant.
@@ -81,10 +80,10 @@ class FlashStrengths:
             hardly any skin is lit.
     """
 
-    strength: Floats
+    strength: Float64Array
     lamps: list[CaptureLamp]
     surface: Surface
-    misfit: Floats
+    misfit: Float64Array
 
     @property
     def median_misfit(self) -> float:
@@ -125,7 +124,7 @@ def downsample_for_strengths(pictures: NDArray[np.floating], matte: Mask) -> Str
 
 def estimate_flash_strengths(
     pictures: Pictures,
-    lamps_cm: Floats,
+    lamps_cm: Float64Array,
     matte: Mask,
     head: tuple[float, float],
     pixels_per_cm: float,
@@ -173,7 +172,7 @@ def estimate_flash_strengths(
 
 def misfit_under_distant_lamps(
     pictures: Pictures,
-    lamps_cm: Floats,
+    lamps_cm: Float64Array,
     matte: Mask,
     head: tuple[float, float],
     pixels_per_cm: float,
@@ -188,7 +187,7 @@ def misfit_under_distant_lamps(
     return estimate_flash_strengths(pictures, distant, matte, head, pixels_per_cm, measured=measured).median_misfit
 
 
-def remove_half_direction_trend(strength: Floats, lamps_cm: Floats) -> Floats:
+def remove_half_direction_trend(strength: Float64Array, lamps_cm: Float64Array) -> Float64Array:
     """Strengths (lights,), median 1, less half of their linear trend over the lamps' directions.
 
     A hand may hold the lamp nearer on one side, and skin that deviates from the cosine law looks the same. Each makes
@@ -204,7 +203,7 @@ def remove_half_direction_trend(strength: Floats, lamps_cm: Floats) -> Floats:
     return np.asarray(np.exp(adjusted - np.median(adjusted)))
 
 
-def set_inverse_square_trend(strength: Floats, lamps_cm: Floats) -> Floats:
+def set_inverse_square_trend(strength: Float64Array, lamps_cm: Float64Array) -> Float64Array:
     """Strengths (lights,), median 1, whose trend over directions is that of the inverse square of the distances.
 
     Where distances are measured, the inverse square is the hand's part of the trend, and the rest is the skin's
@@ -216,8 +215,8 @@ def set_inverse_square_trend(strength: Floats, lamps_cm: Floats) -> Floats:
     """
     logs, terms = _logs_and_terms(strength, lamps_cm)
     rest = logs + 2 * np.log(np.linalg.norm(lamps_cm, axis=1))
-    weights: Floats = np.ones(len(logs))
-    trend: Floats = np.zeros(len(logs))
+    weights: Float64Array = np.ones(len(logs))
+    trend: Float64Array = np.zeros(len(logs))
     for _ in range(_TUNABLES.trend_rounds):
         root = np.sqrt(weights)
         trend = np.asarray(terms @ np.linalg.lstsq(terms * root[:, None], rest * root, rcond=None)[0])
@@ -226,7 +225,7 @@ def set_inverse_square_trend(strength: Floats, lamps_cm: Floats) -> Floats:
     return np.asarray(np.exp(adjusted - np.median(adjusted)))
 
 
-def _logs_and_terms(strength: Floats, lamps_cm: Floats) -> tuple[Floats, Floats]:
+def _logs_and_terms(strength: Float64Array, lamps_cm: Float64Array) -> tuple[Float64Array, Float64Array]:
     """Logarithms (lights,) of the strengths, and the terms (lights, 4) of a function linear in the direction."""
     directions = lamps_cm / np.linalg.norm(lamps_cm, axis=1, keepdims=True)
     return np.log(np.maximum(strength, 1e-6)), np.concatenate([directions, np.ones((len(directions), 1))], axis=1)
@@ -295,7 +294,7 @@ def _fit_flash(
     )
 
 
-def _fit_tilt(logs: Floats, places: NDArray[np.float32], direction: Floats) -> Floats:
+def _fit_tilt(logs: Float64Array, places: NDArray[np.float32], direction: Float64Array) -> Float64Array:
     """Gradient (3,) of light across the head, perpendicular to the direction to the lamp.
 
     Robust least squares with a prior of no tilt, which decides where there are few pixels.
@@ -309,8 +308,8 @@ def _fit_tilt(logs: Floats, places: NDArray[np.float32], direction: Floats) -> F
     terms = np.concatenate([places @ across.T, np.ones((len(places), 1))], axis=1)
     prior = (_TUNABLES.misfit / _TUNABLES.tilt) ** 2 * _TUNABLES.correlated_pixels
     ridge = np.diag([prior] * 2 + [0.0])
-    weights: Floats = np.ones(len(logs))
-    solution: Floats = np.zeros(3)
+    weights: Float64Array = np.ones(len(logs))
+    solution: Float64Array = np.zeros(3)
     for _ in range(_TUNABLES.tilt_rounds):
         weighted = terms * weights[:, None]
         solution = np.asarray(

@@ -45,12 +45,12 @@ class HeadCrop:
             picture: the frame's picture.
             transform: from the frame to the reference.
         """
-        finer = max(1, int(np.ceil(self.side / self.size - 1e-6)))
-        factor = finer * self.scale
+        supersampling = max(1, int(np.ceil(self.side / self.size - 1e-6)))
+        factor = supersampling * self.scale
         matrix = transform.matrix(self.picture)
         matrix[:, 2] -= self.left, self.top
-        fine = warp_affine(picture, matrix * factor, (finer * self.size, finer * self.size))
-        if finer == 1:
+        fine = warp_affine(picture, matrix * factor, (supersampling * self.size, supersampling * self.size))
+        if supersampling == 1:
             return fine
         return np.asarray(cv2.resize(fine, (self.size, self.size), interpolation=cv2.INTER_AREA), np.float32)
 

@@ -1,4 +1,4 @@
-"""Pictures under nearly the same light merged into one with less noise, as under a distant flash of usual strength."""
+"""Pictures under nearly the same light merged into one with less noise, as if the flash were distant and steady."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 
+from relit_camera.base.array_types import Indices
 from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.film.olat.flash_strength import FlashStrengths
 from relit_camera.capture.film.olat.near_field import distant_light_factor
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -96,7 +95,7 @@ def merge_lights(
     *,
     near_field: bool = True,
 ) -> NDArray[np.float32]:
-    """Merge each cluster of pictures into one, as under a distant flash of the usual strength; black outside the matte.
+    """Merge each cluster of pictures into one, as under a distant flash of typical strength; black outside the matte.
 
     Args:
         pictures: (lights, size, size, 3) linear RGB of one flash each.

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
-Floats64 = NDArray[np.float64]
+from relit_camera.base.array_types import Float32Array, Float64Array
 
 BEAM_EXPONENT = 2.0
 """The lamp's intensity is proportional to this power of the cosine off its axis: half at 45 degrees, as of the torches
@@ -33,8 +31,8 @@ class Surface:
         points_cm: (height, width, 3) float32 positions from the head's middle, camera axes.
     """
 
-    normals: Floats
-    points_cm: Floats
+    normals: Float32Array
+    points_cm: Float32Array
 
     def resized(self, size: tuple[int, int]) -> Surface:
         """The surface resampled to this width and height."""
@@ -54,16 +52,16 @@ class CaptureLamp:
             per radian seen from the lamp; nonzero where the lamp points beside the head.
     """
 
-    position_cm: Floats64
-    tilt: Floats64
+    position_cm: Float64Array
+    tilt: Float64Array
 
     @property
-    def direction(self) -> Floats64:
+    def direction(self) -> Float64Array:
         """Unit vector (3,) toward the lamp from the head's middle."""
         return np.asarray(self.position_cm / np.linalg.norm(self.position_cm))
 
 
-def near_field_irradiance(surface: Surface, lamp: CaptureLamp) -> tuple[Floats, Floats]:
+def near_field_irradiance(surface: Surface, lamp: CaptureLamp) -> tuple[Float32Array, Float32Array]:
     """Unit vectors (height, width, 3) toward a lamp, and its light (height, width) relative to the head's middle.
 
     The light depends on the inverse square of the distance, the angle off the beam's axis, and the tilt.
@@ -77,7 +75,7 @@ def near_field_irradiance(surface: Surface, lamp: CaptureLamp) -> tuple[Floats, 
     return toward, np.float32(distance**2) / squared * off_axis**BEAM_EXPONENT * tilted
 
 
-def distant_light_factor(surface: Surface, lamp: CaptureLamp) -> Floats:
+def distant_light_factor(surface: Surface, lamp: CaptureLamp) -> Float32Array:
     """Factor (height, width) from a picture under a near lamp to one under a distant lamp in the same direction."""
     toward, light = near_field_irradiance(surface, lamp)
     near = np.einsum("hwc,hwc->hw", surface.normals, toward)

@@ -16,14 +16,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Indices
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.color import Gamma
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.video.video_readers import LinearVideoReader
 from relit_camera.capture.alignment.rigid_transform import RigidTransform
 from relit_camera.capture.film.olat.head_crop import HeadCrop
-
-Indices = NDArray[np.intp]
 
 _DARK_FRAMES = 4
 """Nearest dark frames on either side of a bright one whose mean shows the room's light."""
@@ -185,5 +184,5 @@ def _interpolate_room(time_s: float, before: _Room | None, after: _Room | None) 
     if before is None or after is None:
         known = before or after
         return None if known is None else known.picture
-    share = np.float32(np.clip((time_s - before.time_s) / (after.time_s - before.time_s), 0, 1))
-    return before.picture + share * (after.picture - before.picture)
+    fraction = np.float32(np.clip((time_s - before.time_s) / (after.time_s - before.time_s), 0, 1))
+    return before.picture + fraction * (after.picture - before.picture)

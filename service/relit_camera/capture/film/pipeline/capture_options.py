@@ -28,7 +28,7 @@ class CaptureOptions:
         ball, second_ball: their outlines in those pixels; None where they are to be found.
         face: circle about the face, brow to chin; None where it is to be found.
         ball_diameter_cm: diameter of the balls; None where it is unknown.
-        light_distance_cm: usual distance of the lamp from the head, where two balls do not measure it.
+        light_distance_cm: assumed distance of the lamp from the head, where two balls do not measure it.
         subtract_room: whether the room's light is subtracted; None for where that leaves less than half of it.
         near_field: whether the lamp's nearness is corrected.
         threads: of the decoder.

@@ -30,8 +30,8 @@ class WarningTunables:
     """When the report warns; `relit evaluate capture` (docs/evaluate.md) shows what errors such films have.
 
     Attributes:
-        min_evidence: share of a ball's outline that is visible, below which its position is uncertain.
-        min_triangulated: share of the usable frames in which two balls show the lamp, below which its distance is
+        min_evidence: fraction of a ball's outline that is visible, below which its position is uncertain.
+        min_triangulated: fraction of the usable frames in which two balls show the lamp, below which its distance is
             uncertain.
         max_gap_deg: median gap between two balls' rays, three times what their errors make.
     """
@@ -63,7 +63,7 @@ class CaptureFindings:
         eyes_px: distance of the pupils; None where they were not found.
         layout: positions of head and balls.
         lamps: where the lamp was in the frames that show it.
-        light_distance_cm: usual distance of the lamp that the user gave.
+        light_distance_cm: distance of the lamp that the user gave.
         crop: the square that became the subject's picture.
         room_subtracted: whether the room's light was subtracted.
         near_field: whether the lamp's nearness was corrected.
@@ -224,10 +224,10 @@ def _ball_warnings(ball: ObservedBall, name: str, option: str) -> list[str]:
 
 def _two_ball_warnings(lamps: LampPositions) -> list[str]:
     warnings = []
-    share = len(lamps.triangulated) / max(len(lamps.index), 1)
-    if share < _TUNABLES.min_triangulated:
+    fraction = len(lamps.triangulated) / max(len(lamps.index), 1)
+    if fraction < _TUNABLES.min_triangulated:
         warnings.append(
-            f"both balls show the lamp in {share:.0%} of the flashes' frames only, its distance is uncertain in "
+            f"both balls show the lamp in {fraction:.0%} of the flashes' frames only, its distance is uncertain in "
             "the others: stand them on either side of the head, where lamp and camera see both"
         )
     gap_deg = _median_gap_deg(lamps)
@@ -245,7 +245,7 @@ def _gain_warnings(gains: FrameGains) -> list[str]:
             "the room is too dark, or too bright, in nearly all of the picture, so the camera's automatic exposure and "
             "white balance cannot be measured: make some light in it, or film with both locked"
         ]
-    if not gains.share:
+    if not gains.fraction:
         return [
             "the flash reaches everything in the picture, so the camera's automatic exposure and white balance are "
             "measured only between flashes: film before something far away, or with both locked"
@@ -258,7 +258,7 @@ def _ball_entry(ball: ObservedBall, radius_cm: float) -> dict[str, Any]:
         **asdict(ball.found.outline),
         "radius_cm": radius_cm,
         "evidence": ball.found.evidence,
-        "glints": ball.found.glints,
+        "glints": ball.found.highlight_visibility,
         "episodes": [
             {"kind": each.kind, "first": each.first, "last": each.last, "shift_px": [each.dx, each.dy]}
             for each in ball.episodes
@@ -281,7 +281,7 @@ def _gain_entry(gains: FrameGains) -> dict[str, Any]:
         "left_as_is": gains.left_as_is,
         "left": gains.left,
         "gains_from": gains.source,
-        "gains_share": gains.share,
+        "gains_share": gains.fraction,
         "gains_spread": gains.spread,
     }
 

@@ -105,7 +105,7 @@ def build_samples(
         threads=options.threads,
         progress=_reporter(progress, "Following the face", total),
     )
-    usable = UsableFrames.of(flashes, motion.lost)
+    usable = UsableFrames.from_flashes(flashes, motion.lost)
 
     # Camera gains, highlights on the balls, distance of the eyes.
     detector = _installed_detector()

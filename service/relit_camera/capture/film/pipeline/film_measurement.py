@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Indices
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.video.video_readers import LinearVideoFrame
 from relit_camera.capture.film.ball.ball_detection import DetectedBall
@@ -18,8 +18,6 @@ from relit_camera.capture.film.face_localization import median_eye_distance_px
 from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass
 from relit_camera.capture.film.olat.camera_gains import FrameGains, downsample_for_gains, estimate_gains
 from relit_camera.face.tracking.face_detector import FaceDetector
-
-Indices = NDArray[np.intp]
 
 _PORTRAITS = 8
 """Bright frames in which the eyes are looked for."""
@@ -37,7 +35,7 @@ class UsableFrames:
     dark: Indices
 
     @classmethod
-    def of(cls, flashes: Flashes, lost: frozenset[int]) -> UsableFrames:
+    def from_flashes(cls, flashes: Flashes, lost: frozenset[int]) -> UsableFrames:
         """The frames of these flashes but those in which the face is lost."""
         without = list(lost)
         return cls(

@@ -15,7 +15,7 @@ Codes = NDArray[np.uint8]
 Points = NDArray[np.float32]
 
 TRACKED_RADIUS_SHARE = 0.6
-"""Share of the radius of the face's circle in which corners are sought: brows, eyes, nose and mouth (thesis 4.2.6)."""
+"""Fraction of the radius of the face's circle where corners are sought: brows, eyes, nose and mouth (thesis 4.2.6)."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,9 @@ class CornerTunables:
         levels: of the image pyramid above the finest.
         max_round_trip_px: largest distance of a corner from itself after tracking there and back.
         tolerance_px: distance within which a corner agrees with a transform (RANSAC).
-        min_found: share of the corners that must be found for the face not to be lost.
-        near, far: sides of the squares over which mean and contrast are taken, as shares of the picture's longer side.
+        min_found: fraction of the corners that must be found for the face not to be lost.
+        near, far: sides of the squares over which mean and contrast are taken, as fractions of the picture's longer
+            side.
     """
 
     max_corners: int = 200
@@ -158,7 +159,7 @@ def local_contrast(picture: NDArray[np.float32]) -> Codes:
 
     This removes the changes of automatic exposure, and differences of brightness over the room.
     """
-    near, far = (2 * [round(share * max(picture.shape))] for share in (_TUNABLES.near, _TUNABLES.far))
+    near, far = (2 * [round(fraction * max(picture.shape))] for fraction in (_TUNABLES.near, _TUNABLES.far))
     detail = picture - cv2.blur(picture, near)
     # Rounding of the running sums may give values slightly below zero.
     spread = np.sqrt(np.maximum(cv2.blur(detail * detail, far), 0)) + 0.01

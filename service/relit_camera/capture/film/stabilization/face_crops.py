@@ -10,13 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Indices
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.video.video_readers import LumaVideoReader
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, Size, warp_affine
 from relit_camera.capture.film.face_circle import FaceCircle
 from relit_camera.capture.film.stabilization.corner_tracking import CornerMatch, CornerTracker, local_contrast
-
-Indices = NDArray[np.intp]
 
 MAX_RADIUS_PX = 128.0
 """Radius of the face to which larger ones are scaled down."""
@@ -55,11 +54,11 @@ class CropWindow:
         matrix[:, 2] -= self.left, self.top
         return warp_affine(picture, matrix, (self.side, self.side))
 
-    def disc(self, circle: FaceCircle, share: float) -> NDArray[np.float32]:
-        """Weights (side, side): 1 within a share of the circle's radius, falling to 0 over a tenth of the radius."""
+    def disc(self, circle: FaceCircle, fraction: float) -> NDArray[np.float32]:
+        """Weights (side, side): 1 within a fraction of the circle's radius, falling to 0 over a tenth of the radius."""
         center = np.arange(self.side) + 0.5
         distance = np.hypot(center + self.left - circle.x, center[:, None] + self.top - circle.y) / circle.radius
-        return np.asarray(np.clip((share + 0.1 - distance) / 0.1, 0, 1), np.float32)
+        return np.asarray(np.clip((fraction + 0.1 - distance) / 0.1, 0, 1), np.float32)
 
     def in_picture(self, transform: RigidTransform) -> RigidTransform:
         """A transform about the square's center as one about the picture's."""
@@ -100,14 +99,14 @@ class FaceCrops:
         """Transforms of the matches."""
         return [match.transform for match in self.matches]
 
-    def only(self, chosen: NDArray[np.bool_]) -> FaceCrops:
+    def subset(self, chosen: NDArray[np.bool_]) -> FaceCrops:
         """Some of the crops, by a mask (count,)."""
         matches = [match for match, kept in zip(self.matches, chosen, strict=True) if kept]
         return replace(self, index=self.index[chosen], codes=self.codes[chosen], matches=matches)
 
-    def of(self, frames: Indices) -> FaceCrops:
+    def of_frames(self, frames: Indices) -> FaceCrops:
         """The crops of these frames."""
-        return self.only(np.isin(self.index, frames))
+        return self.subset(np.isin(self.index, frames))
 
 
 def crop_faces(

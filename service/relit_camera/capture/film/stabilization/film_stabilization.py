@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import CaptureError
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, interpolate_transforms, transforms_to_array
 from relit_camera.capture.film.face_circle import FaceCircle
@@ -16,17 +16,26 @@ from relit_camera.capture.film.flash.frame_classification import Flashes, FrameC
 from relit_camera.capture.film.stabilization.face_crops import crop_faces
 from relit_camera.capture.film.stabilization.stabilization_refinement import align_bright, align_dark
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
-_MIN_TRACKED = 0.7
-"""Share of the dark frames in which the face must be found."""
-_MIN_FEATURES = 0.1
-"""Share of the dark frames below which the face has no features to track."""
-_MIN_BRIGHT_FRAMES = 8
-"""Least bright frames for the refinement of their transforms."""
-_MAX_FLASH_PERIODS = 1.5
-"""Periods of the flash to the nearest measured dark frame beyond which the transform of a bright frame is unknown."""
+@dataclass(frozen=True)
+class StabilizationTunables:
+    """What counts as tracked; `relit evaluate stabilisation` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        min_tracked: fraction of the dark frames in which the face must be found.
+        min_features: fraction of the dark frames below which the face has no features to track.
+        min_bright_frames: least bright frames for the refinement of their transforms.
+        max_flash_periods: periods of the flash to the nearest measured dark frame beyond which the transform of a
+            bright frame is unknown.
+    """
+
+    min_tracked: float = 0.7
+    min_features: float = 0.1
+    min_bright_frames: int = 8
+    max_flash_periods: float = 1.5
+
+
+_TUNABLES = StabilizationTunables()
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +59,7 @@ class Stabilization:
     circle: FaceCircle
     measured: Indices
     inliers: Indices
-    residual_px: Floats
+    residual_px: Float64Array
     lost: frozenset[int]
     unsteady_px: float
 
@@ -88,12 +97,12 @@ def stabilize_film(
         flashes.times_s,
     )
     crops = crop_faces(path, dark_frames, bright_frames, circle, threads, progress)
-    dark = crops.of(dark_frames)
+    dark = crops.of_frames(dark_frames)
     transforms = dark.transforms
     if refine and transforms:
         transforms, outliers = align_dark(dark)
         dark, transforms = (
-            dark.only(~outliers),
+            dark.subset(~outliers),
             [each for each, bad in zip(transforms, outliers, strict=True) if not bad],
         )
     lost = _lost_frames(dark_frames, bright_frames, dark.index, times_s, flashes.schedule.frequency_hz)
@@ -102,8 +111,8 @@ def stabilize_film(
     reference = int(np.square(rows - np.median(rows, axis=0)).sum(axis=1).argmin())
     unsteady = _unsteadiness(dark.index, times_s, rows)
     every = interpolate_transforms(times_s, times_s[dark.index], transforms)
-    bright = crops.of(np.setdiff1d(bright_frames, list(lost)))
-    if refine and len(bright.index) >= _MIN_BRIGHT_FRAMES:
+    bright = crops.of_frames(np.setdiff1d(bright_frames, list(lost)))
+    if refine and len(bright.index) >= _TUNABLES.min_bright_frames:
         flash = np.array([flashes.frames[index].flash for index in bright.index])
         by_time = [every[index] for index in bright.index]
         for index, aligned in zip(bright.index, align_bright(bright, by_time, flash, unsteady), strict=True):
@@ -121,7 +130,7 @@ def stabilize_film(
     )
 
 
-def _unsteadiness(index: Indices, times_s: Floats, rows: Floats) -> Floats:
+def _unsteadiness(index: Indices, times_s: Float64Array, rows: Float64Array) -> Float64Array:
     """Root mean square (3,) of rotation and shifts from the interpolation between the dark frames of other pauses."""
     pause = np.cumsum(np.diff(index, prepend=index[0]) > 2)
     deviations = []
@@ -133,26 +142,26 @@ def _unsteadiness(index: Indices, times_s: Floats, rows: Floats) -> Floats:
 
 
 def _lost_frames(
-    dark: Indices, bright: Indices, measured: Indices, times_s: Floats, frequency_hz: float
+    dark: Indices, bright: Indices, measured: Indices, times_s: Float64Array, frequency_hz: float
 ) -> frozenset[int]:
     """Dark frames without a measurement, and bright ones too far in time from any."""
     lost = np.setdiff1d(dark, measured)
     if len(measured):
         distance_s = np.abs(times_s[bright][:, None] - times_s[measured]).min(axis=1)
-        bright = bright[distance_s > _MAX_FLASH_PERIODS / frequency_hz]
+        bright = bright[distance_s > _TUNABLES.max_flash_periods / frequency_hz]
     return frozenset(lost.tolist()) | frozenset(bright.tolist())
 
 
-def _require_tracked_face(measured: Indices, dark: Indices, lost: frozenset[int], times_s: Floats) -> None:
+def _require_tracked_face(measured: Indices, dark: Indices, lost: frozenset[int], times_s: Float64Array) -> None:
     """Check that the face was found in enough dark frames.
 
     Raises:
         CaptureError: it was not.
     """
-    if len(measured) < max(2, _MIN_FEATURES * len(dark)):
+    if len(measured) < max(2, _TUNABLES.min_features * len(dark)):
         what = "the face shows nothing that can be followed in the dark frames"
         raise CaptureError(what, "make the room a little brighter, so that the face shows without the flash")
-    if len(measured) < _MIN_TRACKED * len(dark):
+    if len(measured) < _TUNABLES.min_tracked * len(dark):
         first = float(times_s[min(lost)])
         followed = f"the face is found in {len(measured)} of {len(dark)} dark frames only"
         cure = "sit still, the head against something, until the end; keep hands off the face"

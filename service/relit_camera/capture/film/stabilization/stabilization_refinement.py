@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.images.color import srgb_decode
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, transforms_from_array, transforms_to_array
 from relit_camera.capture.alignment.template_alignment import align_across_lights, align_to_mean, gaussian_blur
 from relit_camera.capture.film.stabilization.face_crops import FaceCrops
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
-_FEATURE_RADIUS = 0.6
-"""Share of the face's radius within which pixels count: features, and not the background at the outline."""
-_BLUR_PX = 1.0
-"""Standard deviation of the Gaussian that reduces noise."""
-_MIN_CORRELATION = 0.6
-"""Correlation with the mean below which a frame does not show the face."""
-_ROUNDS = 2
-"""Of predicting and aligning bright frames."""
+@dataclass(frozen=True)
+class RefinementTunables:
+    """How crops are aligned; `relit evaluate stabilisation` (docs/evaluate.md) shows the effect of a change.
+
+    Attributes:
+        feature_radius: fraction of the face's radius within which pixels count: features, and not the background at
+            the outline.
+        blur_px: standard deviation of the Gaussian that reduces noise.
+        min_correlation: correlation with the mean below which a frame does not show the face.
+        rounds: of predicting and aligning bright frames.
+    """
+
+    feature_radius: float = 0.6
+    blur_px: float = 1.0
+    min_correlation: float = 0.6
+    rounds: int = 2
+
+
+_TUNABLES = RefinementTunables()
 
 
 def align_dark(dark: FaceCrops) -> tuple[list[RigidTransform], NDArray[np.bool_]]:
@@ -31,16 +42,16 @@ def align_dark(dark: FaceCrops) -> tuple[list[RigidTransform], NDArray[np.bool_]
     Returns:
         Transforms from each frame to the first dark one, and a mask (count,) of the frames that do not show the face.
     """
-    weights = dark.window.disc(dark.circle, _FEATURE_RADIUS)
-    squares = [gaussian_blur(square.astype(np.float32), _BLUR_PX) for square in dark.codes]
+    weights = dark.window.disc(dark.circle, _TUNABLES.feature_radius)
+    squares = [gaussian_blur(square.astype(np.float32), _TUNABLES.blur_px) for square in dark.codes]
     small, mean = align_to_mean(squares, weights, [RigidTransform()] * len(squares))
     correlation = np.array([mean.correlation(square, each) for square, each in zip(squares, small, strict=True)])
     found = [rough.then(dark.window.in_picture(each)) for rough, each in zip(dark.transforms, small, strict=True)]
-    return found, correlation < _MIN_CORRELATION
+    return found, correlation < _TUNABLES.min_correlation
 
 
 def align_bright(
-    bright: FaceCrops, by_time: Sequence[RigidTransform], flash: Indices, unsteady: Floats
+    bright: FaceCrops, by_time: Sequence[RigidTransform], flash: Indices, unsteady: Float64Array
 ) -> list[RigidTransform]:
     """Align bright frames to pictures that those of other flashes predict for their light.
 
@@ -61,7 +72,9 @@ def align_bright(
     remaining = [rough.inverse().then(each) for rough, each in zip(bright.transforms, by_time, strict=True)]
     start = [window.in_window(each) for each in remaining]
     light = srgb_decode(bright.codes.astype(np.float32))
-    aligned = align_across_lights(light, window.disc(bright.circle, _FEATURE_RADIUS), start, flash, _ROUNDS)
+    aligned = align_across_lights(
+        light, window.disc(bright.circle, _TUNABLES.feature_radius), start, flash, _TUNABLES.rounds
+    )
     correction = transforms_to_array(aligned) - transforms_to_array(start)
     gain = np.clip(unsteady**2 / 16 / np.maximum(correction.var(axis=0), 1e-12), 0, 1)
     corrected = transforms_from_array(transforms_to_array(start) + gain * correction)

@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float32Array
 from relit_camera.capture.reflectance.method_registry import factored_field
 from relit_camera.capture.reflectance.methods.appearance_field import (
-    VALIDATION_PIXELS,
+    RESIDUAL,
     AppearanceField,
     AppearanceMethod,
 )
@@ -18,8 +19,6 @@ from relit_camera.capture.reflectance.methods.linear_methods import RadialBasis
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.reflectance.sampled_region import boundary_lights, region_coverage
 from relit_camera.subject.reflectance_field import FactoredField, texel_vectors
-
-Floats = NDArray[np.float32]
 
 FOLDS = 4
 """Parts of the cross-validation."""
@@ -37,7 +36,7 @@ class Blend:
         """The field; see `ReflectanceMethod.build`. It uses `samples.geometry`."""
         modelled = AppearanceMethod().build(samples)
         smooth = factored_field(RadialBasis(), samples)
-        return BlendField(modelled, smooth, choose_model_share(modelled))
+        return BlendField(modelled, smooth, choose_model_fraction(modelled))
 
 
 @dataclass(frozen=True)
@@ -47,46 +46,46 @@ class BlendField:
     Attributes:
         modelled: the field of `model`, for every direction.
         smooth: the field of `rbf`, which fades to black beyond the sampled region.
-        share: weight of the model inside the region, 0..1; the smooth field has the rest.
+        fraction: weight of the model inside the region, 0..1; the smooth field has the rest.
     """
 
     modelled: AppearanceField
     smooth: FactoredField
-    share: float
+    fraction: float
 
     @property
     def size(self) -> tuple[int, int]:
         """Height and width in pixels."""
         return self.modelled.size
 
-    def dense(self, start: int, stop: int) -> Floats:
+    def dense(self, start: int, stop: int) -> Float32Array:
         """R of the pixels [start, stop) in row-major order: (stop − start, 2048, 3)."""
         return self._mixed(
             self.modelled.dense(start, stop), self.smooth.dense(start, stop), self._texels_covered[:, None]
         )
 
-    def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Floats:
+    def at(self, directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> Float32Array:
         """R of row-major pixels (some,) under unit vectors (count, 3): (count, some, 3)."""
         covered = region_coverage(self.smooth.directions, directions)[:, None, None]
         return self._mixed(self.modelled.at(directions, pixels), self.smooth.at(directions, pixels), covered)
 
     @cached_property
-    def _texels_covered(self) -> Floats:
+    def _texels_covered(self) -> Float32Array:
         return region_coverage(self.smooth.directions, texel_vectors())
 
-    def _mixed(self, modelled: Floats, smooth: Floats, covered: Floats) -> Floats:
+    def _mixed(self, modelled: Float32Array, smooth: Float32Array, covered: Float32Array) -> Float32Array:
         """The weighted mean of both fields, written over `modelled`.
 
         `covered` is the weight of the smooth field, whose values have it as a factor already.
         """
-        rest = 1 - self.share
-        total = self.share + rest * covered + 1e-9
-        modelled *= self.share / total
+        rest = 1 - self.fraction
+        total = self.fraction + rest * covered + 1e-9
+        modelled *= self.fraction / total
         modelled += np.maximum(smooth, 0) * (rest / total)
         return modelled
 
 
-def choose_model_share(modelled: AppearanceField) -> float:
+def choose_model_fraction(modelled: AppearanceField) -> float:
     """The model's weight 0..1 that best predicts lights left out of both fits (stacking; Breiman 1996).
 
     Cross-validation in FOLDS parts over the lights that others surround, by least squares over some pixels. Geometry
@@ -97,7 +96,7 @@ def choose_model_share(modelled: AppearanceField) -> float:
     lights = len(samples.directions)
     surrounded = np.setdiff1d(np.arange(lights), boundary_lights(samples.directions))
     inside = np.flatnonzero(samples.matte.ravel() > 0.5)
-    pixels = inside[:: max(1, len(inside) // VALIDATION_PIXELS)]
+    pixels = inside[:: max(1, len(inside) // RESIDUAL.validation_pixels)]
     agreement = distance = 0.0
     for fold in range(FOLDS):
         left_out = surrounded[fold::FOLDS]

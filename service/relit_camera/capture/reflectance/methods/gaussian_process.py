@@ -53,14 +53,14 @@ class Kernel:
 
     def weights(self, directions: Values, queries: Values) -> NDArray[np.float32]:
         """Weights (lights, queries); see `LinearMethod.weights`."""
-        share = region_coverage(directions, queries)
+        fraction = region_coverage(directions, queries)
         factor = cho_factor(self.covariance(directions, directions) + self.noise * np.eye(len(directions)))
         trend, query_trend = _trend(directions), _trend(queries)
         known = cho_solve(factor, self.covariance(directions, queries))
         # The correction for the mean, which is estimated too.
         solved = cho_solve(factor, trend)
         correction = np.linalg.lstsq(trend.T @ solved, query_trend.T - trend.T @ known, rcond=None)[0]
-        return np.asarray((known + solved @ correction) * share, np.float32)
+        return np.asarray((known + solved @ correction) * fraction, np.float32)
 
 
 def fit_kernel(samples: OlatSamples) -> Kernel:

@@ -75,8 +75,8 @@ class PolynomialTextureMap:
                 f"at least {POLYNOMIAL_TERMS}, not all on one conic, are needed",
             )
         weights = np.zeros((len(directions), len(queries)), np.float32)
-        share = region_coverage(directions[front], queries) * (queries[:, 2] > 0)
-        weights[front] = np.linalg.pinv(known).T @ _terms(queries).T * share
+        fraction = region_coverage(directions[front], queries) * (queries[:, 2] > 0)
+        weights[front] = np.linalg.pinv(known).T @ _terms(queries).T * fraction
         return weights
 
 
@@ -119,7 +119,7 @@ class RadialBasis:
 
     def weights(self, directions: NDArray[np.float64], queries: NDArray[np.float64]) -> NDArray[np.float32]:
         """Weights (lights, queries); see `LinearMethod.weights`."""
-        share = region_coverage(directions, queries)
+        fraction = region_coverage(directions, queries)
         one_hot = np.eye(len(directions))
         spline = RBFInterpolator(directions, one_hot, smoothing=SPLINE_SMOOTHING, kernel="thin_plate_spline", degree=1)
-        return np.asarray((spline(queries) * share[:, None]).T, np.float32)
+        return np.asarray((spline(queries) * fraction[:, None]).T, np.float32)

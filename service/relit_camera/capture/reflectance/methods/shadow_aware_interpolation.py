@@ -100,18 +100,18 @@ def interpolate_by_visibility(
     order = np.argsort(at_corners, axis=1, kind="stable")
     rank = np.argsort(order, axis=1)
     least, middle, most = np.take_along_axis(at_corners, order, axis=1).transpose(1, 0, 2)
-    as_lit = _interpolation_share(middle, least, most)
+    as_lit = _interpolation_fraction(middle, least, most)
     stepped = np.zeros_like(corners.colors[:, 0])
     for first_lit, low, high, weight in ((1, least, middle, as_lit), (2, middle, most, 1 - as_lit)):
         is_lit = rank >= first_lit
         lit = lit_colors(_only(corners.weights, is_lit), corners)
         dark = barycentric_mix(_only(corners.weights, ~is_lit), corners.colors)
-        stepped += weight[:, None] * (dark + _interpolation_share(at_query, low, high)[:, None] * (lit - dark))
+        stepped += weight[:, None] * (dark + _interpolation_fraction(at_query, low, high)[:, None] * (lit - dark))
     plain = barycentric_mix(corners.weights, corners.colors)
     return np.asarray(plain + (most - least)[:, None] * (stepped - plain))
 
 
-def _interpolation_share(value: Values, low: Values, high: Values) -> Values:
+def _interpolation_fraction(value: Values, low: Values, high: Values) -> Values:
     """Position of `value` between two others: 0 at `low` or below, 1 at `high` or above, and 1 where both are equal."""
     span = high - low
     return np.where(span > 0, np.clip((value - low) / np.maximum(span, 1e-6), 0, 1), np.float32(1)).astype(np.float32)
@@ -180,7 +180,7 @@ class ThesisMethod:
         def mix(corners: TriangleVertices) -> Values:
             colors = barycentric_mix(corners.weights, corners.colors)
             inside = np.all(corners.triangles < captured, axis=1)
-            colors[inside] = self.mix(corners.only(inside))
+            colors[inside] = self.mix(corners.subset(inside))
             return colors
 
         return TriangleField(with_black_ring(known), mix)

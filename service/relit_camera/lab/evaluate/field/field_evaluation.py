@@ -16,7 +16,7 @@ from relit_camera.lab.evaluate.field.ghost_shadows import (
     clearest_ghosts,
     find_shadow_transitions,
     histogram,
-    mid_tone_share,
+    mid_tone_fraction,
 )
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, not_captured, sampled_region
 from relit_camera.lab.evaluate.field.relighting_metrics import (
@@ -46,8 +46,8 @@ class CandidateScores:
         error_whole, error_region: (pixels,) over all lights, and over those inside the sampled region.
         error_of_light: (truth lights,) mean squared distance over the pixels.
         light_psnr_db: mean over single lights inside the region that were not captured.
-        mid_tone_share: share of the pixels between lit and dark that are mid-tones (see `ghost_shadows`).
-        histogram: (30,) shares of these pixels on the scale from dark to lit.
+        mid_tone_fraction: fraction of the pixels between lit and dark that are mid-tones (see `ghost_shadows`).
+        histogram: (30,) fractions of these pixels on the scale from dark to lit.
         relit: by environment.
         maps: (spots, 2048, 3) reflectance maps at the spots, on the 64 × 32 map.
         ghost: (pixels, 3) colors under the light of the ghost example; empty if there is none.
@@ -58,7 +58,7 @@ class CandidateScores:
     error_region: NDArray[np.float64]
     error_of_light: NDArray[np.float64]
     light_psnr_db: float
-    mid_tone_share: float
+    mid_tone_fraction: float
     histogram: NDArray[np.float64]
     relit: Mapping[str, RelitComparison]
     maps: NDArray[np.float32]
@@ -175,7 +175,7 @@ def evaluate_field(
                 error_region=pixel_errors(distances, truth.weights, in_region),
                 error_of_light=distances.mean(axis=1),
                 light_psnr_db=float(psnr_per_light(colors, truth.colors, judged_lights).mean()),
-                mid_tone_share=mid_tone_share(spots_lit_or_dark, colors),
+                mid_tone_fraction=mid_tone_fraction(spots_lit_or_dark, colors),
                 histogram=histogram(spots_lit_or_dark, colors),
                 relit=compare_under_environments(colors, truth, environments),
                 maps=candidate.maps_at(texel_directions().reshape(-1, 3), places),
@@ -190,7 +190,7 @@ def evaluate_field(
         candidate_scores=sorted(candidate_scores, key=lambda each: float(each.error_region.mean())),
         spots=spots,
         environments=environments,
-        truth_mid_tones=mid_tone_share(spots_lit_or_dark, truth.colors),
+        truth_mid_tones=mid_tone_fraction(spots_lit_or_dark, truth.colors),
         truth_histogram=histogram(spots_lit_or_dark, truth.colors),
         ghost=example,
         harmonics={name: relight_through_harmonics(truth, light_map) for name, light_map in environments.items()},

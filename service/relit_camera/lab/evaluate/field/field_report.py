@@ -49,7 +49,7 @@ def field_json(report: FieldReport) -> dict[str, object]:
                 "error_in_region": float(each.error_region.mean()),
                 "sides_over_middle": report.sides_over_middle(each.error_whole),
                 "light_psnr_db": each.light_psnr_db,
-                "mid_tone_share": each.mid_tone_share,
+                "mid_tone_share": each.mid_tone_fraction,
                 "environment_psnr_db": each.psnr_db,
                 "environment_ssim": each.ssim,
                 "environments": {n: {"psnr_db": r.psnr_db, "ssim": r.ssim} for n, r in each.relit.items()},
@@ -68,7 +68,7 @@ def field_text(report: FieldReport) -> str:
     lines = ["method                      error x1000: all  region   one light   environments   SSIM    mid-tones"]
     lines += [
         f"{each.name:<26} {each.error_whole.mean() * 1e3:17.3f} {each.error_region.mean() * 1e3:7.3f} "
-        f"{each.light_psnr_db:8.2f} dB {each.psnr_db:11.2f} dB {each.ssim:7.4f} {each.mid_tone_share:9.1%}"
+        f"{each.light_psnr_db:8.2f} dB {each.psnr_db:11.2f} dB {each.ssim:7.4f} {each.mid_tone_fraction:9.1%}"
         for each in report.candidate_scores
     ]
     return "\n".join([*lines, f"{'truth':<26} {report.truth_mid_tones:64.1%}"])
@@ -95,7 +95,7 @@ def _summary(report: FieldReport) -> Iterator[Block]:
             each.light_psnr_db,
             each.psnr_db,
             f"{each.ssim:.4f}",
-            f"{each.mid_tone_share:.1%}",
+            f"{each.mid_tone_fraction:.1%}",
         ]
         for each in report.candidate_scores
     ]

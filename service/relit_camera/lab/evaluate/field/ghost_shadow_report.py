@@ -92,7 +92,7 @@ def _histogram(report: FieldReport) -> Figure:
     lines = {"truth": report.truth_histogram * 100} | {
         each.name: each.histogram * 100 for each in report.candidate_scores
     }
-    shares = ", ".join(f"{each.name} {each.mid_tone_share:.1%}" for each in report.candidate_scores)
+    fractions = ", ".join(f"{each.name} {each.mid_tone_fraction:.1%}" for each in report.candidate_scores)
     count = int((report.in_region & not_captured(report.captured, report.truth.directions)).sum())
     return line_plot(
         centers,
@@ -101,7 +101,7 @@ def _histogram(report: FieldReport) -> Figure:
         "share of the pixels, %",
         f"All pixels that one captured light reaches and a neighboring one does not, over {count} lights that were not "
         "captured. In truth most are dark (0) or lit (1). Interpolation moves them to the middle. Mid-tones, between "
-        f"{MID_TONE_RANGE[0]} and {MID_TONE_RANGE[1]}: truth {report.truth_mid_tones:.1%}; {shares}.",
+        f"{MID_TONE_RANGE[0]} and {MID_TONE_RANGE[1]}: truth {report.truth_mid_tones:.1%}; {fractions}.",
         from_zero=True,
     )
 

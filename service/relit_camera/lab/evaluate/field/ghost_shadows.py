@@ -18,9 +18,9 @@ from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth, pixel_colors
 
 DARK_FRACTION = 0.15
-"""A pixel is dark under a captured light at this share or less of its luminance under the brightest one."""
+"""A pixel is dark under a captured light at this fraction or less of its luminance under the brightest one."""
 BRIGHT_FRACTION = 0.5
-"""A pixel is lit at this share or more of the picture's bright parts. It then faces the light within about 60°, so
+"""A pixel is lit at this fraction or more of the picture's bright parts. It then faces the light within about 60°, so
 where it is dark under a neighboring light, it is occluded and not just grazed."""
 MID_TONE_RANGE = (0.15, 0.6)
 """Positions on the scale that count as mid-tones. Higher ones occur in truth under slanted light."""
@@ -76,7 +76,7 @@ def find_shadow_transitions(
 
 
 def histogram(spots: list[ShadowTransition], colors: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Histogram (30,), as shares, of all decided pixels of colors (truth lights, pixels, 3) on the scale."""
+    """Histogram (30,), as fractions, of all decided pixels of colors (truth lights, pixels, 3) on the scale."""
     counts = np.zeros(len(HISTOGRAM_EDGES) - 1)
     for between in spots:
         scale = between.scale(luminance(colors[between.light]))
@@ -84,8 +84,8 @@ def histogram(spots: list[ShadowTransition], colors: NDArray[np.float32]) -> NDA
     return np.asarray(counts / max(counts.sum(), 1))
 
 
-def mid_tone_share(spots: list[ShadowTransition], colors: NDArray[np.float32]) -> float:
-    """Share of mid-tones among all decided pixels of colors (truth lights, pixels, 3); 0 if there are none."""
+def mid_tone_fraction(spots: list[ShadowTransition], colors: NDArray[np.float32]) -> float:
+    """Fraction of mid-tones among all decided pixels of colors (truth lights, pixels, 3); 0 if there are none."""
     total = sum(int(between.decided.sum()) for between in spots)
     mid = sum(int(between.mid_tones(luminance(colors[between.light])).sum()) for between in spots)
     return mid / max(total, 1)

@@ -57,7 +57,7 @@ class GroundTruth:
 
     @cached_property
     def weights(self) -> NDArray[np.float64]:
-        """Each light's share (lights,) in the error measure: cos φ, summed over its texels (thesis 7)."""
+        """Each light's fraction (lights,) in the error measure: cos φ, summed over its texels (thesis 7)."""
         texels = texel_directions().reshape(-1, 3)
         return self._summed(np.hypot(texels[:, 0], texels[:, 2])[:, None])[:, 0]
 

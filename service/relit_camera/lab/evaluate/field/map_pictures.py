@@ -74,10 +74,10 @@ def triangle_edges(directions: NDArray[np.float64], size: tuple[int, int]) -> li
     """
     triangles = spherical_delaunay(directions)
     pairs = np.unique(np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    shares = np.linspace(0, 1, _ARC_POINTS)[:, None]
+    fractions = np.linspace(0, 1, _ARC_POINTS)[:, None]
     edges = []
     for start, end in pairs:
-        edge = map_pixels(directions[start] * (1 - shares) + directions[end] * shares, size)
+        edge = map_pixels(directions[start] * (1 - fractions) + directions[end] * fractions, size)
         edge[1:][np.abs(np.diff(edge[:, 1])) > size[1] / 2] = np.nan
         edges.append(edge)
     return edges

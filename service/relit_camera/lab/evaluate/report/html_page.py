@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from typing import ClassVar, Literal
 
 from relit_camera import __version__
-from relit_camera.base.errors import NotFoundError
+from relit_camera.base.errors import InputError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.images.image_types import DisplayImage
 
@@ -100,13 +100,13 @@ def require_report_packages() -> None:
     """Check that HTML reports can be made.
 
     Raises:
-        NotFoundError: a package of the extra `evaluate` is not installed.
+        InputError: a package of the extra `evaluate` is not installed.
     """
     missing = [name for name in REPORT_PACKAGES if find_spec(name) is None]
     if missing:
-        raise NotFoundError(
+        raise InputError(
             f"HTML reports need {' and '.join(missing)}",
-            "install them with `pip install 'relit-camera[evaluate]'`, or use --json without --out",
+            "`relit doctor` says how to install that; or use --json without --out",
         )
 
 

@@ -225,7 +225,8 @@ def _figure(canvas: Canvas, caption: str, form: Literal["svg", "png"]) -> Figure
 def _name_directions(axes: Axes, height: int, width: int) -> None:
     """Name the directions along the axes of a light map, whose middle is the direction to the camera."""
     axes.set_xticks(
-        [share * width - 0.5 for share in (0, 0.25, 0.5, 0.75, 1)], ["behind", "left", "camera", "right", "behind"]
+        [fraction * width - 0.5 for fraction in (0, 0.25, 0.5, 0.75, 1)],
+        ["behind", "left", "camera", "right", "behind"],
     )
-    axes.set_yticks([share * height - 0.5 for share in (0, 0.5, 1)], ["above", "level", "below"])
+    axes.set_yticks([fraction * height - 0.5 for fraction in (0, 0.5, 1)], ["above", "level", "below"])
     axes.tick_params(length=2, labelsize=8)

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.array_types import Float64Array, Indices
 from relit_camera.base.errors import InputError, ModelError
 from relit_camera.capture.alignment.rigid_transform import RigidTransform, interpolate_transforms, transforms_to_array
 from relit_camera.capture.film.face_localization import locate_face
@@ -28,8 +29,6 @@ from relit_camera.lab.evaluate.report.plots import line_plot
 from relit_camera.lab.evaluate.stabilization.baseline_stabilizers import BASELINE_STABILIZERS, register_landmarks
 from relit_camera.lab.evaluate.stabilization.face_crop_sequence import FaceCropSequence, read_face_crops
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 FramesUsed = Literal["bright", "dark", "both"]
 
 NO_STABILIZATION, OUR_METHOD = "none", "ours"
@@ -51,12 +50,12 @@ class StabilizationErrors:
 
     method: str
     seen: FramesUsed
-    rotation_deg: Floats
-    translation_px: Floats
+    rotation_deg: Float64Array
+    translation_px: Float64Array
     lost: int
 
     @property
-    def distance_px(self) -> Floats:
+    def distance_px(self) -> Float64Array:
         """Length (bright,) of the translation's error."""
         return np.asarray(np.linalg.norm(self.translation_px, axis=1))
 
@@ -136,7 +135,7 @@ def _fill_forward(transforms: Sequence[RigidTransform | None]) -> list[RigidTran
 
 
 def _errors_against_truth(
-    method: str, seen: FramesUsed, found: Sequence[RigidTransform], true_rows: Floats, lost: int
+    method: str, seen: FramesUsed, found: Sequence[RigidTransform], true_rows: Float64Array, lost: int
 ) -> StabilizationErrors:
     left = transforms_to_array(found) - true_rows
     left -= left.mean(axis=0)

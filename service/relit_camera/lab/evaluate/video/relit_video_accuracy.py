@@ -24,7 +24,7 @@ from relit_camera.lab.evaluate.report.plots import line_plot
 from relit_camera.lab.evaluate.video.head_motion_error import HeadMotion, PoseError, pose_error, second_difference_rms
 
 SHADING_BLUR_SIGMA = 0.04
-"""Sigma of the blur, as a share of the picture's width, after which light is compared and features hardly are."""
+"""Sigma of the blur, as a fraction of the picture's width, after which light is compared and features hardly are."""
 REPORT_FRAMES = 6
 """Approximate number of frames shown in the report."""
 _NO_PERSON = (np.nan,) * 6
@@ -56,12 +56,12 @@ class LightConsistency:
 
     @property
     def flicker(self) -> float:
-        """RMS second difference of the brightness, as a share of its mean; NaN for under three frames."""
+        """RMS second difference of the brightness, as a fraction of its mean; NaN for under three frames."""
         return _flicker(self.brightness)
 
     @property
     def true_flicker(self) -> float:
-        """RMS second difference of the truth's brightness, as a share of its mean: the part due to the motion."""
+        """RMS second difference of the truth's brightness, as a fraction of its mean: the part due to the motion."""
         return _flicker(self.true_brightness)
 
 

@@ -1,0 +1,1 @@
+"""What all parts of the studio use: raw files, progress, resuming, random signals."""

@@ -1,0 +1,1 @@
+"""Cameras of the studio: projection, and what a small camera does to light."""

@@ -1,0 +1,1 @@
+"""The mirror ball of a capture, and what it reflects."""

@@ -1,0 +1,1 @@
+"""The blinking torch of a capture: path, timing and shadow."""

@@ -1,0 +1,1 @@
+"""What `python -m relit_studio.mannequin` writes."""

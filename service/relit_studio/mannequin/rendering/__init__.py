@@ -1,0 +1,1 @@
+"""Pictures of the mannequin: camera, visibility and light."""

@@ -1,0 +1,1 @@
+"""Geometry of the mannequin, and its expressions and colors."""

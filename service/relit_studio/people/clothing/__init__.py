@@ -1,0 +1,1 @@
+"""What a person wears: shirt, collar and glasses."""

@@ -1,0 +1,1 @@
+"""Shape of the face: model, identity, expression, eyes and landmarks."""

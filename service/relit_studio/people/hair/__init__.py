@@ -1,0 +1,1 @@
+"""Hair of a person: head hair, brows, lashes and beard."""

@@ -1,0 +1,1 @@
+"""Skin of a person, from the scan of a real head."""

@@ -1,0 +1,1 @@
+"""Traits of a person: named people and random ones."""

@@ -1,0 +1,1 @@
+"""Single pictures of people, and whether public face models recognize them."""
