@@ -1,0 +1,126 @@
+"""How much detail a picture is given while the computer is busy: a state machine without threads or clock.
+
+Where pictures come late, each costs less in steps; where there is time again, the steps are taken back. So latency and
+not the queue grows. `next_quality` takes the state and how late a picture was, and gives the state after it. Whoever
+owns the state (`pipeline_supervisor.PipelineSupervisor`) tells the pipeline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class RenderQuality:
+    """What a picture may cost.
+
+    Attributes:
+        relight_every: the source image is relit for every so many frames while the head turns, extrapolated between.
+        half_size: whether the face is warped at half the output's size and enlarged.
+        track_every: the face is tracked in every so many frames, predicted between.
+    """
+
+    relight_every: int = 2
+    half_size: bool = False
+    track_every: int = 1
+
+
+QUALITY_LEVELS = (
+    RenderQuality(),
+    RenderQuality(relight_every=3),
+    RenderQuality(relight_every=3, half_size=True),
+    RenderQuality(relight_every=3, half_size=True, track_every=2),
+)
+"""From full quality to the cheapest."""
+
+
+@dataclass(frozen=True)
+class QualityLimits:
+    """When quality is lowered and raised. `python -m tests.overload` shows what comes of it (docs/performance.md).
+
+    Attributes:
+        late_s: mean latency of the last pictures above which quality is lowered.
+        early_s: mean latency below which it is raised: far enough below `late_s` that a level up stays below that.
+        idle_s: mean latency below which the load has surely gone, and raising is not delayed.
+        lower_after_s: how long pictures must be late, and how long a level is given to show what it saves.
+        raise_after_s: how long pictures must be early. Three levels up within two seconds.
+        max_raise_delay_s: each time a raised level proves too costly the wait before the next try doubles, up to this.
+        smoothing_s: time constant of the mean.
+    """
+
+    late_s: float = 0.080
+    early_s: float = 0.055
+    idle_s: float = 0.040
+    lower_after_s: float = 0.4
+    raise_after_s: float = 0.5
+    max_raise_delay_s: float = 16.0
+    smoothing_s: float = 0.15
+
+
+@dataclass(frozen=True)
+class QualityState:
+    """What is known of the load.
+
+    Attributes:
+        level: index into `QUALITY_LEVELS`.
+        latency_s: smoothed latency of the pictures; None before the first.
+        seen_at: when the last picture was rendered, in seconds on the clock.
+        since: since when pictures have been late or early without a break; None while they are neither.
+        late: which of the two.
+        raised_at: when quality was last raised; None when it was not, or when that has proved right.
+        raise_delay_s: how long pictures must be early before quality is raised.
+    """
+
+    level: int = 0
+    latency_s: float | None = None
+    seen_at: float = 0.0
+    since: float | None = None
+    late: bool = False
+    raised_at: float | None = None
+    raise_delay_s: float = 0.0
+
+    @property
+    def quality(self) -> RenderQuality:
+        """What the next picture may cost."""
+        return QUALITY_LEVELS[self.level]
+
+
+def next_quality(state: QualityState, rendered_at: float, latency_s: float, limits: QualityLimits) -> QualityState:
+    """The state after a picture.
+
+    Args:
+        state: before it.
+        rendered_at: when it was rendered, in seconds on the clock.
+        latency_s: from the arrival of its frame till then.
+        limits: see there.
+    """
+    state = _with_latency(state, rendered_at, latency_s, limits)
+    assert state.latency_s is not None
+    late, early = state.latency_s > limits.late_s, state.latency_s < limits.early_s
+    if not late and not early:
+        return replace(state, since=None)
+    if state.since is None or late is not state.late:
+        state = replace(state, since=rendered_at, late=late)
+    assert state.since is not None
+    lasted = rendered_at - state.since
+    if late and lasted >= limits.lower_after_s and state.level + 1 < len(QUALITY_LEVELS):
+        return _lowered(state, rendered_at, limits)
+    delay = limits.raise_after_s if state.latency_s < limits.idle_s else max(limits.raise_after_s, state.raise_delay_s)
+    if early and lasted >= delay and state.level > 0:
+        return replace(state, level=state.level - 1, since=None, raised_at=rendered_at)
+    return state
+
+
+def _with_latency(state: QualityState, now: float, latency_s: float, limits: QualityLimits) -> QualityState:
+    if state.latency_s is None or now < state.seen_at:
+        return replace(state, latency_s=latency_s, seen_at=now)
+    weight = min(1.0, (now - state.seen_at) / limits.smoothing_s)
+    return replace(state, latency_s=state.latency_s + weight * (latency_s - state.latency_s), seen_at=now)
+
+
+def _lowered(state: QualityState, now: float, limits: QualityLimits) -> QualityState:
+    """One level down. Where that level was left only lately, the next try waits twice as long."""
+    delay = state.raise_delay_s or limits.raise_after_s
+    tried = state.raised_at is not None and now - state.raised_at < 2 * delay + 2 * limits.lower_after_s
+    delay = min(2 * delay, limits.max_raise_delay_s) if tried else limits.raise_after_s
+    return replace(state, level=state.level + 1, since=None, raised_at=None, raise_delay_s=delay)

@@ -1,0 +1,101 @@
+"""How quality follows the load: a simulated machine whose latency grows with load and falls with each level."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from relit_camera.live.supervision.adaptive_quality import QUALITY_LEVELS, QualityLimits, QualityState, next_quality
+
+LIMITS = QualityLimits()
+SAVED = (1.0, 0.9, 0.7, 0.55)
+"""Latency at each level, relative to full quality."""
+FRAME_S = 1 / 30
+
+
+def simulate(full_latency_s: Callable[[float], float], seconds: float) -> list[tuple[float, int]]:
+    """(time, level) of each picture, where full quality has a latency of `full_latency_s(time)`."""
+    state, levels, now = QualityState(), [], 0.0
+    while now < seconds:
+        latency = full_latency_s(now) * SAVED[state.level]
+        now += max(FRAME_S, latency / 2)  # two frames are at work at once
+        state = next_quality(state, now, latency, LIMITS)
+        levels.append((now, state.level))
+    return levels
+
+
+def level_at(levels: list[tuple[float, int]], time_s: float) -> int:
+    return next(level for at, level in reversed(levels) if at <= time_s)
+
+
+def changes(levels: list[tuple[float, int]], after_s: float) -> int:
+    late = [level for at, level in levels if at > after_s]
+    return sum(a != b for a, b in pairwise(late))
+
+
+def test_there_is_no_cheaper_level_than_the_last_and_each_is_cheaper() -> None:
+    for cheaper, dearer in zip(QUALITY_LEVELS[1:], QUALITY_LEVELS, strict=False):
+        assert cheaper.relight_every >= dearer.relight_every
+        assert cheaper.half_size >= dearer.half_size
+        assert cheaper.track_every >= dearer.track_every
+        assert cheaper != dearer
+
+
+def test_a_machine_with_time_keeps_full_quality() -> None:
+    assert {level for _, level in simulate(lambda now: 0.035, 60)} == {0}
+
+
+def test_one_late_picture_changes_nothing() -> None:
+    assert {level for _, level in simulate(lambda now: 0.3 if 5 < now < 5.05 else 0.035, 10)} == {0}
+
+
+def test_overload_lowers_quality_until_pictures_are_in_time() -> None:
+    levels = simulate(lambda now: 0.105 if now > 1 else 0.035, 20)
+    assert level_at(levels, 3) == 2
+    assert 0.105 * SAVED[2] < LIMITS.late_s
+
+
+def test_overload_beyond_all_levels_ends_at_the_cheapest_within_two_seconds() -> None:
+    levels = simulate(lambda now: 0.3 if now > 1 else 0.035, 20)
+    assert level_at(levels, 3.5) == len(QUALITY_LEVELS) - 1
+    assert changes(levels, 4) == 0
+
+
+def test_full_quality_is_back_two_seconds_after_the_load_has_gone() -> None:
+    levels = simulate(lambda now: 0.3 if 1 < now < 30 else 0.035, 40)
+    assert level_at(levels, 29) == len(QUALITY_LEVELS) - 1
+    assert level_at(levels, 32.0) == 0
+
+
+def test_a_level_that_proves_too_costly_is_tried_less_and_less_often() -> None:
+    # Level 1 is early and level 0 is late: without the growing wait it would go up and down each second.
+    state, now, raised = QualityState(), 0.0, []
+    while now < 120:
+        now += FRAME_S
+        before = state.level
+        state = next_quality(state, now, 0.095 if state.level == 0 else 0.05, LIMITS)
+        if state.level < before:
+            raised.append(now)
+    waits = [round(b - a, 3) for a, b in pairwise(raised)]
+    assert waits == sorted(waits)
+    assert waits[-1] >= LIMITS.max_raise_delay_s
+    assert len(raised) < 15
+
+
+@given(st.lists(st.floats(0.001, 3.0), min_size=1, max_size=400))
+def test_any_latencies_keep_the_level_in_range_and_change_it_by_one(latencies: list[float]) -> None:
+    state, now = QualityState(), 0.0
+    for latency in latencies:
+        now += FRAME_S
+        after = next_quality(state, now, latency, LIMITS)
+        assert 0 <= after.level < len(QUALITY_LEVELS)
+        assert abs(after.level - state.level) <= 1
+        state = after
+
+
+def test_a_clock_that_jumps_back_begins_anew() -> None:
+    state = next_quality(QualityState(), 100.0, 0.2, LIMITS)
+    assert next_quality(state, 1.0, 0.03, LIMITS).latency_s == 0.03
