@@ -6,7 +6,9 @@ Axes and projection are those of `HeadPose`. OpenCV's camera looks along +Z with
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import cv2
 import numpy as np
@@ -35,12 +37,20 @@ class HeadPose:
     translation: NDArray[np.float64]
     focal_px: float
 
+    @cached_property
+    def matrix(self) -> NDArray[np.float64]:
+        """`rotation` as a matrix (3, 3)."""
+        return np.asarray(self.rotation.as_matrix())
+
     def depth_of(self, point: NDArray[np.float64]) -> float:
         """Distance in centimetres, along the camera's axis, from the camera to a head-space point (3,)."""
         return float(-(self.rotation.apply(point) + self.translation)[2])
 
 
 _CV_FROM_OURS = np.array([1.0, -1.0, -1.0])
+
+_REFINEMENT = (cv2.TERM_CRITERIA_COUNT, 5, 0.0)
+"""Steps of Levenberg-Marquardt from SQPnP's minimum: after three of them nothing changes any more."""
 
 
 def guess_focal(size: tuple[int, int]) -> float:
@@ -63,8 +73,7 @@ def fit_pose(
         focal_px: focal length if known, else `guess_focal`.
     """
     focal = focal_px or guess_focal(size)
-    camera = np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1]])
-    model = scheme.rigid_canonical * _CV_FROM_OURS
+    camera, model = _camera_matrix(focal, size), _rigid_model(scheme)
     pixels = landmarks[scheme.rigid_indices].astype(np.float64)
     if not np.isfinite(pixels).all():
         return None
@@ -72,19 +81,31 @@ def fit_pose(
         found, turn, shift = cv2.solvePnP(model, pixels, camera, None, flags=cv2.SOLVEPNP_SQPNP)
         if not found:
             return None
-        turn, shift = cv2.solvePnPRefineLM(model, pixels, camera, None, turn, shift)
+        turn, shift = cv2.solvePnPRefineLM(model, pixels, camera, None, turn, shift, _REFINEMENT)
     except cv2.error:  # OpenCV raises it for degenerate points
         return None
     translation = shift.ravel() * _CV_FROM_OURS
-    if not (np.isfinite(translation).all() and np.isfinite(turn).all() and translation[2] < 0):
+    if not (all(map(math.isfinite, (*shift.flat, *turn.flat))) and translation[2] < 0):
         return None
     # The rotation vector transforms like any vector.
     return HeadPose(Rotation.from_rotvec(turn.ravel() * _CV_FROM_OURS), translation, focal)
 
 
+@lru_cache(maxsize=8)
+def _camera_matrix(focal_px: float, size: tuple[int, int]) -> NDArray[np.float64]:
+    """OpenCV's camera matrix (3, 3), its principal point in the middle of a picture of `size` (width, height)."""
+    return np.array([[focal_px, 0, size[0] / 2], [0, focal_px, size[1] / 2], [0, 0, 1]])
+
+
+@lru_cache(maxsize=8)
+def _rigid_model(scheme: LandmarkScheme) -> NDArray[np.float64]:
+    """(rigid, 3): the rigid points of a scheme in OpenCV's axes."""
+    return scheme.rigid_canonical * _CV_FROM_OURS
+
+
 def project(points: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]) -> Points:
     """Pixels (count, 2) float32 of head-space points (count, 3) in centimetres under `pose`."""
-    camera_points = points @ pose.rotation.as_matrix().T + pose.translation
+    camera_points = points @ pose.matrix.T + pose.translation
     scale = pose.focal_px / -camera_points[:, 2]
     x = size[0] / 2 + camera_points[:, 0] * scale
     y = size[1] / 2 - camera_points[:, 1] * scale
@@ -97,7 +118,7 @@ def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: t
     The depth is that of the mean face; deviations from it are measured in the picture plane only. The inverse of
     `project` for points at those depths.
     """
-    camera_from_head = pose.rotation.as_matrix()
+    camera_from_head = pose.matrix
     depth = -(scheme.canonical @ camera_from_head[2] + pose.translation[2])
     x = (landmarks[:, 0] - size[0] / 2) * depth / pose.focal_px
     y = (size[1] / 2 - landmarks[:, 1]) * depth / pose.focal_px

@@ -186,8 +186,8 @@ class FaceFollower:
         passed = 0.0 if self._time_s is None else max(time_s - self._time_s, 0.0)
         self._time_s = time_s
         step = passed / self._settings.ease_s
-        self._presence = float(np.clip(self._presence + (step if self._followed else -step), 0, 1))
-        return float(smoothstep(self._presence))
+        self._presence = min(max(self._presence + (step if self._followed else -step), 0.0), 1.0)
+        return float(smoothstep(self._presence)) if 0 < self._presence < 1 else self._presence
 
 
 class _FaceSmoother:
@@ -218,7 +218,7 @@ class _FaceSmoother:
         self, points: NDArray[np.float64], pose: HeadPose, time_s: float, noise: float
     ) -> tuple[NDArray[np.float64], HeadPose]:
         """Smooth head-space points (count, 3) and the pose, `noise` times as noisy as those of a near face."""
-        rotation = rotation_from_matrix(self._rotation(pose.rotation.as_matrix(), time_s, noise))
+        rotation = rotation_from_matrix(self._rotation(pose.matrix, time_s, noise))
         # Depth follows from the face's size alone: its error exceeds that of the position across and grows with depth.
         depth_noise = max(1.0, -pose.translation[2] / FACE_SMOOTHING.low_noise_depth_cm)
         axes_noise = noise * np.array([[1.0], [1.0], [depth_noise]])
