@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import Points
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
 
 
@@ -36,11 +36,6 @@ class HeadPose:
     rotation: Rotation
     translation: NDArray[np.float64]
     focal_px: float
-
-    @cached_property
-    def matrix(self) -> NDArray[np.float64]:
-        """`rotation` as a matrix (3, 3)."""
-        return np.asarray(self.rotation.as_matrix())
 
     def depth_of(self, point: NDArray[np.float64]) -> float:
         """Distance in centimetres, along the camera's axis, from the camera to a head-space point (3,)."""
@@ -100,12 +95,12 @@ def _camera_matrix(focal_px: float, size: tuple[int, int]) -> NDArray[np.float64
 @lru_cache(maxsize=8)
 def _rigid_model(scheme: LandmarkScheme) -> NDArray[np.float64]:
     """(rigid, 3): the rigid points of a scheme in OpenCV's axes."""
-    return scheme.rigid_canonical * _CV_FROM_OURS
+    return np.asarray(scheme.rigid_canonical * _CV_FROM_OURS)
 
 
 def project(points: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]) -> Points:
     """Pixels (count, 2) float32 of head-space points (count, 3) in centimetres under `pose`."""
-    camera_points = points @ pose.matrix.T + pose.translation
+    camera_points = points @ pose.rotation.as_matrix().T + pose.translation
     scale = pose.focal_px / -camera_points[:, 2]
     x = size[0] / 2 + camera_points[:, 0] * scale
     y = size[1] / 2 - camera_points[:, 1] * scale
@@ -118,7 +113,7 @@ def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: t
     The depth is that of the mean face; deviations from it are measured in the picture plane only. The inverse of
     `project` for points at those depths.
     """
-    camera_from_head = pose.matrix
+    camera_from_head = pose.rotation.as_matrix()
     depth = -(scheme.canonical @ camera_from_head[2] + pose.translation[2])
     x = (landmarks[:, 0] - size[0] / 2) * depth / pose.focal_px
     y = (size[1] / 2 - landmarks[:, 1]) * depth / pose.focal_px

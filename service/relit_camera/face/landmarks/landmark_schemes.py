@@ -125,7 +125,7 @@ class LandmarkScheme:
         return ((corners[:, 0] + corners[:, 1]) / 2).astype(np.float32)
 
     def eyes_center(self, landmarks: Points) -> tuple[float, float]:
-        """x and y of the middle between the four corners of both eyes."""
+        """X and y of the middle between the four corners of both eyes."""
         corners = landmarks[self._eye_corners.ravel()].tolist()
         return sum(x for x, _ in corners) / 4, sum(y for _, y in corners) / 4
 
