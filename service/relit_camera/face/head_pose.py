@@ -44,9 +44,6 @@ class HeadPose:
 
 _CV_FROM_OURS = np.array([1.0, -1.0, -1.0])
 
-_REFINEMENT = (cv2.TERM_CRITERIA_COUNT, 5, 0.0)
-"""Steps of Levenberg-Marquardt from SQPnP's minimum: after three of them nothing changes any more."""
-
 
 def guess_focal(size: tuple[int, int]) -> float:
     """Focal length in pixels of a typical webcam, whose longer side spans 53 degrees. `size` is (width, height)."""
@@ -76,7 +73,7 @@ def fit_pose(
         found, turn, shift = cv2.solvePnP(model, pixels, camera, None, flags=cv2.SOLVEPNP_SQPNP)
         if not found:
             return None
-        turn, shift = cv2.solvePnPRefineLM(model, pixels, camera, None, turn, shift, _REFINEMENT)
+        turn, shift = cv2.solvePnPRefineLM(model, pixels, camera, None, turn, shift)
     except cv2.error:  # OpenCV raises it for degenerate points
         return None
     translation = shift.ravel() * _CV_FROM_OURS
@@ -101,10 +98,8 @@ def _rigid_model(scheme: LandmarkScheme) -> NDArray[np.float64]:
 def project(points: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]) -> Points:
     """Pixels (count, 2) float32 of head-space points (count, 3) in centimetres under `pose`."""
     camera_points = points @ pose.rotation.as_matrix().T + pose.translation
-    scale = pose.focal_px / -camera_points[:, 2]
-    x = size[0] / 2 + camera_points[:, 0] * scale
-    y = size[1] / 2 - camera_points[:, 1] * scale
-    return np.stack([x, y], axis=1).astype(np.float32)
+    across = camera_points[:, :2] * (np.array([-pose.focal_px, pose.focal_px]) / camera_points[:, 2:])
+    return (across + np.array(size) / 2).astype(np.float32)
 
 
 def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: tuple[int, int]) -> NDArray[np.float64]:
@@ -115,7 +110,9 @@ def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: t
     """
     camera_from_head = pose.rotation.as_matrix()
     depth = -(scheme.canonical @ camera_from_head[2] + pose.translation[2])
-    x = (landmarks[:, 0] - size[0] / 2) * depth / pose.focal_px
-    y = (size[1] / 2 - landmarks[:, 1]) * depth / pose.focal_px
-    camera_points = np.stack([x, y, -depth], axis=1)
-    return np.asarray((camera_points - pose.translation) @ camera_from_head)
+    camera_points = np.empty((len(landmarks), 3))
+    camera_points[:, :2] = (landmarks - np.array(size) / 2) * np.array([1 / pose.focal_px, -1 / pose.focal_px])
+    camera_points[:, 2] = -1
+    camera_points *= depth[:, None]
+    camera_points -= pose.translation
+    return np.asarray(camera_points @ camera_from_head)
