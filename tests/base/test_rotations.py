@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
+from scipy.spatial import transform
 
-from relit_camera.base.rotations import angles_from_rotation, rotation_from_angles
+from relit_camera.base.rotations import Rotation, angles_from_rotation, rotation_from_angles
 
 NOSE, RIGHT_SIDE, TOP = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
@@ -41,8 +41,30 @@ def test_round_trip(yaw: float, pitch: float, roll: float) -> None:
 
 @given(st.integers(0, 2**32 - 1))
 def test_agrees_with_scipy(seed: int) -> None:
-    rotation = Rotation.random(rng=np.random.default_rng(seed))
-    np.testing.assert_allclose(angles_from_rotation(rotation), rotation.as_euler("YXZ", degrees=True), atol=1e-6)
+    rng = np.random.default_rng(seed)
+    first, second = transform.Rotation.random(rng=rng), transform.Rotation.random(rng=rng)
+    one, other = Rotation(first.as_matrix()), Rotation(second.as_matrix())
+    vectors = rng.normal(size=(4, 3))
+    np.testing.assert_allclose(angles_from_rotation(one), first.as_euler("YXZ", degrees=True), atol=1e-6)
+    np.testing.assert_allclose((one * other.inv()).as_matrix(), (first * second.inv()).as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(one.apply(vectors), first.apply(vectors), atol=1e-12)
+    np.testing.assert_allclose(one.apply([0, 0, 1]), first.apply([0, 0, 1]), atol=1e-12)
+    np.testing.assert_allclose(one.as_rotvec(), first.as_rotvec(), atol=1e-6)
+    assert one.magnitude() == pytest.approx(first.magnitude(), abs=1e-6)
+    np.testing.assert_allclose(Rotation.from_rotvec(first.as_rotvec()).as_matrix(), first.as_matrix(), atol=1e-12)
+
+
+def test_the_rotation_nearest_to_a_mean_is_the_mean_rotation() -> None:
+    several = transform.Rotation.from_rotvec(np.random.default_rng(4).normal(0, 0.4, (9, 3)))
+    mean = Rotation.nearest(several.as_matrix().mean(axis=0))
+    np.testing.assert_allclose(mean.as_matrix(), several.mean().as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(Rotation.nearest(np.diag([1.0, 1.0, -0.1])).as_matrix(), np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-7, 1e-3, 3.0, np.pi - 2e-3, np.pi - 1e-4])
+def test_the_axis_of_the_smallest_and_the_largest_turns_is_known(angle: float) -> None:
+    axis = np.array([0.6, 0.0, 0.8])
+    np.testing.assert_allclose(Rotation.from_rotvec(axis * angle).as_rotvec(), axis * angle, rtol=1e-6, atol=1e-15)
 
 
 @pytest.mark.parametrize("pitch", [90, -90])

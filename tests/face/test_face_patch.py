@@ -41,5 +41,11 @@ def test_a_flat_picture_and_points_in_one_place_are_no_trouble() -> None:
     assert FacePatch(scene(), np.zeros((5, 2), np.float32)).matches(scene())
 
 
+@pytest.mark.parametrize("corner", [-400, -50, 150, 900])
+def test_a_face_that_is_partly_or_wholly_beyond_the_picture_is_compared_where_it_is_inside(corner: int) -> None:
+    points = np.array([[corner, corner], [corner + 100, corner + 100]], np.float32)
+    assert FacePatch(scene(), points).matches(scene())
+
+
 def test_it_keeps_the_points() -> None:
     assert FacePatch(scene(), POINTS).points is POINTS

@@ -106,6 +106,7 @@ def test_points_in_one_place_have_no_opening(scheme: LandmarkScheme) -> None:
 
 def test_eye_centres_are_right_then_left(scheme: LandmarkScheme) -> None:
     right, left = scheme.eye_centers(front_view(scheme))
+    np.testing.assert_allclose(scheme.eyes_center(front_view(scheme)), (right + left) / 2, rtol=1e-6)
     assert right[0] < left[0]
     assert right[1] == pytest.approx(left[1])
 

@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from relit_camera.base.rotations import angles_from_rotation, rotation_from_angles
+from relit_camera.base.rotations import Rotation, angles_from_rotation, rotation_from_angles
 from relit_camera.face.motion.one_euro_filter import OneEuroFilter, OneEuroParameters, RotationOneEuroFilter
 
 RATE = 30.0
@@ -131,7 +130,7 @@ def test_reset_forgets() -> None:
 
 
 def turned_by(smooth: RotationOneEuroFilter, angles: list[float], time_s: float) -> Rotation:
-    return Rotation.from_matrix(smooth(rotation_from_angles(*angles).as_matrix(), time_s))
+    return Rotation(smooth(rotation_from_angles(*angles).as_matrix(), time_s))
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

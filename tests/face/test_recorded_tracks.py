@@ -67,7 +67,7 @@ def test_every_frame_is_found(replay: Replay):
 
 
 def test_head_pose_against_truth(replay: Replay):
-    measured = [state.pose.rotation for state in replay.states if state.pose]
+    measured = [Rotation.from_matrix(state.pose.rotation.as_matrix()) for state in replay.states if state.pose]
     offset = Rotation.concatenate(
         [pose * truth.inv() for pose, truth in zip(measured, replay.head, strict=True)]
     ).mean()

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
+from relit_camera.base.images.affine import opencv_affine
 from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
 
 
@@ -32,6 +34,18 @@ def test_the_middle_and_corners_of_an_upright_crop() -> None:
 def test_the_angle_is_clockwise_in_the_picture() -> None:
     crop = Crop(center=(0.0, 0.0), width=2.0, height=2.0, angle=np.pi / 2)
     np.testing.assert_allclose(crop.to_picture(np.array([[2, 1]], np.float32), 2, 2), [[0, 1]], atol=1e-6)
+
+
+@pytest.mark.parametrize(("x", "y"), [(90.0, 80.0), (10.0, 150.0), (215.0, -20.0)])
+def test_a_cut_is_opencvs_of_the_whole_picture(x: float, y: float) -> None:
+    picture = np.random.default_rng(0).integers(0, 256, (160, 200, 3), dtype=np.uint8)
+    crop = Crop(center=(x, y), width=90.0, height=70.0, angle=0.5)
+    affine = opencv_affine(crop.picture_from_pixels(64, 48))
+    whole = cv2.warpAffine(picture, affine, (64, 48), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+    difference = np.abs(crop.cut(picture, 64, 48).astype(int) - whole)
+    assert whole.any()
+    assert difference.max() <= 1
+    assert (difference > 0).mean() < 0.002
 
 
 def test_beyond_the_picture_is_black() -> None:

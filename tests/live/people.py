@@ -7,11 +7,11 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask
 from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.base.rotations import Rotation, rotation_from_angles
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose, guess_focal, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
@@ -26,7 +26,7 @@ from relit_camera.subject.subject import Subject
 
 SCHEME = landmark_scheme("mesh478")
 LIVE_SIZE = (320, 240)
-LIVE_NEUTRAL = HeadPose(Rotation.from_euler("Y", 4, degrees=True), np.array([3.0, -1.0, -60.0]), guess_focal(LIVE_SIZE))
+LIVE_NEUTRAL = HeadPose(rotation_from_angles(4), np.array([3.0, -1.0, -60.0]), guess_focal(LIVE_SIZE))
 NEUTRAL = NeutralFace(SCHEME.canonical.copy(), LIVE_NEUTRAL)
 
 

@@ -6,10 +6,10 @@ from functools import cache
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose, project
 from relit_studio.cameras.studio_camera import Camera
 

@@ -6,14 +6,16 @@ Axes and projection are those of `HeadPose`. OpenCV's camera looks along +Z with
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import Points
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
 
 
@@ -63,8 +65,7 @@ def fit_pose(
         focal_px: focal length if known, else `guess_focal`.
     """
     focal = focal_px or guess_focal(size)
-    camera = np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1]])
-    model = scheme.rigid_canonical * _CV_FROM_OURS
+    camera, model = _camera_matrix(focal, size), _rigid_model(scheme)
     pixels = landmarks[scheme.rigid_indices].astype(np.float64)
     if not np.isfinite(pixels).all():
         return None
@@ -76,19 +77,29 @@ def fit_pose(
     except cv2.error:  # OpenCV raises it for degenerate points
         return None
     translation = shift.ravel() * _CV_FROM_OURS
-    if not (np.isfinite(translation).all() and np.isfinite(turn).all() and translation[2] < 0):
+    if not (all(map(math.isfinite, (*shift.flat, *turn.flat))) and translation[2] < 0):
         return None
     # The rotation vector transforms like any vector.
     return HeadPose(Rotation.from_rotvec(turn.ravel() * _CV_FROM_OURS), translation, focal)
 
 
+@lru_cache(maxsize=8)
+def _camera_matrix(focal_px: float, size: tuple[int, int]) -> NDArray[np.float64]:
+    """OpenCV's camera matrix (3, 3), its principal point in the middle of a picture of `size` (width, height)."""
+    return np.array([[focal_px, 0, size[0] / 2], [0, focal_px, size[1] / 2], [0, 0, 1]])
+
+
+@lru_cache(maxsize=8)
+def _rigid_model(scheme: LandmarkScheme) -> NDArray[np.float64]:
+    """(rigid, 3): the rigid points of a scheme in OpenCV's axes."""
+    return np.asarray(scheme.rigid_canonical * _CV_FROM_OURS)
+
+
 def project(points: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]) -> Points:
     """Pixels (count, 2) float32 of head-space points (count, 3) in centimetres under `pose`."""
     camera_points = points @ pose.rotation.as_matrix().T + pose.translation
-    scale = pose.focal_px / -camera_points[:, 2]
-    x = size[0] / 2 + camera_points[:, 0] * scale
-    y = size[1] / 2 - camera_points[:, 1] * scale
-    return np.stack([x, y], axis=1).astype(np.float32)
+    across = camera_points[:, :2] * (np.array([-pose.focal_px, pose.focal_px]) / camera_points[:, 2:])
+    return (across + np.array(size) / 2).astype(np.float32)
 
 
 def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: tuple[int, int]) -> NDArray[np.float64]:
@@ -99,7 +110,9 @@ def unproject(landmarks: Points, pose: HeadPose, scheme: LandmarkScheme, size: t
     """
     camera_from_head = pose.rotation.as_matrix()
     depth = -(scheme.canonical @ camera_from_head[2] + pose.translation[2])
-    x = (landmarks[:, 0] - size[0] / 2) * depth / pose.focal_px
-    y = (size[1] / 2 - landmarks[:, 1]) * depth / pose.focal_px
-    camera_points = np.stack([x, y, -depth], axis=1)
-    return np.asarray((camera_points - pose.translation) @ camera_from_head)
+    camera_points = np.empty((len(landmarks), 3))
+    camera_points[:, :2] = (landmarks - np.array(size) / 2) * np.array([1 / pose.focal_px, -1 / pose.focal_px])
+    camera_points[:, 2] = -1
+    camera_points *= depth[:, None]
+    camera_points -= pose.translation
+    return np.asarray(camera_points @ camera_from_head)

@@ -7,8 +7,8 @@ from functools import lru_cache
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from relit_camera.base.rotations import Rotation
 from relit_camera.light.directions import MAP_HEIGHT, MAP_WIDTH, direction_from_spherical
 from relit_camera.light.light_map import LightMap, total
 from relit_camera.light.light_map_interpolation import pad_poles, padded_positions

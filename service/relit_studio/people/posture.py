@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from scipy.spatial import transform
 
 from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
-from relit_camera.base.rotations import Angles, rotation_from_angles
+from relit_camera.base.rotations import Angles, Rotation, rotation_from_angles
 from relit_studio.people.face.expressions import NEUTRAL, Expression
 
 PIVOT = np.array([0.0, -4.0, -1.0])
@@ -39,7 +39,7 @@ def turned(points: Float64Array, rotation: Rotation, fraction: Float64Array | No
     offset = points - PIVOT
     if fraction is None:
         return np.asarray(rotation.apply(offset) + PIVOT)
-    return np.asarray(Rotation.from_rotvec(fraction[:, None] * rotation.as_rotvec()).apply(offset) + PIVOT)
+    return np.asarray(transform.Rotation.from_rotvec(fraction[:, None] * rotation.as_rotvec()).apply(offset) + PIVOT)
 
 
 def rigid_motion(rotation: Rotation) -> Float64Array:

@@ -5,11 +5,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.tone_mapping import linear_from_display
-from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.base.rotations import Rotation, rotation_from_angles
 from relit_camera.light.directions import direction_from_degrees, texel_directions
 from relit_camera.light.environments.environment_panorama import Panorama, read_panorama
 from relit_camera.light.exposure import auto_exposure_scale

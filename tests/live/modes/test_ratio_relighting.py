@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Points
 from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
 from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map

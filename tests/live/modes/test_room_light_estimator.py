@@ -6,12 +6,11 @@ import cv2
 import numpy as np
 import pytest
 from scipy.optimize import nnls
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.base.rotations import Rotation, rotation_from_angles
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.room_light_estimator import (

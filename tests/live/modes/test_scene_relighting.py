@@ -6,11 +6,10 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.config.look import Look
 from relit_camera.base.images.image_quality import psnr
-from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.base.rotations import Rotation, rotation_from_angles
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
-from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.base.rotations import Rotation, rotation_from_angles
 from relit_camera.live.modes.turn_extrapolation import TurnExtrapolation
 
 LIGHT, ROOM = object(), object()

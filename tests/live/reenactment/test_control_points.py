@@ -6,9 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.live.reenactment.control_points import (
@@ -146,14 +146,14 @@ def test_feature_boxes_hold_eyes_and_mouth(face: SourceFace) -> None:
 
 def test_the_skulls_outline_stays_when_the_head_turns_about_its_middle(face: SourceFace) -> None:
     rest = skull_outline(face.pose, face.size)
-    nodded = rotate_about(SKULL_CENTER, face.pose, Rotation.from_euler("Y", 25, degrees=True))
+    nodded = rotate_about(SKULL_CENTER, face.pose, rotation_from_angles(25))
     np.testing.assert_allclose(skull_outline(nodded, face.size), rest, atol=1e-3)
 
 
 def test_the_skulls_outline_rolls_and_grows_with_the_head(face: SourceFace) -> None:
     rest, size = skull_outline(face.pose, face.size), face.size
     # A roll about the camera's own axis turns the whole picture: positive lifts its right side.
-    roll = Rotation.from_euler("Z", 20, degrees=True)
+    roll = rotation_from_angles(0, 0, 20)
     rolled = HeadPose(roll * face.pose.rotation, roll.apply(face.pose.translation), face.pose.focal_px)
     across = (rest - np.array(size) / 2) * [1, -1]
     expected = roll.apply(np.column_stack([across, np.zeros(len(across))]))[:, :2] * [1, -1] + np.array(size) / 2
@@ -163,6 +163,6 @@ def test_the_skulls_outline_rolls_and_grows_with_the_head(face: SourceFace) -> N
 
 
 def test_shoulders_stay_while_the_head_turns_on_its_neck(face: SourceFace) -> None:
-    turned = rotate_about(NECK_PIVOT, face.pose, Rotation.from_euler("YXZ", [25, 10, 5], degrees=True))
+    turned = rotate_about(NECK_PIVOT, face.pose, rotation_from_angles(25, 10, 5))
     np.testing.assert_allclose(shoulder_anchors(turned, face.size), shoulder_anchors(face.pose, face.size), atol=1e-3)
     assert shoulder_anchors(face.pose, face.size)[:, 1].min() > face.landmarks[list(SCHEME.lips), 1].max()

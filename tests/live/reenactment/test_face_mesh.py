@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial import Delaunay
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.base.rotations import Rotation, rotation_from_angles
 from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion, box_around
 from relit_camera.live.reenactment.face_mesh import draw_triangles, triangulate_face
@@ -61,7 +61,7 @@ def firm(face: SourceFace):
 
 @pytest.mark.parametrize("yaw", [-12, 0, 12])
 def test_every_landmark_of_a_face_that_hides_nothing_is_met(face: SourceFace, yaw: float) -> None:
-    target, head, mesh = warps_of(face, Rotation.from_euler("Y", yaw, degrees=True))
+    target, head, mesh = warps_of(face, rotation_from_angles(yaw))
     rows = firm(face)
     error, before = (
         np.median(np.linalg.norm(looks_at(warp, target.landmarks[rows]) - face.landmarks[rows], axis=1))
@@ -75,7 +75,7 @@ def test_every_landmark_of_a_face_that_hides_nothing_is_met(face: SourceFace, ya
     ("yaw", "hidden", "seen"), [(35, NOSE_LEFT_WING, NOSE_RIGHT_WING), (-35, NOSE_RIGHT_WING, NOSE_LEFT_WING)]
 )
 def test_a_turned_nose_covers_its_far_side(face: SourceFace, yaw: float, hidden: np.ndarray, seen: np.ndarray) -> None:
-    target, _, mesh = warps_of(face, Rotation.from_euler("Y", yaw, degrees=True))
+    target, _, mesh = warps_of(face, rotation_from_angles(yaw))
     near, far = looks_at(mesh, target.landmarks[[seen, hidden]])
     step = np.linalg.norm(face.landmarks[NOSE_LEFT_WING] - face.landmarks[NOSE_RIGHT_WING])
     assert np.linalg.norm(near - face.landmarks[seen]) < 0.1 * step
@@ -89,7 +89,7 @@ def test_no_point_looks_far_from_where_its_neighbours_look(
     face: SourceFace, angles: tuple[float, float, float]
 ) -> None:
     """Thin triangles, seen from the side, throw nothing away: all look inside the face."""
-    target, _, mesh = warps_of(face, Rotation.from_euler("YXZ", angles, degrees=True))
+    target, _, mesh = warps_of(face, rotation_from_angles(*angles))
     left, top, right, bottom = box_around(target.landmarks, 0.0)
     x, y = np.meshgrid(np.linspace(left, right, 80)[20:-20], np.linspace(top, bottom, 80)[20:-20])
     inner = looks_at(mesh, np.stack([x, y], axis=2).reshape(-1, 2))
@@ -99,7 +99,7 @@ def test_no_point_looks_far_from_where_its_neighbours_look(
 
 
 def test_outside_the_face_the_flow_is_the_heads(face: SourceFace) -> None:
-    target, head, mesh = warps_of(face, Rotation.from_euler("Y", 15, degrees=True))
+    target, head, mesh = warps_of(face, rotation_from_angles(15))
     left, top, right, bottom = box_around(target.landmarks, 0.0)
     corners = np.array([(left, top), (right, top), (left, bottom), (right, bottom)])
     np.testing.assert_allclose(
@@ -146,7 +146,7 @@ def test_a_still_face_does_not_flicker(face: SourceFace) -> None:
     rng = np.random.default_rng(6)
     landmarks, looks = [], []
     for _ in range(4):
-        turn = Rotation.from_euler("YXZ", rng.normal(0, 0.01, 3) + [10, 4, 2], degrees=True)
+        turn = rotation_from_angles(*rng.normal(0, 0.01, 3) + [10, 4, 2])
         target, _, mesh = warps_of(face, turn)
         landmarks.append(target.landmarks)
         looks.append(mesh.grid((0, 0, *face.size), 1).nodes())

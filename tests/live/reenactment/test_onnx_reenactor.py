@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 from onnx import TensorProto, helper, numpy_helper
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.errors import ModelError
 from relit_camera.base.images.color import srgb_decode, srgb_encode
 from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.head_pose import project
 from relit_camera.face.landmarks.rotated_crop import Crop
@@ -276,7 +276,7 @@ def test_crops_show_the_same_part_of_any_head() -> None:
 
 def test_a_crop_goes_along_with_a_shift_and_stays_for_a_turn() -> None:
     shifted = motion(shift=(5, 2, -10)).pose
-    turned = motion(Rotation.from_euler("Y", 20, degrees=True)).pose
+    turned = motion(rotation_from_angles(20)).pose
     assert shifted is not None
     assert turned is not None
     crop = head_crop(LIVE_NEUTRAL, LIVE_SIZE)
@@ -285,7 +285,7 @@ def test_a_crop_goes_along_with_a_shift_and_stays_for_a_turn() -> None:
     assert along.center == pytest.approx(exact.center, abs=2.0)  # of 170; neck and face differ in depth
     assert along.width == pytest.approx(exact.width, rel=0.03)
     assert tracked_head_crop(LIVE_NEUTRAL, LIVE_NEUTRAL, LIVE_SIZE) == crop
-    neck = motion(Rotation.from_euler("Y", 20, degrees=True), shift=_neck_turn(20)).pose
+    neck = motion(rotation_from_angles(20), shift=_neck_turn(20)).pose
     assert neck is not None
     assert tracked_head_crop(LIVE_NEUTRAL, neck, LIVE_SIZE).center == pytest.approx(crop.center, abs=0.05)
     assert tracked_head_crop(LIVE_NEUTRAL, turned, LIVE_SIZE).center != pytest.approx(crop.center, abs=2)
@@ -293,7 +293,7 @@ def test_a_crop_goes_along_with_a_shift_and_stays_for_a_turn() -> None:
 
 def _neck_turn(yaw_deg: float) -> np.ndarray:
     """Centimetres by which the head's origin moves when it turns on the neck."""
-    turn = Rotation.from_euler("Y", yaw_deg, degrees=True)
+    turn = rotation_from_angles(yaw_deg)
     return rotate_about(NECK_PIVOT, LIVE_NEUTRAL, turn).translation - LIVE_NEUTRAL.translation
 
 

@@ -9,11 +9,11 @@ from typing import cast
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.errors import VideoError
 from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.rotations import Rotation
 from relit_camera.devices.sinks.sink import NullSink
 from relit_camera.devices.sources.source import SourceInfo, SourceState
 from relit_camera.face.face_state import FaceStatus

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from relit_camera.base.errors import VideoError
 from relit_camera.base.images.color import Gamma, decode
 from relit_camera.base.images.image_types import Frame, LinearImage
+from relit_camera.base.video.jpeg_packets import JpegPicture, decode_jpeg_packet, is_plain_jpeg
 from relit_camera.base.video.video_decoding import (
     Orientation,
     PixelConverter,
@@ -143,7 +144,7 @@ class FrameReader(Generic[FrameT]):
         begun = False
         try:
             for packet in self._container.demux(self._stream):
-                pictures = _decode_packet(packet)
+                pictures = self._decode_packet(packet)
                 self._damaged += begun and pictures is None
                 for picture in pictures or ():
                     self._damaged += begun and picture.is_corrupt
@@ -152,15 +153,14 @@ class FrameReader(Generic[FrameT]):
         except av.FFmpegError:
             self._damaged += 1
 
-
-def _decode_packet(packet: Any) -> list[Any] | None:
-    """Decode the pictures that a packet completes, or None if it is damaged."""
-    if packet.is_corrupt:
-        return None
-    try:
-        return list(packet.decode())
-    except av.FFmpegError:
-        return None
+    def _decode_packet(self, packet: Any) -> list[Any] | None:
+        """Decode the pictures that a packet completes, or None if it is damaged."""
+        if packet.is_corrupt:
+            return None
+        try:
+            return list(packet.decode())
+        except av.FFmpegError:
+            return None
 
 
 def _video_info(container: Any, stream: Any, turn: Orientation) -> VideoInfo:
@@ -204,14 +204,26 @@ class VideoReader(FrameReader[Frame]):
 
         Args:
             path: the file.
-            accurate: convert colors to within half a code value; otherwise faster, about one code value too dark.
+            accurate: convert colors to within half a code value; otherwise faster, about one code value too dark, or
+                Motion JPEG as `jpeg_packets` does.
             threads: of the decoder.
         """
+        self._accurate, self._plain_jpeg = accurate, False
         self._convert = PixelConverter(accurate=accurate)
         super().__init__(path, threads)
 
+    def _decode_packet(self, packet: Any) -> list[Any] | None:
+        if self._plain_jpeg:
+            return decode_jpeg_packet(packet)
+        pictures = super()._decode_packet(packet)
+        if pictures and not self._accurate:
+            # FFmpeg decodes the first picture in any case: it tells orientation and colors.
+            self._plain_jpeg = is_plain_jpeg(self._stream.codec_context.name, pictures[0])
+        return pictures
+
     def _make(self, picture: Any, index: int, time_s: float) -> Frame:
-        image = np.ascontiguousarray(self._orientation.upright(self._convert(picture)))
+        codes = picture.image if isinstance(picture, JpegPicture) else self._convert(picture)
+        image = np.ascontiguousarray(self._orientation.upright(codes))
         image.setflags(write=False)
         return Frame(image, index, time.monotonic(), time_s)
 

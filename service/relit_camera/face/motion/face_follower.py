@@ -9,12 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import TrackError
 from relit_camera.base.images.image_types import Points
-from relit_camera.base.rotations import Angles, angles_from_rotation, rotation_from_matrix
+from relit_camera.base.rotations import Angles, Rotation, angles_from_rotation
 from relit_camera.face.face_state import FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose, project, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
@@ -186,8 +185,8 @@ class FaceFollower:
         passed = 0.0 if self._time_s is None else max(time_s - self._time_s, 0.0)
         self._time_s = time_s
         step = passed / self._settings.ease_s
-        self._presence = float(np.clip(self._presence + (step if self._followed else -step), 0, 1))
-        return float(smoothstep(self._presence))
+        self._presence = min(max(self._presence + (step if self._followed else -step), 0.0), 1.0)
+        return float(smoothstep(self._presence)) if 0 < self._presence < 1 else self._presence
 
 
 class _FaceSmoother:
@@ -218,7 +217,7 @@ class _FaceSmoother:
         self, points: NDArray[np.float64], pose: HeadPose, time_s: float, noise: float
     ) -> tuple[NDArray[np.float64], HeadPose]:
         """Smooth head-space points (count, 3) and the pose, `noise` times as noisy as those of a near face."""
-        rotation = rotation_from_matrix(self._rotation(pose.rotation.as_matrix(), time_s, noise))
+        rotation = Rotation(self._rotation(pose.rotation.as_matrix(), time_s, noise))
         # Depth follows from the face's size alone: its error exceeds that of the position across and grows with depth.
         depth_noise = max(1.0, -pose.translation[2] / FACE_SMOOTHING.low_noise_depth_cm)
         axes_noise = noise * np.array([[1.0], [1.0], [depth_noise]])

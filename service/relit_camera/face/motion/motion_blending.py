@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.easing import smoothstep
+from relit_camera.base.rotations import Rotation
 
 
 @dataclass(frozen=True, eq=False)

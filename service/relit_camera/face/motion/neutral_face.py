@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from relit_camera.base.rotations import angles_from_rotation
+from relit_camera.base.rotations import Rotation, angles_from_rotation
 from relit_camera.face.face_state import FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose
 
@@ -109,6 +108,6 @@ def _activity(sample: _Sample) -> float:
 def _median(faces: list[NeutralFace]) -> NeutralFace:
     points = np.median([face.points for face in faces], axis=0)
     translation = np.median([face.pose.translation for face in faces], axis=0)
-    mean = Rotation.concatenate([face.pose.rotation for face in faces]).mean()
+    mean = Rotation.nearest(np.mean([face.pose.rotation.as_matrix() for face in faces], axis=0))
     deviation = np.median([(mean.inv() * face.pose.rotation).as_rotvec() for face in faces], axis=0)
     return NeutralFace(points, HeadPose(mean * Rotation.from_rotvec(deviation), translation, faces[-1].pose.focal_px))

@@ -10,17 +10,21 @@ grows from 0 at the edge of the band to 1 at twice the band.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Matrix = NDArray[np.float64]
 Vectors = NDArray[np.float64]
 Value = TypeVar("Value")
+
+_NO_BAND = 1e-12
+"""Added to the dead band, for one of zero."""
 
 
 @dataclass(frozen=True)
@@ -98,17 +102,19 @@ class _OneEuro(ABC, Generic[Value]):
         smoothing = self._smoothing
         velocity = self._between(self._raw, value) / step_s
         if self._velocity is not None:
-            velocity = self._velocity + _low_pass_gain(smoothing.speed_cutoff_hz, step_s) * (velocity - self._velocity)
-        cutoff = smoothing.min_cutoff_hz + smoothing.beta / noise * _norm(velocity)
+            gain = 1 / (1 + 1 / (2 * math.pi * step_s * smoothing.speed_cutoff_hz))
+            velocity = self._velocity + gain * (velocity - self._velocity)
+        # The weight of the new value in a first-order low-pass filter is c / (c + 1), c = 2π · cutoff · step.
+        radians = (smoothing.min_cutoff_hz + smoothing.beta / noise * _norm(velocity)) * (2 * math.pi * step_s)
         change = self._between(self._filtered, value)
-        self._filtered = self._moved(self._filtered, _low_pass_gain(cutoff, step_s) * change)
+        self._filtered = self._moved(self._filtered, radians / (radians + 1) * change)
         self._output = self._moved(self._output, self._beyond_band(self._between(self._output, self._filtered), noise))
         self._raw, self._velocity, self._time_s = value, velocity, time_s
         return self._output
 
     def _beyond_band(self, change: Vectors, noise: float | Vectors) -> Vectors:
-        band = np.maximum(np.asarray(self._smoothing.dead_band) * noise, 1e-12)
-        return change * np.clip(_norm(change) / band - 1, 0, 1)
+        bands = _norm(change) / (self._smoothing.dead_band * noise + _NO_BAND) - 1
+        return np.asarray(change * np.minimum(np.maximum(bands, 0), 1))
 
     @abstractmethod
     def _between(self, start: Value, end: Value) -> Vectors:
@@ -143,10 +149,4 @@ class RotationOneEuroFilter(_OneEuro[Matrix]):
 
 
 def _norm(vectors: Vectors) -> Vectors:
-    return np.asarray(np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True)))
-
-
-def _low_pass_gain(cutoff_hz: ArrayLike, step_s: float) -> Vectors:
-    """Weight of the new value in a first-order low-pass filter."""
-    radians = 2 * np.pi * np.asarray(cutoff_hz, dtype=np.float64) * step_s
-    return np.asarray(radians / (radians + 1))
+    return np.asarray(np.sqrt(np.vecdot(vectors, vectors))[..., None])

@@ -84,6 +84,9 @@ class FaceDetector:
         height, width = image.shape[:2]
         scale = longer_side / max(width, height)
         small_size = (max(1, round(width * scale)), max(1, round(height * scale)))
+        # Averaging over areas that are no whole pixels takes ten times as long as the sampling before it.
+        if scale < 0.5:
+            image = cv2.resize(image, (2 * small_size[0], 2 * small_size[1]), interpolation=cv2.INTER_LINEAR)
         small = cv2.resize(image, small_size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
         self._network.setInputSize(small_size)
         rows = self._network.detect(cv2.cvtColor(small, cv2.COLOR_RGB2BGR))[1]

@@ -175,8 +175,8 @@ class IntervalTracker:
 
     def _motion(self, before: Points, now: Points) -> float:
         """How far the eyes have moved, in eye spans."""
-        ways = self._scheme.eye_centers(now) - self._scheme.eye_centers(before)
-        return float(np.linalg.norm(ways.mean(axis=0))) / self._scheme.eye_span(before)
+        way = math.dist(self._scheme.eyes_center(now), self._scheme.eyes_center(before))
+        return way / self._scheme.eye_span(before)
 
 
 def _region(landmarks: Points, size: tuple[int, int]) -> tuple[int, int, int, int] | None:

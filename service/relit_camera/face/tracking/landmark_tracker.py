@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,7 +63,11 @@ class FacePatch:
         """Take a thumbnail of the upright box around the landmarks."""
         self.points = points
         x, y, width, height = bounding_box(points)
-        self._crop = Crop((x + width / 2, y + height / 2), max(width, 1.0), max(height, 1.0))
+        rows, columns = image.shape[:2]
+        # The part of the box that is in the picture, and at least one pixel.
+        left, top = (min(max(round(start), 0), side - 1) for start, side in ((x, columns), (y, rows)))
+        right, bottom = max(round(x + width), left + 1), max(round(y + height), top + 1)
+        self._box = (slice(top, bottom), slice(left, right))
         self._pixels = self._thumbnail(image)
 
     def matches(self, image: DisplayImage) -> bool:
@@ -73,9 +78,11 @@ class FacePatch:
 
     def _thumbnail(self, image: DisplayImage) -> NDArray[np.float32]:
         """The thumbnail's luma without its mean."""
-        pixels = self._crop.cut(image, TUNABLES.patch_side_px, TUNABLES.patch_side_px)
-        luma = pixels.reshape(-1, 3) @ np.full(3, 1 / 3, np.float32)
-        return np.asarray(luma - luma.mean(), dtype=np.float32)
+        side = TUNABLES.patch_side_px
+        small = cv2.resize(image[self._box], (side, side), interpolation=cv2.INTER_LINEAR)
+        luma = cv2.cvtColor(small, cv2.COLOR_RGB2GRAY).astype(np.float32).ravel()
+        luma -= luma.mean()
+        return np.asarray(luma, dtype=np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,5 +237,5 @@ class LandmarkTracker:
 
     def _moved_far(self, before: Points, now: Points) -> bool:
         scheme = self._network.scheme
-        motion = (scheme.eye_centers(now) - scheme.eye_centers(before)).mean(axis=0)
-        return math.hypot(*motion.tolist()) > TUNABLES.large_motion * scheme.eye_span(now)
+        motion = math.dist(scheme.eyes_center(now), scheme.eyes_center(before))
+        return motion > TUNABLES.large_motion * scheme.eye_span(now)

@@ -80,6 +80,7 @@ class MeshNetwork:
         self.scheme = landmark_scheme("mesh478")
         self._mesh = mesh
         self._blendshapes = blendshapes
+        self._input = np.empty((1, _INPUT, _INPUT, 3), np.float32)
 
     def crop_from_detection(self, detection: Detection) -> Crop:
         """Give a square of 1.5 times the box's longer side about its centre."""
@@ -100,10 +101,10 @@ class MeshNetwork:
 
     def read(self, image: DisplayImage, crop: Crop) -> LandmarkPrediction:
         """Place the 478 points; the confidence is the network's presence."""
-        pixels = np.multiply(crop.cut(image, _INPUT, _INPUT), np.float32(1 / 255), dtype=np.float32)
-        outputs = self._mesh.run({"image": pixels[None]})
+        np.multiply(crop.cut(image, _INPUT, _INPUT), np.float32(1 / 255), out=self._input[0], dtype=np.float32)
+        outputs = self._mesh.run({"image": self._input})
         points = outputs["landmarks"].reshape(-1, 3)[:, :2]
-        presence = 1 / (1 + np.exp(-float(outputs["presence_logit"].ravel()[0])))
+        presence = 1 / (1 + math.exp(-outputs["presence_logit"].item()))
         return LandmarkPrediction(crop.to_picture(points, _INPUT, _INPUT), presence)
 
     def blendshapes(self, points: Points) -> Mapping[str, float]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import Points
+from relit_camera.base.rotations import Rotation
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.face.head_pose import HeadPose, guess_focal, project

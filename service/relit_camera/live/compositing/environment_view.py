@@ -5,10 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import DisplayImage, LinearImage
 from relit_camera.base.images.tone_mapping import display_from_linear
+from relit_camera.base.rotations import Rotation
 from relit_camera.light.directions import map_position_from_direction
 from relit_camera.light.environments.environment_panorama import Panorama
 

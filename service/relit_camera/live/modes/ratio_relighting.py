@@ -11,9 +11,9 @@ from typing import Protocol
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask, Points
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.light_multiplication import light_of_root, multiply_light, root_of_light

@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.sparse import csr_array
 from scipy.spatial import Delaunay
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage, Points
+from relit_camera.base.rotations import Rotation
 from relit_camera.light.directions import (
     MAP_HEIGHT,
     MAP_WIDTH,

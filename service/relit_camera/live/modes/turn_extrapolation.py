@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+
+from relit_camera.base.rotations import Rotation
 
 MAX_STEP, MAX_LAG = np.radians(2.0), np.radians(1.0)
 """The picture is computed at once where the head has turned further than the one since, or than the other aside from

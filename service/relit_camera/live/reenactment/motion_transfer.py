@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import (

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
-from relit_camera.base.rotations import Angles, rotation_from_angles
+from relit_camera.base.rotations import Angles, Rotation, rotation_from_angles
 from relit_studio.base.random_walk import RandomWalk
 from relit_studio.mannequin.shape.figure import PIVOT
 

@@ -9,11 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial.transform import Rotation
 
 from relit_camera.base.array_types import Float64Array
 from relit_camera.base.easing import smoothstep
-from relit_camera.base.rotations import Angles, rotation_from_angles
+from relit_camera.base.rotations import Angles, Rotation, rotation_from_angles
 from relit_studio.mannequin.shape import features
 from relit_studio.mannequin.shape.bust import base, neck, pullover
 from relit_studio.mannequin.shape.expression import Expression, control_vertices, gaze_rotation, jaw_motion

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from relit_camera.base.array_types import Float64Array
-from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.base.rotations import AnyRotation, rotation_from_angles
 from relit_studio.cycles.job import Material, Mesh
 from relit_studio.people.person import Person
 from relit_studio.people.posture import Posture, turned
@@ -116,7 +116,7 @@ def _along(wrist: Float64Array, elbow: Float64Array) -> Float64Array:
     return _motion(Rotation.align_vectors([elbow - wrist], [[0.0, 1.0, 0.0]])[0], wrist)
 
 
-def _motion(rotation: Rotation, offset: ArrayLike) -> Float64Array:
+def _motion(rotation: AnyRotation, offset: ArrayLike) -> Float64Array:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = rotation.as_matrix(), offset
     return matrix
