@@ -47,6 +47,15 @@ def test_frames_taken_over_black_give_back_the_matte() -> None:
     assert np.abs(colors[alpha > 0].astype(int) - HALF_LIGHT).max() <= 1
 
 
+def test_an_edge_darker_than_its_matte_says_has_the_colors_next_to_it() -> None:
+    """Pictures cut out in an editor have the matte as a factor of their codes, so that of their light is smaller."""
+    subject = with_edges(over_black=True)
+    captured = np.repeat(0.5 * subject.matte[..., None] ** 2, 3, axis=2)
+    colors, alpha = unmoved(Cutout(subject), captured)
+    assert HALF_LIGHT.max() - colors[alpha > 0].min() < 20
+    assert colors.max() <= HALF_LIGHT.max() + 1
+
+
 def test_an_edge_over_another_background_is_as_a_finer_rendering_has_it() -> None:
     """A shaded disc at a third of the size and over black, enlarged again: no dark rim over white, none over grey."""
     subject = with_edges(over_black=True)
