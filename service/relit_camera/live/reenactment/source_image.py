@@ -100,8 +100,8 @@ wrong there shows as a dark or jagged outline."""
 EDGE_SIGMA, EDGE_GROWTH = 0.5, 0.5
 """Sigma, in pixels, of the Gaussian over which such colors are averaged: the first, and the second for each pixel that
 the nearest of them is away."""
-EDGE_NEIGHBORS = 12
-"""Colors that are averaged."""
+EDGE_NEIGHBORS, NEGLIGIBLE = 9, 0.02
+"""How many colors are averaged at most, and the share of the largest weight below which one does not count."""
 BEYOND = cv2.BORDER_REPLICATE
 """The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing."""
 REACH = 4
@@ -120,10 +120,9 @@ class Cutout:
         self.alpha = feather_edges(subject.matte)
         self.whole = shows_whole_head(subject.matte)
         self._edge = _edge_colors(subject.matte, subject.metadata.over_black)
-        large = cv2.resize(self.alpha, None, fx=UPSAMPLING, fy=UPSAMPLING, interpolation=cv2.INTER_CUBIC)
-        self._large_alpha = cv2.convertScaleAbs(np.maximum(large, 0), alpha=255)
+        self._alpha_codes = np.rint(self.alpha * 255).astype(np.uint8)
         # Around it too, so that a strand of hair between the middles of the warp's cells is not left out.
-        self._around = _around(self.alpha)
+        self._around = (_around(self.alpha) > 0).astype(np.uint8)
 
     def image(self, relit: LinearImage) -> RgbaImage:
         """The person in the relit source image, as the display shows it, enlarged by `UPSAMPLING`; for warping.
@@ -131,18 +130,20 @@ class Cutout:
         Colors go on beyond the edge, for a warp that mixes neighbors. They are coded before they are enlarged: there
         are few pixels then, and an overshoot in codes is less visible in dark places than one in light.
         """
-        colors, edge = relit.copy(), self._edge
-        colors.reshape(-1, 3)[edge.pixels] = edge.averages @ relit.reshape(-1, 3)
+        codes, edge = display_from_linear(relit), self._edge
+        if edge.pixels.size:
+            colors = edge.averages @ relit.reshape(-1, 3)
+            codes.reshape(-1, 3)[edge.pixels] = display_from_linear(colors[np.newaxis])[0]
+        colored = cv2.cvtColor(codes, cv2.COLOR_RGB2RGBA)
+        cv2.insertChannel(self._alpha_codes, colored, 3)
         size = (UPSAMPLING * relit.shape[1], UPSAMPLING * relit.shape[0])
-        large = cv2.resize(display_from_linear(colors), size, interpolation=cv2.INTER_CUBIC)
-        image: RgbaImage = cv2.cvtColor(large, cv2.COLOR_RGB2RGBA)
-        cv2.insertChannel(self._large_alpha, image, 3)
+        image: RgbaImage = cv2.resize(colored, size, interpolation=cv2.INTER_CUBIC)
         return image
 
     def warped(self, relit: LinearImage, grid: PositionGrid) -> RgbaImage:
         """The person in the relit source image (height, width, 3) at the positions of `grid`."""
-        seen = cv2.remap(self._around, grid.nodes() - np.float32(0.5), None, cv2.INTER_LINEAR, borderMode=BEYOND) > 0
-        return grid.sample(self.image(relit), UPSAMPLING, BEYOND, seen)
+        seen = cv2.remap(self._around, grid.nodes() - np.float32(0.5), None, cv2.INTER_NEAREST, borderMode=BEYOND)
+        return grid.sample(self.image(relit), UPSAMPLING, BEYOND, seen.view(np.bool_))
 
 
 @dataclass(frozen=True)
@@ -165,9 +166,7 @@ def _edge_colors(matte: Mask, over_black: bool) -> _EdgeColors:
         matte: (height, width).
         over_black: whether the picture has the matte as a factor.
     """
-    sure = np.flatnonzero(matte >= COLORED)
-    if sure.size == 0:
-        return _EdgeColors(np.zeros(0, np.intp), csr_array((0, matte.size), dtype=np.float32))
+    sure = np.flatnonzero(matte >= min(COLORED, float(matte.max())))
     pixels = np.flatnonzero((matte < 1) & (_around(matte) > 0))
     places = np.column_stack(np.unravel_index(sure, matte.shape))
     count = min(EDGE_NEIGHBORS, sure.size)
@@ -178,10 +177,12 @@ def _edge_colors(matte: Mask, over_black: bool) -> _EdgeColors:
     nearest = distance[:, :1]
     sigma = EDGE_SIGMA + EDGE_GROWTH * nearest
     weight = share**TRUST_POWER * np.exp((nearest**2 - distance**2) / (2 * sigma**2))
+    weight[weight < NEGLIGIBLE * weight.max(axis=1, keepdims=True)] = 0
     weight /= (weight * (share if over_black else 1)).sum(axis=1, keepdims=True)
     starts = np.arange(len(pixels) + 1) * count
-    averages = csr_array((weight.ravel(), sure[near].ravel(), starts), shape=(len(pixels), matte.size))
-    return _EdgeColors(pixels, averages.astype(np.float32))
+    averages = csr_array((weight.astype(np.float32).ravel(), sure[near].ravel(), starts), (len(pixels), matte.size))
+    averages.eliminate_zeros()
+    return _EdgeColors(pixels, averages)
 
 
 def _around(matte: Mask) -> Mask:
