@@ -179,9 +179,9 @@ def _edge_colors(matte: Mask, over_black: bool) -> _EdgeColors:
     pixels = np.flatnonzero((matte < 1) & (_around(matte) > 0))
     places = np.column_stack(np.unravel_index(sure, matte.shape))
     count = min(EDGE_NEIGHBORS, sure.size)
-    distance, near = KDTree(places).query(
-        np.column_stack(np.unravel_index(pixels, matte.shape)), k=[*range(1, count + 1)]
-    )
+    edge = np.column_stack(np.unravel_index(pixels, matte.shape))
+    found = KDTree(places).query(edge, k=[*range(1, count + 1)])
+    distance, near = np.asarray(found[0]), np.asarray(found[1])
     share = matte.ravel()[sure][near]
     nearest = distance[:, :1]
     sigma = EDGE_SIGMA + EDGE_GROWTH * nearest
