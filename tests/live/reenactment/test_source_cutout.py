@@ -9,7 +9,7 @@ import numpy as np
 
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.live.compositing.alpha_compositing import over, split_alpha
-from relit_camera.live.reenactment.source_image import UPSAMPLING, Cutout, feather_edges, shows_whole_head
+from relit_camera.live.reenactment.source_image import COLORED, UPSAMPLING, Cutout, feather_edges, shows_whole_head
 from relit_camera.live.reenactment.warp import Warp, source_from_output
 from tests.live.people import close_up, person
 
@@ -45,6 +45,16 @@ def test_frames_taken_over_black_give_back_the_matte() -> None:
     captured = np.repeat(0.5 * subject.matte[..., None], 3, axis=2)
     colors, alpha = unmoved(Cutout(subject), captured)
     assert np.abs(colors[alpha > 0].astype(int) - HALF_LIGHT).max() <= 1
+
+
+def test_an_edge_darker_than_its_matte_says_has_the_colors_next_to_it() -> None:
+    """Pictures cut out in an editor have the matte as a factor of their codes, so that of their light is smaller."""
+    subject = with_edges(over_black=True)
+    captured = np.repeat(0.5 * subject.matte[..., None] ** 2, 3, axis=2)
+    colors, alpha = unmoved(Cutout(subject), captured)
+    darkest = display_from_linear(np.full((1, 1, 3), 0.5 * COLORED, np.float32))  # of pixels that count
+    assert colors[alpha > 0].min() >= darkest.min()
+    assert colors.max() <= HALF_LIGHT.max() + 1
 
 
 def test_an_edge_over_another_background_is_as_a_finer_rendering_has_it() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,14 @@ NECK_PIVOT = np.array([0.0, -7.0, -7.0])
 SHOULDER_ANCHORS_CM = np.array([(x, y) for y in (-7.5, -12.0) for x in (-16.0, -11.0, -5.5, 0.0, 5.5, 11.0, 16.0)])
 """Points of neck and shoulders (cm from the pivot, picture plane) that stay where they are while the head turns."""
 CROWN_OFFSET_CM = 6.0
+_SKULL_AXIS = np.stack([SKULL_CENTER, SKULL_CENTER + [0, CROWN_OFFSET_CM, 0]])
+_RIGID_POINTS = np.vstack([_SKULL_AXIS, EARS_AND_JAW])
+# From one temple over the crown to the other: below are face and neck.
+_RING_ANGLES = np.linspace(-0.12, np.pi + 0.12, 13)
+_SKULL_RINGS = np.vstack(
+    [np.column_stack([a * np.cos(_RING_ANGLES), b * np.sin(_RING_ANGLES)]) for a, b in SKULL_RADII]
+)
+"""Points of the outline (count, 2): cm to the right and up from the skull's center."""
 SLIT_OFFSET = 3.0
 """Distance from the slit, in radii, at which the influence of closed lids and lips is centred: one side's influence
 gives way to the other's within a third of the radius."""
@@ -147,7 +156,8 @@ def head_and_shoulder_anchors(pose: HeadPose, size: tuple[int, int]) -> NDArray[
 
 def rigid_head_anchors(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
     """Anchors (count, 2) of skull, hair, ears and jaw."""
-    return np.vstack([skull_outline(pose, size), project(EARS_AND_JAW, pose, size)])
+    seen = project(_RIGID_POINTS, pose, size).astype(np.float64)
+    return np.vstack([_skull_rings(seen[:2], pose), seen[2:]])
 
 
 def skull_outline(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
@@ -155,14 +165,17 @@ def skull_outline(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:
 
     The outline of a round head does not turn with it: it follows the skull's centre, its size and its roll only.
     """
-    center, above = project(np.stack([SKULL_CENTER, SKULL_CENTER + [0, CROWN_OFFSET_CM, 0]]), pose, size)
+    return _skull_rings(project(_SKULL_AXIS, pose, size).astype(np.float64), pose)
+
+
+def _skull_rings(axis: NDArray[np.float64], pose: HeadPose) -> NDArray[np.float64]:
+    """The points of `skull_outline` from where the skull's center and its crown are seen, (2, 2)."""
+    center, above = axis
+    way = above - center
+    up = way / max(math.hypot(*way), 1e-6)
     depth = pose.depth_of(SKULL_CENTER)
-    up = (above - center) / max(float(np.linalg.norm(above - center)), 1e-6)
-    right = np.array([-up[1], up[0]])
-    # From one temple over the crown to the other: below are face and neck.
-    angle = np.linspace(-0.12, np.pi + 0.12, 13)
-    rings = [np.outer(a * np.cos(angle), right) + np.outer(b * np.sin(angle), up) for a, b in SKULL_RADII]
-    return np.asarray(center + np.vstack(rings) * (pose.focal_px / max(depth, 1.0)))
+    rings = _SKULL_RINGS @ np.array([[-up[1], up[0]], up])
+    return np.asarray(center + rings * (pose.focal_px / max(depth, 1.0)))
 
 
 def shoulder_anchors(pose: HeadPose, size: tuple[int, int]) -> NDArray[np.float64]:

@@ -36,6 +36,7 @@ class FaceMesh:
         members: (points,) the landmarks that are corners: all but the irises, which roll behind the lids.
         triangles: (count, 3) rows of `members`.
         clockwise: (count,) the sign of each triangle's area in the source image.
+        middles: (count, 3) float64 head axes, cm: the middle of each triangle on the canonical face.
         values: (count, 3, 3) float64, of each triangle's corners: x and y in the source image, and how far the mesh
             counts beside the flow round it, 0 at the outline of the face, rising to 1 inside.
         span: the eye distance in source pixels.
@@ -45,6 +46,7 @@ class FaceMesh:
     members: NDArray[np.intp]
     triangles: NDArray[np.intp]
     clockwise: NDArray[np.float64]
+    middles: NDArray[np.float64]
     values: NDArray[np.float64]
     span: float
 
@@ -56,11 +58,13 @@ class FaceMesh:
             pose: of the head that goes there: it says which of two parts is nearer.
         """
         target = landmarks[self.members]
-        corners = target[self.triangles]
-        depth = self.face.scheme.canonical[self.members] @ pose.rotation.as_matrix()[2]
+        corners = target.take(self.triangles, axis=0)
         facing = np.flatnonzero(_doubled_areas(corners) * self.clockwise > 0)
-        order = facing[np.argsort(depth[self.triangles[facing]].mean(axis=1))]
-        return SurfacePatch(corners[order], self.values[order], box_around(target, MARGIN * self.span))
+        nearness = self.middles @ pose.rotation.as_matrix()[2]
+        order = facing[np.argsort(nearness[facing])]
+        return SurfacePatch(
+            corners.take(order, axis=0), self.values.take(order, axis=0), box_around(target, MARGIN * self.span)
+        )
 
     def feature_patch(self, flow: FlowPatch, feature: NDArray[np.float64]) -> FeaturePatch:
         """The flow of an eye or the mouth, whose landmarks in the source image are `feature` (count, 2)."""
@@ -134,37 +138,40 @@ def draw_triangles(
         (channels, rows, columns) float32.
     """
     rows, columns = shape
-    a, b, c = np.moveaxis(corners, 1, 0)
-    low = np.maximum(np.ceil(np.minimum(np.minimum(a, b), c)), 0)
-    high = np.minimum(np.floor(np.maximum(np.maximum(a, b), c)), [columns - 1, rows - 1])
-    size = np.maximum(high - low + 1, 0)
-    count = (size[:, 0] * size[:, 1]).astype(np.intp)
-    (ax, ay), (bx, by), (px, py) = (b - a).T, (c - a).T, (low - a).T
+    (x, y), (ax, ay), (bx, by) = corners.transpose(1, 2, 0)
+    ax, ay, bx, by = ax - x, ay - y, bx - x, by - y
     area = ax * by - ay * bx
-    area[area == 0] = np.nan  # such a triangle shows nowhere: no comparison with its weights holds
-    # The weights of the second and the third corner are linear in the place in the bounding rectangle.
-    second_weight = np.stack([by, -bx, px * by - py * bx]) / area
-    third_weight = np.stack([-ay, ax, ax * py - ay * px]) / area
-    rectangle = np.stack([size[:, 0], np.cumsum(count) - count])
-    # All triangles at once: each point of each bounding rectangle is tested against its triangle.
-    table = np.concatenate([second_weight, third_weight, rectangle]).astype(np.float32)
-    triangle = np.repeat(np.arange(len(corners)), count)
-    s0, s1, s2, t0, t1, t2, width, start = table.take(triangle, axis=1)
-    number = np.arange(len(start), dtype=np.float32) - start
-    down = np.floor((number + np.float32(0.5)) / width)
-    across = number - down * width
-    second, third = s0 * across + s1 * down + s2, t0 * across + t1 * down + t2
-    inside = np.flatnonzero((second > -ON_BORDER) & (third > -ON_BORDER) & (second + third < 1 + ON_BORDER))
-    triangle, second, third = triangle[inside], second[inside], third[inside]
-    x, y = across[inside] + low[triangle, 0], down[inside] + low[triangle, 1]
-    place = (y * columns + x).astype(np.intp)
-    first = values[:, 0]
-    table = np.stack([first, values[:, 1] - first, values[:, 2] - first], axis=2).astype(np.float32)
+    flat = area == 0  # such a triangle shows nowhere
+    area[flat] = 1
+    # The weights of the second and the third corner, and what is interpolated by them, are planes over the picture:
+    # the change a column, the change a row, and the value at column 0 of row 0.
+    second = np.stack([by, -bx, bx * y - by * x]) / area
+    third = np.stack([-ay, ax, ay * x - ax * y]) / area
+    first_row = np.maximum(np.ceil(corners[..., 1].min(axis=1)), 0)
+    last_row = np.minimum(np.floor(corners[..., 1].max(axis=1)), rows - 1)
+    lines = np.where(flat, 0, np.maximum(last_row - first_row + 1, 0)).astype(np.intp)
+    # In each line of nodes a triangle shows from where the last of its weights gets positive to where the first ends.
+    triangle = np.repeat(np.arange(len(corners)), lines)
+    line = np.arange(len(triangle)) + (first_row - (np.cumsum(lines) - lines)).take(triangle)
+    weights = np.stack([second, third, [[0.0], [0.0], [1.0]] - second - third], axis=1)
+    weights[0][weights[0] == 0] = np.finfo(np.float64).tiny ** 0.5
+    slope, down, start = weights.take(triangle, axis=2)
+    end = (-ON_BORDER - start - down * line) / slope
+    left = np.ceil(np.where(slope > 0, end, 0).max(axis=0).clip(0, columns))
+    right = np.floor(np.where(slope < 0, end, columns - 1).min(axis=0).clip(-1, columns - 1))
+    count = np.maximum(right - left + 1, 0).astype(np.intp)
+    before = np.cumsum(count) - count
+    number = np.arange(count.sum())
+    place = number + np.repeat((line * columns + left).astype(np.intp) - before, count)
+    along = (number - np.repeat(before, count)).astype(np.float32)
     drawn = np.zeros((values.shape[2], rows * columns), np.float32)
-    for channel, of_corners in zip(drawn, table.transpose(1, 2, 0), strict=True):
-        base, by_second, by_third = of_corners.take(triangle, axis=1)
+    for channel, (base, by_second, by_third) in zip(drawn, values.transpose(2, 1, 0), strict=True):
+        plane = second * (by_second - base) + third * (by_third - base)
+        plane[2] += base
+        across, downward, origin = plane.take(triangle, axis=1)
+        begin = (origin + across * left + downward * line).astype(np.float32)
         # Where a place is given several times the last value stays.
-        channel[place] = base + second * by_second + third * by_third
+        channel[place] = np.repeat(begin, count) + along * np.repeat(across.astype(np.float32), count)
     return drawn.reshape(-1, rows, columns)
 
 
@@ -179,7 +186,8 @@ def triangulate_face(face: SourceFace) -> FaceMesh:
     span = face.scheme.eye_span(face.landmarks)
     trust = smoothstep(_distance(corners, outline), 0, OUTLINE_BLEND * span)
     clockwise = np.sign(_doubled_areas(corners[triangles]))
-    return FaceMesh(face, members, triangles, clockwise, np.column_stack([corners, trust])[triangles], span)
+    middles = face.scheme.canonical[members][triangles].mean(axis=1)
+    return FaceMesh(face, members, triangles, clockwise, middles, np.column_stack([corners, trust])[triangles], span)
 
 
 def _distance(points: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -73,17 +73,23 @@ class MouthInterior:
             return
         shape = (int(high[1] - low[1]), int(high[0] - low[0]))
         softness = max(0.02 * float(np.ptp(opening[:, 0])), 0.5)
-        hole = _polygon(opening - low, shape, softness) * np.float32(shown)
+        hole = _polygon(opening - low, shape, softness).ravel()
+        teeth = _polygon(self._teeth(pose, to_output) - low, shape, 1.5 * softness).ravel()
+        row = self._row(pose, to_output, np.arange(shape[1]) + low[0] + 0.5)
         light = relit[self._lips[:, 1], self._lips[:, 0]].mean(axis=0) / self._white
-        inside = np.broadcast_to(CAVITY * light, (*shape, 3)).copy()
-        teeth = _polygon(self._teeth(pose, to_output) - low, shape, 1.5 * softness)[..., None]
-        shade = self._row(pose, to_output, np.arange(shape[1]) + low[0] + 0.5)[None, :, None]
-        inside += teeth * (TEETH * shade * light - inside)
+        # Only the pixels of the hole: it fills half of its bounding box.
+        pixels = np.flatnonzero(hole)
+        if pixels.size == 0:
+            return
+        covered, shade = teeth.take(pixels)[:, None], row.take(pixels % shape[1])[:, None]
+        cavity = CAVITY * light
+        inside = cavity + covered * (TEETH * light * shade - cavity)
         area = np.s_[low[1] : high[1], low[0] : high[0]]
-        colors = image[area][..., :3]
-        around = linear_from_display(np.ascontiguousarray(colors))
-        drawn = display_from_linear(np.asarray(around + hole[..., None] * (inside - around), np.float32))
-        np.copyto(colors, drawn, where=hole[..., None] > 0)
+        drawn = image[area].reshape(-1, 4)
+        around = linear_from_display(np.ascontiguousarray(drawn.take(pixels, axis=0)[None, :, :3]))
+        share = hole.take(pixels)[:, None] * np.float32(shown)
+        drawn[pixels, :3] = display_from_linear(np.asarray(around + share * (inside - around), np.float32))[0]
+        image[area] = drawn.reshape(*shape, 4)
 
     def _gap(self, landmarks: NDArray) -> float:
         return self._face.scheme.mouth_opening(landmarks.astype(np.float32))

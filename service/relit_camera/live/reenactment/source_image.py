@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.sparse import csr_array
+from scipy.spatial import KDTree
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import SubjectError
@@ -91,9 +92,16 @@ UPSAMPLING = 2
 """Factor of a bicubic enlargement before the bilinear warp: as sharp as a bicubic warp, and quicker."""
 FEATHER_WIDTH = 0.06
 """Share of the source image's width over which a person who is cut off by its side fades out."""
-COLORED = 0.7
-"""Matte from which a pixel's own color counts; others have that of the nearest such pixel. Where less of a pixel is the
-person, what the matte or the capture got wrong there shows as a dark or jagged outline."""
+COLORED = 0.5
+"""Matte from which a pixel's color counts for its neighbors at the edge."""
+TRUST_POWER = 4
+"""The power of the matte with which it counts: where less of a pixel is the person, what the matte or the capture got
+wrong there shows as a dark or jagged outline."""
+EDGE_SIGMA, EDGE_GROWTH = 0.5, 0.5
+"""Sigma, in pixels, of the Gaussian over which such colors are averaged: the first, and the second for each pixel that
+the nearest of them is away."""
+EDGE_NEIGHBORS, NEGLIGIBLE = 9, 0.02
+"""How many colors are averaged at most, and the share of the largest weight below which one does not count."""
 BEYOND = cv2.BORDER_REPLICATE
 """The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing."""
 REACH = 4
@@ -112,10 +120,9 @@ class Cutout:
         self.alpha = feather_edges(subject.matte)
         self.whole = shows_whole_head(subject.matte)
         self._edge = _edge_colors(subject.matte, subject.metadata.over_black)
-        large = cv2.resize(self.alpha, None, fx=UPSAMPLING, fy=UPSAMPLING, interpolation=cv2.INTER_CUBIC)
-        self._large_alpha = cv2.convertScaleAbs(np.maximum(large, 0), alpha=255)
+        self._alpha_codes = np.rint(self.alpha * 255).astype(np.uint8)
         # Around it too, so that a strand of hair between the middles of the warp's cells is not left out.
-        self._around = _around(self.alpha)
+        self._around = (_around(self.alpha) > 0).astype(np.uint8)
 
     def image(self, relit: LinearImage) -> RgbaImage:
         """The person in the relit source image, as the display shows it, enlarged by `UPSAMPLING`; for warping.
@@ -123,12 +130,14 @@ class Cutout:
         Colors go on beyond the edge, for a warp that mixes neighbors. They are coded before they are enlarged: there
         are few pixels then, and an overshoot in codes is less visible in dark places than one in light.
         """
-        colors, edge = relit.copy(), self._edge
-        colors.reshape(-1, 3)[edge.pixels] = relit.reshape(-1, 3).take(edge.colored, axis=0) * edge.gain
+        codes, edge = display_from_linear(relit), self._edge
+        if edge.pixels.size:
+            colors = edge.averages @ relit.reshape(-1, 3)
+            codes.reshape(-1, 3)[edge.pixels] = display_from_linear(colors[np.newaxis])[0]
+        colored = cv2.cvtColor(codes, cv2.COLOR_RGB2RGBA)
+        cv2.insertChannel(self._alpha_codes, colored, 3)
         size = (UPSAMPLING * relit.shape[1], UPSAMPLING * relit.shape[0])
-        large = cv2.resize(display_from_linear(colors), size, interpolation=cv2.INTER_CUBIC)
-        image: RgbaImage = cv2.cvtColor(large, cv2.COLOR_RGB2RGBA)
-        cv2.insertChannel(self._large_alpha, image, 3)
+        image: RgbaImage = cv2.resize(colored, size, interpolation=cv2.INTER_CUBIC)
         return image
 
     def warped(self, relit: LinearImage, grid: PositionGrid, half_size: bool = False) -> RgbaImage:
@@ -136,7 +145,8 @@ class Cutout:
 
         With `half_size`, for which the step must be even, every second pixel is sampled and the others interpolated.
         """
-        seen = cv2.remap(self._around, grid.nodes() - np.float32(0.5), None, cv2.INTER_LINEAR, borderMode=BEYOND) > 0
+        near = cv2.remap(self._around, grid.nodes() - np.float32(0.5), None, cv2.INTER_NEAREST, borderMode=BEYOND)
+        seen = near.view(np.bool_)
         if not half_size:
             return grid.sample(self.image(relit), UPSAMPLING, BEYOND, seen)
         half = grid.halved().sample(self.image(relit), UPSAMPLING, BEYOND, seen)
@@ -147,29 +157,41 @@ class Cutout:
 
 @dataclass(frozen=True)
 class _EdgeColors:
-    """Where the pixels at the edge of the person, and next to it, take their colors from.
+    """The colors of the pixels at the edge of the person, and next to it, as averages of colors nearby.
 
     Attributes:
         pixels: (count,) flat indices of those pixels.
-        colored: (count,) flat index of the pixel whose color each of them has: its own, or the nearest.
-        gain: (count, 1) float32 factor of that color.
+        averages: sparse (count, pixels of the picture) float32: straight colors of them from the picture's.
     """
 
     pixels: NDArray[np.intp]
-    colored: NDArray[np.intp]
-    gain: NDArray[np.float32]
+    averages: csr_array
 
 
 def _edge_colors(matte: Mask, over_black: bool) -> _EdgeColors:
-    """`over_black`: whether the picture has the matte as a factor."""
-    colored = matte >= COLORED
-    if not colored.any():
-        return _EdgeColors(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 1), np.float32))
-    row, column = distance_transform_edt(~colored, return_distances=False, return_indices=True)
+    """Normalised convolution (Knutsson and Westin 1993) with powers of the matte as certainty.
+
+    Args:
+        matte: (height, width).
+        over_black: whether the picture has the matte as a factor.
+    """
+    sure = np.flatnonzero(matte >= min(COLORED, float(matte.max())))
     pixels = np.flatnonzero((matte < 1) & (_around(matte) > 0))
-    nearest = (row * matte.shape[1] + column).reshape(-1)[pixels]
-    gain = 1 / matte.reshape(-1, 1)[nearest] if over_black else np.ones((len(pixels), 1), np.float32)
-    return _EdgeColors(pixels, nearest, gain.astype(np.float32))
+    places = np.column_stack(np.unravel_index(sure, matte.shape))
+    count = min(EDGE_NEIGHBORS, sure.size)
+    edge = np.column_stack(np.unravel_index(pixels, matte.shape))
+    found = KDTree(places).query(edge, k=[*range(1, count + 1)])
+    distance, near = np.asarray(found[0]), np.asarray(found[1])
+    share = matte.ravel()[sure][near]
+    nearest = distance[:, :1]
+    sigma = EDGE_SIGMA + EDGE_GROWTH * nearest
+    weight = share**TRUST_POWER * np.exp((nearest**2 - distance**2) / (2 * sigma**2))
+    weight[weight < NEGLIGIBLE * weight.max(axis=1, keepdims=True)] = 0
+    weight /= (weight * (share if over_black else 1)).sum(axis=1, keepdims=True)
+    starts = np.arange(len(pixels) + 1) * count
+    averages = csr_array((weight.astype(np.float32).ravel(), sure[near].ravel(), starts), (len(pixels), matte.size))
+    averages.eliminate_zeros()
+    return _EdgeColors(pixels, averages)
 
 
 def _around(matte: Mask) -> Mask:

@@ -219,7 +219,9 @@ class FlowPatch:
         flow = cv2.warpAffine(self.flow, grid_from_node, (columns, rows), flags=flags, borderMode=cv2.BORDER_REPLICATE)
         x, y = nodes.places
         across, down = cv2.split(flow)
-        return across + x, down + y
+        across += x
+        down += y
+        return across, down
 
 
 BORDER_FADE = 0.08
