@@ -155,7 +155,7 @@ def test_the_installed_network_is_faster_than_the_published_one() -> None:
         model_path("face_mesh")
     except ModelError as error:
         pytest.skip(str(error))
-    assert 0.4 < installed_mesh_runs(MeshRun()) < 0.95
+    assert 0.4 < installed_mesh_runs() < 0.95
 
 
 def test_bench_measures_each_combination(monkeypatch: pytest.MonkeyPatch, material: Material) -> None:

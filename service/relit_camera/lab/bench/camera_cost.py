@@ -51,7 +51,7 @@ class CameraCost:
         processor_ms: processor time of the whole process.
         mesh_runs: the same in mesh runs (`lab.bench.mesh_run`).
         mesh_run_ms: processor time of such a run, the median of those beside the camera.
-        installed_mesh_runs: what a run of the installed face mesh network costs, in mesh runs; None where there is none.
+        installed_mesh_runs: what a run of the installed face mesh network costs, in mesh runs; None without one.
         stages: by name.
         outside_ms: processor time of the process outside the stages.
         threads_ms: processor time of the threads by name, stages included; empty where the system does not tell.
@@ -148,7 +148,7 @@ def measure_camera(settings: RelitSettings, source_fps: float, seconds: float, m
         RelitError: the camera cannot run, or makes no pictures.
     """
     try:
-        installed = installed_mesh_runs(mesh)
+        installed = installed_mesh_runs()
     except ModelError:
         installed = None
     with CameraProcess(settings) as camera:
