@@ -122,7 +122,7 @@ def test_a_copied_subject_outlives_its_file(
 ) -> None:
     monkeypatch.setattr(subject_file, "DISK", tmp_path if disk == "there" else tmp_path / "none")
     if disk == "full":
-        monkeypatch.setattr(subject_file.tempfile, "TemporaryFile", _no_space)
+        monkeypatch.setattr("tempfile.TemporaryFile", _no_space)
     files = sorted(tmp_path.iterdir())
     expected, copied = np.array(read_subject(path).basis.mixes), read_subject(path, copied=True)
     path.write_bytes(b"")
