@@ -13,7 +13,7 @@ import multiprocessing
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -81,7 +81,7 @@ def warmth(http: httpx.Client) -> float:
     return red - blue
 
 
-def lamp_seen_s(http: httpx.Client, lighting: dict[str, object]) -> float:
+def lamp_seen_s(http: httpx.Client, lighting: Mapping[str, object]) -> float:
     """Set a light without transition, and wait until the published picture shows it."""
     before, began = warmth(http), time.monotonic()
     http.patch("api/v1/lighting", json={**lighting, "transition_s": 0}).raise_for_status()
@@ -94,15 +94,17 @@ def lamp_seen_s(http: httpx.Client, lighting: dict[str, object]) -> float:
 
 def observe(http: httpx.Client, seconds: float) -> Phase:
     """Let time pass, and say what is seen."""
-    until, seen = time.monotonic() + seconds, []
+    until, seen = time.monotonic() + seconds, list[float]()
     while time.monotonic() < until or not seen:
         for lighting in LAMPS:
             seen.append(lamp_seen_s(http, lighting))
             time.sleep(1.0)
     status = http.get("api/v1/status").raise_for_status().json()
-    latency = status["latency_ms"]
+    latency = {name: round(value, 1) for name, value in status["latency_ms"].items()}
     return Phase(
-        *(round(latency[name], 1) for name in ("p50", "p95", "max")),
+        p50_ms=latency["p50"],
+        p95_ms=latency["p95"],
+        max_ms=latency["max"],
         pictures_per_s=round(status["fps"]["pipeline"], 1),
         quality=status["quality_level"],
         lamp_seen_s=round(float(np.mean(seen)), 2),

@@ -48,6 +48,7 @@ from relit_camera.face.tracking.trackers import TrackerOptions
 from relit_camera.light.light_map import LightMap
 from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, WarpedLayer, WarpTask
 from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.render_quality import RenderQuality
 from relit_camera.subject.reflectance_field import ExactField, FactoredField, ReflectanceField
 from relit_camera.subject.relighting.relighter import Relighter, RelighterOptions, weighted_light
 from relit_camera.subject.subject import Subject
@@ -84,6 +85,7 @@ __all__ = [
     "Relighter",
     "RelighterOptions",
     "RelitError",
+    "RenderQuality",
     "RgbaImage",
     "Session",
     "SessionOptions",

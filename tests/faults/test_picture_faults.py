@@ -22,6 +22,7 @@ from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
 from relit_camera.live.reenactment.reenactor import WarpedLayer, WarpTask
+from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.supervision.pipeline_health import HealthLimits
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from tests.faults.watched_camera import Survived
@@ -166,10 +167,10 @@ def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, mo
                 raise FloatingPointError("a bug in the warp")
             released.wait(60)
 
-    def plan_warp(self: FirstOrderReenactor, motion: FaceMotion, frame: Frame) -> WarpTask:
+    def plan_warp(self: FirstOrderReenactor, motion: FaceMotion, frame: Frame, quality: RenderQuality) -> WarpTask:
         if half == "follow":
             fail()
-        move = healthy(self, motion, frame)
+        move = healthy(self, motion, frame, quality)
 
         def faulty(relit: LinearImage) -> WarpedLayer:
             fail()

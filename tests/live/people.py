@@ -21,6 +21,7 @@ from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.live.compositing.alpha_compositing import split_alpha
 from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, WarpedLayer
 from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
+from relit_camera.live.render_quality import FULL_QUALITY
 from relit_camera.subject.subject import Subject
 
 SCHEME = landmark_scheme("mesh478")
@@ -94,7 +95,7 @@ NOBODY = FaceMotion(
 
 def moved_by(reenactor: Reenactor, relit: LinearImage, motion: FaceMotion, frame: Frame) -> WarpedLayer:
     """A frame as mode reenact does it: plan the warp, then warp the relit picture."""
-    return reenactor.plan_warp(motion, frame)(relit)
+    return reenactor.plan_warp(motion, frame, FULL_QUALITY)(relit)
 
 
 def premultiplied(layer: WarpedLayer) -> tuple[LinearImage, Mask]:

@@ -24,6 +24,7 @@ from relit_camera.light.environments.builtin.builtin_environments import builtin
 from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.pipeline import Pipeline
+from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.relighter import open_relighter
@@ -191,10 +192,12 @@ class OneGrey:
     def __init__(self, context: ModeContext) -> None:
         self.context = context
 
-    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene) -> RenderTask | FaceMismatch:
+    def begin(
+        self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
+    ) -> RenderTask | FaceMismatch:
         if motion.status is FaceStatus.LOST:
             return FaceMismatch("nobody is there", "come back")
-        relit = self.context.scene_relighting.relight(scene, motion.rotation, frame.time_s)
+        relit = self.context.scene_relighting.relight(scene, motion.rotation, frame.time_s, quality.relight_every)
         width, height = self.context.size
         value = np.uint8(np.clip(255 * relit.mean(), 1, 255))
         return lambda: RenderedFrame(np.full((height, width, 3), value, np.uint8), motion, scene)
@@ -286,3 +289,37 @@ def test_closing_it_ends_its_thread() -> None:
     assert {thread.name for thread in set(threading.enumerate()) - before} == {"warp-planner_0"}
     made.close()
     assert set(threading.enumerate()) == before
+
+
+class CountingTracker(SteadyTracker):
+    """Counts the frames that it measures."""
+
+    measured = 0
+
+    def track(self, frame: Frame) -> FaceState:
+        self.measured += 1
+        return super().track(frame)
+
+
+def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
+    asked: list[RenderQuality] = []
+
+    class Noting(OneGrey):
+        def begin(
+            self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
+        ) -> RenderTask | FaceMismatch:
+            asked.append(quality)
+            return super().begin(frame, motion, scene, quality)
+
+    tracker = CountingTracker()
+    modes = {Mode.REENACT: Noting, Mode.RATIO: Noting}
+    follower = make_follower(CPU.tracker, tracker)
+    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
+    noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)  # flow needs something to follow
+    made.process(frame(0, noise), scene())
+    before, made.quality = tracker.measured, QUALITY_LEVELS[-1]
+    for index in range(1, 9):
+        made.process(frame(index, noise), scene())
+    made.close()
+    assert asked == [FULL_QUALITY, *[QUALITY_LEVELS[-1]] * 8]
+    assert tracker.measured - before == 4

@@ -202,6 +202,8 @@ class CameraService:
             for session in sessions
             if session.why
         ]
+        load = self._supervisor.load
+        reduced = [_reduced_quality(load.latency_s or 0.0)] if load.level else []
         return CameraStatus(
             state=CameraState.FROZEN if scene.frozen else self._board.state,
             source=f"{source.kind} {source.id}".strip(),
@@ -215,7 +217,8 @@ class CameraService:
             stage_processor_s=pipeline.timer.processor_s(),
             frames=replace(counts, dropped=counts.dropped + self._loop.skipped + self._supervisor.dropped),
             providers={session.name: session.provider for session in sessions} | pipeline.providers,
-            degraded=[*self._board.degradations(), *pipeline.troubles, *slower],
+            quality_level=load.level,
+            degraded=[*self._board.degradations(), *pipeline.troubles, *slower, *reduced],
             version=__version__,
             uptime_s=self._clock.now() - self._started_at,
         )
@@ -237,3 +240,12 @@ class CameraService:
 
     def _scene(self) -> Scene:
         return self.scene_controller.scene
+
+
+def _reduced_quality(latency_s: float) -> Degradation:
+    return Degradation(
+        code=DegradationCode.REDUCED_QUALITY,
+        what="pictures have less detail",
+        why=f"the computer is busy: they come {1e3 * latency_s:.0f} ms late",
+        cure="close other programs, or choose a smaller output, such as 640x360; full quality comes back by itself",
+    )

@@ -13,12 +13,14 @@ from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
+from relit_camera.face.tracking.interval_tracker import IntervalTracker
 from relit_camera.live.compositing.compositor import Compositor
 from relit_camera.live.compositing.matting import Matting
 from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, ModeFactory, RenderedFrame, RenderMode, RenderTask
 from relit_camera.live.modes.scene_relighting import SceneRelighting
 from relit_camera.live.reenactment.source_image import find_source_face
+from relit_camera.live.render_quality import FULL_QUALITY, RenderQuality
 from relit_camera.live.scene.light_transition import LightTransition
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import Degradation, DegradationCode
@@ -67,6 +69,7 @@ class Pipeline:
 
     Attributes:
         timer: how long each stage took.
+        quality: what a picture may cost; any thread may replace it, and the next frame is begun with it.
         on_opening: called before models are opened, which may take long: those of a subject or mode, or of the matte.
     """
 
@@ -90,8 +93,10 @@ class Pipeline:
             open_matte: called when a live person must first be parted from the room.
         """
         self.timer = StageTimer()
+        self.quality = FULL_QUALITY
         self.on_opening: Callable[[], None] = lambda: None
         self._tracker = tracker
+        self._live_tracker = IntervalTracker(tracker)
         self._follower = follower
         self._size = size
         self._modes = modes
@@ -141,7 +146,8 @@ class Pipeline:
             SubjectError: no face is found in the subject's source image.
             ModelError: a model that the scene needs is missing; so does the task.
         """
-        motion = self._track(frame) if scene_now().subject else None
+        quality = self.quality
+        motion = self._track(frame, quality) if scene_now().subject else None
         scene = scene_now()
         self._forget_mismatch_of_other(scene.subject)
         if scene.subject is None:
@@ -149,19 +155,20 @@ class Pipeline:
             return lambda: self._render_unrelit(frame, scene)
         self._troubles.pop("subject", None)
         if motion is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
-            motion = self._track(frame)
+            motion = self._track(frame, quality)
         name = self._mode_for(scene.look.mode)
-        task = self._mode(scene.subject, name).begin(frame, motion, scene)
+        task = self._mode(scene.subject, name).begin(frame, motion, scene, quality)
         if isinstance(task, FaceMismatch):
             self._note_mismatch(scene.subject, name, task)
-            task = self._mode(scene.subject, FALLBACK_MODE).begin(frame, motion, scene)
+            task = self._mode(scene.subject, FALLBACK_MODE).begin(frame, motion, scene, quality)
             if isinstance(task, FaceMismatch):
                 raise SubjectError(task.why, task.cure)
         return task
 
-    def _track(self, frame: Frame) -> FaceMotion:
+    def _track(self, frame: Frame, quality: RenderQuality) -> FaceMotion:
         with self.timer.stage("track"):
-            return self._follower.follow(self._tracker.track(frame), frame.size, frame.time_s)
+            self._live_tracker.set_interval(quality.track_every)
+            return self._follower.follow(self._live_tracker.track(frame), frame.size, frame.time_s)
 
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:
         live = fit_frame(frame, self._size)

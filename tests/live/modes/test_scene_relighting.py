@@ -53,7 +53,7 @@ def truth(scene: Scene, index: int) -> np.ndarray:
 
 def test_a_turning_head_is_relit_in_every_second_frame_and_lit_rightly_in_all() -> None:
     ours, relighter = made()
-    pictures = [ours.relight(SUNSET, turn(index), index / 30) for index in range(30)]
+    pictures = [ours.relight(SUNSET, turn(index), index / 30, 2) for index in range(30)]
     assert 14 <= len(relighter.lights) <= 17
     assert min(psnr(pictures[index], truth(SUNSET, index)) for index in range(3, 30)) > 45
 
@@ -61,9 +61,9 @@ def test_a_turning_head_is_relit_in_every_second_frame_and_lit_rightly_in_all() 
 def test_a_change_of_light_is_eased_in_every_frame() -> None:
     ours, relighter = made()
     for index in range(6):
-        ours.relight(SUNSET, turn(0), index / 30)
+        ours.relight(SUNSET, turn(0), index / 30, 2)
     assert relighter.lights == [1]
-    seen = [ours.relight(PARTY, turn(0), (6 + index) / 30) for index in range(20)]
+    seen = [ours.relight(PARTY, turn(0), (6 + index) / 30, 2) for index in range(20)]
     assert 10 <= len(relighter.lights) <= 15  # in 0.4 s, then no more
     steps = [psnr(a, b) for a, b in pairwise(seen)]
     assert steps == sorted(steps)  # fast at first
@@ -74,10 +74,10 @@ def test_scene_and_room_are_relit_together_and_combined() -> None:
     ours, relighter = made()
     room: LightMap = builtin_environment("window").light_map
     head = rotate_light_map(room, turn(3))
-    both = ours.compare(SUNSET, turn(3), 0.1, room, head, lambda scene, room: np.concatenate([scene, room]))
+    both = ours.compare(SUNSET, turn(3), 0.1, room, head, lambda scene, room: np.concatenate([scene, room]), 2)
     assert relighter.lights == [2]
     height = close_up().matte.shape[0]
     np.testing.assert_allclose(both[:height], truth(SUNSET, 3), rtol=1e-3, atol=1e-5)
     np.testing.assert_allclose(both[height:], BasisRelighter(close_up()).relight(head[None])[0], rtol=1e-3, atol=1e-5)
     again = replace(SUNSET, revision=1)
-    assert ours.compare(again, turn(3), 0.2, room, head, lambda *_: np.zeros(0, np.float32)) is both
+    assert ours.compare(again, turn(3), 0.2, room, head, lambda *_: np.zeros(0, np.float32), 2) is both

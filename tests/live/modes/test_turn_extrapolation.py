@@ -24,14 +24,14 @@ class Counted:
     """Gives pictures of a turning head, and counts what is computed."""
 
     def __init__(self, every: int = 2) -> None:
-        self.extrapolation, self.computed = TurnExtrapolation(every), 0
+        self.extrapolation, self.every, self.computed = TurnExtrapolation(), every, 0
 
     def at(self, rotation: Rotation, light: object = LIGHT, room: object = ROOM, scale: float = 1.0) -> np.ndarray:
         def compute() -> np.ndarray:
             self.computed += 1
             return shaded(rotation) * np.float32(scale)
 
-        return self.extrapolation.picture(rotation, light, room, compute)
+        return self.extrapolation.picture(rotation, light, room, self.every, compute)
 
 
 def yaw(degrees: float) -> Rotation:
@@ -68,10 +68,8 @@ def test_a_head_that_stops_or_turns_round_is_not_overshot() -> None:
 
 def test_it_is_never_negative() -> None:
     ours = Counted(every=100)
-    ours.extrapolation.picture(yaw(0), LIGHT, ROOM, lambda: np.ones((4, 4, 3), np.float32))
-    ours.extrapolation.every = 1
-    ours.extrapolation.picture(yaw(1), LIGHT, ROOM, lambda: np.full((4, 4, 3), 0.2, np.float32))
-    ours.extrapolation.every = 100
+    ours.extrapolation.picture(yaw(0), LIGHT, ROOM, 100, lambda: np.ones((4, 4, 3), np.float32))
+    ours.extrapolation.picture(yaw(1), LIGHT, ROOM, 1, lambda: np.full((4, 4, 3), 0.2, np.float32))
     assert ours.at(yaw(1.9)).min() == 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -17,6 +18,7 @@ from relit_camera.live.reenactment.motion_transfer import split_body_motion, tra
 from relit_camera.live.reenactment.reenactor import WarpedLayer, open_reenactor
 from relit_camera.live.reenactment.source_image import feather_edges
 from relit_camera.live.reenactment.warp import inverse_affine, move_body, source_from_output
+from relit_camera.live.render_quality import FULL_QUALITY
 from relit_camera.subject.subject import Subject
 from tests.live.people import NOBODY, SCHEME, close_up, context_of, live_frame, motion, moved_by, person, premultiplied
 
@@ -160,3 +162,25 @@ def test_light_and_picture_are_proportional() -> None:
     moving = motion(rotation_from_angles(10, 5, 0))
     once, twice = (premultiplied(moved_by(reenactor, relit * gain, moving, live_frame()))[0] for gain in (0.4, 0.8))
     np.testing.assert_allclose(twice, 2 * once, atol=0.02)
+
+
+@pytest.mark.parametrize("size", [SIZE, (1280, 720), (642, 358)])
+@pytest.mark.parametrize("angles", [(0, 0, 0), (12, 5, -4)])
+def test_at_half_size_it_is_the_same_picture_only_softer(
+    size: tuple[int, int], angles: tuple[float, float, float]
+) -> None:
+    subject = person()
+    reenactor = FirstOrderReenactor(context_of(subject, size))
+    moving, relit = motion(rotation_from_angles(*angles)), relit_picture(subject)
+    whole, half = (
+        reenactor.plan_warp(moving, live_frame(), replace(FULL_QUALITY, half_size=each))(relit)
+        for each in (False, True)
+    )
+    assert half.at == whole.at
+    assert half.image.shape == whole.image.shape
+    inside = whole.image[..., 3] > 250
+    error = half.image[inside].astype(float) - whole.image[inside]
+    assert 10 * np.log10(255**2 / np.mean(error**2)) > 30
+    assert abs(error.mean()) < 0.5  # no shift by half a pixel, which a slope would show
+    edge = np.abs(half.image[..., 3].astype(float) - whole.image[..., 3]).mean()
+    assert edge < 4

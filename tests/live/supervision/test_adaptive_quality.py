@@ -8,7 +8,8 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relit_camera.live.supervision.adaptive_quality import QUALITY_LEVELS, QualityLimits, QualityState, next_quality
+from relit_camera.live.render_quality import QUALITY_LEVELS
+from relit_camera.live.supervision.adaptive_quality import QualityLimits, QualityState, next_quality
 
 LIMITS = QualityLimits()
 SAVED = (1.0, 0.9, 0.7, 0.55)

@@ -13,6 +13,7 @@ from relit_camera.base.config.look import Look
 from relit_camera.base.errors import PipelineHangError, TrackError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.live.pipeline import Pipeline, RenderedFrame
+from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.supervision.pipeline_health import (
     Event,
@@ -35,6 +36,8 @@ HANG = 1e9
 
 class FakePipeline:
     """In the place of a pipeline: a `FakeWorker` uses nothing of it."""
+
+    quality = FULL_QUALITY
 
 
 class FakeWorker:
@@ -325,3 +328,38 @@ def test_closing_closes_all_workers() -> None:
     simulation.supervisor.close()
     assert [worker.closed for worker in simulation.workers] == [True, True]
     assert not simulation.supervisor.ended(by=simulation.clock.now())  # the first still hangs
+
+
+def test_late_pictures_get_cheaper_and_full_quality_comes_back_within_two_seconds() -> None:
+    simulation = Simulation()
+    simulation.at(5.0, render_s=0.2)
+    simulation.run(5.0)
+    assert simulation.supervisor.pipeline.quality == FULL_QUALITY
+    simulation.run(8.0)
+    assert simulation.supervisor.pipeline.quality == QUALITY_LEVELS[-1]
+    simulation.at(8.0, render_s=RENDER_S)
+    simulation.run(10.0)
+    assert simulation.supervisor.pipeline.quality == FULL_QUALITY
+    assert simulation.troubles == []
+
+
+def test_models_that_open_slowly_are_no_reason_for_cheaper_pictures() -> None:
+    simulation = Simulation()
+    simulation.render_s, simulation.opens_models = 3.0, True
+    simulation.at(0.1, render_s=RENDER_S, opens_models=False)
+    levels = set()
+    for until in np.arange(0.1, 6.0, 0.1):
+        simulation.run(float(until))
+        levels.add(simulation.supervisor.load.level)
+    assert levels == {0}
+
+
+def test_a_new_worker_begins_with_the_quality_that_the_load_allows() -> None:
+    simulation = Simulation()
+    simulation.render_s = 0.2
+    simulation.run(5.0)
+    simulation.at(5.0, render_s=HANG)
+    simulation.at(5.5, render_s=0.2)
+    simulation.run(17.0)
+    assert len(simulation.workers) > 1
+    assert simulation.supervisor.pipeline.quality == QUALITY_LEVELS[-1]

@@ -19,6 +19,7 @@ from relit_camera.plugins import (
     ReenactorContext,
     ReflectanceField,
     RelighterOptions,
+    RenderQuality,
     SinkInfo,
     SinkOptions,
     SourceInfo,
@@ -106,7 +107,7 @@ class TopLeft:
             raise InputError("the reenactor example takes no argument", "name it 'example'")
         self.alpha = np.rint(context.subject.matte * 255).astype(np.uint8)
 
-    def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
+    def plan_warp(self, motion: FaceMotion, frame: Frame, quality: RenderQuality) -> WarpTask:
         return lambda relit: WarpedLayer(np.dstack([display_from_linear(relit), self.alpha]), (0, 0))
 
 

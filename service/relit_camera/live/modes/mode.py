@@ -12,6 +12,7 @@ from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.compositing.compositor import Compositor
 from relit_camera.live.modes.scene_relighting import SceneRelighting
 from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.stage_timing import StageTimer
 from relit_camera.subject.relighting.relighter import Relighter
@@ -79,7 +80,9 @@ class ModeContext:
 class RenderMode(Protocol):
     """Makes pictures of one subject in one mode. Keeps state between frames; `begin` is called by one thread."""
 
-    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene) -> RenderTask | FaceMismatch:
+    def begin(
+        self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
+    ) -> RenderTask | FaceMismatch:
         """Do the first half of a frame's work, and return the second.
 
         A mode divides its work so that both halves take about as long: two frames are then at work at once.
@@ -88,6 +91,7 @@ class RenderMode(Protocol):
             frame: the live frame, of the source's size.
             motion: of the face in that frame.
             scene: what to show; its subject is that of the mode's context.
+            quality: what the picture may cost.
 
         Raises:
             ModelError: a model that the scene needs is missing; so does the render task.

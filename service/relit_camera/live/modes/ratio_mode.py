@@ -9,6 +9,7 @@ from relit_camera.live.modes.identity_check import IdentityCheck
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
 from relit_camera.live.reenactment.warp import PositionGrid
+from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
 
 
@@ -20,7 +21,9 @@ class RatioMode:
         self._relighting = relighting
         self._identity = IdentityCheck(context.face)
 
-    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene) -> RenderTask | FaceMismatch:
+    def begin(
+        self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
+    ) -> RenderTask | FaceMismatch:
         """See `RenderMode.begin`: relights the source image in both lights, and finds where it lies on the live face.
 
         Both at the same time; the task multiplies and composes.
@@ -28,7 +31,7 @@ class RatioMode:
         timer = self._context.timer
         live = fit_frame(frame, self._context.size)
         motion = fit_motion(motion, frame.size, self._context.size)
-        plan = self._plan(motion, live, scene)
+        plan = self._plan(motion, live, scene, quality)
         if isinstance(plan, FaceMismatch):
             return plan
 
@@ -42,7 +45,9 @@ class RatioMode:
 
         return render
 
-    def _plan(self, motion: FaceMotion, frame: Frame, scene: Scene) -> RatioPlan | FaceMismatch | None:
+    def _plan(
+        self, motion: FaceMotion, frame: Frame, scene: Scene, quality: RenderQuality
+    ) -> RatioPlan | FaceMismatch | None:
         """What must be known to relight the frame; None without a face: then it is shown as it is."""
         context, relighting, pose = self._context, self._relighting, motion.pose
         if pose is None:
@@ -54,7 +59,13 @@ class RatioMode:
             return mismatch
         followed = context.executor.submit(self._follow, motion, frame)
         roots = context.scene_relighting.compare(
-            scene, motion.rotation, frame.time_s, room.light_map, room.in_head_frame, relighting.ratio_roots
+            scene,
+            motion.rotation,
+            frame.time_s,
+            room.light_map,
+            room.in_head_frame,
+            relighting.ratio_roots,
+            quality.relight_every,
         )
         return RatioPlan(frame, float(motion.presence), room.gain, roots, followed.result())
 

@@ -9,6 +9,7 @@ from relit_camera.base.images.image_types import Frame, LinearImage
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.reenactment.reenactor import Reenactor, WarpTask
+from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject
 
@@ -20,11 +21,11 @@ class ReenactMode:
         self._context = context
         self._reenactor = reenactor
 
-    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene) -> RenderTask:
+    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
         """See `RenderMode.begin`: plans the warp while the source image is relit; the task warps and composes."""
         context, timer = self._context, self._context.timer
-        planned = context.executor.submit(self._plan, motion, frame)
-        relit = context.scene_relighting.relight(scene, motion.rotation, frame.time_s)
+        planned = context.executor.submit(self._plan, motion, frame, quality)
+        relit = context.scene_relighting.relight(scene, motion.rotation, frame.time_s, quality.relight_every)
         warp = planned.result()
 
         def render() -> RenderedFrame:
@@ -36,9 +37,9 @@ class ReenactMode:
 
         return render
 
-    def _plan(self, motion: FaceMotion, frame: Frame) -> WarpTask:
+    def _plan(self, motion: FaceMotion, frame: Frame, quality: RenderQuality) -> WarpTask:
         with self._context.timer.stage("follow"):
-            return self._reenactor.plan_warp(motion, frame)
+            return self._reenactor.plan_warp(motion, frame, quality)
 
 
 def blend_with_source(subject: Subject, relit: LinearImage, share: float) -> LinearImage:

@@ -18,26 +18,19 @@ from relit_camera.live.status.stage_timing import StageTimer
 from relit_camera.subject.relighting.relighter import Relighter
 from relit_camera.subject.subject import Subject
 
-RELIT_EVERY = 2
-"""While the head turns, the subject is relit in every so many frames."""
-
 
 class SceneRelighting:
-    """Relights one subject frame by frame. Not thread-safe.
-
-    Attributes:
-        extrapolation: what it gives while the head turns, in frames in which the subject is not relit.
-    """
+    """Relights one subject frame by frame. Not thread-safe."""
 
     def __init__(self, subject: Subject, relighter: Relighter, light: LightTransition, timer: StageTimer) -> None:
         """`light` goes on from subject to subject, so that a change of light stays smooth."""
-        self.extrapolation = TurnExtrapolation(RELIT_EVERY)
+        self._extrapolation = TurnExtrapolation()
         self._gain = np.float32(subject.metadata.display_gain)
         self._relighter = relighter
         self._light = light
         self._timer = timer
 
-    def relight(self, scene: Scene, rotation: Rotation, time_s: float) -> LinearImage:
+    def relight(self, scene: Scene, rotation: Rotation, time_s: float, every: int) -> LinearImage:
         """The subject under the scene's light: float32 linear, the subject's size, in display exposure.
 
         The same picture again while neither the light nor the head has moved; it must not be written to.
@@ -46,12 +39,13 @@ class SceneRelighting:
             scene: what to show.
             rotation: of the head since neutral; the light stays where it is in the room.
             time_s: of the frame.
+            every: while the head turns, the subject is relit in every so many frames; between it is extrapolated.
         """
         with self._timer.stage("light"):
             light = self._light.update(scene, time_s)
         with self._timer.stage("relight"):
-            return self.extrapolation.picture(
-                rotation, light, None, lambda: self._relighter.relight(self._seen(light, rotation)[None])[0]
+            return self._extrapolation.picture(
+                rotation, light, None, every, lambda: self._relighter.relight(self._seen(light, rotation)[None])[0]
             )
 
     def compare(
@@ -62,6 +56,7 @@ class SceneRelighting:
         room: LightMap,
         room_in_head_frame: LightMap,
         combine: Callable[[LinearImage, LinearImage], NDArray[np.float32]],
+        every: int,
     ) -> NDArray[np.float32]:
         """What `combine` makes of the subject under the scene's light and under the room's, both of the subject's size.
 
@@ -74,6 +69,7 @@ class SceneRelighting:
             room: the room's light map; another object for another light.
             room_in_head_frame: the same as the head sees it.
             combine: makes an array (height, width, 3 or 4) of non-negative values.
+            every: as in `relight`.
         """
         with self._timer.stage("light"):
             light = self._light.update(scene, time_s)
@@ -82,7 +78,7 @@ class SceneRelighting:
             return combine(*self._relighter.relight(np.stack([self._seen(light, rotation), room_in_head_frame])))
 
         with self._timer.stage("relight"):
-            return self.extrapolation.picture(rotation, light, room, relit)
+            return self._extrapolation.picture(rotation, light, room, every, relit)
 
     def _seen(self, light: LightMap, rotation: Rotation) -> LightMap:
         return rotate_light_map(light, rotation) * self._gain

@@ -39,20 +39,16 @@ class TurnExtrapolation:
 
     It goes by how far the head has turned, not by time: with a head that stops, the picture stops, and a still head has
     the same picture again. It is extrapolated by no more than the turn between the last two that were computed.
-
-    Attributes:
-        every: the picture is computed in every so many frames, 1 for all; may be changed between frames.
     """
 
-    def __init__(self, every: int) -> None:
-        self.every = every
+    def __init__(self) -> None:
         self._whole: object = None
         self._latest: _Computed | None = None
         self._slope: _Slope | None = None
         self._age = 0
 
     def picture(
-        self, rotation: Rotation, whole: object, part: object, compute: Callable[[], NDArray[np.float32]]
+        self, rotation: Rotation, whole: object, part: object, every: int, compute: Callable[[], NDArray[np.float32]]
     ) -> NDArray[np.float32]:
         """The picture (height, width, 3 or 4) with the head under `rotation`; it must not be written to.
 
@@ -60,6 +56,7 @@ class TurnExtrapolation:
             rotation: of the head.
             whole: what else the picture depends on; with another object it is computed at once.
             part: the same of what makes so little difference that the picture goes on changing as before.
+            every: it is computed in every so many frames, 1 for all.
             compute: makes it.
         """
         latest = self._latest
@@ -74,7 +71,7 @@ class TurnExtrapolation:
         share = self._share(step)
         lag = step if self._slope is None else step - share * self._slope.turn
         jumped = np.linalg.norm(step) > MAX_STEP or np.linalg.norm(lag) > MAX_LAG
-        if self._age >= self.every or not same or jumped:
+        if self._age >= every or not same or jumped:
             computed = _Computed(rotation, part, compute())
             if same:  # else the difference is not the turn's alone: the last slope still holds
                 self._slope = _slope(latest, computed)

@@ -34,6 +34,7 @@ from relit_camera.live.reenactment.warp import (
     source_from_output,
     visible_box,
 )
+from relit_camera.live.render_quality import RenderQuality
 
 NODE_SPACING = 0.0145
 """Eye distances between computed positions. With 0.02 the outline of a turned nose is seen as a staircase."""
@@ -59,7 +60,7 @@ class FirstOrderReenactor:
         # Of the body at rest: a step that changed as the body grows would be seen.
         self._step = max(round(NODE_SPACING * self._points.unit / self._placed[0, 0]), 1)
 
-    def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
+    def plan_warp(self, motion: FaceMotion, frame: Frame, quality: RenderQuality) -> WarpTask:
         """See `Reenactor.plan_warp`."""
         face = self._face
         target = (transfer_motion if self._person.whole else transfer_motion_in_place)(face, self._points, motion)
@@ -70,12 +71,12 @@ class FirstOrderReenactor:
             patches = (*patches, StillBorder(face.size))
         placed = move_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
         box = visible_box(placed, face.size, self._size)
-        grid = Warp(placed, patches).grid(box, self._step)
+        grid = Warp(placed, patches).grid(box, 2 * self._step if quality.half_size else self._step)
         to_box = inverse_affine(placed)
         to_box[:, 2] -= box[:2]
 
         def warp(relit: LinearImage) -> WarpedLayer:
-            image = self._person.warped(relit, grid)
+            image = self._person.warped(relit, grid, quality.half_size)
             self._mouth.draw(image, relit, target.landmarks, target.pose, to_box)
             return WarpedLayer(image, box[:2])
 

@@ -15,6 +15,7 @@ from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.render_quality import RenderQuality
 from relit_camera.subject.subject import Subject
 
 
@@ -60,7 +61,7 @@ once, maybe in another thread while the next frame's warp is planned: it shares 
 class Reenactor(Protocol):
     """Moves the relit source image as the live face moves. Keeps state between frames; not thread-safe."""
 
-    def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
+    def plan_warp(self, motion: FaceMotion, frame: Frame, quality: RenderQuality) -> WarpTask:
         """Find out how the source image must be warped to move as `motion` says.
 
         What needs no relit picture is done here, what needs one in the task.
@@ -68,6 +69,7 @@ class Reenactor(Protocol):
         Args:
             motion: of the live face since its neutral pose and expression.
             frame: the live frame, for networks that look at it.
+            quality: what the picture may cost; a wish, not a must.
         """
         ...
 

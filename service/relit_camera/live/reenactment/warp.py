@@ -83,6 +83,11 @@ class PositionGrid:
         """Positions (rows, columns, 2) of the cells in the box: of the pixels of a picture 1/`step` of its size."""
         return self.positions[1:-1, 1:-1]
 
+    def halved(self) -> PositionGrid:
+        """The same positions for a picture of half the size, if `step` is even."""
+        left, top, right, bottom = self.box
+        return PositionGrid(self.positions, (0, 0, -(-(right - left) // 2), -(-(bottom - top) // 2)), self.step // 2)
+
     def sample(
         self,
         image: Picture,

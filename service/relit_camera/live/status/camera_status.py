@@ -42,6 +42,8 @@ class DegradationCode(StrEnum):
     """Mode ratio: the live face is not the subject's, so mode reenact takes over."""
     PROVIDER_FALLBACK = "provider-fallback"
     """A model runs on a slower execution provider than asked."""
+    REDUCED_QUALITY = "reduced-quality"
+    """The computer is busy: pictures are given less detail so that they stay in time."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,7 @@ class Percentiles:
 
     p50: float
     p95: float
+    max: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,8 @@ class CameraStatus:
     providers: dict[str, str] = field(default_factory=dict)
     """Name of each open model → the execution provider that is proven to run it, such as `cpu`; and `relighter NAME`,
     the relighter at work → `numpy` or such a provider."""
+    quality_level: int = 0
+    """0 is full quality; at each further level a picture costs less, because the computer is busy."""
     degraded: list[Degradation] = field(default_factory=list)
     version: str = ""
     uptime_s: float = 0.0

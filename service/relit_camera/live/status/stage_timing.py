@@ -30,13 +30,13 @@ class DurationWindow:
             self._seconds.append(seconds)
 
     def percentiles(self) -> Percentiles:
-        """Median and 95th percentile in milliseconds, 0 before the first duration."""
+        """Median, 95th percentile and maximum in milliseconds, 0 before the first duration."""
         with self._lock:
             seconds = np.array(self._seconds)
         if seconds.size == 0:
-            return Percentiles(0.0, 0.0)
-        p50, p95 = np.percentile(seconds, [50, 95]) * 1e3
-        return Percentiles(float(p50), float(p95))
+            return Percentiles(0.0, 0.0, 0.0)
+        p50, p95, longest = np.percentile(seconds, [50, 95, 100]) * 1e3
+        return Percentiles(float(p50), float(p95), float(longest))
 
 
 class StageTimer:

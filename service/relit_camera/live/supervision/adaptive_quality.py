@@ -9,29 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-
-@dataclass(frozen=True)
-class RenderQuality:
-    """What a picture may cost.
-
-    Attributes:
-        relight_every: the source image is relit for every so many frames while the head turns, extrapolated between.
-        half_size: whether the face is warped at half the output's size and enlarged.
-        track_every: the face is tracked in every so many frames, predicted between.
-    """
-
-    relight_every: int = 2
-    half_size: bool = False
-    track_every: int = 1
-
-
-QUALITY_LEVELS = (
-    RenderQuality(),
-    RenderQuality(relight_every=3),
-    RenderQuality(relight_every=3, half_size=True),
-    RenderQuality(relight_every=3, half_size=True, track_every=2),
-)
-"""From full quality to the cheapest."""
+from relit_camera.live.render_quality import QUALITY_LEVELS, RenderQuality
 
 
 @dataclass(frozen=True)
@@ -95,23 +73,23 @@ def next_quality(state: QualityState, rendered_at: float, latency_s: float, limi
         limits: see there.
     """
     state = _with_latency(state, rendered_at, latency_s, limits)
-    assert state.latency_s is not None
-    late, early = state.latency_s > limits.late_s, state.latency_s < limits.early_s
+    latency = state.latency_s or 0.0
+    late, early = latency > limits.late_s, latency < limits.early_s
     if not late and not early:
         return replace(state, since=None)
-    if state.since is None or late is not state.late:
-        state = replace(state, since=rendered_at, late=late)
-    assert state.since is not None
-    lasted = rendered_at - state.since
+    since = rendered_at if state.since is None or late is not state.late else state.since
+    state, lasted = replace(state, since=since, late=late), rendered_at - since
     if late and lasted >= limits.lower_after_s and state.level + 1 < len(QUALITY_LEVELS):
         return _lowered(state, rendered_at, limits)
-    delay = limits.raise_after_s if state.latency_s < limits.idle_s else max(limits.raise_after_s, state.raise_delay_s)
+    idle = latency < limits.idle_s
+    delay = limits.raise_after_s if idle else max(limits.raise_after_s, state.raise_delay_s)
     if early and lasted >= delay and state.level > 0:
         return replace(state, level=state.level - 1, since=None, raised_at=rendered_at)
     return state
 
 
 def _with_latency(state: QualityState, now: float, latency_s: float, limits: QualityLimits) -> QualityState:
+    latency_s = min(latency_s, 2 * limits.late_s)  # one that is very late, while models are opened, is still but one
     if state.latency_s is None or now < state.seen_at:
         return replace(state, latency_s=latency_s, seen_at=now)
     weight = min(1.0, (now - state.seen_at) / limits.smoothing_s)

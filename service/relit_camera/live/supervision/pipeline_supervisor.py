@@ -12,6 +12,7 @@ from relit_camera.base.errors import PipelineHangError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.live.pipeline import Pipeline, RenderedFrame
 from relit_camera.live.scene.scene import Scene
+from relit_camera.live.supervision.adaptive_quality import QualityLimits, QualityState, next_quality
 from relit_camera.live.supervision.pipeline_health import (
     Action,
     Event,
@@ -32,6 +33,7 @@ from relit_camera.live.supervision.pipeline_health import (
 from relit_camera.live.supervision.pipeline_worker import PipelineWorker
 
 DEFAULT_LIMITS = HealthLimits()
+DEFAULT_QUALITY_LIMITS = QualityLimits()
 
 
 class Worker(Protocol):
@@ -102,6 +104,7 @@ class PipelineSupervisor:
 
     Attributes:
         pipeline: the one at work, or that was last. Any thread may read this.
+        load: how late pictures are, and so what the next one may cost. Any thread may read this.
         dropped: frames that no worker took. Any thread may read this.
     """
 
@@ -115,6 +118,7 @@ class PipelineSupervisor:
         limits: HealthLimits = DEFAULT_LIMITS,
         clock: Clock = SYSTEM_CLOCK,
         start_worker: WorkerFactory = PipelineWorker,
+        quality_limits: QualityLimits = DEFAULT_QUALITY_LIMITS,
     ) -> None:
         """Set up; the first frame starts a worker.
 
@@ -127,13 +131,16 @@ class PipelineSupervisor:
             limits: see there.
             clock: to measure by.
             start_worker: starts a worker.
+            quality_limits: when pictures are made cheaper.
         """
         self.pipeline = first
         self.dropped = 0
         self._next_pipeline: Callable[[], Pipeline] = lambda: first
         self._make_pipeline, self._scene, self._publish, self._on_trouble = make_pipeline, scene, publish, on_trouble
         self._limits, self._clock, self._start_worker = limits, clock, start_worker
+        self._quality_limits = quality_limits
         self._health = PipelineHealth()
+        self.load = QualityState()
         self._messages: queue.SimpleQueue[Event | tuple[PictureRendered, ShownPicture]] = queue.SimpleQueue()
         self._worker: Worker | None = None
         self._retired: dict[int, Worker] = {}  # replaced, never modified: `close` reads it in another thread
@@ -154,6 +161,8 @@ class PipelineSupervisor:
                 event, picture = message
                 shown.append(picture)
                 self._apply(event)
+                latency_s = picture.at - picture.frame.captured_at
+                self.load = next_quality(self.load, picture.at, latency_s, self._quality_limits)
             else:
                 self._apply(message)
         return shown
@@ -163,6 +172,7 @@ class PipelineSupervisor:
         actions = self._apply(FrameArrived(self._clock.now(), self._scene().revision), frame)
         if self._worker is not None:
             self.pipeline = self._worker.pipeline or self.pipeline
+        self.pipeline.quality = self.load.quality
         self.dropped = self._dropped_by_retired + (self._worker.dropped if self._worker else 0)
         return ShowFallback() not in actions
 

@@ -36,6 +36,7 @@ from relit_camera.live.reenactment.warp import (
     source_from_output,
     visible_box,
 )
+from relit_camera.live.render_quality import RenderQuality
 
 EDGE_FADE = 0.1
 """Share of the crop's side over which a picture gives way to the source image round it."""
@@ -63,7 +64,7 @@ class OnnxReenactor:
         self._person = Cutout(context.subject)
         self._placed = source_from_output(context.subject.size, context.size)
 
-    def plan_warp(self, motion: FaceMotion, frame: Frame) -> WarpTask:
+    def plan_warp(self, motion: FaceMotion, frame: Frame, quality: RenderQuality) -> WarpTask:
         """See `Reenactor.plan_warp`.
 
         Raises:
