@@ -28,7 +28,7 @@ NOT_TIMED = "–"
 
 
 def measure_short(data: Path) -> list[CameraCost]:
-    """Both modes, small and briefly, with what every checkout has: the recorded track, and the substitute as unit."""
+    """Both modes, small and briefly, with what every checkout has: the recorded track."""
     settings = bundled_settings(RelitSettings(storage=StorageSettings(data_dir=data)))
     recorded = {
         "tracker": settings.tracker.model_copy(update={"name": f"recorded:{demo_files.TRACK}"}),
@@ -42,7 +42,6 @@ def measure_short(data: Path) -> list[CameraCost]:
             [NoBackground()],
             SHORT_FPS,
             SHORT_SECONDS,
-            substitute=True,
         )
     )
 

@@ -127,7 +127,7 @@ LIMITS = {
     "a panorama": [f"{MAX_PANORAMA_PIXELS / 1e6:.1f} million", f"{MAX_EXR_VALUES // 10**6} million values"],
     "a stored background": [f"{MAX_BACKGROUND_SIDE_PX} pixels"],
     "a preset's or settings file": [f"{MAX_YAML_BYTES // MIB} MiB", f"{MAX_YAML_DEPTH} levels"],
-    "a subject that is shown by the camera": [f"{subject_file.MAX_IN_MEMORY_BYTES // (1 << 30)} GiB"],
+    "a subject that is shown by the camera": [f"{subject_file.MAX_COPIED_BYTES // (1 << 30)} GiB"],
     "a subject file elsewhere": [f"{subject_file.MAX_BYTES // (1 << 30)} GiB"],
     "any subject file": [f"{subject_file.MAX_TENSORS} tensors", f"{MAX_SIDE_PX} pixels"],
     "a recorded matte": [f"{matting.MAX_RECORDED_BYTES // (1 << 30)} GiB"],

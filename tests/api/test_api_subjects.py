@@ -12,7 +12,7 @@ import pytest
 from relit_camera.subject.compression.local_basis import global_basis
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.subject import Subject, SubjectMetadata
-from relit_camera.subject.subject_file import MAX_IN_MEMORY_BYTES, write_subject
+from relit_camera.subject.subject_file import MAX_COPIED_BYTES, write_subject
 from tests.api.api_client import Client, check_problem, decoded_picture
 from tests.api.fake_camera import FakeCamera
 
@@ -113,7 +113,7 @@ def test_what_is_too_large_to_be_shown_is_told_and_seen(client: Client, camera: 
     path = stored / "ada.relit"
     data = path.read_bytes()
     start = 8 + int.from_bytes(data[:8], "little")
-    header, size = json.loads(data[8:start]), MAX_IN_MEMORY_BYTES
+    header, size = json.loads(data[8:start]), MAX_COPIED_BYTES
     header["more"] = {"dtype": "U8", "shape": [size], "data_offsets": [len(data) - start, len(data) - start + size]}
     text = json.dumps(header).encode()
     path.write_bytes(len(text).to_bytes(8, "little") + text + data[start:])

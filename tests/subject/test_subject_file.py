@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import mmap
 import shutil
@@ -15,11 +16,12 @@ from safetensors.numpy import load_file, save_file
 from relit_camera.app.demo import demo_files
 from relit_camera.base.errors import NotFoundError, StorageError, SubjectError
 from relit_camera.capture.subject_builder import build_subject
+from relit_camera.subject import subject_file
 from relit_camera.subject.compression.webp_packing import decode_basis
 from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import (
     HEADER_KEY,
-    MAX_IN_MEMORY_BYTES,
+    MAX_COPIED_BYTES,
     read_metadata,
     read_neutral,
     read_subject,
@@ -114,13 +116,30 @@ def test_wrong_tensors_are_refused(path: Path, change: dict[str, np.ndarray]) ->
         read_subject(path)
 
 
-def test_what_is_held_in_memory_may_be_less_than_what_is_mapped(path: Path) -> None:
-    in_memory = read_subject(path, in_memory=True)
-    np.testing.assert_array_equal(in_memory.coefficients, read_subject(path).coefficients)
+@pytest.mark.parametrize("disk", ["there", "full"])
+def test_a_copied_subject_outlives_its_file(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, disk: str
+) -> None:
+    monkeypatch.setattr(subject_file, "DISK", tmp_path if disk == "there" else tmp_path / "none")
+    if disk == "full":
+        monkeypatch.setattr("tempfile.TemporaryFile", _no_space)
+    files = sorted(tmp_path.iterdir())
+    expected, copied = np.array(read_subject(path).basis.mixes), read_subject(path, copied=True)
+    path.write_bytes(b"")
+    copied.drop_pages()
+    np.testing.assert_array_equal(copied.basis.mixes, expected)
+    assert sorted(tmp_path.iterdir()) == files
+
+
+def _no_space(**_: object) -> None:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_what_is_copied_may_be_less_than_what_is_mapped(path: Path) -> None:
     with path.open("ab") as file:
-        file.truncate(MAX_IN_MEMORY_BYTES + 1)  # takes no room
+        file.truncate(MAX_COPIED_BYTES + 1)  # takes no room
     with pytest.raises(SubjectError, match="larger than 1 GiB; build it again at a smaller size"):
-        read_subject(path, in_memory=True)
+        read_subject(path, copied=True)
     with pytest.raises(SubjectError, match="not a usable subject"):
         read_subject(path)
 

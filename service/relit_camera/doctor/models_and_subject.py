@@ -76,7 +76,7 @@ def _provider_cure(provider: str) -> str:
 
 def check_subject(settings: RelitSettings) -> Finding:
     """Check that the subject in the settings exists and can be read. Without one the live picture passes through."""
-    topic, store = "subject", SubjectStore(settings.storage.subjects, in_memory=True)  # as the camera does
+    topic, store = "subject", SubjectStore(settings.storage.subjects, copied=True)  # as the camera does
     stored = ", ".join(store.names())
     if settings.subject is None:
         cure = f"choose one by `subject:` in config.yaml or --subject; stored are: {stored}"

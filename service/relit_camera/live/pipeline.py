@@ -214,4 +214,5 @@ class Pipeline:
         )
         self._active = _ActiveMode(subject, name, relighter, self._modes[name](context))
         return_freed_memory()  # what opening models and unpacking the subject took for a moment
+        subject.drop_pages()
         return self._active.mode

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
@@ -124,6 +125,14 @@ class Subject:
     def size(self) -> tuple[int, int]:
         """Width and height in pixels."""
         return self.metadata.width, self.metadata.height
+
+    def drop_pages(self) -> None:
+        """Give back the memory of what was read of the mapped file; the system reads it again where it is needed."""
+        owner: object = self.coefficients
+        while isinstance(owner, np.ndarray):
+            owner = owner.base
+        if isinstance(owner, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+            owner.madvise(mmap.MADV_DONTNEED)
 
     def pictures(self, amounts: NDArray[np.float32]) -> NDArray[np.float32]:
         """The linear pictures (count, height, width, 3) of amounts (components, count) of the shared basis."""

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import logging
+import os
+import shutil
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,14 +24,18 @@ from relit_camera.subject.compression.local_basis import LocalBasis, global_basi
 from relit_camera.subject.compression.webp_packing import decode_basis, encode_basis
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
 
+log = logging.getLogger(__name__)
+
 SUFFIX = ".relit"
 HEADER_KEY = "relit_subject"
 LANDMARKS_PREFIX = "landmarks."
 MAX_TENSORS = 64
 MAX_BYTES = 8 << 30
 """Largest file that is memory-mapped."""
-MAX_IN_MEMORY_BYTES = 1 << 30
-"""Largest file that is read into memory; the largest subject that is built, 1024 pixels a side, has under 700 MB."""
+MAX_COPIED_BYTES = 1 << 30
+"""Largest file that is copied first; the largest subject that is built, 1024 pixels a side, has under 700 MB."""
+DISK = Path("/var/tmp")  # noqa: S108 - the copy has no name there
+"""Temporary files on a disk, where the system has such a folder."""
 REQUIRED_TENSORS = ("coefficients", "light_directions", "light_coefficients", "matte", "neutral")
 OPTIONAL_TENSORS = ("normals", "albedo", "depth", "horizons")
 LOCAL_BASIS_PREFIX = "basis."
@@ -84,25 +92,25 @@ def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
     write_tensors(path, tensors, {HEADER_KEY: meta.model_dump_json()})
 
 
-def read_subject(path: Path, in_memory: bool = False) -> Subject:
+def read_subject(path: Path, copied: bool = False) -> Subject:
     """Open a subject; its arrays are read-only views of the mapped file, which the system may drop and read again.
 
     The basis of a file of version 1 is not: it is decoded into memory.
 
     Args:
         path: the file.
-        in_memory: read the file into memory instead, `MAX_IN_MEMORY_BYTES` at most, else `MAX_BYTES`. Long-running
-            programs need that: the system kills a process that reads a mapped file which was truncated meanwhile.
+        copied: map a copy of the file, `MAX_COPIED_BYTES` at most, else `MAX_BYTES`. Long-running programs need that:
+            the system kills a process that reads a mapped file which was truncated meanwhile.
 
     Raises:
         SubjectError: missing, too large, damaged, of another version, or with values that are not finite.
     """
-    with _open_safetensors(path, MAX_IN_MEMORY_BYTES if in_memory else MAX_BYTES) as file:
+    with _open_safetensors(path, MAX_COPIED_BYTES if copied else MAX_BYTES) as file:
         metadata = _metadata(path, file.metadata() or {})
         names = list(file.keys())
         if len(names) > MAX_TENSORS:
             raise _damaged_file_error(path, f"it holds {len(names)} tensors")
-        tensors = _tensor_views(path, names, in_memory)
+        tensors = _tensor_views(path, names, copied)
     _require_valid_tensors(path, tensors, metadata.format_version)
     landmarks = {n.removeprefix(LANDMARKS_PREFIX): t for n, t in tensors.items() if n.startswith(LANDMARKS_PREFIX)}
     arrays = {name: tensors[name] for name in (*REQUIRED_TENSORS, *OPTIONAL_TENSORS) if name in tensors}
@@ -183,12 +191,12 @@ def _metadata(path: Path, header: Mapping[str, str]) -> SubjectMetadata:
         raise _damaged_file_error(path, f"header field {'.'.join(map(str, first['loc']))}: {first['msg']}") from error
 
 
-def _tensor_views(path: Path, names: list[str], in_memory: bool) -> dict[str, NDArray]:
+def _tensor_views(path: Path, names: list[str], copied: bool) -> dict[str, NDArray]:
     """Views of the tensors of a file that `safe_open` has checked; its own `get_tensor` would copy each.
 
     Layout (github.com/huggingface/safetensors): the header's length as 8 bytes, the header as JSON, the tensors.
     """
-    content = np.fromfile(path, np.uint8) if in_memory else np.asarray(np.memmap(path, np.uint8, mode="r"))
+    content = _own_copy(path) if copied else np.asarray(np.memmap(path, np.uint8, mode="r"))
     content.flags.writeable = False
     start = 8 + int.from_bytes(content[:8].tobytes(), "little")
     header = json.loads(content[8:start].tobytes())
@@ -200,6 +208,22 @@ def _tensor_views(path: Path, names: list[str], in_memory: bool) -> dict[str, ND
         stored = content[start + first : start + last]
         tensors[name] = stored.view(SAFETENSORS_DTYPES[kind]).reshape(header[name]["shape"])
     return tensors
+
+
+def _own_copy(path: Path) -> NDArray[np.uint8]:
+    """The content of a file, mapped from a copy without a name, which nobody else can change.
+
+    The system can drop its pages, unlike those of memory. Where no copy can be written it is read into memory.
+    """
+    try:
+        # Not the usual folder: that may be memory itself.
+        with path.open("rb") as file, tempfile.TemporaryFile(dir=DISK if os.access(DISK, os.W_OK) else None) as copy:
+            shutil.copyfileobj(file, copy, 1 << 20)
+            copy.flush()
+            return np.asarray(np.memmap(copy, np.uint8, mode="r"))
+    except OSError as error:
+        log.warning("no copy of %s can be written (%s): it is read into memory", path, error.strerror)
+        return np.fromfile(path, np.uint8)
 
 
 def _require_valid_tensors(path: Path, tensors: Mapping[str, NDArray], version: int) -> None:

@@ -14,16 +14,16 @@ from relit_camera.subject.subject_file import SUFFIX, read_metadata, read_neutra
 class SubjectStore(NamedFiles):
     """A folder of .relit files; a subject's name is its file's stem."""
 
-    def __init__(self, folder: Path, in_memory: bool = False) -> None:
+    def __init__(self, folder: Path, copied: bool = False) -> None:
         """Set up; nothing is read.
 
         Args:
             folder: where the files are.
-            in_memory: whether subjects are read into memory instead of mapped (see `read_subject`).
+            copied: whether a copy of a file is mapped, not the file (see `read_subject`).
         """
         # Subjects come into the folder by hand (`relit capture --out`), so their names may be any file's.
         super().__init__(folder, "subject", [SUFFIX], any_name=True)
-        self._in_memory = in_memory
+        self._copied = copied
 
     def load(self, name: str) -> Subject:
         """Read a stored subject.
@@ -32,7 +32,7 @@ class SubjectStore(NamedFiles):
             NotFoundError: there is none of that name.
             SubjectError: its file is damaged, or too large.
         """
-        return read_subject(self.path(name), self._in_memory)
+        return read_subject(self.path(name), self._copied)
 
     def load_file(self, path: Path) -> tuple[str, Subject]:
         """Read a subject's file anywhere. Returns the name to show, which is the file's stem, and the subject.
@@ -43,7 +43,7 @@ class SubjectStore(NamedFiles):
         """
         if not path.exists():
             raise NotFoundError(f"no subject file {path}", "check the path")
-        return path.stem, read_subject(path, self._in_memory)
+        return path.stem, read_subject(path, self._copied)
 
     def metadata(self, name: str) -> SubjectMetadata:
         """The header of a stored subject's file, which is read alone, whatever the size of the file.

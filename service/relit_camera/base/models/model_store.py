@@ -96,7 +96,7 @@ class ModelStore:
         state = self.state(name)
         if state is ModelState.PULLED:
             return self._file(name)
-        what = "is not pulled" if state is ModelState.MISSING else f"in {self.folder} has the wrong sha256"
+        what = "is not pulled" if state is ModelState.MISSING else f"in {self.folder} is of another version or damaged"
         raise ModelError(f"model {name} {what}", f"run `relit models pull {name}`")
 
     def pull(

@@ -13,9 +13,10 @@ from typing import Any
 from relit_camera.app.demo import demo_files
 from relit_camera.base.config.look import Background, Mode
 from relit_camera.base.config.settings import RelitSettings
+from relit_camera.base.errors import ModelError
 from relit_camera.lab.bench.bench_source import prepare_video
 from relit_camera.lab.bench.camera_process import CameraProcess
-from relit_camera.lab.bench.mesh_run import MeshRun
+from relit_camera.lab.bench.mesh_run import MeshRun, installed_mesh_runs
 
 WARM_UP_S = 4.0
 SAMPLE_INTERVAL_S = 1.0
@@ -27,7 +28,7 @@ class StageCost:
 
     Attributes:
         processor_ms: processor time a picture, the mean; stages within it not counted.
-        mesh_runs: the same in runs of the face mesh network.
+        mesh_runs: the same in mesh runs (`lab.bench.mesh_run`).
         p50_ms, p95_ms: time from its beginning to its end.
     """
 
@@ -48,9 +49,9 @@ class CameraCost:
         composed: pictures made while it was measured.
         dropped: frames passed over meanwhile. They were decoded, which counts.
         processor_ms: processor time of the whole process.
-        mesh_runs: the same in runs of the face mesh network.
+        mesh_runs: the same in mesh runs (`lab.bench.mesh_run`).
         mesh_run_ms: processor time of such a run, the median of those beside the camera.
-        mesh_network: what was run; see `MeshRun.network`.
+        installed_mesh_runs: what a run of the installed face mesh network costs, in mesh runs; None without one.
         stages: by name.
         outside_ms: processor time of the process outside the stages.
         threads_ms: processor time of the threads by name, stages included; empty where the system does not tell.
@@ -70,7 +71,7 @@ class CameraCost:
     processor_ms: float
     mesh_runs: float
     mesh_run_ms: float
-    mesh_network: str
+    installed_mesh_runs: float | None
     stages: dict[str, StageCost]
     outside_ms: float
     threads_ms: dict[str, float]
@@ -82,7 +83,7 @@ class CameraCost:
 
     @property
     def outside_mesh_runs(self) -> float:
-        """`outside_ms` in runs of the face mesh network."""
+        """`outside_ms` in mesh runs."""
         return self.outside_ms / self.mesh_run_ms
 
     def as_json(self) -> dict[str, Any]:
@@ -97,8 +98,6 @@ def measure_cameras(
     backgrounds: Sequence[Background],
     source_fps: float | None,
     seconds: float,
-    *,
-    substitute: bool = False,
 ) -> Iterator[CameraCost]:
     """Measure a camera of each combination, one after another, in their order.
 
@@ -109,7 +108,6 @@ def measure_cameras(
         backgrounds: of the look.
         source_fps: frames a second of a video file; its own if None.
         seconds: how long each is measured.
-        substitute: take the substitute for the face mesh network also where that is installed.
 
     Raises:
         RelitError: the video cannot be read, or a camera cannot run.
@@ -127,7 +125,7 @@ def measure_cameras(
                 "output": settings.output.model_copy(update={**place, "sink": "null"}),
                 "look": settings.look.model_copy(update={"mode": mode, "background": background}),
             }
-            yield measure_camera(settings.model_copy(update=changed), fps, seconds, MeshRun(substitute=substitute))
+            yield measure_camera(settings.model_copy(update=changed), fps, seconds, MeshRun())
 
 
 def bundled_settings(settings: RelitSettings) -> RelitSettings:
@@ -149,6 +147,10 @@ def measure_camera(settings: RelitSettings, source_fps: float, seconds: float, m
     Raises:
         RelitError: the camera cannot run, or makes no pictures.
     """
+    try:
+        installed = installed_mesh_runs()
+    except ModelError:
+        installed = None
     with CameraProcess(settings) as camera:
         time.sleep(WARM_UP_S)
         before, began_s, threads_before = camera.status(), camera.processor_s, camera.thread_s
@@ -177,7 +179,7 @@ def measure_camera(settings: RelitSettings, source_fps: float, seconds: float, m
         processor_ms=used_s * per_picture,
         mesh_runs=used_s * per_picture / mesh.ms,
         mesh_run_ms=mesh.ms,
-        mesh_network=mesh.network,
+        installed_mesh_runs=installed,
         stages=stages,
         outside_ms=used_s * per_picture - sum(stage.processor_ms for stage in stages.values()),
         threads_ms={name: (s - threads_before.get(name, 0.0)) * per_picture for name, s in threads_after.items()},

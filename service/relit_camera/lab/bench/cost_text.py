@@ -29,7 +29,7 @@ def cost_text(cost: CameraCost) -> str:
             *([f"  threads, in mesh runs: {threads}"] if threads else []),
             f"  {cost.composed} pictures of {cost.source_fps:g} frames a second, {_dropped(cost)}",
             f"  resident memory {cost.resident_mb:.0f} MB; first picture {cost.first_picture_s:.1f} s after the start",
-            f"  a mesh run ({cost.mesh_network}): {unit:.2f} ms",
+            f"  a mesh run: {unit:.2f} ms; the installed face mesh network {_installed(cost)}",
             *(f"  degraded: {line}" for line in cost.degraded),
         ]
     )
@@ -39,6 +39,10 @@ def cost_title(cost: CameraCost) -> str:
     """What was measured, in a line."""
     width, height = cost.size
     return f"{cost.mode}, background {cost.background}, {width}x{height}, tracker {cost.tracker.partition(':')[0]}"
+
+
+def _installed(cost: CameraCost) -> str:
+    return "is missing" if cost.installed_mesh_runs is None else f"takes {cost.installed_mesh_runs:.2f}"
 
 
 def _dropped(cost: CameraCost) -> str:

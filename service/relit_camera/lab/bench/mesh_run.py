@@ -1,20 +1,20 @@
-"""The unit in which processor time is given: one run of the face mesh network, float32, on one thread.
+"""The unit in which processor time is given: one run of the face mesh network as its authors publish it.
 
-Figures in it can be compared between machines, and between minutes of a machine that others use too.
+Figures in it can be compared between machines, between minutes of a machine that others use too, and between versions
+of this program: what is run is not the installed network, which is made faster, but one generated with the published
+one's layers and random weights, float32, on one thread.
 """
 
 from __future__ import annotations
 
 import time
-from contextlib import suppress
 from statistics import median
 
 import numpy as np
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 
-from relit_camera.base.errors import ModelError
 from relit_camera.base.models.model_store import model_path
-from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
+from relit_camera.base.models.session_with_fallback import Model, SessionOptions, open_session
 
 WARM_UP_RUNS = 2
 RUNS = 6
@@ -22,16 +22,15 @@ RUNS = 6
 
 
 class MeshRun:
-    """The network, and the processor times of its runs.
+    """A network, and the processor times of its runs."""
 
-    Attributes:
-        network: `face_mesh`; or `substitute`, where the public networks are not installed: a network of the same kinds
-            of layers that takes about as long, with random weights.
-    """
+    def __init__(self, model: Model | None = None) -> None:
+        """Open a network of one input; the one that is the unit if not given.
 
-    def __init__(self, *, substitute: bool = False) -> None:
-        """Open the network; the substitute where that is wanted, for figures that must be comparable everywhere."""
-        self.network, self._session = _open_network(substitute)
+        Raises:
+            ModelError: it cannot run.
+        """
+        self._session = open_session(model or _published_layers(), "mesh-run", SessionOptions("cpu"))
         (name, spec), *_ = self._session.inputs.items()
         self._feeds = {name: np.full([size or 1 for size in spec.shape], 0.5, np.float32)}
         self._seconds: list[float] = []
@@ -55,57 +54,88 @@ class MeshRun:
         return 1e3 * median(self._seconds)
 
 
-def _open_network(substitute: bool) -> tuple[str, Session]:
-    options = SessionOptions("cpu")
-    if not substitute:
-        with suppress(ModelError):
-            return "face_mesh", open_session(model_path("face_mesh"), "face_mesh", options)
-    return "substitute", open_session(_substitute_network(), "substitute", options)
+def installed_mesh_runs() -> float:
+    """What a run of the installed network `face_mesh` costs, in mesh runs.
+
+    Raises:
+        ModelError: it is not installed.
+    """
+    installed, mesh = MeshRun(model_path("face_mesh")), MeshRun()
+    for _ in range(INSTALLED_SAMPLES):
+        mesh.sample()
+        installed.sample()
+    return installed.ms / mesh.ms
 
 
-SUBSTITUTE_LAYERS = ((16, 2, 10), (32, 2, 14), (64, 2, 14), (128, 2, 14), (128, 2, 14), (128, 2, 14))
-"""Of each step of the substitute: channels, stride, and pairs of a depthwise and a pointwise convolution."""
+INSTALLED_SAMPLES = 3
+SIDE_PX, LANDMARKS = 256, 478
+STEPS = ((8, 16), (16, 32), (32, 64), (64, 128), (64, 128), (64, 128), (64, 128))
+"""Of each step, at half the size of the step before: channels within its blocks, and of their sums."""
+BLOCKS = 4
+"""Residual blocks of a step, after the one that halves the size."""
 
 
-def _substitute_network() -> bytes:
-    """An ONNX network that costs what the face mesh network costs: separable convolutions of (1, 3, 256, 256)."""
-    rng = np.random.default_rng(0)
-    nodes: list[NodeProto] = []
-    weights: list[TensorProto] = []
+def _published_layers() -> bytes:
+    """An ONNX network with the layers of the face mesh network: residual blocks of separable convolutions, PReLU."""
+    net = _Layers()
+    value = net.prelu(net.convolve("image", (16, 3, 3, 3), stride=2), 16)
+    for step, (inner, outer) in enumerate(STEPS):
+        for block in range(BLOCKS + (step > 0)):
+            halves = step > 0 and block == 0
+            given = STEPS[step - 1][1] if halves else outer
+            size = 2 if halves else 1
+            narrow = net.prelu(net.convolve(value, (inner, given, size, size), stride=size), inner)
+            spread = net.convolve(narrow, (inner, 1, 3, 3), groups=inner)
+            summed = net.convolve(spread, (outer, inner, 1, 1))
+            kept = net.halve(value, outer - given) if halves else value
+            value = net.prelu(net.node("Add", [summed, kept]), outer)
+    return net.model(net.convolve(value, (3 * LANDMARKS, STEPS[-1][1], 2, 2)))
 
-    def convolve(value: str, channels: int, given: int, kernel: int, stride: int, groups: int) -> str:
-        name = f"conv{len(nodes)}"
-        shape = (channels, given // groups, kernel, kernel)
-        scale = np.sqrt(2.4 / (shape[1] * kernel * kernel))  # so that values neither grow nor fade
-        weights.append(numpy_helper.from_array((rng.standard_normal(shape) * scale).astype(np.float32), f"{name}.w"))
-        pads = [kernel // 2] * 4
-        nodes.append(
-            helper.make_node(
-                "Conv",
-                [value, f"{name}.w"],
-                [name],
-                strides=[stride] * 2,
-                pads=pads,
-                group=groups,
-                kernel_shape=[kernel] * 2,
-            )
+
+class _Layers:
+    """Layers of a network in the making. Values are named after their nodes."""
+
+    def __init__(self) -> None:
+        self._rng = np.random.default_rng(0)
+        self._nodes: list[NodeProto] = []
+        self._weights: list[TensorProto] = []
+
+    def node(self, kind: str, inputs: list[str], **attributes: object) -> str:
+        name = f"{kind}{len(self._nodes)}"
+        self._nodes.append(helper.make_node(kind, inputs, [name], **attributes))
+        return name
+
+    def convolve(self, value: str, shape: tuple[int, int, int, int], stride: int = 1, groups: int = 1) -> str:
+        scale = np.sqrt(0.5 / np.prod(shape[1:]))  # so that values do not grow
+        bias = self._constant(np.zeros(shape[0], np.float32))
+        weights = self._constant((self._rng.standard_normal(shape) * scale).astype(np.float32))
+        pads = [1 if shape[2] == 3 else 0] * 4
+        return self.node("Conv", [value, weights, bias], strides=[stride] * 2, pads=pads, group=groups)
+
+    def prelu(self, value: str, channels: int) -> str:
+        """As a converter writes it: ONNX Runtime's own PRelu takes longer than the four."""
+        slopes = np.full((channels, 1, 1), 0.25, np.float32)
+        positive = self.node("Mul", [self.node("Relu", [value]), self._constant(1 - slopes)])
+        return self.node("Add", [self.node("Mul", [value, self._constant(slopes)]), positive])
+
+    def halve(self, value: str, more_channels: int) -> str:
+        largest = self.node("MaxPool", [value], kernel_shape=[2, 2], strides=[2, 2])
+        if not more_channels:
+            return largest
+        return self.node("Pad", [largest, self._constant(np.array([0, 0, 0, 0, 0, more_channels, 0, 0]))])
+
+    def model(self, output: str) -> bytes:
+        graph = helper.make_graph(
+            self._nodes,
+            "mesh-run",
+            [helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, 3, SIDE_PX, SIDE_PX])],
+            [helper.make_tensor_value_info(output, TensorProto.FLOAT, [1, 3 * LANDMARKS, 1, 1])],
+            self._weights,
         )
-        nodes.append(helper.make_node("Relu", [name], [f"{name}.r"]))
-        return f"{name}.r"
+        model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
+        return bytes(model.SerializeToString())
 
-    value, given = "image", 3
-    for channels, stride, pairs in SUBSTITUTE_LAYERS:
-        value, given = convolve(value, channels, given, 3, stride, 1 if given == 3 else given), channels
-        for _ in range(pairs):
-            value = convolve(value, channels, channels, 3, 1, channels)
-            value = convolve(value, channels, channels, 1, 1, 1)
-    graph = helper.make_graph(
-        nodes,
-        "substitute",
-        [helper.make_tensor_value_info("image", TensorProto.FLOAT, [1, 3, 256, 256])],
-        [helper.make_tensor_value_info(value, TensorProto.FLOAT, None)],
-        weights,
-    )
-    return bytes(
-        helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9).SerializeToString()
-    )
+    def _constant(self, value: np.ndarray) -> str:
+        name = f"constant{len(self._weights)}"
+        self._weights.append(numpy_helper.from_array(value, name))
+        return name

@@ -16,7 +16,6 @@ from itertools import product
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from scipy.sparse import csr_array
 from scipy.spatial import Delaunay
 
@@ -188,6 +187,8 @@ def regularized_nnls(
 
     It is solved on the Cholesky factor of the normal matrix, which is small.
     """
+    from scipy.optimize import nnls  # a hundred modules that mode reenact does without
+
     normal = design.T @ (design * weight[:, None])
     ridge = TUNABLES.ridge * max(float(np.trace(normal)) / len(normal), 1e-12)
     normal[np.diag_indices_from(normal)] += ridge

@@ -42,7 +42,7 @@ class SceneController:
 
     def __init__(self, storage: StorageSettings) -> None:
         self.environments = EnvironmentStore(storage.environments)
-        self.subjects = SubjectStore(storage.subjects, in_memory=True)
+        self.subjects = SubjectStore(storage.subjects, copied=True)
         self.backgrounds = BackgroundStore(storage.backgrounds)
         self._change = threading.Lock()
         self._temporary_environments: dict[str, Environment] = {}

@@ -6,6 +6,7 @@ import logging
 
 import numpy as np
 
+from relit_camera.base.concurrency.threads import return_freed_memory
 from relit_camera.base.config.settings import Fallback
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.images.resize import crop_to_fill
@@ -46,7 +47,9 @@ class FallbackRenderer:
 
     def release(self) -> None:
         """Free the memory of the relit source image, while no fallback is needed."""
-        self._source = None
+        if self._source is not None:
+            self._source = None
+            return_freed_memory()
 
     def picture(self, frame: Frame, scene: Scene) -> DisplayImage:
         """A picture in place of this live frame: uint8 sRGB RGB (height, width, 3). Never raises."""
@@ -72,6 +75,7 @@ class _RelitSource:
     def __init__(self, subject: Subject, size: tuple[int, int]) -> None:
         self.subject = subject
         self._relighter = BasisRelighter(subject)
+        subject.drop_pages()
         self._person = Cutout(subject)
         placed = source_from_output(subject.size, size)
         self._box = visible_box(placed, subject.size, size)

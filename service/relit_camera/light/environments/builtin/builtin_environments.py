@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
 
-from relit_camera.light.environments.builtin.canvas import Canvas
+from relit_camera.light.environments.builtin.canvas import Canvas, bearings, directions
 from relit_camera.light.environments.environment_panorama import (
     Environment,
     environment_from_panorama,
@@ -29,4 +29,7 @@ def builtin_environment(name: str) -> Environment:
     paint: Callable[[], Canvas] = import_module(
         f"relit_camera.light.environments.builtin.{name.replace('-', '_')}"
     ).paint
-    return environment_from_panorama(name, panorama_from_radiance(between_map_and_viewer_axes(paint()), name))
+    panorama = panorama_from_radiance(between_map_and_viewer_axes(paint()), name)
+    for kept in (bearings, directions):
+        kept.cache_clear()  # ten megabytes that only painting needs
+    return environment_from_panorama(name, panorama)
