@@ -16,7 +16,6 @@ from itertools import product
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 from scipy.sparse import csr_array
 from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
@@ -49,7 +48,8 @@ class RoomLightTunables:
             light.
         fits_per_s: how often the light is fitted.
         light_smoothing: share of the way from the last light to the newly fitted one.
-        residual_smoothing: share of the way that the reported residual goes to that of each frame.
+        residual_smoothing: share of the way that the reported residual goes to that of each fit.
+        turn_tolerance: radians that the head turns before the light that it sees, and the face in it, are made anew.
         clipping_code: sRGB code from which a sample counts as clipped.
         huber_threshold: relative residual from which a sample loses weight (Huber).
         min_samples: usable samples that the gain of a frame needs.
@@ -63,7 +63,8 @@ class RoomLightTunables:
     robust_iterations: int = 3
     fits_per_s: float = 4.0
     light_smoothing: float = 0.5
-    residual_smoothing: float = 0.1
+    residual_smoothing: float = 0.5
+    turn_tolerance: float = 0.25 * np.pi / 180
     clipping_code: int = 250
     huber_threshold: float = 0.25
     min_samples: int = 20
@@ -83,7 +84,7 @@ class RoomLightEstimate:
 
     Attributes:
         light_map: (32, 64, 3) float32 room radiance in units of the live picture's linear values.
-        in_head_frame: the same as the head sees it, under its rotation.
+        in_head_frame: the same as the head sees it, under its rotation or nearly so.
         gain: (3,) float32 by which this frame's exposure differs from the fit's.
         residual: median relative deviation of the live face from the relit one, 0..1: how badly the light explains it.
     """
@@ -92,6 +93,21 @@ class RoomLightEstimate:
     in_head_frame: LightMap
     gain: NDArray[np.float32]
     residual: float
+
+
+@dataclass(frozen=True)
+class _Prediction:
+    """The last fitted light, as a head sees it.
+
+    Attributes:
+        rotation: of the head.
+        light_map: (32, 64, 3) float32 in its frame.
+        samples: (count, 3) float32 of the face under that light.
+    """
+
+    rotation: Rotation
+    light_map: LightMap
+    samples: NDArray[np.float32]
 
 
 class RoomLightEstimator:
@@ -108,6 +124,7 @@ class RoomLightEstimator:
         self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
         self._fitted_at = -np.inf
         self._residual: float | None = None
+        self._seen: _Prediction | None = None
 
     def update(self, image: DisplayImage, landmarks: Points, rotation: Rotation, time_s: float) -> RoomLightEstimate:
         """Estimate the light of the next live frame.
@@ -119,26 +136,27 @@ class RoomLightEstimator:
             time_s: of the frame.
         """
         live, usable = _sample_frame(image, landmarks[self._triangles].mean(axis=1))
-        lobes = _lobe_maps(rotation)
-        if time_s - self._fitted_at > 1 / TUNABLES.fits_per_s or time_s < self._fitted_at:
-            self._fit(live, usable, lobes)
+        due = time_s - self._fitted_at > 1 / TUNABLES.fits_per_s or time_s < self._fitted_at
+        if due:
+            self._fit(live, usable, _lobe_maps(rotation))
             self._fitted_at = time_s
             self._light_map = (_lobe_maps(Rotation.identity()) @ self._amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3)
-        in_head_frame = lobes @ self._amounts
-        predicted = self._predict(self._project @ in_head_frame)
-        gain = _exposure_gain(live, predicted, usable)
-        if usable.sum() >= TUNABLES.min_samples:
-            deviation = np.abs(predicted * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
+        if due or self._seen is None or _angle(rotation, self._seen.rotation) > TUNABLES.turn_tolerance:
+            self._seen = self._predict_under(rotation)
+        gain = _exposure_gain(live, self._seen.samples, usable)
+        if due and usable.sum() >= TUNABLES.min_samples:
+            deviation = np.abs(self._seen.samples * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
             now = float(np.median(deviation))
             self._residual = (
                 now if self._residual is None else self._residual + TUNABLES.residual_smoothing * (now - self._residual)
             )
         return RoomLightEstimate(
-            self._light_map,
-            in_head_frame.reshape(self._light_map.shape),
-            gain,
-            0.0 if self._residual is None else self._residual,
+            self._light_map, self._seen.light_map, gain, 0.0 if self._residual is None else self._residual
         )
+
+    def _predict_under(self, rotation: Rotation) -> _Prediction:
+        light = _lobe_maps(rotation) @ self._amounts
+        return _Prediction(rotation, light.reshape(self._light_map.shape), self._predict(self._project @ light))
 
     def _predict(self, harmonics: NDArray[np.floating]) -> NDArray[np.float32]:
         """The samples (count, 3) under a light of these harmonics (harmonics, 3)."""
@@ -158,6 +176,11 @@ class RoomLightEstimator:
                 fitted = regularized_nnls(design, goal, weight, amounts)
                 weight = _robust_weight(design @ fitted, goal, level, usable)
             self._amounts[:, channel] = fitted if first else amounts + TUNABLES.light_smoothing * (fitted - amounts)
+
+
+def _angle(first: Rotation, second: Rotation) -> float:
+    """The angle in radians between two rotations, from their quaternions: scipy's own way takes ten times as long."""
+    return 2 * float(np.arccos(min(abs(first.as_quat() @ second.as_quat()), 1.0)))
 
 
 def _exposure_gain(
@@ -192,6 +215,8 @@ def regularized_nnls(
     ridge = TUNABLES.ridge * max(float(np.trace(normal)) / len(normal), 1e-12)
     normal[np.diag_indices_from(normal)] += ridge
     right = design.T @ (weight * values) + ridge * prior
+    from scipy.optimize import nnls  # takes a tenth of a second to load, which the start of the camera need not wait for
+
     factor = np.linalg.cholesky(normal)
     solution, _ = nnls(factor.T, np.linalg.solve(factor, right))
     return np.asarray(solution)
@@ -199,9 +224,11 @@ def regularized_nnls(
 
 def _lobe_maps(rotation: Rotation) -> NDArray[np.float32]:
     """The soft lights, fixed in the room, in the frame of a head under `rotation`: (2048, lobe_count) float32."""
-    toward = rotation.inv().apply(fibonacci_directions(TUNABLES.lobe_count)).astype(np.float32)
-    exponent = texel_directions().reshape(-1, 3).astype(np.float32) @ (TUNABLES.lobe_sharpness * toward.T)
-    return np.exp(exponent - np.float32(TUNABLES.lobe_sharpness))
+    toward = fibonacci_directions(TUNABLES.lobe_count) @ rotation.as_matrix()
+    texels = texel_directions().reshape(-1, 3).astype(np.float32)
+    exponent = texels @ (TUNABLES.lobe_sharpness * toward.T).astype(np.float32)
+    exponent -= np.float32(TUNABLES.lobe_sharpness)
+    return np.exp(exponent, out=exponent)
 
 
 def _skin_triangles(face: SourceFace) -> NDArray[np.intp]:
@@ -250,14 +277,13 @@ def _sample_frame(image: DisplayImage, points: Points) -> tuple[NDArray[np.float
     high = np.clip(np.ceil(points.max(axis=0)).astype(int) + reach, low + 2, [width, height])
     columns, rows = map(int, np.maximum((high - low) // cell, 1))
     part = image[low[1] : low[1] + rows * cell, low[0] : low[0] + columns * cell]
-    light = linear_from_uint8(part)
-    small = light if cell == 1 else cv2.resize(light, (columns, rows), interpolation=cv2.INTER_AREA)
-    soft = cv2.blur(small, (box, box))
+    small = part if cell == 1 else cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
+    soft = cv2.blur(linear_from_uint8(np.asarray(small, np.uint8)), (box, box))
     local = ((points - low) / cell - 0.5).astype(np.float32)
     values = cv2.remap(soft, local[None], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
-    column, row = np.clip(np.floor(points), 0, [width - 1, height - 1]).astype(int).T
-    inside = ((points > 0) & (points < [width, height])).all(axis=1)
-    return values, inside & (image[row, column].max(axis=1) < TUNABLES.clipping_code)
+    column, row = np.clip(points.astype(int), 0, [width - 1, height - 1]).T
+    unclipped = (image[row, column] < TUNABLES.clipping_code).all(axis=1)
+    return values, unclipped & ((points > 0) & (points < [width, height])).all(axis=1)
 
 
 def _blur_size(points: Points) -> int:
