@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.frame_fitting import fit_frame, fit_motion
@@ -11,6 +13,10 @@ from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
 from relit_camera.live.reenactment.warp import PositionGrid
 from relit_camera.live.scene.scene import Scene
 
+RELIT_EVERY, MAX_STEP = 4, np.radians(4.0)
+"""How often the source image is relit while the head turns, see `TurnExtrapolation`: less often than in mode reenact,
+since the ratio of two pictures changes less than one of them, and is seen under the texture of the live picture."""
+
 
 class RatioMode:
     """See `RenderMode`."""
@@ -19,6 +25,8 @@ class RatioMode:
         self._context = context
         self._relighting = relighting
         self._identity = IdentityCheck(context.face)
+        context.scene_relighting.extrapolation.every = RELIT_EVERY
+        context.scene_relighting.extrapolation.max_step = MAX_STEP
 
     def begin(self, frame: Frame, motion: FaceMotion, scene: Scene) -> RenderTask | FaceMismatch:
         """See `RenderMode.begin`: relights the source image in both lights, and finds where it lies on the live face.

@@ -189,9 +189,10 @@ def extrapolate_roots(warped: NDArray[np.float32]) -> NDArray[np.float32]:
     roots, weight = small[..., :3], small[..., 3:]
     small[..., :3] = light_of_root(roots / (weight + np.float32(1e-9))) * weight
     # Narrow blurs win where they have weight: detail near the person, the mean far away. Wide ones need fewer pixels.
-    wide = _sum_of_blurs(_shrunk(small), {2.0: 1 / 8**3, 5.0: 1 / 20**3})
+    wide: NDArray = _sum_of_blurs(_shrunk(small), {2.0: 1 / 8**3, 5.0: 1 / 20**3})
     spread = cv2.add(
-        _sum_of_blurs(small, {1.0: 1.0, 3.0: 1 / 3**3}), cv2.resize(wide, small.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+        _sum_of_blurs(small, {1.0: 1.0, 3.0: 1 / 3**3}),
+        cv2.resize(wide, small.shape[1::-1], interpolation=cv2.INTER_LINEAR),
     )
     beyond = root_of_light((spread[..., :3] + np.float32(1e-9)) / (spread[..., 3:] + np.float32(1e-9)))
     beyond = cv2.resize(beyond, (width, height), interpolation=cv2.INTER_LINEAR)

@@ -11,6 +11,7 @@ are read in place of the subject's components and the 2048 texels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import product
 
 import cv2
@@ -114,6 +115,7 @@ class RoomLightEstimator:
     """Fits the room's light to the face of one subject."""
 
     def __init__(self, subject: Subject, face: SourceFace) -> None:
+        import_module("scipy.optimize")  # takes a tenth of a second: not at the start, and not at the first fit
         self._triangles = _skin_triangles(face)
         harmonics = basis(texel_directions().reshape(-1, 3), TUNABLES.harmonics_degree)
         weighted = harmonics * texel_solid_angles().reshape(-1, 1)
@@ -168,7 +170,7 @@ class RoomLightEstimator:
         predicted = self._predict(mixed @ self._amounts)
         predicted *= _exposure_gain(live, predicted, usable)
         for channel in range(3):
-            design, goal = (self._response[channel] @ mixed).astype(np.float64), live[:, channel]
+            design, goal = self._response[channel] @ mixed, live[:, channel]
             amounts = self._amounts[:, channel]
             level = max(float(goal[usable].mean()) if usable.any() else 0.0, 1e-4)
             weight = usable if first else _robust_weight(predicted[:, channel], goal, level, usable)
@@ -180,7 +182,8 @@ class RoomLightEstimator:
 
 def _angle(first: Rotation, second: Rotation) -> float:
     """The angle in radians between two rotations, from their quaternions: scipy's own way takes ten times as long."""
-    return 2 * float(np.arccos(min(abs(first.as_quat() @ second.as_quat()), 1.0)))
+    cosine = abs(float(first.as_quat() @ second.as_quat()))
+    return 2 * float(np.arccos(min(cosine, 1.0)))
 
 
 def _exposure_gain(
@@ -189,7 +192,9 @@ def _exposure_gain(
     """The factor (3,) float32 by which the live samples (count, 3) are brighter than the predicted ones."""
     if usable.sum() < TUNABLES.min_samples:
         return np.ones(3, np.float32)
-    ratio = live[usable] / np.maximum(predicted[usable], 1e-4)
+    if not usable.all():
+        live, predicted = live[usable], predicted[usable]
+    ratio = live / np.maximum(predicted, 1e-4)
     return np.clip(np.median(ratio, axis=0), *TUNABLES.gain_range).astype(np.float32)
 
 
@@ -202,7 +207,7 @@ def _robust_weight(
 
 
 def regularized_nnls(
-    design: NDArray[np.float64],
+    design: NDArray[np.floating],
     values: NDArray[np.float32],
     weight: NDArray[np.floating] | NDArray[np.bool_],
     prior: NDArray[np.floating],
@@ -211,12 +216,13 @@ def regularized_nnls(
 
     It is solved on the Cholesky factor of the normal matrix, which is small.
     """
-    normal = design.T @ (design * weight[:, None])
+    from scipy.optimize import nnls
+
+    weighted = design * weight.astype(design.dtype)[:, None]
+    normal = (weighted.T @ design).astype(np.float64)
     ridge = TUNABLES.ridge * max(float(np.trace(normal)) / len(normal), 1e-12)
     normal[np.diag_indices_from(normal)] += ridge
-    right = design.T @ (weight * values) + ridge * prior
-    from scipy.optimize import nnls  # takes a tenth of a second to load, which the start of the camera need not wait for
-
+    right = weighted.T @ values + ridge * prior
     factor = np.linalg.cholesky(normal)
     solution, _ = nnls(factor.T, np.linalg.solve(factor, right))
     return np.asarray(solution)
