@@ -56,3 +56,17 @@ def test_numpy_looks_up_the_same_where_opencv_cannot(monkeypatch: pytest.MonkeyP
         pictures.append(multiply_light(image, factors, STEP))
     np.testing.assert_array_equal(pictures[0], pictures[1])
     assert pictures[0].dtype == np.uint8
+
+
+@pytest.mark.parametrize("shape", [(300, 40), (301, 41), (129, 3)])
+def test_a_tall_picture_is_multiplied_in_bands_without_seams(shape: tuple[int, int]) -> None:
+    """A ramp of roots down the picture, against the same ramp in floats: no row is displaced, none left out."""
+    height, width = shape
+    image = np.random.default_rng(0).integers(0, 256, (height, width, 3)).astype(np.uint8)
+    y = (np.arange(-(-height // STEP)) + 0.5) * STEP
+    ramp = np.broadcast_to((0.4 + y / 400)[:, None, None], (len(y), -(-width // STEP), 3)).astype(np.float32)
+    at = np.clip(np.arange(height) + 0.5, y[0], y[-1])
+    light = linear_from_uint8(image) * light_of_root((0.4 + at / 400).astype(np.float32)).reshape(-1, 1, 1)
+    error = np.abs(multiply_light(image, ramp, STEP).astype(int) - display_from_linear(light.astype(np.float32)))
+    assert error.max() <= 1
+    assert (error > 0).mean() < 0.05

@@ -99,3 +99,12 @@ def test_a_jump_is_computed_at_once(jump: tuple[float, float]) -> None:
     ours.at(yaw(0.5))
     there = rotation_from_angles(*jump)
     np.testing.assert_array_equal(ours.at(there), shaded(there))
+
+
+@pytest.mark.parametrize(("max_step_deg", "computed"), [(2.0, 3), (4.0, 2)])
+def test_how_far_the_head_may_turn_before_it_is_computed(max_step_deg: float, computed: int) -> None:
+    ours = Counted(every=100)
+    ours.extrapolation = TurnExtrapolation(np.radians(max_step_deg))
+    for degrees in (0.0, 2.5, 4.5):
+        ours.at(yaw(degrees))
+    assert ours.computed == computed

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.face.motion.neutral_face import NeutralFace
 from relit_camera.live.modes.mode import FaceMismatch
 from relit_camera.live.reenactment.source_image import SourceFace
 
@@ -39,6 +40,8 @@ class IdentityCheck:
         self._face = face
         self._tunables = tunables or IdentityTunables()
         self._since_s: float | None = None
+        self._neutral: NeutralFace | None = None
+        self._shape_cm = 0.0
 
     def check(self, motion: FaceMotion, residual: float, time_s: float) -> FaceMismatch | None:
         """Return what speaks against the face; None while it passes for the subject's, or is not judged yet.
@@ -52,7 +55,9 @@ class IdentityCheck:
         self._since_s = time_s if self._since_s is None else min(self._since_s, time_s)
         if motion.neutral is None or motion.presence < 1 or time_s - self._since_s < limits.delay_s:
             return None
-        shape_cm = shape_distance_cm(motion.neutral.points, self._face)
+        if motion.neutral is not self._neutral:
+            self._neutral, self._shape_cm = motion.neutral, shape_distance_cm(motion.neutral.points, self._face)
+        shape_cm = self._shape_cm
         if (shape_cm / limits.shape_cm) * (residual / limits.residual) <= 1:
             return None
         return FaceMismatch(

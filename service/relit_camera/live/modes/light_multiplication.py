@@ -21,6 +21,8 @@ _CODES = np.arange(256, dtype=np.uint8)
 _ONE = 1 << 14
 """What stands for a root of 1 in 16 bits. The largest, a light of 27, reads 255; a code is 60 steps wide."""
 _POWER = 2.4
+_BAND_CELLS = 32
+"""Rows of cells that are multiplied at a time: their 16-bit numbers stay in the processor's cache."""
 _WIDE_TABLES = int(cv2.__version__.split(".")[0]) >= 5
 """Whether `cv2.LUT` takes 16-bit indices, which it does three times as fast as numpy."""
 
@@ -47,14 +49,37 @@ def multiply_light(image: DisplayImage, roots: NDArray[np.float32], step: int, a
             takes them for just what sRGB says, 1 gives back the picture itself where the factor is 1.
     """
     height, width = image.shape[:2]
-    coarse = cv2.multiply(roots, (_ONE,) * 4, dtype=cv2.CV_16U)
-    size = (step * coarse.shape[1], step * coarse.shape[0])
-    factors = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)[:height, :width]
-    product = cv2.multiply(cv2.LUT(image, _roots_of_codes(as_shown)), factors, scale=1 / _ONE)
-    if _WIDE_TABLES:
-        return np.asarray(cv2.LUT(product, _codes_of_roots()), np.uint8)
-    shown: DisplayImage = _codes_of_roots().take(product)
+    cells = cv2.multiply(roots, (_ONE,) * 4, dtype=cv2.CV_16U)
+    columns = step * cells.shape[1]
+    cells = cv2.copyMakeBorder(cells, 1, 1, 0, 0, cv2.BORDER_REPLICATE)
+    image, shown = np.ascontiguousarray(image), np.empty(image.shape, np.uint8)
+    fine = np.empty((step * (_BAND_CELLS + 2), columns, 3), np.uint16)
+    for first in range(0, len(cells) - 2, _BAND_CELLS):
+        some = cells[first : first + _BAND_CELLS + 2]
+        above = cv2.resize(some, (columns, step * len(some)), fine[: step * len(some)], interpolation=cv2.INTER_LINEAR)
+        top, bottom = step * first, min(step * (first + _BAND_CELLS), height)
+        product = _roots_of(image[top:bottom], as_shown)
+        cv2.multiply(product, above[step : step + bottom - top, :width], dst=product, scale=1 / _ONE)
+        if _WIDE_TABLES:
+            cv2.LUT(product, _codes_of_roots(), dst=shown[top:bottom])
+        else:
+            _codes_of_roots().take(product, out=shown[top:bottom], mode="clip")  # other modes would copy `out`
     return shown
+
+
+def _roots_of(image: DisplayImage, as_shown: float) -> NDArray[np.uint16]:
+    """The roots of the light of a picture's codes, uint16 of its shape."""
+    if not _WIDE_TABLES or image.size % 2:
+        return np.asarray(cv2.LUT(image, _roots_of_codes(as_shown)), np.uint16)
+    pairs = cv2.LUT(image.reshape(1, -1).view(np.uint16), _roots_of_pairs(as_shown))
+    return np.asarray(pairs, np.int32).view(np.uint16).reshape(image.shape)
+
+
+@lru_cache(maxsize=4)
+def _roots_of_pairs(as_shown: float) -> NDArray[np.int32]:
+    """The roots of two neighboring codes at once, which takes half as many look-ups: (65536,)."""
+    codes = np.arange(1 << 16, dtype=np.uint16).view(np.uint8)
+    return _roots_of_codes(as_shown)[codes].view(np.int32)
 
 
 @lru_cache(maxsize=64)

@@ -5,6 +5,7 @@ The person's own mouth, eyes and texture stay in the picture; only the light is 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -105,9 +106,11 @@ class RatioRelighting:
         """
         # A room may have no light at all of one colour; then the live picture has none of it either.
         floor = tuple(RATIO_FLOOR * max(mean, MIN_CHANNEL_MEAN) for mean in cv2.mean(under_room, self._inside))
-        ratio = cv2.divide(cv2.add(relit, floor), cv2.add(np.maximum(under_room, 0), floor))
-        roots = root_of_light(np.clip(ratio, *RATIO_RANGE))
-        return np.asarray(cv2.merge([*cv2.split(cv2.multiply(roots, self._weights)), self._weight]), np.float32)
+        ratio = np.maximum(under_room, 0)
+        cv2.divide(cv2.add(relit, floor), cv2.add(ratio, floor, dst=ratio), dst=ratio)
+        roots = root_of_light(np.clip(ratio, *RATIO_RANGE, out=ratio))
+        cv2.multiply(roots, self._weights, dst=roots)
+        return np.asarray(cv2.merge([*cv2.split(roots), self._weight]), np.float32)
 
     def positions(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> PositionGrid:
         """Where a live frame of `size` (width, height) lies in the source image.
@@ -182,15 +185,32 @@ def extrapolate_roots(warped: NDArray[np.float32]) -> NDArray[np.float32]:
         warped: (height, width, 4): roots of the ratio times weight, and the weight.
     """
     height, width = warped.shape[:2]
-    size = max(width // EXTRAPOLATION_DOWNSAMPLING, 1), max(height // EXTRAPOLATION_DOWNSAMPLING, 1)
-    small = cv2.resize(warped, size, interpolation=cv2.INTER_AREA)
+    small = _shrunk(warped)
     roots, weight = small[..., :3], small[..., 3:]
     small[..., :3] = light_of_root(roots / (weight + np.float32(1e-9))) * weight
-    spread = np.zeros_like(small)
-    for sigma in (1.0, 3.0, 8.0, 20.0):
-        # Narrow blurs win where they have weight: detail near the person, the mean far away.
-        spread += cv2.GaussianBlur(small, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE) / np.float32(sigma**3)
+    # Narrow blurs win where they have weight: detail near the person, the mean far away. Wide ones need fewer pixels.
+    wide: NDArray = _sum_of_blurs(_shrunk(small), {2.0: 1 / 8**3, 5.0: 1 / 20**3})
+    spread = cv2.add(
+        _sum_of_blurs(small, {1.0: 1.0, 3.0: 1 / 3**3}),
+        cv2.resize(wide, small.shape[1::-1], interpolation=cv2.INTER_LINEAR),
+    )
     beyond = root_of_light((spread[..., :3] + np.float32(1e-9)) / (spread[..., 3:] + np.float32(1e-9)))
     beyond = cv2.resize(beyond, (width, height), interpolation=cv2.INTER_LINEAR)
-    *known, weight = cv2.split(warped)
-    return np.asarray(cv2.merge(known) + cv2.merge([1 - weight] * 3) * beyond, dtype=np.float32)
+    cover = cv2.cvtColor(cv2.extractChannel(warped, 3), cv2.COLOR_GRAY2RGB)
+    known = cv2.cvtColor(warped, cv2.COLOR_RGBA2RGB)
+    cv2.subtract(beyond, cv2.multiply(cover, beyond, dst=cover), dst=beyond)
+    return np.asarray(cv2.add(known, beyond, dst=known), np.float32)
+
+
+def _shrunk(picture: NDArray[np.float32]) -> NDArray[np.float32]:
+    size = [max(side // EXTRAPOLATION_DOWNSAMPLING, 1) for side in picture.shape[1::-1]]
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _sum_of_blurs(picture: NDArray[np.float32], shares: Mapping[float, float]) -> NDArray[np.float32]:
+    """A picture blurred by each of some sigmas, summed by their shares."""
+    total = np.zeros_like(picture)
+    for sigma, share in shares.items():
+        blurred = cv2.GaussianBlur(picture, (0, 0), sigma, borderType=cv2.BORDER_REPLICATE)
+        total = cv2.scaleAdd(blurred, share, total, dst=total)
+    return np.asarray(total, np.float32)

@@ -11,6 +11,7 @@ are read in place of the subject's components and the 2048 texels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import product
 
 import cv2
@@ -48,7 +49,8 @@ class RoomLightTunables:
             light.
         fits_per_s: how often the light is fitted.
         light_smoothing: share of the way from the last light to the newly fitted one.
-        residual_smoothing: share of the way that the reported residual goes to that of each frame.
+        residual_smoothing: share of the way that the reported residual goes to that of each fit.
+        turn_tolerance: radians that the head turns before the light that it sees, and the face in it, are made anew.
         clipping_code: sRGB code from which a sample counts as clipped.
         huber_threshold: relative residual from which a sample loses weight (Huber).
         min_samples: usable samples that the gain of a frame needs.
@@ -62,7 +64,8 @@ class RoomLightTunables:
     robust_iterations: int = 3
     fits_per_s: float = 4.0
     light_smoothing: float = 0.5
-    residual_smoothing: float = 0.1
+    residual_smoothing: float = 0.5
+    turn_tolerance: float = 0.25 * np.pi / 180
     clipping_code: int = 250
     huber_threshold: float = 0.25
     min_samples: int = 20
@@ -82,7 +85,7 @@ class RoomLightEstimate:
 
     Attributes:
         light_map: (32, 64, 3) float32 room radiance in units of the live picture's linear values.
-        in_head_frame: the same as the head sees it, under its rotation.
+        in_head_frame: the same as the head sees it, under its rotation or nearly so.
         gain: (3,) float32 by which this frame's exposure differs from the fit's.
         residual: median relative deviation of the live face from the relit one, 0..1: how badly the light explains it.
     """
@@ -93,10 +96,26 @@ class RoomLightEstimate:
     residual: float
 
 
+@dataclass(frozen=True)
+class _Prediction:
+    """The last fitted light, as a head sees it.
+
+    Attributes:
+        rotation: of the head.
+        light_map: (32, 64, 3) float32 in its frame.
+        samples: (count, 3) float32 of the face under that light.
+    """
+
+    rotation: Rotation
+    light_map: LightMap
+    samples: NDArray[np.float32]
+
+
 class RoomLightEstimator:
     """Fits the room's light to the face of one subject."""
 
     def __init__(self, subject: Subject, face: SourceFace) -> None:
+        import_module("scipy.optimize")  # takes a tenth of a second: not at the start, and not at the first fit
         self._triangles = _skin_triangles(face)
         harmonics = basis(texel_directions().reshape(-1, 3), TUNABLES.harmonics_degree)
         weighted = harmonics * texel_solid_angles().reshape(-1, 1)
@@ -107,6 +126,7 @@ class RoomLightEstimator:
         self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
         self._fitted_at = -np.inf
         self._residual: float | None = None
+        self._seen: _Prediction | None = None
 
     def update(self, image: DisplayImage, landmarks: Points, rotation: Rotation, time_s: float) -> RoomLightEstimate:
         """Estimate the light of the next live frame.
@@ -118,26 +138,27 @@ class RoomLightEstimator:
             time_s: of the frame.
         """
         live, usable = _sample_frame(image, landmarks[self._triangles].mean(axis=1))
-        lobes = _lobe_maps(rotation)
-        if time_s - self._fitted_at > 1 / TUNABLES.fits_per_s or time_s < self._fitted_at:
-            self._fit(live, usable, lobes)
+        due = time_s - self._fitted_at > 1 / TUNABLES.fits_per_s or time_s < self._fitted_at
+        if due:
+            self._fit(live, usable, _lobe_maps(rotation))
             self._fitted_at = time_s
             self._light_map = (_lobe_maps(Rotation.identity()) @ self._amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3)
-        in_head_frame = lobes @ self._amounts
-        predicted = self._predict(self._project @ in_head_frame)
-        gain = _exposure_gain(live, predicted, usable)
-        if usable.sum() >= TUNABLES.min_samples:
-            deviation = np.abs(predicted * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
+        if due or self._seen is None or (rotation * self._seen.rotation.inv()).magnitude() > TUNABLES.turn_tolerance:
+            self._seen = self._predict_under(rotation)
+        gain = _exposure_gain(live, self._seen.samples, usable)
+        if due and usable.sum() >= TUNABLES.min_samples:
+            deviation = np.abs(self._seen.samples * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
             now = float(np.median(deviation))
             self._residual = (
                 now if self._residual is None else self._residual + TUNABLES.residual_smoothing * (now - self._residual)
             )
         return RoomLightEstimate(
-            self._light_map,
-            in_head_frame.reshape(self._light_map.shape),
-            gain,
-            0.0 if self._residual is None else self._residual,
+            self._light_map, self._seen.light_map, gain, 0.0 if self._residual is None else self._residual
         )
+
+    def _predict_under(self, rotation: Rotation) -> _Prediction:
+        light = _lobe_maps(rotation) @ self._amounts
+        return _Prediction(rotation, light.reshape(self._light_map.shape), self._predict(self._project @ light))
 
     def _predict(self, harmonics: NDArray[np.floating]) -> NDArray[np.float32]:
         """The samples (count, 3) under a light of these harmonics (harmonics, 3)."""
@@ -149,7 +170,7 @@ class RoomLightEstimator:
         predicted = self._predict(mixed @ self._amounts)
         predicted *= _exposure_gain(live, predicted, usable)
         for channel in range(3):
-            design, goal = (self._response[channel] @ mixed).astype(np.float64), live[:, channel]
+            design, goal = self._response[channel] @ mixed, live[:, channel]
             amounts = self._amounts[:, channel]
             level = max(float(goal[usable].mean()) if usable.any() else 0.0, 1e-4)
             weight = usable if first else _robust_weight(predicted[:, channel], goal, level, usable)
@@ -165,7 +186,9 @@ def _exposure_gain(
     """The factor (3,) float32 by which the live samples (count, 3) are brighter than the predicted ones."""
     if usable.sum() < TUNABLES.min_samples:
         return np.ones(3, np.float32)
-    ratio = live[usable] / np.maximum(predicted[usable], 1e-4)
+    if not usable.all():
+        live, predicted = live[usable], predicted[usable]
+    ratio = live / np.maximum(predicted, 1e-4)
     return np.clip(np.median(ratio, axis=0), *TUNABLES.gain_range).astype(np.float32)
 
 
@@ -178,7 +201,7 @@ def _robust_weight(
 
 
 def regularized_nnls(
-    design: NDArray[np.float64],
+    design: NDArray[np.floating],
     values: NDArray[np.float32],
     weight: NDArray[np.floating] | NDArray[np.bool_],
     prior: NDArray[np.floating],
@@ -187,12 +210,13 @@ def regularized_nnls(
 
     It is solved on the Cholesky factor of the normal matrix, which is small.
     """
-    from scipy.optimize import nnls  # a hundred modules that mode reenact does without
+    from scipy.optimize import nnls
 
-    normal = design.T @ (design * weight[:, None])
+    weighted = design * weight.astype(design.dtype)[:, None]
+    normal = (weighted.T @ design).astype(np.float64)
     ridge = TUNABLES.ridge * max(float(np.trace(normal)) / len(normal), 1e-12)
     normal[np.diag_indices_from(normal)] += ridge
-    right = design.T @ (weight * values) + ridge * prior
+    right = weighted.T @ values + ridge * prior
     factor = np.linalg.cholesky(normal)
     solution, _ = nnls(factor.T, np.linalg.solve(factor, right))
     return np.asarray(solution)
@@ -200,9 +224,11 @@ def regularized_nnls(
 
 def _lobe_maps(rotation: Rotation) -> NDArray[np.float32]:
     """The soft lights, fixed in the room, in the frame of a head under `rotation`: (2048, lobe_count) float32."""
-    toward = rotation.inv().apply(fibonacci_directions(TUNABLES.lobe_count)).astype(np.float32)
-    exponent = texel_directions().reshape(-1, 3).astype(np.float32) @ (TUNABLES.lobe_sharpness * toward.T)
-    return np.exp(exponent - np.float32(TUNABLES.lobe_sharpness))
+    toward = fibonacci_directions(TUNABLES.lobe_count) @ rotation.as_matrix()
+    texels = texel_directions().reshape(-1, 3).astype(np.float32)
+    exponent = texels @ (TUNABLES.lobe_sharpness * toward.T).astype(np.float32)
+    exponent -= np.float32(TUNABLES.lobe_sharpness)
+    return np.exp(exponent, out=exponent)
 
 
 def _skin_triangles(face: SourceFace) -> NDArray[np.intp]:
@@ -251,14 +277,13 @@ def _sample_frame(image: DisplayImage, points: Points) -> tuple[NDArray[np.float
     high = np.clip(np.ceil(points.max(axis=0)).astype(int) + reach, low + 2, [width, height])
     columns, rows = map(int, np.maximum((high - low) // cell, 1))
     part = image[low[1] : low[1] + rows * cell, low[0] : low[0] + columns * cell]
-    light = linear_from_uint8(part)
-    small = light if cell == 1 else cv2.resize(light, (columns, rows), interpolation=cv2.INTER_AREA)
-    soft = cv2.blur(small, (box, box))
+    small = part if cell == 1 else cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
+    soft = cv2.blur(linear_from_uint8(np.asarray(small, np.uint8)), (box, box))
     local = ((points - low) / cell - 0.5).astype(np.float32)
     values = cv2.remap(soft, local[None], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
-    column, row = np.clip(np.floor(points), 0, [width - 1, height - 1]).astype(int).T
-    inside = ((points > 0) & (points < [width, height])).all(axis=1)
-    return values, inside & (image[row, column].max(axis=1) < TUNABLES.clipping_code)
+    column, row = np.clip(points.astype(int), 0, [width - 1, height - 1]).T
+    unclipped = (image[row, column] < TUNABLES.clipping_code).all(axis=1)
+    return values, unclipped & ((points > 0) & (points < [width, height])).all(axis=1)
 
 
 def _blur_size(points: Points) -> int:

@@ -18,13 +18,18 @@ from relit_camera.live.status.stage_timing import StageTimer
 from relit_camera.subject.relighting.relighter import Relighter
 from relit_camera.subject.subject import Subject
 
+RATIO_INTERVAL_FACTOR, RATIO_MAX_STEP = 2, np.radians(4.0)
+"""The ratio of two pictures changes less than one of them, and is seen under the texture of the live picture: while the
+head turns it is computed half as often, and for twice the turn."""
+
 
 class SceneRelighting:
     """Relights one subject frame by frame. Not thread-safe."""
 
     def __init__(self, subject: Subject, relighter: Relighter, light: LightTransition, timer: StageTimer) -> None:
         """`light` goes on from subject to subject, so that a change of light stays smooth."""
-        self._extrapolation = TurnExtrapolation()
+        self._relit = TurnExtrapolation()
+        self._compared = TurnExtrapolation(RATIO_MAX_STEP)
         self._gain = np.float32(subject.metadata.display_gain)
         self._relighter = relighter
         self._light = light
@@ -44,7 +49,7 @@ class SceneRelighting:
         with self._timer.stage("light"):
             light = self._light.update(scene, time_s)
         with self._timer.stage("relight"):
-            return self._extrapolation.picture(
+            return self._relit.picture(
                 rotation, light, None, every, lambda: self._relighter.relight(self._seen(light, rotation)[None])[0]
             )
 
@@ -69,7 +74,7 @@ class SceneRelighting:
             room: the room's light map; another object for another light.
             room_in_head_frame: the same as the head sees it.
             combine: makes an array (height, width, 3 or 4) of non-negative values.
-            every: as in `relight`.
+            every: as in `relight`; the comparison is made half as often.
         """
         with self._timer.stage("light"):
             light = self._light.update(scene, time_s)
@@ -78,7 +83,7 @@ class SceneRelighting:
             return combine(*self._relighter.relight(np.stack([self._seen(light, rotation), room_in_head_frame])))
 
         with self._timer.stage("relight"):
-            return self._extrapolation.picture(rotation, light, room, every, relit)
+            return self._compared.picture(rotation, light, room, RATIO_INTERVAL_FACTOR * every, relit)
 
     def _seen(self, light: LightMap, rotation: Rotation) -> LightMap:
         return rotate_light_map(light, rotation) * self._gain

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from relit_camera.base.rotations import Rotation
 
-MAX_STEP, MAX_LAG = np.radians(2.0), np.radians(1.0)
-"""The picture is computed at once where the head has turned further than the one since, or than the other aside from
-how it turned before: shadow edges do not move evenly over such angles, and every other frame would stand out."""
+MAX_STEP = np.radians(2.0)
+"""Radians: shadow edges do not move evenly over such angles, and every other frame would stand out."""
 MAX_BASE = np.radians(8.0)
 """Two computed pictures further apart than this say nothing about what lies beyond them."""
 _UNMOVED = 1e-6
@@ -42,7 +41,14 @@ class TurnExtrapolation:
     the same picture again. It is extrapolated by no more than the turn between the last two that were computed.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, max_step: float = MAX_STEP) -> None:
+        """Set up.
+
+        Args:
+            max_step: radians. The picture is computed at once where the head has turned further than this since the
+                last one, or than half of it aside from how it turned before.
+        """
+        self._max_step = max_step
         self._whole: object = None
         self._latest: _Computed | None = None
         self._slope: _Slope | None = None
@@ -71,7 +77,7 @@ class TurnExtrapolation:
             return latest.picture
         share = self._share(step)
         lag = step if self._slope is None else step - share * self._slope.turn
-        jumped = np.linalg.norm(step) > MAX_STEP or np.linalg.norm(lag) > MAX_LAG
+        jumped = np.linalg.norm(step) > self._max_step or np.linalg.norm(lag) > self._max_step / 2
         if self._age >= every or not same or jumped:
             computed = _Computed(rotation, part, compute())
             if same:  # else the difference is not the turn's alone: the last slope still holds
