@@ -25,8 +25,8 @@ def test_status_tells_everything(client: Client, camera: FakeCamera) -> None:
     assert status["state"] == "live"
     assert status["tracker"] == {"name": "mesh", "state": "found"}
     assert status["fps"] == {"camera": 29.9, "pipeline": 29.8, "published": 30.0}
-    assert status["latency_ms"] == {"p50": 31.0, "p95": 44.0}
-    assert status["stage_ms"] == {"track": {"p50": 5.0, "p95": 7.5}}
+    assert status["latency_ms"] == {"p50": 31.0, "p95": 44.0, "max": 60.0}
+    assert status["stage_ms"] == {"track": {"p50": 5.0, "p95": 7.5, "max": 9.0}}
     assert status["frames"] == {"published": 900, "dropped": 3, "repeated": 4, "composed": 899}
     assert status["stage_processor_s"] == {"track": 7.5}
     assert status["providers"] == {"face_mesh": "CPUExecutionProvider"}
@@ -35,8 +35,8 @@ def test_status_tells_everything(client: Client, camera: FakeCamera) -> None:
 
 
 def test_figures_that_are_no_numbers_are_null(client: Client, camera: FakeCamera) -> None:
-    camera.base = replace(STATUS, latency_ms=Percentiles(math.nan, math.inf))
-    assert client.get("/api/v1/status").json()["latency_ms"] == {"p50": None, "p95": None}
+    camera.base = replace(STATUS, latency_ms=Percentiles(math.nan, math.inf, -math.inf))
+    assert client.get("/api/v1/status").json()["latency_ms"] == {"p50": None, "p95": None, "max": None}
 
 
 def test_alive_whatever_the_camera_does(client: Client, camera: FakeCamera) -> None:

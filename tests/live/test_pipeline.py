@@ -288,7 +288,7 @@ def test_closing_it_ends_its_thread() -> None:
     made.process(frame(), scene())
     assert {thread.name for thread in set(threading.enumerate()) - before} == {"warp-planner_0"}
     made.close()
-    assert set(threading.enumerate()) == before
+    assert set(threading.enumerate()) <= before  # those of other tests' pipelines may have ended meanwhile
 
 
 class CountingTracker(SteadyTracker):

@@ -79,7 +79,7 @@ class Percentiles:
 
     p50: float
     p95: float
-    max: float = 0.0
+    max: float
 
 
 @dataclass(frozen=True)
