@@ -20,8 +20,8 @@ START_S = 240.0
 """Thirteen seconds on an idle machine."""
 ADDRESS = "http://127.0.0.1:8470/api/v1"
 TRACK = f"{GUEST_PROGRAM}/relit_camera/app/demo/data/track.json"
-EXPECTED = ("no-subject",)
-"""What every camera here says, for it has no subject."""
+EXPECTED = ("no-subject", "reduced-quality")
+"""What a camera here may say: it has no subject, and an emulated machine is slow."""
 ROOM = "room.hdr"
 """A small environment: an emulated machine takes a quarter of a minute to paint one of the built-in ones."""
 
