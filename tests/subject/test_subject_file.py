@@ -16,7 +16,6 @@ from safetensors.numpy import load_file, save_file
 from relit_camera.app.demo import demo_files
 from relit_camera.base.errors import NotFoundError, StorageError, SubjectError
 from relit_camera.capture.subject_builder import build_subject
-from relit_camera.subject import subject_file
 from relit_camera.subject.compression.webp_packing import decode_basis
 from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import (
@@ -120,7 +119,6 @@ def test_wrong_tensors_are_refused(path: Path, change: dict[str, np.ndarray]) ->
 def test_a_copied_subject_outlives_its_file(
     path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, disk: str
 ) -> None:
-    monkeypatch.setattr(subject_file, "DISK", tmp_path if disk == "there" else tmp_path / "none")
     if disk == "full":
         monkeypatch.setattr("tempfile.TemporaryFile", _no_space)
     files = sorted(tmp_path.iterdir())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -34,8 +33,6 @@ MAX_BYTES = 8 << 30
 """Largest file that is memory-mapped."""
 MAX_COPIED_BYTES = 1 << 30
 """Largest file that is copied first; the largest subject that is built, 1024 pixels a side, has under 700 MB."""
-DISK = Path("/var/tmp")  # noqa: S108 - the copy has no name there
-"""Temporary files on a disk, where the system has such a folder."""
 REQUIRED_TENSORS = ("coefficients", "light_directions", "light_coefficients", "matte", "neutral")
 OPTIONAL_TENSORS = ("normals", "albedo", "depth", "horizons")
 LOCAL_BASIS_PREFIX = "basis."
@@ -110,7 +107,10 @@ def read_subject(path: Path, copied: bool = False) -> Subject:
         names = list(file.keys())
         if len(names) > MAX_TENSORS:
             raise _damaged_file_error(path, f"it holds {len(names)} tensors")
-        tensors = _tensor_views(path, names, copied)
+        try:
+            tensors = _tensor_views(path, names, copied)
+        except (KeyError, ValueError) as error:  # replaced by another file meanwhile
+            raise _damaged_file_error(path, f"it changed while it was read ({error})") from error
     _require_valid_tensors(path, tensors, metadata.format_version)
     landmarks = {n.removeprefix(LANDMARKS_PREFIX): t for n, t in tensors.items() if n.startswith(LANDMARKS_PREFIX)}
     arrays = {name: tensors[name] for name in (*REQUIRED_TENSORS, *OPTIONAL_TENSORS) if name in tensors}
@@ -213,16 +213,16 @@ def _tensor_views(path: Path, names: list[str], copied: bool) -> dict[str, NDArr
 def _own_copy(path: Path) -> NDArray[np.uint8]:
     """The content of a file, mapped from a copy without a name, which nobody else can change.
 
-    The system can drop its pages, unlike those of memory. Where no copy can be written it is read into memory.
+    The system can drop its pages, unlike those of memory. The copy is in the file's own folder: a likeness must not get
+    to a disk that is protected less. Where none can be written there, the file is read into memory.
     """
     try:
-        # Not the usual folder: that may be memory itself.
-        with path.open("rb") as file, tempfile.TemporaryFile(dir=DISK if os.access(DISK, os.W_OK) else None) as copy:
+        with path.open("rb") as file, tempfile.TemporaryFile(dir=path.parent) as copy:
             shutil.copyfileobj(file, copy, 1 << 20)
             copy.flush()
             return np.asarray(np.memmap(copy, np.uint8, mode="r"))
     except OSError as error:
-        log.warning("no copy of %s can be written (%s): it is read into memory", path, error.strerror)
+        log.info("no copy of %s can be written (%s): it is read into memory", path, error.strerror)
         return np.fromfile(path, np.uint8)
 
 

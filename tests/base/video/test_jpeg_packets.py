@@ -86,3 +86,10 @@ def test_zeros_after_a_picture_are_no_damage(tmp_path: Path, packets: list[int])
     with VideoReader(path, accurate=False) as video:
         assert len(list(video)) == COUNT
     assert packets
+
+
+@pytest.mark.parametrize("behind", [b"\0" * 700, b"\xff\xff", b"made by a camera"])
+def test_what_stands_behind_a_picture_does_no_harm(tmp_path: Path, behind: bytes) -> None:
+    path = motion_jpeg(tmp_path / "film.mov", lambda data, index: data + behind)
+    with VideoReader(path, accurate=False) as video:
+        assert len(list(video)) == COUNT

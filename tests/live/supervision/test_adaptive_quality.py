@@ -97,6 +97,11 @@ def test_any_latencies_keep_the_level_in_range_and_change_it_by_one(latencies: l
         state = after
 
 
+def test_one_late_picture_after_a_pause_changes_nothing() -> None:
+    state = next_quality(QualityState(), 1.0, 0.2, LIMITS)
+    assert next_quality(state, 60.0, 0.2, LIMITS).level == 0
+
+
 def test_a_clock_that_jumps_back_begins_anew() -> None:
     state = next_quality(QualityState(), 100.0, 0.2, LIMITS)
     assert next_quality(state, 1.0, 0.03, LIMITS).latency_s == 0.03

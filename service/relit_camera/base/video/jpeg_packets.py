@@ -48,15 +48,14 @@ def is_plain_jpeg(codec: str, picture: Any) -> bool:
     return codec == "mjpeg" and usual and not picture.interlaced_frame
 
 
-def decode_jpeg_packet(packet: Any) -> list[JpegPicture] | None:
-    """The picture in a packet, none in the empty one at the end of a file; None if it is damaged."""
-    if packet.is_corrupt:
-        return None
-    if packet.size == 0:
-        return []
-    data = np.frombuffer(packet, np.uint8)
-    # Cameras pad their packets with zeros.
-    if not data[-512:].tobytes().rstrip(b"\0").endswith(_END_OF_IMAGE):
-        return None
-    image = cv2.imdecode(data, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
-    return None if image is None else [JpegPicture(np.asarray(image, np.uint8), packet.pts, packet.time_base)]
+def is_cut_short(packet: Any) -> bool:
+    """Whether a packet holds a JPEG without its end, of which FFmpeg would show a part."""
+    return packet.is_corrupt or (packet.size > 0 and bytes(packet).rfind(_END_OF_IMAGE) < 0)
+
+
+def decode_jpeg_packet(packet: Any) -> list[JpegPicture]:
+    """The picture in a packet; none in the empty one at the end of a file, and where OpenCV cannot decode it."""
+    image = None
+    if packet.size > 0:
+        image = cv2.imdecode(np.frombuffer(packet, np.uint8), cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
+    return [] if image is None else [JpegPicture(np.asarray(image, np.uint8), packet.pts, packet.time_base)]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from relit_camera.base.errors import VideoError
 from relit_camera.base.images.color import Gamma, decode
 from relit_camera.base.images.image_types import Frame, LinearImage
-from relit_camera.base.video.jpeg_packets import JpegPicture, decode_jpeg_packet, is_plain_jpeg
+from relit_camera.base.video.jpeg_packets import JpegPicture, decode_jpeg_packet, is_cut_short, is_plain_jpeg
 from relit_camera.base.video.video_decoding import (
     Orientation,
     PixelConverter,
@@ -213,13 +213,15 @@ class VideoReader(FrameReader[Frame]):
         super().__init__(path, threads)
 
     def _decode_packet(self, packet: Any) -> list[Any] | None:
-        if self._plain_jpeg:
-            return decode_jpeg_packet(packet)
-        pictures = super()._decode_packet(packet)
-        if pictures and not self._accurate:
+        if self._plain_jpeg and is_cut_short(packet):
+            return None
+        if self._plain_jpeg and (pictures := decode_jpeg_packet(packet)):
+            return pictures  # what OpenCV cannot decode is FFmpeg's
+        decoded = super()._decode_packet(packet)
+        if decoded and not self._accurate:
             # FFmpeg decodes the first picture in any case: it tells orientation and colors.
-            self._plain_jpeg = is_plain_jpeg(self._stream.codec_context.name, pictures[0])
-        return pictures
+            self._plain_jpeg = is_plain_jpeg(self._stream.codec_context.name, decoded[0])
+        return decoded
 
     def _make(self, picture: Any, index: int, time_s: float) -> Frame:
         codes = picture.image if isinstance(picture, JpegPicture) else self._convert(picture)

@@ -99,6 +99,8 @@ class Source(Protocol):
     def read(self, timeout_s: float) -> Frame | None:
         """Get the next frame, waiting up to `timeout_s` seconds; None if none came in time or none will come any more.
 
+        Its picture is an array of its own, which the source does not use again: it may be published as it is.
+
         Raises:
             RelitError: the source has failed for good; raised again at each call. Not for a camera that is away.
         """

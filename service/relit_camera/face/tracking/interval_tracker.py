@@ -88,6 +88,7 @@ class IntervalTracker:
         self._lips = LipRegression(self._scheme)
         self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
         self._flow.setFinestScale(TUNABLES.finest_scale)
+        self._interval = 1
         self.set_interval(interval)
         self.reset()
 
@@ -99,6 +100,8 @@ class IntervalTracker:
         """
         if frames < 1:
             raise InputError(f"a tracker cannot measure every {frames} frames", "give an interval of 1 or more")
+        if frames != self._interval:
+            self._lips.reset()  # what it learned before may be another person's by now
         self._interval = frames
 
     @property

@@ -61,7 +61,7 @@ class FacePatch:
 
     def __init__(self, image: DisplayImage, points: Points) -> None:
         """Take a thumbnail of the upright box around the landmarks."""
-        self.points = points
+        self.points, self._size = points, image.shape
         x, y, width, height = bounding_box(points)
         rows, columns = image.shape[:2]
         # The part of the box that is in the picture, and at least one pixel.
@@ -71,7 +71,9 @@ class FacePatch:
         self._pixels = self._thumbnail(image)
 
     def matches(self, image: DisplayImage) -> bool:
-        """Whether the next frame correlates with the thumbnail at the same place."""
+        """Whether the next frame has the same size, and correlates with the thumbnail at the same place."""
+        if image.shape != self._size:
+            return False
         now = self._thumbnail(image)
         norms = math.sqrt(float(self._pixels @ self._pixels) * float(now @ now))
         return float(self._pixels @ now) >= TUNABLES.min_correlation * norms

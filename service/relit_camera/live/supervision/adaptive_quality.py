@@ -93,7 +93,8 @@ def _with_latency(state: QualityState, now: float, latency_s: float, limits: Qua
     if state.latency_s is None or now < state.seen_at:
         return replace(state, latency_s=latency_s, seen_at=now)
     weight = min(1.0, (now - state.seen_at) / limits.smoothing_s)
-    return replace(state, latency_s=state.latency_s + weight * (latency_s - state.latency_s), seen_at=now)
+    since = None if now - state.seen_at > limits.lower_after_s else state.since  # nothing is known of a pause
+    return replace(state, latency_s=state.latency_s + weight * (latency_s - state.latency_s), seen_at=now, since=since)
 
 
 def _lowered(state: QualityState, now: float, limits: QualityLimits) -> QualityState:
