@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.recorded_cost import measure_short, recorded
+from tests.recorded_cost import RECORD, measure_short, recorded
 
 MOST = 2.0
 """Times the record. Less tells nothing on a machine that others use too: it is printed, and people judge it."""
@@ -23,3 +23,9 @@ def test_a_picture_costs_about_what_it_did(note_row: Callable[[str, tuple[str, .
         note_row("what a picture costs, in runs of a network like the face mesh", (cost.mode, *figures))
         assert cost.degraded == []
         assert cost.mesh_runs < MOST * before[cost.mode]
+
+
+def test_the_record_names_no_place_of_the_machine_it_was_made_on() -> None:
+    text = RECORD.read_text()
+    assert '"/' not in text
+    assert ":/" not in text

@@ -43,7 +43,8 @@ class CameraCost:
     """What a picture of a running camera costs. Times are means a composed picture where nothing else is said.
 
     Attributes:
-        mode, background, tracker: as the settings name them.
+        mode, background: as the settings name them.
+        tracker: the same, without its argument, which may be a path of this machine.
         size: (width, height) of the pictures.
         source_fps: frames a second that the source gave.
         composed: pictures made while it was measured.
@@ -171,7 +172,7 @@ def measure_camera(settings: RelitSettings, source_fps: float, seconds: float, m
     return CameraCost(
         mode=after["mode"],
         background=settings.look.background.kind,
-        tracker=settings.tracker.name,
+        tracker=settings.tracker.name.partition(":")[0],
         size=(settings.output.width, settings.output.height),
         source_fps=source_fps,
         composed=composed,

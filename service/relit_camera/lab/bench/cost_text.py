@@ -38,7 +38,7 @@ def cost_text(cost: CameraCost) -> str:
 def cost_title(cost: CameraCost) -> str:
     """What was measured, in a line."""
     width, height = cost.size
-    return f"{cost.mode}, background {cost.background}, {width}x{height}, tracker {cost.tracker.partition(':')[0]}"
+    return f"{cost.mode}, background {cost.background}, {width}x{height}, tracker {cost.tracker}"
 
 
 def _installed(cost: CameraCost) -> str:
