@@ -27,9 +27,11 @@ WARM_UP_S = 6.0
 UNIT_SAMPLES = 5
 
 
-def measure(variables: dict[str, str], arguments: list[str], seconds: float) -> dict[str, float]:
-    """Run a camera with these environment variables and arguments, and watch it."""
-    process = subprocess.Popen([*COMMAND, *arguments], env=variables, stdout=subprocess.PIPE, stderr=-1, text=True)
+def measure(folder: Path, variables: dict[str, str], arguments: list[str], seconds: float) -> dict[str, float]:
+    """Run a camera in `folder`, with these environment variables and arguments, and watch it."""
+    process = subprocess.Popen(
+        [*COMMAND, *arguments], cwd=folder, env=variables, stdout=subprocess.PIPE, stderr=-1, text=True
+    )
     try:
         assert process.stdout is not None
         with httpx.Client(base_url=process.stdout.readline().split()[-1], timeout=30) as http:
@@ -78,11 +80,12 @@ def main() -> None:
             for name, tree in (("before", options.old_tree), ("after", here)):
                 variables = {**environment(Path(folder)), "PYTHONPATH": str(tree.resolve() / "service")}
                 if name == "before" and options.old_models:
-                    variables[FOLDER_VARIABLE] = str(options.old_models)
-                chosen = ["--source", str(options.video), "--subject", str(options.subject), "--tracker", "mesh"]
-                arguments = ["run", *chosen, "--mode", mode, "--sink", "null", "--port", "0"]
+                    variables[FOLDER_VARIABLE] = str(options.old_models.resolve())
+                chosen = ["--source", str(options.video.resolve()), "--subject", str(options.subject.resolve())]
+                arguments = ["run", *chosen, "--tracker", "mesh", "--mode", mode, "--sink", "null", "--port", "0"]
                 unit_ms = mesh_run_ms()
-                found = measure(variables, arguments, options.seconds)
+                # Not here: each camera would read the configuration file of this checkout.
+                found = measure(Path(folder), variables, arguments, options.seconds)
                 unit_ms = (unit_ms + mesh_run_ms()) / 2
                 runs = round(found["picture_ms"] / unit_ms, 2)
                 line = {"mode": mode, "camera": name, "mesh_runs": runs, "mesh_run_ms": round(unit_ms, 2), **found}

@@ -11,6 +11,7 @@ import numpy as np
 
 from relit_camera.base.config.look import Look
 from relit_camera.base.config.settings import StorageSettings
+from relit_camera.base.errors import ConflictError, RelitError
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import (
@@ -22,6 +23,8 @@ from relit_camera.live.status.camera_status import (
     Rates,
     TrackerStatus,
 )
+from relit_camera.live.status.capture_status import CaptureStage, CaptureStatus
+from relit_camera.live.status.desk_status import DeskCaptureStatus, DeskPlace, DeskStage
 from relit_camera.live.status.event_hub import EventHub
 
 FPS = 30
@@ -43,6 +46,54 @@ STATUS = CameraStatus(
 )
 
 
+class FakeCapture:
+    """Implements `live.camera_control.CaptureControl`; it is filming until it is canceled."""
+
+    def __init__(self) -> None:
+        self.current = CaptureStatus()
+        self.error: RelitError | None = None
+
+    def status(self) -> CaptureStatus:
+        return self.current
+
+    def start(self, name: str) -> CaptureStatus:
+        if self.error is not None:
+            raise self.error
+        self.current = CaptureStatus(CaptureStage.FILMING, name)
+        return self.current
+
+    def cancel(self) -> CaptureStatus:
+        self.current = CaptureStatus(CaptureStage.CANCELED, self.current.subject)
+        return self.current
+
+
+class FakeDeskCapture:
+    """Implements `live.camera_control.DeskCaptureControl`: each step that is shown leads to the next."""
+
+    def __init__(self) -> None:
+        self.current = DeskCaptureStatus()
+        self.place: DeskPlace | None = None
+
+    def status(self) -> DeskCaptureStatus:
+        return self.current
+
+    def start(self, name: str, place: DeskPlace) -> DeskCaptureStatus:
+        if self.current.stage.is_running:
+            raise ConflictError("a desk capture runs already", "wait for its end, or cancel it")
+        self.place = place
+        self.current = DeskCaptureStatus(DeskStage.EXPOSING, name, 0, 1, (1.0,) * 15, 5, 3)
+        return self.current
+
+    def page_shows(self, step: int) -> DeskCaptureStatus:
+        if step == self.current.step:
+            self.current = replace(self.current, stage=DeskStage.FILMING, step=step + 1)
+        return self.current
+
+    def cancel(self) -> DeskCaptureStatus:
+        self.current = replace(self.current, stage=DeskStage.CANCELED, patches=())
+        return self.current
+
+
 class FakeCamera:
     """Implements `live.camera_control.CameraControl` around a real director."""
 
@@ -50,6 +101,8 @@ class FakeCamera:
         self.scene_controller = SceneController(StorageSettings(data_dir=data_dir))
         self.scene_controller.set_look(Look())
         self.events = EventHub()
+        self.instant_capture = FakeCapture()
+        self.desk_capture = FakeDeskCapture()
         self.image = picture() if image is None else image
         self.publishing = True
         self.degraded: list[Degradation] = []

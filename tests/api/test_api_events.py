@@ -68,6 +68,8 @@ def test_a_listener_first_gets_what_stands(listener: Listener, camera: FakeCamer
         "background": {"kind": "none"},
         "mode": "reenact",
         "subject": None,
+        "rung": None,
+        "unlit_allowed": True,
         "frozen": False,
     }
     kind, status = next(stream)

@@ -15,12 +15,13 @@ import pytest
 from relit_camera.app.run_camera import run_camera
 from relit_camera.app.startup_checks import check_before_devices
 from relit_camera.app.wiring import make_pipeline
-from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
+from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings, StorageSettings
 from relit_camera.base.errors import ConfigError, DeviceError, RelitError
 from relit_camera.devices.on_demand import on_demand_source
 from relit_camera.devices.sinks.sink import Sink
 from relit_camera.devices.sources.source import Source
-from relit_camera.live.compositing import matting
+from relit_camera.face import matting
+from relit_camera.live.scene.scene_controller import SceneController
 from tests.cli.relit_command import Material, write_material
 from tests.small_camera import SteadyTracker, memory_source
 
@@ -73,6 +74,22 @@ def test_sound_settings_reach_the_devices(material: Material, tmp_path: Path) ->
     with pytest.raises(DeviceError, match="the sink was reached"):
         run(material, tmp_path, devices, {})
     assert devices.opened == ["source", "sink"]
+
+
+def test_instant_shows_neither_the_configured_subject_nor_the_unlit_picture(
+    material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[SceneController] = []
+
+    def make(storage: StorageSettings) -> SceneController:
+        made.append(SceneController(storage))
+        return made[-1]
+
+    monkeypatch.setattr("relit_camera.app.run_camera.SceneController", make)
+    with pytest.raises(DeviceError, match="the sink was reached"):
+        run(material, tmp_path, Devices(), {}, instant=True)
+    assert made[0].scene.subject is None
+    assert not made[0].scene.unlit_allowed
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,12 @@ def test_horizons_come_back_within_half_a_step(samples: OlatSamples, subject: Su
     assert np.ptp(known) > 1
 
 
+def test_the_header_says_how_much_was_measured(subject: Subject) -> None:
+    """The cap of lights reaches 60 degrees from the camera: a quarter of the sphere."""
+    assert subject.metadata.rung == "pictures"
+    assert subject.metadata.measured_fraction == pytest.approx((1 - np.cos(np.radians(60))) / 2, abs=0.02)
+
+
 def test_the_header_says_what_was_reached(subject: Subject) -> None:
     meta = subject.metadata
     assert meta.format_version == 2

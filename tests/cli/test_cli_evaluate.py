@@ -72,6 +72,16 @@ def test_olat_prints_each_list(folder: Path, tmp_path: Path) -> None:
     assert "nearest" in out.read_text()
 
 
+def test_frontal_predicts_the_other_lights(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    answer = call("evaluate", "frontal", folder / "captured", "--out", out, "--json")
+    assert answer.code == 0, answer.err
+    figures = json.loads(answer.out)["captured"]
+    assert figures["frontal_lights"] + figures["predicted_lights"] == len(cap(60, 50))
+    assert figures["predictors"]["model"]["psnr_db"] > figures["predictors"]["frontal picture"]["psnr_db"] + 10
+    assert "generic head" in out.read_text()
+
+
 def test_video_compares_two_videos(tmp_path: Path) -> None:
     for name, level in (("relit.mp4", 100), ("truth.mp4", 120)):
         with VideoWriter(tmp_path / name, (64, 64), 24) as video:
@@ -117,6 +127,11 @@ def test_what_is_wrong_is_said_in_one_line_and_leaves_nothing(folder: Path, tmp_
     call("evaluate", "capture", tmp_path / "none.json", "--truth", tmp_path / "none.json", "--out", out).complains(
         "none.json"
     )
+    call("evaluate", "frontal", tmp_path / "none.lp", "--out", out).complains("none.lp")
+    call("evaluate", "ladder", truth, "--rung", "stairs", "--out", tmp_path / "ladder").complains("'stairs'")
+    call("evaluate", "ladder", truth, "--room", "nowhere", "--out", tmp_path / "ladder").complains("'nowhere'")
+    call("evaluate", "ladder", tmp_path / "none.lp", "--out", tmp_path / "ladder").complains("none.lp")
+    assert call("evaluate", "ladder", truth, truth, "--out", tmp_path / "ladder").code == 2
     assert field(captured, "--out", tmp_path / "report.pdf").code == 2
     assert call("evaluate", "video", out, "--truth", out, "--pose", out).code == 2
     assert files(tmp_path) == before

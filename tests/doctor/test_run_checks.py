@@ -15,9 +15,9 @@ from typing import NoReturn
 import psutil
 import pytest
 
+from relit_camera.app.needed_models import OF_TRACKER
 from relit_camera.base.config.settings import RelitSettings, ServerSettings
 from relit_camera.base.models.model_store import ModelState, ModelStore
-from relit_camera.doctor import models_and_subject
 from relit_camera.doctor import run_checks as examining
 from relit_camera.doctor.installation import check_cores, check_folder, check_packages, check_python
 from relit_camera.doctor.models_and_subject import check_models, check_provider
@@ -56,9 +56,20 @@ def test_pulled_models_are_fine(monkeypatch: pytest.MonkeyPatch) -> None:
     expect(check_models(RelitSettings()), Severity.OK, "in ")
 
 
+def test_what_the_package_index_has_is_fine(monkeypatch: pytest.MonkeyPatch) -> None:
+    manifest = ModelStore().manifest
+    indexed = [name for name, model in manifest.models.items() if model.packaged]
+    monkeypatch.setattr(
+        ModelStore, "state", lambda self, name: ModelState.PULLED if name in indexed else ModelState.MISSING
+    )
+    expect(check_models(RelitSettings()), Severity.OK, "4 of 8", "missing: face_blendshapes, openseeface")
+    openseeface = RelitSettings(tracker={"name": "openseeface"})
+    expect(check_models(openseeface), Severity.PROBLEM, "tracker openseeface lacks openseeface", "relit models pull")
+
+
 def test_every_needed_model_is_in_the_manifest() -> None:
     known = ModelStore().names()
-    assert all(name in known for names in models_and_subject.REQUIRED_MODELS.values() for name in names)
+    assert all(name in known for groups in OF_TRACKER.values() for group in groups for name in group)
 
 
 def test_the_provider_is_proven_by_its_nodes() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from relit_camera.base.models.model_store import FOLDER_VARIABLE, ModelStore
 
-FACE_MODELS = ("face_mesh", "face_blendshapes", "face_detector_yunet", "openseeface")
+FACE_MODELS = ("face_mesh", "face_blendshapes", "face_detector_yunet", "face_detector_short_range", "openseeface")
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import ModelError
-from relit_camera.face.tracking.face_detector import FaceDetector, intersection_over_union, is_same_face
+from relit_camera.face.detection.face_detector import intersection_over_union, is_same_face
+from relit_camera.face.detection.yunet_detector import YuNetDetector
 
 
 def test_overlap_is_intersection_over_union() -> None:
@@ -23,19 +24,19 @@ def test_a_face_that_moved_a_little_is_the_same() -> None:
 
 def test_a_missing_model_names_its_cure(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="relit models pull"):
-        FaceDetector(tmp_path / "none.onnx")
+        YuNetDetector(tmp_path / "none.onnx")
 
 
 def test_a_damaged_model_names_its_cure(tmp_path: Path) -> None:
     broken = tmp_path / "broken.onnx"
     broken.write_bytes(b"no model at all")
     with pytest.raises(ModelError, match=r"broken\.onnx is damaged"):
-        FaceDetector(broken)
+        YuNetDetector(broken)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 500), (500, 3), (64, 48)])
 def test_pictures_of_any_size_are_searched(face_models: Path, size: tuple[int, int]) -> None:
-    detector = FaceDetector(face_models / "face_detector_yunet.onnx")
+    detector = YuNetDetector(face_models / "face_detector_yunet.onnx")
     assert detector.detect(np.full((size[1], size[0], 3), 90, np.uint8)) is None
 
 
@@ -45,7 +46,7 @@ def test_the_face_near_the_last_one_is_preferred_to_the_larger(face_models: Path
     both = np.zeros((height, width + small.shape[1], 3), np.uint8)
     both[:, :width] = portrait
     both[: small.shape[0], width:] = small
-    detector = FaceDetector(face_models / "face_detector_yunet.onnx")
+    detector = YuNetDetector(face_models / "face_detector_yunet.onnx")
     largest = detector.detect(both)
     assert largest is not None
     assert largest.box[0] + largest.box[2] / 2 < width
@@ -62,7 +63,7 @@ def test_a_look_nearby_finds_the_same_face_and_no_other(face_models: Path, portr
     height, width = portrait.shape[:2]
     both = np.zeros((2 * height, 3 * width, 3), np.uint8)
     both[:height, :width] = portrait
-    detector = FaceDetector(face_models / "face_detector_yunet.onnx")
+    detector = YuNetDetector(face_models / "face_detector_yunet.onnx")
     whole = detector.detect(both)
     assert whole is not None
     nearby = detector.detect_nearby(both, whole.box)

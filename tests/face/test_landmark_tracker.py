@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.image_types import Frame
+from relit_camera.face.detection.face_detector import Box, Detection, is_same_face
 from relit_camera.face.face_state import LOST, FaceStatus
 from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
-from relit_camera.face.tracking.face_detector import Box, Detection, is_same_face
 from relit_camera.face.tracking.landmark_tracker import LandmarkPrediction, LandmarkTracker
 from tests.face.faces import SCHEME, SIZE, face
 

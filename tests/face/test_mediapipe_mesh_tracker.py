@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -8,11 +9,12 @@ import pytest
 from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
+from relit_camera.base.models.onnx_runtime import TensorSpec
 from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.face.detection.face_detector import Detection
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_camera.face.tracking.face_detector import Detection
 from relit_camera.face.tracking.mediapipe_mesh_tracker import (
     BLENDSHAPE_NAMES,
     BLENDSHAPE_POINTS,
@@ -27,6 +29,8 @@ SIZE = (640, 480)
 
 class FakeMesh:
     """Puts every point in the middle of the crop, with a presence logit of 2."""
+
+    inputs = MappingProxyType({"image": TensorSpec((1, 256, 256, 3), np.dtype(np.float32))})
 
     def run(self, feeds: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         self.fed = feeds["image"]

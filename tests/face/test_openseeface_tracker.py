@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from relit_camera.face.detection.face_detector import Detection
 from relit_camera.face.landmarks.rotated_crop import bounding_box
-from relit_camera.face.tracking.face_detector import Detection
 from relit_camera.face.tracking.openseeface_tracker import OpenSeeFaceNetwork, decode_heat_maps
 from tests.face.faces import face
 

@@ -145,13 +145,13 @@ def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     image = np.ascontiguousarray(noise.repeat(4, axis=0).repeat(4, axis=1))
     made, ratio = pipeline(LongFace()), scene(mode=Mode.RATIO)
-    for index in range(45):
+    for index in range(100):
         last = made.process(frame(index, image), ratio).image
     assert [trouble.what for trouble in made.troubles] == ["mode reenact is shown in place of mode ratio"]
-    still = made.process(frame(45, image), scene()).image
+    still = made.process(frame(100, image), scene()).image
     assert difference(last, still) < 2
     other = replace(ratio, subject=replace(small_subject()))
-    made.process(frame(46, image), other)
+    made.process(frame(101, image), other)
     assert made.troubles == []
 
 

@@ -14,8 +14,8 @@ import pytest
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.capture.subject_builder import build_subject
+from relit_camera.face.matting import RecordedMatting
 from relit_camera.face.tracking.track_recording import read_track
-from relit_camera.live.compositing.matting import RecordedMatting
 from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import read_subject
 from relit_studio import demo_bundle

@@ -18,6 +18,7 @@ from relit_camera.api.middleware.token_authentication import TokenAuthMiddleware
 from relit_camera.api.openapi.openapi_document import openapi_document, operation_id
 from relit_camera.api.routes import (
     backgrounds,
+    captures,
     environments,
     lighting,
     mode_and_freeze,
@@ -71,6 +72,7 @@ def create_app_without_camera() -> FastAPI:
         backgrounds,
         mode_and_freeze,
         subjects,
+        captures,
         presets,
         preview,
         server_sent_events,
@@ -80,6 +82,7 @@ def create_app_without_camera() -> FastAPI:
     app.include_router(api)
     app.include_router(monitoring.probe_router)
     app.add_api_route("/", _panel_page, include_in_schema=False)
+    app.add_api_route("/desk", _desk_page, include_in_schema=False)
     app.mount("/panel", StaticFiles(directory=PANEL_FOLDER), "panel")
     install_error_handlers(app)
     app.openapi = lambda: _cached_openapi(app)  # type: ignore[method-assign]
@@ -88,6 +91,10 @@ def create_app_without_camera() -> FastAPI:
 
 def _panel_page() -> FileResponse:
     return FileResponse(PANEL_FOLDER / "index.html", media_type="text/html")
+
+
+def _desk_page() -> FileResponse:
+    return FileResponse(PANEL_FOLDER / "desk.html", media_type="text/html")
 
 
 def _cached_openapi(app: FastAPI) -> dict[str, Any]:

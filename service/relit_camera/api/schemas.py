@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from relit_camera.base.config.look import Background, Lighting, Mode, StoredName
+from relit_camera.subject.rungs import Rung
 from relit_camera.subject.subject import SubjectMetadata
 
 
@@ -57,6 +58,38 @@ class SubjectDetails(SubjectItem):
     metadata: SubjectMetadata
 
 
+class InstantCaptureRequest(ApiModel):
+    """A subject to be captured from the webcam."""
+
+    name: StoredName = "instant"
+    """Under which it is stored; an instant subject of that name is replaced."""
+
+
+class DeskCaptureRequest(ApiModel):
+    """A subject to be captured by the light of the screen that shows the page."""
+
+    name: StoredName = "desk"
+    """Under which it is stored; an instant or desk subject of that name is replaced."""
+    screen_width_cm: Annotated[float, Field(ge=8, le=200)]
+    """Of the screen's lit area."""
+    screen_height_cm: Annotated[float, Field(ge=5, le=120)]
+    distance_cm: Annotated[float, Field(ge=20, le=200)]
+    """From the eyes to the screen."""
+    camera_up_cm: Annotated[float, Field(ge=-200, le=200)]
+    """From the middle of the screen up to the webcam."""
+    camera_right_cm: Annotated[float, Field(ge=-200, le=200)] = 0.0
+    """From there to the right, as you see it."""
+    one_by_one: bool = False
+    """Light one patch at a time: a calmer screen, a noisier result."""
+
+
+class ShownStep(ApiModel):
+    """What the page with the patterns shows."""
+
+    step: Annotated[int, Field(ge=-1, le=1000)]
+    """Index of the step; -1 for none yet."""
+
+
 class EnvironmentItem(ApiModel):
     """A stored environment."""
 
@@ -104,6 +137,10 @@ class SceneBody(ApiModel):
     background: Background
     mode: Mode
     subject: str | None
+    rung: Rung | None
+    """How the subject was captured; null for nobody, and where its file does not say."""
+    unlit_allowed: bool
+    """Whether the live picture is shown as it is while there is no subject; else a placeholder is."""
     frozen: bool
 
 

@@ -12,16 +12,23 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from relit_camera import __version__
+from relit_camera.app.desk.desk_filming import DeskFilming
+from relit_camera.app.desk.desk_worker import write_desk_subject
+from relit_camera.app.live_capture import LiveCapture
+from relit_camera.app.live_capture_worker import write_instant_subject
 from relit_camera.app.wiring import make_pipeline
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import StorageError
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.models.session_with_fallback import session_report
+from relit_camera.devices.device_discovery import find_webcam
 from relit_camera.devices.sinks.sink import Sink
 from relit_camera.devices.sources.source import Source
+from relit_camera.devices.webcam_controls import open_controls
 from relit_camera.face.face_state import Tracker
-from relit_camera.live.publishing.placeholder_image import placeholder
+from relit_camera.live.frame_recorder import FrameRecorder
+from relit_camera.live.publishing.placeholder_image import Placeholder, placeholder
 from relit_camera.live.publishing.publisher import Publisher
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
@@ -42,6 +49,8 @@ from relit_camera.live.supervision.pipeline_supervisor import PipelineSupervisor
 
 RELEASED_MESSAGE = "the webcam is off until somebody looks"
 """What the placeholder says in on-demand mode."""
+CAPTURING_MESSAGE = "no face is measured yet: look at the camera"
+"""What the placeholder says while a first subject is captured."""
 HANGING_THREAD_PREFIXES = ("source-", "camera", "pipeline", "renderer", "warp-planner", "publisher")
 """Threads that may be inside a driver or a network."""
 
@@ -104,11 +113,26 @@ class CameraService:
         self._on_viewer, self._timings, self._clock = on_viewer, timings, SYSTEM_CLOCK
         self._board = StatusBoard(self.events)
         size = (settings.output.width, settings.output.height)
-        make_placeholder = partial(placeholder, size, picture=settings.output.placeholder)
+        own_picture = placeholder(size, picture=settings.output.placeholder) if settings.output.placeholder else None
+
+        def make_placeholder(reason: str) -> Placeholder:
+            return Placeholder(lambda: placeholder(size, reason) if own_picture is None else own_picture)
+
+        recorder = FrameRecorder()
+        self.instant_capture = LiveCapture(recorder, scene_controller, self.events, write_instant_subject, on_viewer)
+        self.desk_capture = DeskFilming(
+            recorder,
+            scene_controller,
+            self.events,
+            write_desk_subject,
+            lambda: open_controls(find_webcam(source.describe().id).node),
+            lambda: 1 / max(source.describe().fps, 1.0),
+            on_viewer,
+        )
         self._publisher = Publisher(
             sink,
             settings.output.fps,
-            make_placeholder("starting"),
+            make_placeholder("starting").image,
             stale_after_s=timings.stale_after_s,
             on_sink_error=partial(self._board.report, DegradationCode.SINK_FAILED),
         )
@@ -125,9 +149,14 @@ class CameraService:
             self._supervisor,
             FallbackRenderer(size, settings.output.fallback, make_placeholder("the picture has failed: see the panel")),
             self._publisher,
-            Placeholders(make_placeholder("waiting for the camera"), make_placeholder(RELEASED_MESSAGE)),
+            Placeholders(
+                make_placeholder("waiting for the camera"),
+                make_placeholder(RELEASED_MESSAGE),
+                make_placeholder(CAPTURING_MESSAGE),
+            ),
             self._scene,
             self._board,
+            recorder,
             timings.loop,
         )
         self._started_at = self._clock.now()
@@ -149,7 +178,7 @@ class CameraService:
         self._board.set_state(CameraState.STOPPING)
         self._stop_by = self._clock.now() + self._timings.stop_timeout_s
         self._supervisor.close()
-        for end in (self._publisher.stop, self._source.close):
+        for end in (self._publisher.stop, self._source.close, self.instant_capture.cancel, self.desk_capture.cancel):
             thread = threading.Thread(target=end, daemon=True)
             thread.start()
             self._ending.append(thread)

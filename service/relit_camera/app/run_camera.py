@@ -24,6 +24,7 @@ from relit_camera.app.config_reload import apply_edited_settings
 from relit_camera.app.startup_checks import check_before_devices
 from relit_camera.app.systemd import notify_systemd
 from relit_camera.app.wiring import make_tracker
+from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.concurrency.threads import freeze_gc, limit_threads
 from relit_camera.base.config.config_watcher import watch_config
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
@@ -39,6 +40,8 @@ from relit_camera.live.status.camera_status import DegradationCode
 
 log = logging.getLogger(__name__)
 
+INSTANT_SUBJECT = "instant"
+"""Name under which the subject that `instant` asks for is stored."""
 CompanionTask = Callable[[CameraService, str], AbstractContextManager[None]]
 """Makes a context that is entered while the camera runs, from the camera and the panel's address."""
 SourceOpener = Callable[[SourceSettings, str], Source]
@@ -53,6 +56,7 @@ def run_camera(
     source_for: SourceOpener = lambda settings, own_label: open_source(settings, own_label=own_label),
     sink_for: Callable[[OutputSettings], Sink] = open_sink,
     reload: tuple[Path, Callable[[Path], RelitSettings]] | None = None,
+    instant: bool = False,
 ) -> None:
     """Run the camera until SIGTERM or SIGINT, then end within 3 s.
 
@@ -67,11 +71,15 @@ def run_camera(
         source_for: opens the source that the settings name.
         sink_for: opens the sink that the settings name.
         reload: the configuration file, to be watched for edits, and the function that reads it.
+        instant: capture the person before the camera as subject `INSTANT_SUBJECT` first, and show nothing until then;
+            the subject that the settings name is not shown.
 
     Raises:
         RelitError: the port is in use, a file, device or model is missing …
     """
     limit_threads()
+    opening = contextlib.ExitStack()
+    opening.enter_context(large_allocations_apart())
     for folder in settings.storage.folders:
         remove_unfinished_files(folder)  # of an earlier run that was killed
     look, scene_controller = settings.look, SceneController(settings.storage)
@@ -81,12 +89,15 @@ def run_camera(
         )
         look = look.model_copy(update={"lighting": named})
     scene_controller.set_look(look)
-    scene_controller.load_configured_subject(settings.subject)
+    scene_controller.load_configured_subject(None if instant else settings.subject)
+    if instant:
+        scene_controller.set_unlit_allowed(False)
     check_before_devices(settings)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     with contextlib.ExitStack() as cleanup:
+        cleanup.push(opening)
         listener = cleanup.enter_context(open_listener(settings.server))
         tracker = make_tracker(settings)
         make_source = partial(source_for, settings.source, published_label(settings.output))
@@ -108,6 +119,8 @@ def run_camera(
         cleanup.push(partial(_exit_if_threads_hang, camera_service))
         cleanup.callback(camera_service.stop)
         camera_service.start()
+        if instant:
+            camera_service.instant_capture.start(INSTANT_SUBJECT, until_done=True)
         # The web framework is loaded while the first picture is made.
         from relit_camera.api.app import create_app
         from relit_camera.api.server.http_server import start_api_server
@@ -115,6 +128,7 @@ def run_camera(
         server = start_api_server(create_app(camera_service, settings), settings.server, listener=listener)
         cleanup.callback(server.stop)
         freeze_gc()
+        opening.close()
         typer.echo(f"Relit Camera runs; the panel is at {server.address.url}")
         if side_task is not None:
             cleanup.enter_context(side_task(camera_service, server.address.url))

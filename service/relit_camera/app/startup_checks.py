@@ -32,7 +32,8 @@ def check_before_devices(settings: RelitSettings) -> None:
     require_provider(session)
     if settings.source.on_demand and settings.output.sink == "camera":
         require_known_readers()
-    placeholder((settings.output.width, settings.output.height), picture=settings.output.placeholder)
+    if settings.output.placeholder is not None:
+        placeholder((settings.output.width, settings.output.height), picture=settings.output.placeholder)
     open_matting(settings.matte, session)
     reenactor, _, file = settings.reenact.reenactor.partition(":")
     if reenactor == "onnx" and not (file and Path(file).expanduser().is_file()):

@@ -10,10 +10,10 @@ from relit_camera.base.config.look import Mode
 from relit_camera.base.config.settings import InferenceSettings, RelitSettings, TrackerSettings
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import Tracker
+from relit_camera.face.matting import matting_factory
 from relit_camera.face.motion.face_follower import FaceFollower, FaceFollowerSettings
 from relit_camera.face.motion.one_euro_filter import FACE_SMOOTHING
 from relit_camera.face.tracking.trackers import TRACKERS, TrackerOptions, open_tracker
-from relit_camera.live.compositing.matting import matting_factory
 from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderMode
 from relit_camera.live.modes.ratio_mode import RatioMode
 from relit_camera.live.modes.ratio_relighting import RatioRelighting

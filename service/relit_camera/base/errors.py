@@ -12,12 +12,14 @@ RelitError                       what is wrong, and what cures it
 │   ├── CaptureError             something a capture needs is not in its pictures: no flash, no mirror ball …
 │   ├── TrackError               a recorded track does not fit
 │   └── ModelError               a model is missing, has the wrong hash, or breaks its contract
+│       └── DownloadError        no host gives a model's file as it was tested
 ├── DeviceError                  a camera, virtual camera or provider is missing or in use
 │   └── UnsupportedByDriverError the device's driver is too old for what it is asked
 ├── PortInUseError               another program listens on the port
 ├── StorageError                 a file cannot be written (disk full, no permission)
 ├── PluginError                  a plug-in of another package fails: its author can mend it
 ├── PipelineHangError            a frame took so long that its thread was given up
+├── WorkerError                  work in a process of its own died, took too long or was canceled
 ├── ConflictError                API: the thing is in use, built in, or has that name already (409)
 ├── TooLargeError                API: the request's body is too large (413)
 ├── ForbiddenError               API: the request came from another site (403)
@@ -93,6 +95,18 @@ class ModelError(InputError):
     """A model is missing, has the wrong hash, or breaks its contract."""
 
 
+class DownloadError(ModelError):
+    """No host gives the file as it was tested.
+
+    Attributes:
+        reasons: one for each host, such as "no connection to example.org".
+    """
+
+    def __init__(self, what: str, cure: str, reasons: tuple[str, ...]) -> None:
+        super().__init__(what, cure)
+        self.reasons = reasons
+
+
 class DeviceError(RelitError):
     """A camera, a virtual camera or an execution provider is missing or in use."""
 
@@ -115,6 +129,10 @@ class PluginError(RelitError):
 
 class PipelineHangError(RelitError):
     """A frame took so long in the pipeline that its thread was given up."""
+
+
+class WorkerError(RelitError):
+    """Work in a process of its own died, took too long, or was canceled."""
 
 
 class ConflictError(RelitError):

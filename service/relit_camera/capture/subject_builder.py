@@ -14,11 +14,14 @@ from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
 from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD, open_method
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
+from relit_camera.capture.reflectance.sampled_region import region_coverage
 from relit_camera.capture.subject_landmarks import find_landmarks
 from relit_camera.light.directions import texel_directions, texel_solid_angles
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.compression.field_compression import CompressedField, compress_field
+from relit_camera.subject.reflectance_field import ReflectanceField
+from relit_camera.subject.rungs import EXPECTED_DB, Rung
 from relit_camera.subject.subject import HORIZON_STEP_RAD, Subject, SubjectMetadata
 
 MAX_SKIN_LUMINANCE = 0.45
@@ -34,6 +37,7 @@ def build_subject(
     gamma: Gamma = "srgb",
     landmarks: Mapping[str, Points] | None = None,
     with_geometry: bool = True,
+    rung: Rung = "pictures",
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Subject:
     """Build and compress the field of `samples`.
@@ -45,6 +49,7 @@ def build_subject(
         gamma: curve that the pictures were decoded with, for the header.
         landmarks: known landmarks by scheme; None finds them with the installed trackers.
         with_geometry: whether to store the person's geometry in the subject.
+        rung: how the person was captured.
         progress: called with the number of tiles that are compressed and the total.
 
     Raises:
@@ -53,6 +58,33 @@ def build_subject(
     """
     method = DEFAULT_METHOD if method == "default" else method
     field = open_method(method).build(samples)
+    return subject_from_field(field, samples, method, source, gamma, landmarks, with_geometry, rung, progress)
+
+
+def subject_from_field(
+    field: ReflectanceField,
+    samples: OlatSamples,
+    method: str,
+    source: str,
+    gamma: Gamma = "srgb",
+    landmarks: Mapping[str, Points] | None = None,
+    with_geometry: bool = True,
+    rung: Rung = "pictures",
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Subject:
+    """Compress a field that was built from samples.
+
+    Args:
+        field: of the person.
+        samples: the pictures that it was built from.
+        method: name of what built it, for the header.
+        source: file name of the capture, for the header.
+        gamma: curve that the pictures were decoded with, for the header.
+        landmarks: known landmarks by scheme; None finds them with the installed trackers.
+        with_geometry: whether to store the person's geometry in the subject.
+        rung: how the person was captured.
+        progress: called with the number of tiles that are compressed and the total.
+    """
     maps = [builtin_environment(name).light_map for name in BUILTIN_NAMES]
     compressed = compress_field(field, samples.pictures, samples.matte, CompressionTarget(maps=maps), progress)
     quality = compressed.quality
@@ -74,6 +106,9 @@ def build_subject(
             gamma=str(gamma),
             over_black=over_black(samples),
             display_gain=display_gain(frontal, samples.matte),
+            rung=rung,
+            expected_db=EXPECTED_DB.get(rung),
+            measured_fraction=measured_fraction(samples.directions),
             created_by=f"relit-camera {__version__}",
             created_at=datetime.now(UTC).isoformat(timespec="seconds"),
         ),
@@ -86,6 +121,12 @@ def build_subject(
         landmarks=find_landmarks(neutral) if landmarks is None else landmarks,
         **(quantize_geometry(samples.geometry) if with_geometry else {}),
     )
+
+
+def measured_fraction(directions: NDArray[np.float64]) -> float:
+    """Share of the sphere within the region that the lights (lights, 3) span."""
+    inside = region_coverage(directions, texel_directions().reshape(-1, 3)) > 0.99
+    return min(float(inside @ texel_solid_angles().ravel() / (4 * np.pi)), 1.0)
 
 
 def quantize_geometry(geometry: Geometry) -> dict[str, NDArray]:

@@ -1,7 +1,7 @@
 """The V4L2 calls (ioctl) that Relit Camera makes, on an open device; all of them are here.
 
 Names, numbers and structures are those of linux/videodev2.h, but for the event of v4l2loopback. The Python libraries
-for V4L2 are under the GPL, so the five calls are written out. They raise OSError as the kernel answers.
+for V4L2 are under the GPL, so the eight calls are written out. They raise OSError as the kernel answers.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import struct
 import sys
+from dataclasses import dataclass
 
 from relit_camera.base.errors import UnsupportedByDriverError
 
@@ -21,6 +22,10 @@ VIDIOC_S_FMT = 0xC0D05605
 VIDIOC_STREAMON = 0x40045612
 VIDIOC_SUBSCRIBE_EVENT = 0x4020565A
 VIDIOC_DQEVENT = 0x80885659
+
+VIDIOC_QUERYCTRL = 0xC0445624
+VIDIOC_G_CTRL = 0xC008561B
+VIDIOC_S_CTRL = 0xC008561C
 
 CAPABILITY_BYTES, DEVICE_CAPS_OFFSET = 104, 88
 CAP_VIDEO_CAPTURE, CAP_VIDEO_OUTPUT = 0x1, 0x2
@@ -37,6 +42,12 @@ EVENT_CLIENT_USAGE = 0x08000000 + 0x08E00000 + 1
 """V4L2_EVENT_PRI_CLIENT_USAGE of v4l2loopback 0.13 and newer (pull request 516): how many clients stream from it."""
 EVENT_SUB_FL_SEND_INITIAL = 1
 """A subscription's first event is the present state, not the next change."""
+
+V4L2_QUERYCTRL = struct.Struct("=II32siiiiI8x")
+"""v4l2_queryctrl: id, type, name, minimum, maximum, step, default, flags."""
+V4L2_CONTROL = struct.Struct("=Ii")
+"""v4l2_control: id and value."""
+CTRL_FLAG_DISABLED, CTRL_FLAG_READ_ONLY = 0x1, 0x4
 
 OutputFormat = tuple[tuple[int, int], int]
 """Width and height, and the pixel format, such as `YU12`."""
@@ -87,6 +98,51 @@ def query_has_readers(descriptor: int) -> bool:
         raise
     (count,) = struct.unpack_from("=I", event, EVENT_DATA_OFFSET)
     return bool(count)
+
+
+@dataclass(frozen=True)
+class ControlRange:
+    """The values that a control of a device may have.
+
+    Attributes:
+        name: as the driver calls it.
+        least, most, step: of its values.
+        default: the driver's.
+    """
+
+    name: str
+    least: int
+    most: int
+    step: int
+    default: int
+
+
+def query_control(descriptor: int, control: int) -> ControlRange | None:
+    """The range of a control; None where the device has no such one, or it cannot be set."""
+    answer = bytearray(V4L2_QUERYCTRL.pack(control, 0, b"", 0, 0, 0, 0, 0))
+    try:
+        fcntl.ioctl(descriptor, VIDIOC_QUERYCTRL, answer)
+    except OSError as error:
+        if error.errno in (errno.EINVAL, errno.ENOTTY):
+            return None
+        raise
+    _, _, name, least, most, step, default, flags = V4L2_QUERYCTRL.unpack(answer)
+    if flags & (CTRL_FLAG_DISABLED | CTRL_FLAG_READ_ONLY):
+        return None
+    return ControlRange(name.split(b"\0")[0].decode(errors="replace"), least, most, max(step, 1), default)
+
+
+def get_control(descriptor: int, control: int) -> int:
+    """The present value of a control."""
+    answer = bytearray(V4L2_CONTROL.pack(control, 0))
+    fcntl.ioctl(descriptor, VIDIOC_G_CTRL, answer)
+    value: int = V4L2_CONTROL.unpack(answer)[1]
+    return value
+
+
+def set_control(descriptor: int, control: int, value: int) -> None:
+    """Set a control; the driver takes the nearest value that it can."""
+    fcntl.ioctl(descriptor, VIDIOC_S_CTRL, bytearray(V4L2_CONTROL.pack(control, value)))
 
 
 def _exchange_format(descriptor: int, request: int, size: tuple[int, int]) -> OutputFormat:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
+from relit_camera.app.needed_models import OF_TRACKER
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import DeviceError, RelitError
 from relit_camera.base.models.model_store import ModelState, ModelStore
@@ -11,12 +12,6 @@ from relit_camera.base.models.provider_names import CPU, available_providers, ch
 from relit_camera.base.models.session_with_fallback import SessionOptions, open_session
 from relit_camera.doctor.report import Finding, ok, problem, problem_from_error, warning
 from relit_camera.subject.subject_store import SubjectStore
-
-REQUIRED_MODELS = {
-    "mesh": ("face_mesh", "face_detector_yunet"),
-    "openseeface": ("openseeface", "face_detector_yunet"),
-}
-"""Models without which a tracker does not open. `recorded` needs none; a plug-in checks its own when it opens."""
 
 
 def check_models(settings: RelitSettings, registry: ModelStore | None = None) -> Finding:
@@ -28,19 +23,21 @@ def check_models(settings: RelitSettings, registry: ModelStore | None = None) ->
     except RelitError as error:
         return problem_from_error(topic, error)
     by_state = {state: [name for name, found in states.items() if found is state] for state in ModelState}
-    missing, damaged = by_state[ModelState.MISSING], by_state[ModelState.DAMAGED]
+    damaged = by_state[ModelState.DAMAGED]
+    missing = [name for name in registry.lacking() if name not in damaged]
     parts = [f"{len(by_state[ModelState.PULLED])} of {len(states)} in {registry.folder}"]
     parts += [f"{word}: {', '.join(names)}" for word, names in (("missing", missing), ("damaged", damaged)) if names]
     seen, cure = "; ".join(parts), "run: relit models pull"
     tracker = settings.tracker.name.partition(":")[0]
     lacking = [
-        name
-        for name in REQUIRED_MODELS.get(tracker, ())
-        if states.get(name, ModelState.PULLED) is not ModelState.PULLED
+        group[0]
+        for group in OF_TRACKER.get(tracker, ())
+        if not any(states.get(name) is ModelState.PULLED for name in group)
     ]
     if lacking:
         return problem(topic, f"tracker {tracker} lacks {', '.join(lacking)}; {seen}", cure)
-    if missing or damaged:
+    needed = [name for name in missing if registry.manifest.models[name].without is None]
+    if needed or damaged:  # little is missing without the others, which the package index does not have
         return warning(topic, seen, cure)
     return ok(topic, seen)
 

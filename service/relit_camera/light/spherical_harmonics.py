@@ -5,12 +5,11 @@ Real, orthonormal harmonics; the azimuth is θ about the Y axis, the polar angle
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
-from math import factorial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import lpmv
 
 from relit_camera.light.directions import spherical_from_direction, texel_directions, texel_solid_angles
 from relit_camera.light.light_map import LightMap
@@ -26,17 +25,29 @@ def coefficient_count(degree: int) -> int:
 def basis(directions: ArrayLike, degree: int) -> Floats:
     """Harmonics (..., (degree + 1)²) at unit vectors (..., 3), in the order l² + l + m."""
     azimuth, elevation = spherical_from_direction(directions)
-    height = np.sin(elevation)
     values = np.empty((*azimuth.shape, coefficient_count(degree)))
-    for l in range(degree + 1):  # noqa: E741
-        for m in range(l + 1):
-            scale = np.sqrt((2 * l + 1) / (4 * np.pi) * factorial(l - m) / factorial(l + m) * (2 if m else 1))
-            # lpmv has the Condon-Shortley sign; real harmonics are written without.
-            legendre = scale * (-1) ** m * lpmv(m, l, height)
-            values[..., l * l + l + m] = legendre * np.cos(m * azimuth)
+    for m in range(degree + 1):
+        along, across = np.cos(m * azimuth), np.sin(m * azimuth)
+        for l, legendre in enumerate(_normalized_legendre(np.sin(elevation), m, degree), start=m):  # noqa: E741
+            values[..., l * l + l + m] = legendre * along
             if m:
-                values[..., l * l + l - m] = legendre * np.sin(m * azimuth)
+                values[..., l * l + l - m] = legendre * across
     return values
+
+
+def _normalized_legendre(x: Floats, m: int, degree: int) -> Iterator[Floats]:
+    """Associated Legendre functions of order `m` and degrees m to `degree`, without the Condon-Shortley sign.
+
+    They are normalized for real harmonics. By the recurrence of Holmes and Featherstone, J. Geodesy 76 (2002), eq. 11.
+    """
+    first = np.sqrt((2 if m else 1) / (4 * np.pi) * np.prod([(2 * k + 1) / (2 * k) for k in range(1, m + 1)]))
+    before, now = np.zeros_like(x), first * (1 - x * x) ** (m / 2)
+    yield now
+    for l in range(m + 1, degree + 1):  # noqa: E741
+        a = np.sqrt((2 * l - 1) * (2 * l + 1) / ((l - m) * (l + m)))
+        b = np.sqrt((2 * l + 1) * (l + m - 1) * (l - m - 1) / ((l - m) * (l + m) * (2 * l - 3))) if l > m + 1 else 0.0
+        before, now = now, a * x * now - b * before
+        yield now
 
 
 def project(light_map: LightMap, degree: int) -> Floats:

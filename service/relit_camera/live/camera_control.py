@@ -7,7 +7,55 @@ from typing import Protocol
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import CameraStatus
+from relit_camera.live.status.capture_status import CaptureStatus
+from relit_camera.live.status.desk_status import DeskCaptureStatus, DeskPlace
 from relit_camera.live.status.event_hub import EventHub
+
+
+class CaptureControl(Protocol):
+    """A capture that runs beside the camera. `app.live_capture.LiveCapture` implements it."""
+
+    def status(self) -> CaptureStatus:
+        """How far the last capture is."""
+        ...
+
+    def start(self, name: str) -> CaptureStatus:
+        """Begin to capture a subject that is stored under `name`, and shown once it is.
+
+        Raises:
+            ConflictError: a capture runs, or a better subject has that name.
+            InputError: the name is not allowed.
+        """
+        ...
+
+    def cancel(self) -> CaptureStatus:
+        """End the capture that runs, if one does; nothing is stored then."""
+        ...
+
+
+class DeskCaptureControl(Protocol):
+    """A desk capture, whose patterns a page shows. `app.desk.desk_filming.DeskFilming` implements it."""
+
+    def status(self) -> DeskCaptureStatus:
+        """How far the last capture is."""
+        ...
+
+    def start(self, name: str, place: DeskPlace) -> DeskCaptureStatus:
+        """Begin to capture a subject that is stored under `name`, and shown once it is.
+
+        Raises:
+            ConflictError: a capture runs, or a better subject has that name.
+            InputError: the name is not allowed, or the place cannot be.
+        """
+        ...
+
+    def page_shows(self, step: int) -> DeskCaptureStatus:
+        """Note which step the page shows; it must be called several times a second."""
+        ...
+
+    def cancel(self) -> DeskCaptureStatus:
+        """End the capture that runs, if one does; nothing is stored then."""
+        ...
 
 
 class CameraControl(Protocol):
@@ -15,6 +63,16 @@ class CameraControl(Protocol):
 
     scene_controller: SceneController
     events: EventHub
+
+    @property
+    def instant_capture(self) -> CaptureControl:
+        """The capture that makes a subject of the person before the camera."""
+        ...
+
+    @property
+    def desk_capture(self) -> DeskCaptureControl:
+        """The capture by the light of the person's own screen."""
+        ...
 
     def status(self) -> CameraStatus:
         """The camera's present state; cheap enough for several calls a second."""

@@ -7,15 +7,15 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from relit_camera.base.concurrency.threads import return_freed_memory
+from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.config.look import Mode
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.face.face_state import Tracker
+from relit_camera.face.matting import Matting
 from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
 from relit_camera.face.tracking.interval_tracker import IntervalTracker
 from relit_camera.live.compositing.compositor import Compositor
-from relit_camera.live.compositing.matting import Matting
 from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, ModeFactory, RenderedFrame, RenderMode, RenderTask
 from relit_camera.live.modes.scene_relighting import SceneRelighting
@@ -201,18 +201,18 @@ class Pipeline:
         if active is not None and same_subject and active.name is name:
             return active.mode
         self.on_opening()
-        relighter = active.relighter if active is not None and same_subject else self._open_relighter(subject)
-        context = ModeContext(
-            subject=subject,
-            face=find_source_face(subject, self._tracker),
-            relighter=relighter,
-            scene_relighting=SceneRelighting(subject, relighter, self._light, self.timer),
-            compositor=self._compositor,
-            size=self._size,
-            executor=self._executor,
-            timer=self.timer,
-        )
-        self._active = _ActiveMode(subject, name, relighter, self._modes[name](context))
-        return_freed_memory()  # what opening models and unpacking the subject took for a moment
+        with large_allocations_apart():
+            relighter = active.relighter if active is not None and same_subject else self._open_relighter(subject)
+            context = ModeContext(
+                subject=subject,
+                face=find_source_face(subject, self._tracker),
+                relighter=relighter,
+                scene_relighting=SceneRelighting(subject, relighter, self._light, self.timer),
+                compositor=self._compositor,
+                size=self._size,
+                executor=self._executor,
+                timer=self.timer,
+            )
+            self._active = _ActiveMode(subject, name, relighter, self._modes[name](context))
         subject.drop_pages()
         return self._active.mode

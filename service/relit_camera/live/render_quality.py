@@ -15,16 +15,16 @@ class RenderQuality:
         track_every: the face is tracked in every so many frames, followed by optical flow between.
     """
 
-    relight_every: int = 2
+    relight_every: int = 3
     half_size: bool = False
     track_every: int = 1
 
 
 QUALITY_LEVELS = (
     RenderQuality(),
-    RenderQuality(relight_every=3),
-    RenderQuality(relight_every=3, half_size=True),
-    RenderQuality(relight_every=3, half_size=True, track_every=2),
+    RenderQuality(relight_every=4),
+    RenderQuality(relight_every=4, half_size=True),
+    RenderQuality(relight_every=4, half_size=True, track_every=2),
 )
 """From full quality to the cheapest."""
 FULL_QUALITY = QUALITY_LEVELS[0]

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from relit_camera.base.images.image_types import DisplayImage, Mask, Points
 from relit_camera.subject.compression.local_basis import LocalBasis
 from relit_camera.subject.reflectance_field import TEXELS
+from relit_camera.subject.rungs import Rung
 
 FORMAT_VERSION: Literal[2] = 2
 MIN_SIDE_PX, MAX_SIDE_PX = 8, 8192
@@ -52,6 +53,12 @@ class SubjectMetadata(BaseModel):
     """Factor from pictures to displayed values, where the captured frames are not in units of a white wall."""
     over_black: bool = False
     """Whether the captured frames show the person over black: their colors then have the matte as a factor."""
+    rung: Rung | None = None
+    """How it was captured; None in files that older versions wrote."""
+    expected_db: float | None = None
+    """Mean PSNR under environments that subjects of this rung reach on people whose truth is known."""
+    measured_fraction: Annotated[float, Field(ge=0, le=1)] | None = None
+    """Share of the sphere of light directions from which light was measured; from the rest it is modelled."""
     created_by: str
     created_at: str
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.storage.atomic_files import make_folder
 from relit_camera.base.storage.named_files import NamedFiles
 from relit_camera.subject.subject import Subject, SubjectMetadata
 from relit_camera.subject.subject_file import SUFFIX, read_metadata, read_neutral, read_subject
@@ -24,6 +25,17 @@ class SubjectStore(NamedFiles):
         # Subjects come into the folder by hand (`relit capture --out`), so their names may be any file's.
         super().__init__(folder, "subject", [SUFFIX], any_name=True)
         self._copied = copied
+
+    def new_path(self, name: str) -> Path:
+        """Where a subject of that name is to be written, by `write_subject`; the folder is created where it is missing.
+
+        Raises:
+            InputError: the name is not allowed.
+            StorageError: the folder cannot be created.
+        """
+        self.require_free_name(name)
+        make_folder(self.folder)
+        return self.folder / f"{name}{SUFFIX}"
 
     def load(self, name: str) -> Subject:
         """Read a stored subject.

@@ -10,11 +10,10 @@ from rich.console import Console
 from rich.table import Table
 
 from relit_camera.base.images.image_files import read_display
-from relit_camera.base.models.model_store import model_path
 from relit_camera.base.rotations import Angles
 from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.cli.arguments import parse_numbers
-from relit_camera.face.tracking.face_detector import FaceDetector
+from relit_camera.face.detection.installed_detector import open_face_detector
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
 from relit_studio.base.resume import keep_settings
 from relit_studio.cameras.studio_camera import Camera
@@ -50,7 +49,7 @@ def check(
 
     Finished pictures are kept. The models are those of `relit models pull`.
     """
-    detector = FaceDetector(model_path("face_detector_yunet"))
+    detector = open_face_detector()
     trackers = [open_tracker(name, TrackerOptions(blendshapes=False)) for name in _TRACKERS]
     turns = [
         Angles(yaw, pitch, 0.0)

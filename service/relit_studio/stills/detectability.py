@@ -9,9 +9,9 @@ import numpy as np
 
 from relit_camera.base.array_types import Float64Array
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.face.detection.face_detector import FaceDetector
 from relit_camera.face.face_state import FaceStatus, Tracker
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_camera.face.tracking.face_detector import FaceDetector
 from relit_camera.face.tracking.trackers import track_still
 from relit_studio.cameras.studio_camera import Camera
 from relit_studio.people.face.landmarks import landmarks

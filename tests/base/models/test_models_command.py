@@ -27,7 +27,7 @@ def relit_models(*arguments: str) -> list[str]:
 
 def test_list_is_plain_text_in_a_pipe(folder: Path) -> None:
     head, *lines = relit_models("list")
-    assert head.split() == ["model", "state", "size", "licence", "purpose"]
+    assert head.split() == ["model", "state", "size", "licence", "from", "purpose"]
     assert [line.split()[:2] for line in lines] == [[name, "missing"] for name in public_manifest().models]
     assert not folder.exists()
 
@@ -62,6 +62,7 @@ def test_pull_list_and_verify(folder: Path, shared: Path) -> None:
         "selfie_square: getting selfie_segmentation.tflite",
         f"models are in {folder}",
     ]
+    assert any(str(shared / "models") in line for line in relit_models("list"))
     states = dict(line.split()[:2] for line in relit_models("list")[1:])
     assert {name for name, state in states.items() if state == "pulled"} == {"openseeface", "selfie_square"}
     assert "openseeface: pulled" in relit_models("verify")

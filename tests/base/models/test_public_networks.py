@@ -29,6 +29,7 @@ REFERENCES = {
 def both(name: str, folder: Path) -> tuple[Session, Session]:
     """Our conversion of a public model and the reference, on one thread."""
     model = public_manifest().models[name]
+    assert model.download is not None
     source = folder / model.download
     if model.member:
         with zipfile.ZipFile(source) as archive:

@@ -376,4 +376,5 @@ def test_every_operator_of_the_table_is_tested() -> None:
     tested = {*UNARY, *POSITIVE, *BINARY, *(operator.kind for operator, _, _ in ARRANGEMENTS.values())}
     tested |= {"CONV_2D", "DEPTHWISE_CONV_2D", "Convolution2DTransposeBias", "DEQUANTIZE", "MAX_POOL_2D"}
     tested |= {"AVERAGE_POOL_2D", "MEAN", "SUM", "STRIDED_SLICE", "RESIZE_BILINEAR"}
+    tested |= {"Landmarks2TransformMatrix", "TransformTensorBilinear", "TransformLandmarks"}  # test_region_operators.py
     assert tested == set(OPERATORS)

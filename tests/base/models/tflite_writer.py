@@ -13,12 +13,16 @@ from numpy.typing import NDArray
 
 @dataclass
 class Operator:
-    """An operator of `kind` (CONV_2D …, or the name of a custom one); `options` are (table, {field: value})."""
+    """An operator of `kind` (CONV_2D …, or the name of a custom one).
+
+    `options` are (table, {field: value}), `custom_options` a FlexBuffer.
+    """
 
     kind: str
     inputs: Sequence[int]
     outputs: Sequence[int]
     options: tuple[str, dict[str, int]] | None = None
+    custom_options: bytes = b""
 
 
 @dataclass
@@ -57,6 +61,8 @@ class NetworkWriter:
                 table, values = operator.options
                 fields["BuiltinOptions"] = _table(builder, table, **values)
                 fields["BuiltinOptionsType"] = getattr(tflite.BuiltinOptions, table)
+            if operator.custom_options:
+                fields["CustomOptions"] = builder.CreateByteVector(operator.custom_options)
             operators.append(_table(builder, "Operator", OpcodeIndex=len(codes) - 1, **fields))
         graph = _table(
             builder,

@@ -236,6 +236,12 @@ def test_pictures_read_are_freed_at_once(tmp_path: Path) -> None:
     assert max(held) < 15  # of 30: the decoder keeps a few
 
 
+def test_a_colon_in_a_name_is_no_protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(Path("12:30.mp4"), noise(3))
+    assert len(list(VideoReader(Path("12:30.mp4")))) == 3
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(VideoError, match=r"no video at .*nowhere\.mp4"):
         VideoReader(tmp_path / "nowhere.mp4")

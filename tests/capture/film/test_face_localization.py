@@ -19,7 +19,7 @@ from relit_camera.capture.film.face_localization import (
 )
 from relit_camera.capture.film.flash.flash_signal import BrightnessGrid
 from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass
-from relit_camera.face.tracking.face_detector import FaceDetector
+from relit_camera.face.detection.yunet_detector import YuNetDetector
 
 ROWS, COLUMNS, PIXELS = 32, 24, 22.5
 
@@ -78,7 +78,7 @@ def test_without_a_detector_the_lit_head_is_the_face(
 
 def test_with_a_detector_that_decides(shared: Path) -> None:
     with pytest.raises(VideoError, match="no face found"):
-        locate_face(*film_of(person()), FaceDetector(shared / "models" / "face_detection_yunet_2023mar.onnx"))
+        locate_face(*film_of(person()), YuNetDetector(shared / "models" / "face_detection_yunet_2023mar.onnx"))
 
 
 @pytest.mark.parametrize("width", [1, 24])
@@ -91,7 +91,7 @@ def test_a_shape_that_is_no_head_is_refused(width: int) -> None:
 
 def test_the_circle_is_that_of_the_face(shared: Path) -> None:
     portrait = read_display(shared / "portraits" / "astronaut.png")
-    detector = FaceDetector(shared / "models" / "face_detection_yunet_2023mar.onnx")
+    detector = YuNetDetector(shared / "models" / "face_detection_yunet_2023mar.onnx")
     circle = find_face_circle(portrait, detector)
     assert abs(circle.x - 224) < 15
     assert abs(circle.y - 115) < 25

@@ -23,7 +23,7 @@ from relit_camera.capture.reflectance.methods.appearance_field import (
     residual_weights,
 )
 from relit_camera.capture.reflectance.methods.barycentric_methods import SphericalBarycentric
-from relit_camera.capture.reflectance.methods.blend import Blend, choose_model_fraction
+from relit_camera.capture.reflectance.methods.blend import Blend, BlendField, choose_model_fraction
 from relit_camera.capture.reflectance.methods.gaussian_process import Kernel
 from relit_camera.capture.reflectance.methods.linear_methods import RadialBasis
 from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import ThesisMethod
@@ -109,6 +109,30 @@ def test_beyond_the_sampled_region_the_blend_is_the_model_and_goes_on() -> None:
     found = Blend().build(samples).at(side, pixels)
     np.testing.assert_allclose(found, AppearanceMethod().build(samples).at(side, pixels), atol=1e-6)
     assert np.sqrt(np.mean((found - truth) ** 2)) < 0.25 * np.sqrt(np.mean(truth**2))
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.3])
+def test_whatever_its_share_inside_the_model_has_the_rest_beyond(fraction: float) -> None:
+    """Where the splines fade the model takes over what they lose; it may have no share at all inside."""
+    samples = lambert(cap(60, 50), SIZE)
+    pixels = inside(samples)
+    built = Blend().build(samples)
+    field = BlendField(built.modelled, built.smooth, fraction)
+    side, fading = direction_from_degrees([90.0], [0.0]), direction_from_degrees([70.0], [0.0])
+    np.testing.assert_allclose(field.at(side, pixels), field.modelled.at(side, pixels), atol=1e-6)
+    covered = float(region_coverage(samples.directions, fading)[0])
+    assert 0.1 < covered < 0.9
+    weight = fraction + (1 - fraction) * (1 - covered)
+    smooth = np.maximum(field.smooth.at(fading, pixels), 0)
+    expected = weight * field.modelled.at(fading, pixels) + (1 - fraction) * smooth
+    np.testing.assert_allclose(field.at(fading, pixels), expected, atol=1e-6)
+    whole = shadow_free_brightness(fading, pixels)
+    np.testing.assert_allclose(field.at(fading, pixels).mean(), whole, rtol=0.1)
+
+
+def shadow_free_brightness(directions: NDArray[np.float64], pixels: NDArray[np.intp]) -> float:
+    """The mean of the white ball itself under a light."""
+    return float(lambert(directions, SIZE).pictures.reshape(1, -1, 3)[:, pixels].mean())
 
 
 def test_inside_the_region_the_blend_is_the_mean_of_its_parts(samples: OlatSamples) -> None:

@@ -182,6 +182,34 @@ def test_a_live_room_is_blurred_but_replaced_by_the_other_kinds(room: MattedFram
         np.testing.assert_array_equal(BackgroundRenderer(SIZE).live_background(wanted, room, 0.0), static(wanted))
 
 
+def empty_room(code: int) -> MattedFrame:
+    return MattedFrame(np.full((720, 1280, 3), code, np.uint8), np.zeros((720, 1280), np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("strength", "shown_at", "held"),
+    [(0.5, 1.04, True), (0.5, 1.06, False), (0.5, 0.9, False), (0.5, 1.0, False), (0.05, 1.04, False)],
+)
+def test_only_a_strongly_blurred_room_is_shown_again_and_only_for_a_moment(
+    strength: float, shown_at: float, held: bool
+) -> None:
+    dark, bright = empty_room(20), empty_room(90)
+    renderer = BackgroundRenderer((1280, 720))
+    request = BackgroundRequest(BlurBackground(strength=strength), Lighting())
+    renderer.live_background(request, dark, 1.0)[:] = 255  # it may be written to
+    assert abs(int(renderer.live_background(request, bright, shown_at)[360, 640, 0]) - (20 if held else 90)) <= 1
+    other = BackgroundRequest(BlurBackground(strength=0.4), Lighting())
+    assert abs(int(renderer.live_background(other, bright, shown_at + 0.01)[360, 640, 0]) - 90) <= 1
+
+
+def test_a_blurred_room_is_not_shown_again_after_another_background() -> None:
+    dark, bright = empty_room(20), empty_room(90)
+    renderer, blurred = BackgroundRenderer((1280, 720)), BackgroundRequest(BlurBackground(), Lighting())
+    renderer.live_background(blurred, dark, 1.0)
+    renderer.live_background(BackgroundRequest(ColorBackground(), Lighting()), dark, 1.01)
+    assert abs(int(renderer.live_background(blurred, bright, 1.02)[360, 640, 0]) - 90) <= 1
+
+
 @pytest.mark.parametrize("background", STILLS, ids=lambda background: background.kind)
 def test_no_trace_of_the_live_room_outlives_the_live_picture(
     background: NoBackground, environment: Environment, room: MattedFrame

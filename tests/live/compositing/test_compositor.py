@@ -10,8 +10,8 @@ import pytest
 from relit_camera.base.config.look import ColorBackground, Lighting, Look, NoBackground
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame
+from relit_camera.face.matting import Matting
 from relit_camera.live.compositing.compositor import Compositor
-from relit_camera.live.compositing.matting import Matting
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.stage_timing import StageTimer

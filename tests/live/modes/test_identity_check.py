@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,26 @@ def test_a_stranger_is_found_out_after_a_while_and_not_before() -> None:
 def test_the_subject_is_not_taken_for_a_stranger_even_in_odd_light() -> None:
     check, person = IdentityCheck(face_of(close_up())), before_the_camera()
     assert all(check.check(person, NO_LIGHT_EXPLAINS, time_s) is None for time_s in np.arange(0, 10, 0.5))
+
+
+def test_a_person_who_grimaces_is_not_taken_for_a_stranger() -> None:
+    """The neutral face may have been taken while they did; what counts is that they ever look like themselves."""
+    check, person = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
+    assert person.neutral is not None
+    relaxed = replace(person, expression=face_of(close_up()).head_points - person.neutral.points)
+    assert check.check(person, NO_LIGHT_EXPLAINS, 0.0) is None
+    assert check.check(relaxed, NO_LIGHT_EXPLAINS, 1.0) is None
+    assert all(check.check(person, NO_LIGHT_EXPLAINS, time_s) is None for time_s in np.arange(1.5, 10, 0.5))
+
+
+def test_a_stranger_who_takes_the_persons_place_is_found_out() -> None:
+    check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
+    times = iter(np.arange(0, 60, 0.5))
+    assert all(check.check(before_the_camera(), NO_LIGHT_EXPLAINS, next(times)) is None for _ in range(20))
+    assert check.check(replace(stranger, presence=0.0), NO_LIGHT_EXPLAINS, next(times)) is None
+    found = [check.check(stranger, NO_LIGHT_EXPLAINS, next(times)) for _ in range(10)]
+    assert found[0] is None
+    assert isinstance(found[-1], FaceMismatch)
 
 
 def test_one_measure_alone_decides_only_when_it_is_far_off() -> None:

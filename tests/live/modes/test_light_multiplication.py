@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.images.color import WIDE_TABLES, linear_from_uint8
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.live.modes import light_multiplication
 from relit_camera.live.modes.light_multiplication import light_of_root, multiply_light, root_of_light
@@ -51,8 +51,8 @@ def test_numpy_looks_up_the_same_where_opencv_cannot(monkeypatch: pytest.MonkeyP
     image = np.random.default_rng(0).integers(0, 256, (32, 32, 3)).astype(np.uint8)
     factors = roots(np.random.default_rng(1).random((8, 8, 3)) * 3)
     pictures = []
-    for wide in (False, light_multiplication._WIDE_TABLES):
-        monkeypatch.setattr(light_multiplication, "_WIDE_TABLES", wide)
+    for wide in (False, WIDE_TABLES):
+        monkeypatch.setattr(light_multiplication, "WIDE_TABLES", wide)
         pictures.append(multiply_light(image, factors, STEP))
     np.testing.assert_array_equal(pictures[0], pictures[1])
     assert pictures[0].dtype == np.uint8

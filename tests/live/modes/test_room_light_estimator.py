@@ -5,7 +5,6 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from scipy.optimize import nnls
 
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_quality import psnr
@@ -17,7 +16,6 @@ from relit_camera.live.modes.room_light_estimator import (
     TUNABLES,
     RoomLightEstimate,
     RoomLightEstimator,
-    regularized_nnls,
 )
 from tests.live.people import close_up, face_of
 from tests.live.rooms import EVENING, WINDOW, before_the_camera, live_picture, relighter, still_under
@@ -133,16 +131,3 @@ def test_black_white_and_absent_faces_are_no_trouble() -> None:
         assert np.isfinite(room.gain).all()
     outside = fresh_probe().update(live_picture(WINDOW), motion.landmarks + 5000, motion.rotation, 0.0)
     assert np.isfinite(outside.light_map).all()
-
-
-def test_the_fit_is_non_negative_least_squares_with_a_ridge() -> None:
-    """Against scipy's nnls on the stacked system, which is the same problem."""
-    rng = np.random.default_rng(4)
-    design, prior = rng.random((200, 12)), rng.random(12)
-    truth = np.maximum(rng.normal(0.3, 0.5, 12), 0)
-    values = (design @ truth + rng.normal(0, 0.05, 200)).astype(np.float32)
-    weight = rng.random(200)
-    ridge = 3e-3 * np.trace(design.T @ (design * weight[:, None])) / 12
-    stacked = np.vstack([design * np.sqrt(weight)[:, None], np.sqrt(ridge) * np.eye(12)])
-    expected, _ = nnls(stacked, np.concatenate([values * np.sqrt(weight), np.sqrt(ridge) * prior]))
-    np.testing.assert_allclose(regularized_nnls(design, values, weight, prior), expected, atol=1e-6)

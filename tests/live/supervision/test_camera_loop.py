@@ -18,7 +18,9 @@ from relit_camera.devices.sinks.sink import NullSink
 from relit_camera.devices.sources.source import SourceInfo, SourceState
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.frame_recorder import FrameRecorder
 from relit_camera.live.pipeline import RenderedFrame
+from relit_camera.live.publishing.placeholder_image import Placeholder
 from relit_camera.live.publishing.publisher import PublishedPicture, Publisher
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import CameraState, DegradationCode
@@ -37,7 +39,7 @@ def image(value: int) -> DisplayImage:
     return np.full((SIZE[1], SIZE[0], 3), value, np.uint8)
 
 
-PICTURE, FALLBACK, WAITING, RELEASED = image(1), image(2), image(3), image(4)
+PICTURE, FALLBACK, WAITING, RELEASED, CAPTURING = image(1), image(2), image(3), image(4), image(5)
 
 
 class FakeSource:
@@ -118,6 +120,7 @@ class LoopUnderTest:
         self.clock = VirtualClock()
         self.source, self.fallback, self.supervisor = FakeSource(self.clock), FakeFallback(), FakeSupervisor(self)
         self.scene = Scene(Look())
+        self.recorder = FrameRecorder(self.clock)
         events = EventHub()
         self.board = StatusBoard(events)
         self.publisher = Publisher(NullSink(SIZE), FPS, image(0), clock=self.clock)
@@ -126,9 +129,10 @@ class LoopUnderTest:
             cast(PipelineSupervisor, self.supervisor),
             cast(FallbackRenderer, self.fallback),
             self.publisher,
-            Placeholders(WAITING, RELEASED),
+            Placeholders(Placeholder(lambda: WAITING), Placeholder(lambda: RELEASED), Placeholder(lambda: CAPTURING)),
             lambda: self.scene,
             self.board,
+            self.recorder,
             clock=self.clock,
         )
         self._listening = events.listen()
@@ -177,6 +181,35 @@ def test_without_a_face_it_searches(camera: LoopUnderTest) -> None:
     camera.clock.at(1.0, lambda: setattr(camera.supervisor, "face", FaceStatus.LOST))
     camera.run(2.0)
     assert camera.events()[2:] == [("tracking", "lost"), ("state", "searching")]
+
+
+def test_without_a_subject_nothing_unlit_is_shown_where_that_is_forbidden(camera: LoopUnderTest) -> None:
+    camera.scene = replace(camera.scene, unlit_allowed=False)
+    camera.run(1.0)
+    assert camera.publisher.placeholder is CAPTURING
+    assert camera.publisher.pictures.newer(0, 0) is None
+    assert camera.board.state is CameraState.CAPTURING
+    camera.scene = replace(camera.scene, unlit_allowed=True)
+    camera.run(1.0)
+    assert camera.newest().image is PICTURE
+    assert camera.board.state is CameraState.LIVE
+
+
+def test_a_late_unlit_picture_is_not_shown_once_that_is_forbidden(camera: LoopUnderTest) -> None:
+    rendered = RenderedFrame(PICTURE, None, camera.scene)
+    forbidden = replace(camera.scene, unlit_allowed=False)
+    frame = Frame(image(0), 0, camera.clock.now(), 0.0)
+    assert publish_if_current(camera.publisher, lambda: camera.scene, frame, rendered)
+    assert not publish_if_current(camera.publisher, lambda: forbidden, frame, rendered)
+
+
+def test_frames_are_recorded_while_they_are_shown(camera: LoopUnderTest) -> None:
+    camera.clock.every(1 / FPS, lambda: camera.loop.step(threading.Event()))
+    frames = camera.recorder.record(5, 0.2, 10.0)
+    times = np.array([frame.captured_at for frame in frames])
+    assert len(frames) == 5
+    assert ((np.diff(times) >= 0.2 - 1e-9) & (np.diff(times) < 0.3)).all()
+    assert camera.newest().image is PICTURE
 
 
 def test_while_the_pipeline_fails_the_fallback_is_shown(camera: LoopUnderTest) -> None:

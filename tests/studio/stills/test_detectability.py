@@ -9,8 +9,8 @@ import pytest
 
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.rotations import Angles
+from relit_camera.face.detection.face_detector import Detection
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus
-from relit_camera.face.tracking.face_detector import Detection
 from relit_studio.cameras.studio_camera import Camera
 from relit_studio.people.face.landmarks import landmarks
 from relit_studio.people.person import Person

@@ -71,8 +71,10 @@ export class Library {
     const names = this.stored.subjects.map((item) => item.name);
     if (current && !names.includes(current)) names.push(current);
     const options = [["", "Nobody (unlit)"], ...names.map((name) => [name, name])];
+    const hidden = !current && this.scene()?.unlit_allowed === false; // nobody is captured yet, and nothing is shown
+    if (hidden) options.unshift(["?", "Nobody yet (hidden)"]);
     const select = document.getElementById("subject");
-    select.replaceChildren(...options.map(([value, text]) => make("option", { value, selected: value === current }, text)));
+    select.replaceChildren(...options.map(([value, text]) => make("option", { value, selected: value === (hidden ? "?" : current) }, text)));
   }
 
   #drawPresets() {

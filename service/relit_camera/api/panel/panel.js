@@ -2,6 +2,7 @@
 
 import { Latest, attempt, request, sentence } from "./api.js";
 import { BackgroundControls } from "./background.js";
+import { InstantCapture } from "./instant.js";
 import { Lamps, wrap } from "./lamps.js";
 import { Library } from "./library.js";
 import { choose, degrees, make, percent, slider, stops } from "./widgets.js";
@@ -19,9 +20,14 @@ const STATES = {
   "standing-in": "Showing the captured picture at rest: see below",
   waiting: "Waiting for the camera",
   released: "Webcam released until somebody looks",
+  capturing: "Measuring your face: look at the camera",
   frozen: "Frozen",
   stopping: "Stopping…",
   lost: "Not connected",
+};
+const RUNG_HINTS = {
+  instant: "Captured in the light of a room: soft places look right, lamps from behind are softened. Truer: a desk capture.",
+  desk: "Captured before a monitor: light from the front is measured, from behind it is modelled. Truer: a film.",
 };
 const LIGHT = {
   yaw_deg: { label: "Rotation", min: -180, max: 180, step: 1, initial: 0, show: degrees, of: wrap },
@@ -53,6 +59,7 @@ for (const [place, specs] of [["light", LIGHT], ["light-more", MORE_LIGHT]]) {
 const background = new BackgroundControls();
 const library = new Library(() => scene, (change) => lighting.push(change), (body) => background.send(body));
 background.use(library);
+const instant = new InstantCapture();
 const lamps = new Lamps((all) => lighting.push({ lamps: all }), mirrored);
 
 // Page → camera
@@ -82,6 +89,7 @@ function showScene(now) {
   if (lighting.idle) lamps.show(now.lighting.lamps);
   choose(byId("mode"), now.mode);
   byId("mode-hint").textContent = MODE_HINTS[now.mode];
+  byId("rung-hint").textContent = RUNG_HINTS[now.rung] ?? "";
   byId("freeze").setAttribute("aria-pressed", String(now.frozen));
   background.show(now.background);
   library.draw();
@@ -100,7 +108,7 @@ function restore() {
 function showState(state, tracking) {
   byId("state").dataset.state = state;
   byId("state-text").textContent = STATES[state] ?? sentence(state);
-  const veiled = ["waiting", "lost", "starting"].includes(state);
+  const veiled = ["waiting", "lost", "starting", "capturing"].includes(state);
   byId("veil").hidden = !veiled || (state === "waiting" && byId("preview").naturalWidth > 0);
   byId("veil").textContent = STATES[state] ?? "";
   document.body.classList.toggle("lost", state === "lost");
@@ -133,10 +141,12 @@ function openEvents() {
   on("scene", showScene);
   on("status", showStatus);
   on("caption", showCaption);
+  on("capture", (status) => instant.show(status));
   on("collection", ({ name }) => library.load(name).then(restore));
   events.onopen = () => {
     showCaption({ text: "" });
     library.loadAll().then(restore);
+    instant.load();
     openPreview();
   };
   events.onerror = () => {

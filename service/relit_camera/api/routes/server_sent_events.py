@@ -71,6 +71,8 @@ def scene_body(scene: Scene) -> SceneBody:
         background=look.background,
         mode=look.mode,
         subject=scene.subject_name,
+        rung=scene.subject.metadata.rung if scene.subject else None,
+        unlit_allowed=scene.unlit_allowed,
         frozen=scene.frozen,
     )
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from relit_camera.base.errors import ModelError
-from relit_camera.base.models.model_store import model_path
+from relit_camera.app.needed_models import missing_models
 
 FOLDER = Path(__file__).parent / "data"
 SUBJECT = FOLDER / "adam.relit"
@@ -19,16 +18,9 @@ CREDITS = FOLDER / "CREDITS.md"
 
 def tracker_of_clip() -> str:
     """The tracker `mesh`, or the clip's own track where the public networks are not installed."""
-    return "mesh" if _installed("face_mesh", "face_detector_yunet") else f"recorded:{TRACK}"
+    return f"recorded:{TRACK}" if missing_models("mesh") else "mesh"
 
 
 def matte_of_clip() -> str:
     """The matte `selfie`, or the clip's own mattes where the public networks are not installed."""
-    return "selfie" if _installed("selfie_landscape", "selfie_square") else f"recorded:{MATTES}"
-
-
-def _installed(*models: str) -> bool:
-    try:
-        return all(model_path(name) for name in models)
-    except ModelError:
-        return False
+    return f"recorded:{MATTES}" if missing_models("", "selfie") else "selfie"

@@ -1,8 +1,7 @@
-"""Limits how many threads the libraries use, and how much freed memory the process keeps."""
+"""Limits how many threads the libraries use, and when Python collects garbage."""
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import os
 from collections.abc import Iterator
@@ -10,8 +9,9 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import cv2
-import numpy as np
 from threadpoolctl import threadpool_limits
+
+from relit_camera.base.concurrency.resident_memory import retain_large_allocations, share_freed_memory
 
 OPENCV_THREADS = 1
 """The camera's own threads keep two cores at work. A second thread of OpenCV's would shorten a stage, but waking it and
@@ -21,11 +21,6 @@ BLAS_THREADS = 1
 call app uses the other core."""
 MAX_WORKERS = 4
 """Threads of a `worker_pool` at most: each holds a block of its own in memory."""
-_GLIBC = ctypes.CDLL(None) if "CS_GNU_LIBC_VERSION" in getattr(os, "confstr_names", ()) else None
-_M_ARENA_MAX = -8
-"""The parameter of mallopt(3)."""
-LARGE_ALLOCATION_BYTES = 31 << 20
-"""More than any array of a frame, and less than the 32 MB up to which glibc adapts its threshold."""
 
 
 def limit_threads() -> None:
@@ -48,33 +43,6 @@ def worker_pool() -> Iterator[ThreadPoolExecutor]:
     count = min(os.cpu_count() or 1, MAX_WORKERS)
     with threadpool_limits(limits=1, user_api="blas"), ThreadPoolExecutor(count) as pool:
         yield pool
-
-
-def retain_large_allocations() -> None:
-    """Make the C library keep freed arrays of a frame's size for the process.
-
-    glibc returns every large block to the system when it is freed, and requests it again for the next frame, page by
-    page: several milliseconds a frame. Freeing one block of `LARGE_ALLOCATION_BYTES` raises the size from which it does
-    so (mallopt(3), M_MMAP_THRESHOLD). With other C libraries this has no effect.
-    """
-    block = np.empty(LARGE_ALLOCATION_BYTES, dtype=np.uint8)
-    del block
-
-
-def share_freed_memory() -> None:
-    """Make all threads allocate from one heap, so that one takes what another has freed. Only with glibc.
-
-    It gives each thread a heap of its own otherwise, and each keeps the arrays of a frame that were freed in it: a
-    hundred megabytes with five threads. They allocate large blocks and few, so they do not wait for each other.
-    """
-    if _GLIBC is not None:
-        _GLIBC.mallopt(_M_ARENA_MAX, 1)
-
-
-def return_freed_memory() -> None:
-    """Give freed memory back to the system, after work that needed much for a moment. Only with glibc."""
-    if _GLIBC is not None:
-        _GLIBC.malloc_trim(0)
 
 
 def freeze_gc() -> None:

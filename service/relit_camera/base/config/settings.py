@@ -188,6 +188,8 @@ class RelitSettings(BaseSettings):
     tracker: TrackerSettings = TrackerSettings()
     matte: str = "selfie"
     """What finds the person in the live picture (mode ratio): `selfie`, or `recorded:FILE.npz`."""
+    pull_models: Literal["ask", "always", "never"] = "ask"
+    """Whether commands get public models that they need and that are missing: `ask` does so on a terminal, once."""
     relight: RelightSettings = RelightSettings()
     reenact: ReenactSettings = ReenactSettings()
     inference: InferenceSettings = InferenceSettings()

@@ -36,10 +36,13 @@ def srgb_encode(linear: ArrayLike) -> NDArray[np.float32]:
     return np.where(value <= 0.0031308, value * 12.92, 1.055 * value ** (1 / 2.4) - 0.055).astype(np.float32)
 
 
+WIDE_TABLES = int(cv2.__version__.split(".")[0]) >= 5
+"""Whether `cv2.LUT` takes 16-bit indices, which it does three times as fast as numpy."""
+
+
 @lru_cache(maxsize=1)
 def _encode_table() -> NDArray[np.uint8]:
-    # 14 bits: even at its steepest (12.92 x 255 codes per unit) the curve moves less than a quarter code a step.
-    return np.round(srgb_encode(np.linspace(0, 1, 1 << 14)) * 255).astype(np.uint8)
+    return np.round(srgb_encode(np.linspace(0, 1, 1 << 16)) * 255).astype(np.uint8)
 
 
 @lru_cache(maxsize=1)
@@ -49,10 +52,12 @@ def _decode_table() -> NDArray[np.float32]:
 
 def uint8_from_linear(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     """SRGB uint8 picture of linear light, same shape; values outside 0..1 are clipped, NaN becomes 0."""
-    table = _encode_table()
-    scaled = np.fmax(linear * np.float32(table.size - 1) + np.float32(0.5), 0)  # unlike maximum, fmax drops NaN
-    coded: NDArray[np.uint8] = table.take(np.minimum(scaled, table.size - 1).astype(np.uint16))
-    return coded
+    if not linear.size:
+        return np.zeros(linear.shape, np.uint8)
+    # OpenCV rounds, makes 0 of what is negative and of NaN, and of what no integer can hold too: so that is cut first.
+    index = cv2.multiply(np.minimum(linear, 1).reshape(1, -1), 65535, dtype=cv2.CV_16U)
+    coded = cv2.LUT(index, _encode_table()) if WIDE_TABLES else _encode_table().take(index)
+    return np.asarray(coded, np.uint8).reshape(linear.shape)
 
 
 def linear_from_uint8(encoded: NDArray[np.uint8]) -> NDArray[np.float32]:

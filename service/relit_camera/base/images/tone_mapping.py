@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from relit_camera.base.images.color import linear_from_uint8, srgb_encode
+from relit_camera.base.images.color import WIDE_TABLES, linear_from_uint8, srgb_encode
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, check_image
 
 SHOULDER = 0.8
@@ -30,8 +30,8 @@ _STEPS = 8191
 """Steps of the table, even in √light since sRGB is steep near black. Each code is at least 5 steps wide."""
 
 
-_STRIPE_ROWS = 32
-"""Rows processed at a time, so that the intermediate values stay in the processor's cache."""
+_STRIPE_VALUES = 1 << 16
+"""Numbers processed at a time, so that the intermediate values stay in the processor's cache."""
 
 
 def tone_curve(linear: ArrayLike) -> NDArray[np.float32]:
@@ -62,13 +62,16 @@ def display_from_linear(linear: LinearImage) -> DisplayImage:
     check_image(linear, np.float32, "linear picture")
     table = _table()
     shown = np.empty(linear.shape, dtype=np.uint8)
-    for top in range(0, len(linear), _STRIPE_ROWS):
-        root = np.clip(linear[top : top + _STRIPE_ROWS], 0, _MAX_LIGHT, order="C")  # OpenCV writes to no other order
+    rows = max(_STRIPE_VALUES // max(linear[0].size, 1), 1)
+    for top in range(0, len(linear), rows):
+        # In C's order, since OpenCV writes to no other. Roots of negative light are NaN, of which it makes 0.
+        root = np.minimum(linear[top : top + rows], _MAX_LIGHT, order="C")
         cv2.sqrt(root, dst=root)
         index = cv2.multiply(root, _STEPS / _MAX_LIGHT**0.5, dtype=cv2.CV_16U)
-        np.take(
-            table, index, out=shown[top : top + _STRIPE_ROWS], mode="clip"
-        )  # other modes would make a copy of `out`
+        if WIDE_TABLES:
+            cv2.LUT(index, table, dst=shown[top : top + rows])
+        else:
+            np.take(table, index, out=shown[top : top + rows], mode="clip")  # other modes would make a copy of `out`
     return shown
 
 
@@ -84,6 +87,7 @@ def linear_from_display(display: DisplayImage) -> LinearImage:
 @lru_cache(maxsize=1)
 def _table() -> NDArray[np.uint8]:
     light = np.linspace(0, _MAX_LIGHT**0.5, _STEPS + 1) ** 2
+    light = np.pad(light, (0, (1 << 16) - len(light)), mode="edge")  # as long as OpenCV wants it
     return np.round(srgb_encode(tone_curve(light)) * 255).astype(np.uint8)
 
 

@@ -41,6 +41,34 @@ class Member(_ManifestEntry):
     sha256: Sha256
 
 
+class Package(_ManifestEntry):
+    """A wheel on the package index that holds networks. It is never installed: files are read from it."""
+
+    version: str
+    python: Annotated[str, Field(pattern=r"^3\.\d+$")]
+    """The Python version of the wheel that is asked for, whatever runs here: its networks are the same in all."""
+    platform: str
+    """Its platform tag."""
+    size: int
+    """Bytes of the wheel."""
+    licence: str
+    """SPDX identifier."""
+    credits: str
+    page: str
+    """Where a person reads about it."""
+
+
+class PackagedFile(_ManifestEntry):
+    """A file in a wheel."""
+
+    package: str
+    name: str
+    """Its path in the wheel."""
+    sha256: Sha256
+    size: int
+    """Bytes."""
+
+
 class Conversion(_ManifestEntry):
     """How a TFLite file becomes ONNX: names for its inputs and outputs, in its own order."""
 
@@ -52,10 +80,16 @@ class PublicModel(_ManifestEntry):
     """A model as it is stored: an ONNX file."""
 
     purpose: str
-    download: str
-    """The file that it is made from."""
+    download: str | None = None
+    """The file of its authors that it is made from; None where they publish it in a package alone."""
     member: Member | None = None
     """The part of the file, where it is a zip."""
+    packaged: PackagedFile | None = None
+    """The same in a package, to the byte once it is converted."""
+    substitute: str | None = None
+    """A model that does the same, for where this one cannot be had."""
+    without: str | None = None
+    """What does not work without it, where that is little and it has no stand-in."""
     convert: Conversion | None = None
     """None where the file is ONNX already."""
     sha256: Sha256
@@ -67,18 +101,28 @@ class Manifest(_ManifestEntry):
     """All public models by name."""
 
     downloads: Mapping[str, Download]
+    packages: Mapping[str, Package] = {}
     models: Mapping[str, PublicModel]
 
     @model_validator(mode="after")
-    def _downloads_exist(self) -> Manifest:
-        unknown = {model.download for model in self.models.values()} - set(self.downloads)
-        if unknown:
-            raise ValueError(f"no such download: {', '.join(sorted(unknown))}")
+    def _sources_exist(self) -> Manifest:
+        for name, model in self.models.items():
+            if model.download is None and model.packaged is None:
+                raise ValueError(f"{name} has no source")
+            if model.download is not None and model.download not in self.downloads:
+                raise ValueError(f"no such download: {model.download}")
+            if model.packaged is not None and model.packaged.package not in self.packages:
+                raise ValueError(f"no such package: {model.packaged.package}")
+            if model.substitute is not None and model.substitute not in self.models:
+                raise ValueError(f"no such model: {model.substitute}")
         return self
 
-    def download_of(self, name: str) -> Download:
-        """Return the file that the model `name` is made from."""
-        return self.downloads[self.models[name].download]
+    def licence_of(self, name: str) -> str:
+        """Return the SPDX identifier of the model's licence."""
+        model = self.models[name]
+        if model.download is not None:
+            return self.downloads[model.download].licence
+        return self.packages[model.packaged.package].licence if model.packaged else ""
 
 
 @cache

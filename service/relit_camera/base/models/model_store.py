@@ -6,8 +6,8 @@ this machine. The published files stay in the folder `downloads` beside them, so
 
 from __future__ import annotations
 
+import json
 import os
-import zipfile
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from functools import lru_cache
@@ -19,6 +19,7 @@ from filelock import FileLock, Timeout
 
 from relit_camera.base.errors import ModelError, NotFoundError, StorageError
 from relit_camera.base.models import model_download
+from relit_camera.base.models.model_download import Report
 from relit_camera.base.models.model_manifest import Manifest, PublicModel, public_manifest
 from relit_camera.base.storage.atomic_files import write_atomic
 
@@ -49,6 +50,16 @@ def model_path(name: str) -> Path:
         ModelError: it is not pulled, or damaged.
     """
     return ModelStore().path(name)
+
+
+def installed_model(names: Sequence[str]) -> str | None:
+    """Return the first of some models, any of which will do, that is stored, whole or damaged; None where none is.
+
+    Raises:
+        NotFoundError: no public model has that name.
+    """
+    store = ModelStore()
+    return next((name for name in names if store.state(name) is not ModelState.MISSING), None)
 
 
 class ModelStore:
@@ -86,6 +97,10 @@ class ModelStore:
         same = found.st_size == model.size and _sha256(path, found.st_size, found.st_mtime_ns) == model.sha256
         return ModelState.PULLED if same else ModelState.DAMAGED
 
+    def is_pulled(self, name: str) -> bool:
+        """Whether the model is stored, whole."""
+        return self.state(name) is ModelState.PULLED
+
     def path(self, name: str) -> Path:
         """Return the ONNX file of a model.
 
@@ -99,31 +114,57 @@ class ModelStore:
         what = "is not pulled" if state is ModelState.MISSING else f"in {self.folder} is of another version or damaged"
         raise ModelError(f"model {name} {what}", f"run `relit models pull {name}`")
 
+    def origin(self, name: str) -> str:
+        """Say where a stored model came from, in the words of the pull that stored it; "" where none is known."""
+        try:
+            return str(json.loads(self._origins.read_text("utf-8")).get(name, ""))
+        except (OSError, ValueError, AttributeError):
+            return ""
+
+    def lacking(self) -> list[str]:
+        """Return the models that are neither stored, nor replaced by a stored one, nor merely replace another one."""
+        stored = {name for name in self.manifest.models if self.state(name) is ModelState.PULLED}
+        return [
+            name
+            for name, model in self.manifest.models.items()
+            if model.download is not None and name not in stored and model.substitute not in stored
+        ]
+
     def pull(
-        self, chosen: Sequence[str] = (), mirror: Path | None = None, say: Callable[[str], None] = lambda _: None
+        self,
+        chosen: Sequence[str] = (),
+        mirror: Path | None = None,
+        say: Callable[[str], None] = lambda _: None,
+        report: Report = lambda *_: None,
+        from_index: bool = False,
     ) -> None:
-        """Store the chosen models, or all, where they are not yet; each whole or not at all.
+        """Store the chosen models, or all that are of use, where they are not yet; each whole or not at all.
+
+        What its authors' hosts do not give comes from the package index, where it is there, too. Where a model is on
+        neither, another one may stand in for it, or something small does not work without it: `say` is told.
 
         Args:
             chosen: names; none for all.
-            mirror: a local folder with the upstream files, instead of the network.
+            mirror: a local folder with the upstream files or the wheel, instead of the network.
             say: called with a line for each model.
+            report: called while something is fetched.
+            from_index: ask the package index alone; of all models, take those that it has.
 
         Raises:
             NotFoundError: no public model has such a name, or there is no such mirror.
-            ModelError: a file cannot be downloaded or has the wrong sha256. Models before it are stored.
+            ModelError: a file cannot be had or has the wrong sha256. What could be had is stored.
             StorageError: the folder cannot be written, or another pull keeps it locked.
         """
+        from relit_camera.base.models.model_pull import ModelPull
+
         names = self.names(chosen)
+        if not chosen:
+            wanted = {name for name, model in self.manifest.models.items() if _has_source(model, from_index)}
+            names = [name for name in names if name in wanted]
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             with FileLock(self.folder / ".lock", timeout=_LOCK_TIMEOUT_S):
-                for name in names:
-                    if self.state(name) is ModelState.PULLED:
-                        say(f"{name}: already there")
-                        continue
-                    say(f"{name}: getting {self.manifest.models[name].download}")
-                    self._store(name, mirror)
+                ModelPull(self, mirror, say, report).run(names, from_index, exactly=bool(chosen))
         except Timeout as error:
             raise StorageError(f"{self.folder} is locked by another pull", "wait for it to end") from error
         except OSError as error:
@@ -136,22 +177,28 @@ class ModelStore:
             NotFoundError: no public model has such a name, or there is no such mirror.
             ModelError: a file is missing or has the wrong sha256.
         """
-        for file in dict.fromkeys(self.manifest.models[name].download for name in self.names(chosen)):
+        files = [self.manifest.models[name].download for name in self.names(chosen)]
+        for file in dict.fromkeys(file for file in files if file is not None):
             model_download.find_in_mirror(file, self.manifest.downloads[file], mirror)
 
-    def _store(self, name: str, mirror: Path | None) -> None:
-        model = self.manifest.models[name]
-        download = self.manifest.downloads[model.download]
-        if mirror is None:
-            source = model_download.fetch(model.download, download, self.folder / "downloads")
-        else:
-            source = model_download.find_in_mirror(model.download, download, mirror)
-        data = _onnx_bytes(name, model, source)
-        found = sha256(data).hexdigest()
-        if found != model.sha256:
-            what = f"{name} made from {source} has the sha256 {found[:12]}…, not {model.sha256[:12]}… as tested"
+    def write(self, name: str, data: bytes, origin: str) -> None:
+        """Store a model's ONNX file, and where it came from. Call within `pull`.
+
+        Raises:
+            ModelError: it has another sha256 than the manifest says.
+            OSError, StorageError: the folder cannot be written.
+        """
+        found, tested = sha256(data).hexdigest(), self.manifest.models[name].sha256
+        if found != tested:
+            what = f"{name} made from what {origin} gave has the sha256 {found[:12]}…, not {tested[:12]}… as tested"
             raise ModelError(what, "report this with the versions of the packages onnx and protobuf")
+        origins = {other: self.origin(other) for other in self.manifest.models if self.origin(other)}
         write_atomic(self._file(name), data)
+        write_atomic(self._origins, json.dumps({**origins, name: origin}, indent=1).encode())
+
+    @property
+    def _origins(self) -> Path:
+        return self.folder / "origins.json"
 
     def _file(self, name: str) -> Path:
         return self.folder / f"{name}.onnx"
@@ -163,19 +210,8 @@ class ModelStore:
         )
 
 
-def _onnx_bytes(name: str, model: PublicModel, source: Path) -> bytes:
-    """The bytes of the ONNX file, made from the published file, whose sha256 was checked."""
-    data = source.read_bytes()
-    if model.member:
-        with zipfile.ZipFile(source) as archive:
-            data = archive.read(model.member.name)
-        if sha256(data).hexdigest() != model.member.sha256:
-            raise ModelError(f"{model.member.name} in {source} has the wrong sha256", "pull it again")
-    if model.convert is None:
-        return data
-    from relit_camera.base.models.tflite.tflite_converter import convert_tflite_to_onnx
-
-    return convert_tflite_to_onnx(data, name, model.convert.inputs, model.convert.outputs)
+def _has_source(model: PublicModel, from_index: bool) -> bool:
+    return (model.packaged if from_index else model.download) is not None
 
 
 @lru_cache(maxsize=64)

@@ -44,7 +44,7 @@ def open_stream(path: Path) -> tuple[Any, Any]:
         raise VideoError(f"{path} is empty", "record or copy it again")
     cut_off = is_truncated(path)
     try:
-        container = av.open(str(path))
+        container = av.open(str(path.absolute()))  # FFmpeg takes what stands before a colon for a protocol
     except (av.FFmpegError, OSError) as error:
         if cut_off:
             raise VideoError(f"{path} is cut off: 0 frames can be read", "record or copy it again") from error

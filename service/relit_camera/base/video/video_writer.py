@@ -62,7 +62,7 @@ class VideoWriter:
         self._reformatter = VideoReformatter()
         with ExitStack() as files:  # closed in turn: the container first, then the file takes its name
             temporary = files.enter_context(atomic_path(self.path))
-            self._container = files.enter_context(av.open(str(temporary), "w"))
+            self._container = files.enter_context(av.open(str(temporary.absolute()), "w"))
             self._stream = self._add_stream(rate, crf, threads)
             self._files = files.pop_all()
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import CaptureError, ConfigError, ModelError, VideoError
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.models.model_store import model_path
 from relit_camera.base.video.video_readers import LinearVideoReader
 from relit_camera.capture.film.face_circle import FaceCircle
 from relit_camera.capture.film.flash.flash_signal import BrightnessGrid
 from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass
-from relit_camera.face.tracking.face_detector import FaceDetector
+from relit_camera.face.detection.face_detector import FaceDetector
+from relit_camera.face.detection.installed_detector import open_face_detector
 
 log = logging.getLogger(__name__)
 
@@ -92,7 +92,7 @@ def find_face_circle(picture: DisplayImage, detector: FaceDetector | None = None
         VideoError: there is no face.
     """
     try:
-        detector = detector or FaceDetector(model_path("face_detector_yunet"))
+        detector = detector or open_face_detector()
     except ModelError as error:
         raise ModelError(f"the face cannot be looked for: {error.what}", f"{error.cure}, or {_FACE_CURE}") from error
     found = detector.detect(picture)

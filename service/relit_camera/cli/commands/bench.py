@@ -43,12 +43,23 @@ def bench(
     relighting: Annotated[
         bool, typer.Option("--relighting/--no-relighting", help="Measure every implementation of relighting as well.")
     ] = True,
+    curves: Annotated[
+        Path | None,
+        typer.Option(
+            help="Measure cost curves instead (pixels, rank, lamps, viewers), and write their plots and curves.json "
+            "into this folder. The options that say what the camera shows do not matter then.",
+            metavar="FOLDER",
+        ),
+    ] = None,
 ) -> None:
     """Measure processor time, latency and memory of the camera, and relighting by every implementation.
 
     Each combination of mode, background and size is a camera of its own, measured one after another: without options
     four, some 80 seconds in all. Run nothing else meanwhile.
     """
+    if curves is not None:
+        _measure_curves(curves, as_json)
+        return
     import json
 
     from relit_camera.app.demo import demo_files
@@ -98,6 +109,37 @@ def bench(
         result["relight"] = benchmark_relighting(measured, maps, options)
         result["transfer"] = benchmark_gpu_transfer(options)
     typer.echo(json.dumps(result, indent=2) if as_json else _text({**result, "camera": None}))
+
+
+def _measure_curves(folder: Path, as_json: bool) -> None:
+    """Measure the cost curves one after another, and write them into the folder, which is made where it is missing."""
+    from relit_camera.app.demo import demo_files
+    from relit_camera.base.storage.atomic_files import make_folder
+    from relit_camera.base.video.video_readers import VideoReader
+    from relit_camera.lab.bench.curves.curve_files import RECORD, write_curves
+    from relit_camera.lab.bench.curves.light_curve import light_curve
+    from relit_camera.lab.bench.curves.preview_curve import preview_curve
+    from relit_camera.lab.bench.curves.relighting_curves import relighting_curves
+    from relit_camera.lab.bench.machine_info import machine_info
+    from relit_camera.lab.bench.mesh_run import MeshRun
+    from relit_camera.lab.evaluate.report.html_page import require_report_packages
+    from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+
+    require_report_packages()
+    make_folder(folder)
+    machine, mesh = machine_info(), MeshRun()
+    with VideoReader(demo_files.CLIP) as reader:
+        picture = next(iter(reader)).image
+    found = [
+        *relighting_curves(mesh),
+        light_curve(mesh, builtin_environment(BUILTIN_NAMES[0])),
+        preview_curve(mesh, picture),
+    ]
+    files = write_curves(folder, found, machine)
+    if as_json:
+        typer.echo((folder / RECORD).read_text(), nl=False)
+    else:
+        typer.echo("\n\n".join([*(curve.text() for curve in found), "\n".join(map(str, files))]))
 
 
 def _text(result: dict[str, Any], indent: int = 0) -> str:

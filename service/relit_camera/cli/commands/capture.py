@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from relit_camera.cli.model_offer import Pull
+
 app = typer.Typer(no_args_is_help=True)
 
 
@@ -79,6 +81,48 @@ def import_lights(
         f"{out}: {meta.width}x{meta.height}, {meta.lights} lights, {meta.components} components, "
         f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better, "
         f"{100 * (meta.bytes_share or 0):.1f} % of the dense field"
+    )
+
+
+@app.command("instant")
+def instant(
+    context: typer.Context,
+    out: Annotated[Path, typer.Option(help="The subject file to write (.relit).")],
+    source: Annotated[
+        str,
+        typer.Argument(
+            help="A picture or video file of one person who looks into the camera, or a webcam: a name, id or node of "
+            "`relit devices`."
+        ),
+    ] = "webcam",
+    pull: Pull = None,
+) -> None:
+    """Build a subject from three seconds of your webcam, a video or a picture, in the light of the room."""
+    from relit_camera.base.concurrency.threads import limit_threads
+    from relit_camera.base.storage.atomic_files import atomic_path
+    from relit_camera.capture.instant.frame_reading import read_frames
+    from relit_camera.capture.instant.instant_capture import capture_instant
+    from relit_camera.cli.arguments import load_command_settings
+    from relit_camera.cli.model_offer import offer_models
+    from relit_camera.cli.progress import progress_bar, stage_reporter
+    from relit_camera.subject.subject_file import write_subject
+
+    settings = load_command_settings(context)
+    offer_models("mesh", "selfie", pull, settings.pull_models)
+    limit_threads()
+    # Opened before the work, so that a path that cannot be written fails at once.
+    with atomic_path(out) as subject_file:
+        with progress_bar() as progress:
+            report_stage = stage_reporter(progress)
+            read = read_frames(source, settings.source, report_stage)
+            captured = capture_instant(read.frames, read.source, report_stage)
+        write_subject(subject_file, captured.subject)
+    for warning in captured.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    meta = captured.subject.metadata
+    typer.echo(
+        f"{out}: {meta.width}x{meta.height}, from {captured.frames} of {len(read.frames)} frames; "
+        f"its picture in the estimated light of the room is right to {meta.psnr_db:.0f} dB"
     )
 
 
@@ -189,6 +233,7 @@ def build(
                 method,
                 video.name,
                 options.gamma,
+                rung="film",
                 progress=partial(report_stage, "Building the field"),
             )
         write_subject(subject_file, subject)
@@ -201,6 +246,30 @@ def build(
         f"{out}: {meta.width}x{meta.height}, {meta.lights} lights of {flashes} flashes' frames, "
         f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better"
     )
+
+
+@app.command("desk")
+def desk(
+    frames: Annotated[
+        Path, typer.Option(help="A folder of webcam frames and desk.json, as docs/formats.md describes.")
+    ],
+    out: Annotated[Path, typer.Option(help="The subject file to write (.relit).")],
+) -> None:
+    """Build a subject from frames filmed while your own screen lit you in patterns: see docs/desk.md."""
+    from relit_camera.base.storage.atomic_files import atomic_path
+    from relit_camera.capture.desk.desk_capture import build_desk_subject
+    from relit_camera.capture.desk.desk_recording import read_desk_recording
+    from relit_camera.cli.progress import progress_bar, stage_reporter
+    from relit_camera.subject.subject_file import write_subject
+
+    recording = read_desk_recording(frames)
+    with atomic_path(out) as subject_file, progress_bar() as progress:
+        subject, warnings = build_desk_subject(recording, frames.resolve().name, stage_reporter(progress))
+        write_subject(subject_file, subject)
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    meta = subject.metadata
+    typer.echo(f"{out}: {meta.width}x{meta.height}, {meta.lights} patches of the screen")
 
 
 def _circle(text: str, option: str) -> tuple[float, float, float]:

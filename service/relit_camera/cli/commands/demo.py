@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from relit_camera.cli.model_offer import Pull
+
 app = typer.Typer()
 
 
@@ -16,6 +18,7 @@ def demo(
     seconds: Annotated[float | None, typer.Option(min=0, help="End after so long; until Ctrl-C if not given.")] = None,
     host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback, or a token is set.")] = None,
     port: Annotated[int | None, typer.Option(help="Port of API and panel; 0 picks one.")] = None,
+    pull: Pull = None,
 ) -> None:
     """Show a bundled person in one place after another; whoever touches the panel takes over."""
     import time
@@ -31,6 +34,7 @@ def demo(
     from relit_camera.base.config.settings import OutputSettings
     from relit_camera.base.errors import DeviceError
     from relit_camera.cli.arguments import load_command_settings
+    from relit_camera.cli.model_offer import offer_models
     from relit_camera.devices.sinks.sink import NullSink, Sink
     from relit_camera.devices.sinks.sink_factory import open_sink
     from relit_camera.live.status.camera_status import CameraState
@@ -42,6 +46,7 @@ def demo(
             typer.echo(f"No virtual camera, so the page alone shows it: {error.what} (relit doctor tells the cure)")
             return NullSink((output.width, output.height))
 
+    offer_models("mesh", "selfie", pull, load_command_settings(context).pull_models)
     tracker = demo_files.tracker_of_clip()
     if tracker != "mesh":
         typer.echo("No public models (relit models pull gets them): the clip's own record tells where the face is")

@@ -207,6 +207,103 @@ def olat(
 
 
 @app.command()
+def ladder(
+    context: typer.Context,
+    lights: Annotated[list[Path], typer.Argument(help="Lights (.lp) from directions all round, a list a person.")],
+    out: Annotated[
+        Path, typer.Option(help="Folder for report, sheets and figures; subjects that take long are kept there.")
+    ],
+    as_json: AsJson = False,
+    gamma: GammaText = "srgb",
+    room: Annotated[
+        list[str] | None, typer.Option(help="Environment the person sits in; the built-in ones if none is given.")
+    ] = None,
+    environment: Annotated[
+        list[str] | None, typer.Option(help="Whose light the live picture is taken into; the built-in ones if none.")
+    ] = None,
+    rung: Annotated[list[str] | None, typer.Option(help="Rung to measure; all if none is given.")] = None,
+    size: Annotated[int, typer.Option(help="Longer side to which known pictures are reduced.", min=32, max=1024)] = 128,
+) -> None:
+    """Compare the ways to a subject (instant, desk, film) on people whose field is known."""
+    import json
+
+    from relit_camera.base.images.image_files import encode_display
+    from relit_camera.base.storage.atomic_files import write_atomic
+    from relit_camera.capture.lights_file import read_lights
+    from relit_camera.cli.arguments import load_command_settings
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
+    from relit_camera.lab.evaluate.ladder.known_person import SubjectFolder, known_person
+    from relit_camera.lab.evaluate.ladder.ladder_evaluation import evaluate_person
+    from relit_camera.lab.evaluate.ladder.ladder_report import (
+        ladder_json,
+        ladder_page,
+        ladder_text,
+        room_figures,
+        room_sheet,
+    )
+    from relit_camera.lab.evaluate.ladder.ladder_rungs import rung_names
+    from relit_camera.lab.evaluate.report.html_page import require_report_packages
+    from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+    from relit_camera.light.environments.environment_store import EnvironmentStore
+
+    require_report_packages()
+    names = rung_names(rung)
+    store = EnvironmentStore(load_command_settings(context).storage.environments)
+    rooms, environments = (list(map(store.resolve, given or BUILTIN_NAMES)) for given in (room, environment))
+    listed = {path.resolve().parent.name: path for path in map(_lights_file, lights)}
+    if len(listed) < len(lights):
+        raise typer.BadParameter("two lists of lights lie in folders of one name, which names the person")
+    for path in listed.values():
+        read_lights(path)  # what is wrong with the last is told before the first one's hour begins
+    subjects, tracker = SubjectFolder(out / "subjects"), open_tracker("mesh", TrackerOptions(blendshapes=False))
+    results = []
+    for name, path in listed.items():
+        samples = _samples(path, gamma)
+        with progress_bar() as progress:
+            task = progress.add_task(name, total=len(rooms))
+            person = known_person(name, samples, size, subjects)
+            for result in evaluate_person(person, rooms, environments, names, tracker, subjects):
+                sheet = room_sheet(result.pictures, result.room)
+                write_atomic(out / f"{result.person}-{result.room}.jpg", encode_display(sheet, ".jpg"))
+                results.append(room_figures(result, sheet))
+                progress.advance(task)
+    figures = json.dumps(ladder_json(results), indent=1)
+    write_atomic(out / "ladder.json", figures)
+    write_atomic(out / "ladder.html", ladder_page(results))
+    typer.echo(figures if as_json else ladder_text(results))
+
+
+@app.command()
+def frontal(
+    lights: Annotated[list[Path], typer.Argument(help="Captured lights (.lp) of a face, one list or several.")],
+    out: Out = None,
+    as_json: AsJson = False,
+    gamma: GammaText = "srgb",
+    size: Annotated[int, typer.Option(help="Longer side to which pictures are reduced.", min=32, max=1024)] = 96,
+) -> None:
+    """Predict lights from the sides from frontal ones alone, as a desk or a single picture must."""
+    import json
+
+    from relit_camera.cli.progress import progress_bar
+    from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
+    from relit_camera.lab.evaluate.ladder.frontal_lights import evaluate_frontal, split_frontal
+    from relit_camera.lab.evaluate.ladder.frontal_report import frontal_json, frontal_page, frontal_text
+
+    opened = partial(open_tracker, "mesh", TrackerOptions(blendshapes=False))
+    results = []
+    with _report_file(out) as report_file:
+        for path in map(_lights_file, lights):
+            known = split_frontal(path.resolve().parent.name, _samples(path, gamma), opened, size)
+            with progress_bar() as progress:
+                task = progress.add_task(known.name, total=None)
+                results.append(evaluate_frontal(known, partial(_advance, progress, task)))
+        if report_file:
+            report_file.write_text(frontal_page(results), encoding="utf-8")
+    typer.echo(json.dumps(frontal_json(results), indent=1) if as_json else frontal_text(results))
+
+
+@app.command()
 def video(
     relit: Annotated[Path, typer.Argument(help="Video made by `relit replay`.")],
     truth: Annotated[Path, typer.Option(help="Ground-truth relit video: the same frames under the same light.")],

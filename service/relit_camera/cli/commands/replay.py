@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from relit_camera.cli.model_offer import Pull
+
+if TYPE_CHECKING:
+    from relit_camera.base.config.settings import RelitSettings
+    from relit_camera.subject.subject import Subject
 
 app = typer.Typer()
 
@@ -17,16 +23,20 @@ SHEET_FRAMES = 12
 def replay(
     context: typer.Context,
     video: Annotated[Path, typer.Argument(help="The driving video.")],
-    subject: Annotated[str, typer.Option(help="A stored subject's name, or a .relit file.")],
     environment: Annotated[str, typer.Option(help="A stored environment's name, or a panorama file.")],
     out: Annotated[Path, typer.Option(help="Video to write: .mp4, .mkv or .mov, at the driving video's size.")],
+    subject: Annotated[str | None, typer.Option(help="A stored subject's name, or a .relit file.")] = None,
+    instant: Annotated[
+        bool, typer.Option("--instant", help="No subject is at hand: capture one from the video itself.")
+    ] = False,
     report: Annotated[Path | None, typer.Option(help="JSON to write: state, pose and times of each frame.")] = None,
-    mode: Annotated[str, typer.Option(help="reenact or ratio.")] = "reenact",
+    mode: Annotated[str | None, typer.Option(help="reenact, or ratio, which --instant has by default.")] = None,
     tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
     background: Annotated[str, typer.Option(help="none, blur, environment, or #RRGGBB.")] = "none",
     rotate: Annotated[str, typer.Option(help="YAW,PITCH,ROLL of the environment, in degrees.")] = "0,0,0",
     exposure_ev: Annotated[float, typer.Option(help="Brighter or darker.")] = 0.0,
     contact_sheet: Annotated[Path | None, typer.Option(help="PNG or JPEG of some frames, live above relit.")] = None,
+    pull: Pull = None,
 ) -> None:
     """Relight a recorded video: the subject under the environment, moved as the face in the video moves."""
     import json
@@ -43,19 +53,29 @@ def replay(
     from relit_camera.base.storage.atomic_files import atomic_path
     from relit_camera.base.video.video_readers import probe_video
     from relit_camera.cli.arguments import load_command_settings, parse_background, parse_lighting, parse_mode
+    from relit_camera.cli.model_offer import offer_models
     from relit_camera.cli.progress import progress_bar
     from relit_camera.live.scene.scene_controller import SceneController
 
     if contact_sheet and contact_sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"{contact_sheet} is neither .png nor .jpg", param_hint="--contact-sheet")
+    if instant == (subject is not None):
+        raise typer.BadParameter("give --subject, or --instant to capture one from the video", param_hint="--subject")
     if video.resolve() == out.resolve():
         raise typer.BadParameter(f"{out} is the driving video itself", param_hint="--out")
     settings = load_command_settings(context, tracker={"name": tracker})
+    offer_models(settings.tracker.name, settings.matte, pull, settings.pull_models)
     limit_threads()
-    chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
+    chosen_background, chosen_mode = (
+        parse_background(background),
+        parse_mode(mode or ("ratio" if instant else "reenact")),
+    )
     info = probe_video(video)
     scene_controller = SceneController(settings.storage)
-    scene_controller.load_configured_subject(subject)
+    if instant:
+        scene_controller.show_subject("instant", _instant_subject(video, settings))
+    else:
+        scene_controller.load_configured_subject(subject)
     lighting = parse_lighting(scene_controller.register_temporary_environment(environment), rotate, exposure_ev)
     scene_controller.set_look(Look(lighting=lighting, background=chosen_background, mode=chosen_mode))
     track = make_tracker(settings)
@@ -91,7 +111,7 @@ def replay(
             document = {
                 "video": video.name,
                 "tracker": track.name,
-                "mode": mode,
+                "mode": str(chosen_mode),
                 "degraded": [vars(trouble) for trouble in pipelines[0].troubles],
                 "frames": [frame.as_json() for frame in frames],
             }
@@ -100,3 +120,23 @@ def replay(
         print(f"relit: {trouble.what}: {trouble.why}; {trouble.cure}", file=sys.stderr)
     found = sum(1 for frame in frames if frame.motion and frame.motion.status == "found")
     typer.echo(f"{out}: {len(frames)} frames, face found in {found}")
+
+
+def _instant_subject(video: Path, settings: RelitSettings) -> Subject:
+    """The subject that the first seconds of the video give; warnings are printed.
+
+    Raises:
+        CaptureError: no usable face is in them.
+    """
+    from relit_camera.capture.instant.frame_reading import read_frames
+    from relit_camera.capture.instant.instant_capture import capture_instant
+    from relit_camera.cli.progress import progress_bar, stage_reporter
+
+    with progress_bar() as progress:
+        report_stage = stage_reporter(progress)
+        captured = capture_instant(
+            read_frames(str(video), settings.source, report_stage).frames, video.name, report_stage
+        )
+    for warning in captured.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    return captured.subject

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from relit_camera.cli.model_offer import Pull
+
 app = typer.Typer()
 
 
@@ -15,6 +17,9 @@ def run(
     source: Annotated[str | None, typer.Option(help="webcam, a camera's id, a video or picture file, pattern.")] = None,
     sink: Annotated[str | None, typer.Option(help="camera, a video file, or null.")] = None,
     subject: Annotated[str | None, typer.Option(help="A stored subject's name, or a .relit file.")] = None,
+    instant: Annotated[
+        bool, typer.Option("--instant", help="Measure the face before the webcam first, for three seconds.")
+    ] = False,
     environment: Annotated[str | None, typer.Option(help="A stored environment's name, or a panorama file.")] = None,
     mode: Annotated[str | None, typer.Option(help="reenact or ratio.")] = None,
     tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
@@ -24,6 +29,7 @@ def run(
     on_demand: Annotated[
         bool | None, typer.Option("--on-demand/--always-on", help="Release the webcam while nobody looks (Linux).")
     ] = None,
+    pull: Pull = None,
 ) -> None:
     """Run the camera until it is told to stop (Ctrl-C or SIGTERM)."""
     from functools import partial
@@ -31,7 +37,10 @@ def run(
     from relit_camera.app.run_camera import run_camera
     from relit_camera.base.config.settings_loader import config_path, load_settings
     from relit_camera.cli.arguments import load_command_settings, parse_mode, parse_size
+    from relit_camera.cli.model_offer import offer_models
 
+    if instant and subject is not None:
+        raise typer.BadParameter("--instant makes a subject of its own", param_hint="--subject")
     width, height = parse_size(size) if size else (None, None)
     given = {
         "source": {"source": source, "on_demand": on_demand},
@@ -42,8 +51,9 @@ def run(
         "server": {"host": host, "port": port},
     }
     settings = load_command_settings(context, **given)
+    offer_models(settings.tracker.name, settings.matte, pull, settings.pull_models)
     path = config_path((context.find_root().obj or {}).get("config"))
     # Always the same file: if it is deleted, another one must not be read instead.
     load = partial(load_settings, overrides={"log_level": settings.log_level, **given})
     reload = (path.absolute(), load) if path else None
-    run_camera(settings, environment, reload=reload)
+    run_camera(settings, environment, reload=reload, instant=instant)

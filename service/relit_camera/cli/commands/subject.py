@@ -27,6 +27,7 @@ def info(
 ) -> None:
     """Show what a subject file holds."""
     from relit_camera.cli.arguments import load_command_settings
+    from relit_camera.subject.rungs import describe_rung
     from relit_camera.subject.subject_store import SubjectStore
 
     name, opened = SubjectStore(load_command_settings(context).storage.subjects).resolve(subject)
@@ -37,8 +38,10 @@ def info(
     if as_json:
         typer.echo(json.dumps(shown, indent=2))
         return
+    meta = opened.metadata
+    typer.echo(describe_rung(meta.rung, meta.expected_db, meta.measured_fraction))
     for key, value in shown.items():
-        typer.echo(f"{key:16} {value}")
+        typer.echo(f"{key:17} {value}")
 
 
 @app.command()

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, Points
+from relit_camera.face.detection.face_detector import Detection, FaceDetector, is_same_face
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus
 from relit_camera.face.head_pose import fit_pose
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
 from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
-from relit_camera.face.tracking.face_detector import Detection, FaceDetector, is_same_face
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from relit_camera.base.images.image_types import DisplayImage, Points
-from relit_camera.base.models.model_store import model_path
+from relit_camera.base.models.model_store import installed_model, model_path
 from relit_camera.base.models.session_with_fallback import Session, open_session
+from relit_camera.face.detection.face_detector import Detection
+from relit_camera.face.detection.installed_detector import open_face_detector
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
-from relit_camera.face.tracking.face_detector import Detection, FaceDetector
 from relit_camera.face.tracking.landmark_tracker import LandmarkPrediction, LandmarkTracker
+from relit_camera.face.tracking.mesh_refinement import mesh_points
 from relit_camera.face.tracking.trackers import TrackerOptions
 
 # fmt: off
@@ -46,7 +48,9 @@ BLENDSHAPE_NAMES = (
 # fmt: on
 
 
-_INPUT = 256
+MESHES = ("face_mesh", "face_mesh_attention")
+"""Networks of the tracker; the first one that is installed is used."""
+
 _MARGIN = 1.5
 _RIGHT_EYE, _LEFT_EYE = 33, 263
 
@@ -61,13 +65,14 @@ class MeshTracker(LandmarkTracker):
             ModelError: a model is missing.
         """
         options = options or TrackerOptions()
+        mesh = installed_model(MESHES) or MESHES[0]
         network = MeshNetwork(
-            open_session(model_path("face_mesh"), "face_mesh", options.session),
+            open_session(model_path(mesh), mesh, options.session),
             open_session(model_path("face_blendshapes"), "face_blendshapes", options.session)
             if options.blendshapes
             else None,
         )
-        detector = FaceDetector(model_path("face_detector_yunet"))
+        detector = open_face_detector(options.session)
         super().__init__("mesh", network, detector, options.focal_px, options.check_every)
 
 
@@ -80,7 +85,8 @@ class MeshNetwork:
         self.scheme = landmark_scheme("mesh478")
         self._mesh = mesh
         self._blendshapes = blendshapes
-        self._input = np.empty((1, _INPUT, _INPUT, 3), np.float32)
+        self._side = mesh.inputs["image"].shape[1] or 0
+        self._input = np.empty((1, self._side, self._side, 3), np.float32)
 
     def crop_from_detection(self, detection: Detection) -> Crop:
         """Give a square of 1.5 times the box's longer side about its centre."""
@@ -101,11 +107,11 @@ class MeshNetwork:
 
     def read(self, image: DisplayImage, crop: Crop) -> LandmarkPrediction:
         """Place the 478 points; the confidence is the network's presence."""
-        np.multiply(crop.cut(image, _INPUT, _INPUT), np.float32(1 / 255), out=self._input[0], dtype=np.float32)
+        side = self._side
+        np.multiply(crop.cut(image, side, side), np.float32(1 / 255), out=self._input[0], dtype=np.float32)
         outputs = self._mesh.run({"image": self._input})
-        points = outputs["landmarks"].reshape(-1, 3)[:, :2]
         presence = 1 / (1 + math.exp(-outputs["presence_logit"].item()))
-        return LandmarkPrediction(crop.to_picture(points, _INPUT, _INPUT), presence)
+        return LandmarkPrediction(crop.to_picture(mesh_points(outputs), side, side), presence)
 
     def blendshapes(self, points: Points) -> Mapping[str, float]:
         """Scores 0..1 by ARKit name; {} without the blendshape model."""

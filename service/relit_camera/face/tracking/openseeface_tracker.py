@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from relit_camera.base.images.image_types import DisplayImage, Points
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.models.session_with_fallback import Session, open_session
+from relit_camera.face.detection.face_detector import Detection
+from relit_camera.face.detection.installed_detector import open_face_detector
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.landmarks.rotated_crop import Crop, bounding_box
-from relit_camera.face.tracking.face_detector import Detection, FaceDetector
 from relit_camera.face.tracking.landmark_tracker import LandmarkPrediction, LandmarkTracker
 from relit_camera.face.tracking.trackers import TrackerOptions
 
@@ -35,7 +36,7 @@ class OpenSeeFaceTracker(LandmarkTracker):
         """
         options = options or TrackerOptions()
         network = OpenSeeFaceNetwork(open_session(model_path("openseeface"), "openseeface", options.session))
-        detector = FaceDetector(model_path("face_detector_yunet"))
+        detector = open_face_detector(options.session)
         super().__init__("openseeface", network, detector, options.focal_px, options.check_every)
 
 

@@ -57,10 +57,12 @@ def over(
     window = np.s_[max(-top, 0) : height - top, max(-left, 0) : width - left]
     foreground, alpha = np.ascontiguousarray(foreground[window]), alpha[window]
     edge = _partial_pixels(alpha)
-    return _blend(foreground, alpha, edge, _light_at(foreground, edge), background, (max(left, 0), max(top, 0)))
+    out = np.array(background, order="C")
+    share, light = _share_at(alpha, edge), _light_at(foreground, edge)
+    return _blend(foreground, alpha, edge, share, light, out, (max(left, 0), max(top, 0)))
 
 
-def replace_room(image: DisplayImage, alpha: Alpha, background: DisplayImage) -> DisplayImage:
+def replace_room(image: DisplayImage, alpha: Alpha, background: DisplayImage, in_place: bool = False) -> DisplayImage:
     """Lay the person in a live frame over another background, without the room that shines through the matte's edge.
 
     At the edge the camera saw C = αF + (1 - α)B. F and B are first guessed as the colors of surely person and surely
@@ -71,6 +73,7 @@ def replace_room(image: DisplayImage, alpha: Alpha, background: DisplayImage) ->
         image: uint8 sRGB (height, width, 3), the live frame.
         alpha: (height, width), the person's matte in it.
         background: of the image's size.
+        in_place: whether the background may be written to: it is then what is returned.
 
     Raises:
         ImageError: a picture is not uint8 (height, width, 3), or they differ in size.
@@ -82,33 +85,40 @@ def replace_room(image: DisplayImage, alpha: Alpha, background: DisplayImage) ->
     person, room = _mean_layer_colors(image, alpha, edge)
     share = _share_at(alpha, edge)
     person += share * (_light_at(image, edge) - room - share * (person - room))
-    return _blend(image, alpha, edge, person, background, (0, 0))
+    out = background if in_place and background.flags.c_contiguous else np.array(background, order="C")
+    return _blend(image, alpha, edge, share, person, out, (0, 0))
 
 
 def _blend(
     foreground: DisplayImage,
     alpha: Alpha,
     edge: NDArray[np.intp],
+    share: NDArray[np.float32],
     light: NDArray[np.float32],
-    background: DisplayImage,
+    out: DisplayImage,
     at: tuple[int, int],
 ) -> DisplayImage:
-    """The background with the foreground where alpha is 255, and at its `edge` a mixture with the given light.
+    """Write the foreground into `out` where alpha is 255, and at its `edge` a mixture with the given light.
 
     Args:
-        foreground: (rows, columns, 3), all of it within the background.
+        foreground: (rows, columns, 3), all of it within `out`.
         alpha: (rows, columns).
         edge: (count,) flat indices in alpha of what is neither clear nor opaque.
-        light: (count, 3) linear, straight, of the foreground there.
-        background: (height, width, 3).
-        at: column and row of the background where the foreground's corner comes.
+        share: (count, 1) alpha there, 0..1.
+        light: (count, 3) linear, straight, of the foreground there; it is written to.
+        out: (height, width, 3), C-contiguous: the background, and in the end the mixture, which is returned.
+        at: column and row of it where the foreground's corner comes.
     """
-    out = np.array(background, order="C")
     (left, top), (rows, columns) = at, alpha.shape
-    in_out = edge + (edge // columns) * (out.shape[1] - columns) + (top * out.shape[1] + left)
+    in_out = edge
+    if columns != out.shape[1] or top or left:
+        in_out = edge + (edge // columns) * (out.shape[1] - columns) + (top * out.shape[1] + left)
     behind = _light_at(out, in_out)
     cv2.copyTo(foreground, cv2.compare(alpha, 255, cv2.CMP_EQ), out[top : top + rows, left : left + columns])
-    codes, flat = uint8_from_linear(behind + _share_at(alpha, edge) * (light - behind)), out.reshape(-1, 3)
+    light -= behind
+    light *= share
+    light += behind
+    codes, flat = uint8_from_linear(light), out.reshape(-1, 3)
     for channel in range(3):  # thrice as fast as whole pixels
         flat[in_out, channel] = codes[:, channel]
     return out
@@ -120,7 +130,10 @@ def _mean_layer_colors(
     """Linear colors (count, 3) of what is surely person, and of what is surely room, averaged around those pixels."""
     height, width = alpha.shape
     coarse: DisplayImage = image
-    while len(coarse) * _NEIGHBORHOOD >= 1.5 * _WINDOW:
+    if _halvings(height) >= 2:  # a window of hundreds of pixels: a quarter of them are enough for the first two
+        quarter = (max(width // 4, 1), height // 4)
+        coarse, alpha = (cv2.resize(each, quarter, interpolation=cv2.INTER_LINEAR) for each in (image, alpha))
+    for _ in range(_halvings(len(coarse))):
         coarse, alpha = halve(coarse), halve(alpha)
     light = linear_from_uint8(coarse)
     share = alpha * np.float32(1 / 255)
@@ -129,19 +142,28 @@ def _mean_layer_colors(
     size = (-(-width // step), -(-height // step))
     rows = pixels // width
     at = rows // step * size[0] + (pixels - rows * width) // step
-    # So high a power that a pixel counts only when it is all but sure: at 0.9 already by less than a fifth.
-    means = (cv2.resize(_weighted_mean(light, certainty**16), size) for certainty in (share, 1 - share))
+    means = (cv2.resize(_weighted_mean(light, certainty), size) for certainty in (share, 1 - share))
     person, room = (mean.reshape(-1, 3).take(at, axis=0) for mean in means)
     return person, room
 
 
-def _weighted_mean(light: LinearImage, weight: NDArray[np.float32]) -> LinearImage:
+def _halvings(rows: int) -> int:
+    """How often a picture of so many rows is halved until `_NEIGHBORHOOD` of it is about `_WINDOW` pixels."""
+    count = 0
+    while rows * _NEIGHBORHOOD >= 1.5 * _WINDOW:
+        rows, count = rows // 2, count + 1
+    return count
+
+
+def _weighted_mean(light: LinearImage, certainty: NDArray[np.float32]) -> LinearImage:
+    """The mean of light around each pixel, by a certainty (height, width) in 0..1."""
     window = (_WINDOW, _WINDOW)
-    weight = weight[..., np.newaxis]
+    for _ in range(4):  # so high a power, 16, that a pixel counts only when all but sure: at 0.9 by less than a fifth
+        certainty = np.square(certainty)
+    weight = certainty[..., np.newaxis]
     # The small constant leaves a pixel with nothing certain around it as it is.
-    mean = (cv2.blur(light * weight, window) + _EPSILON * light) / (
-        cv2.blur(weight, window)[..., np.newaxis] + _EPSILON
-    )
+    mean = cv2.blur(light * weight, window) + _EPSILON * light
+    mean /= cv2.blur(weight, window)[..., np.newaxis] + _EPSILON
     return np.asarray(mean, np.float32)
 
 

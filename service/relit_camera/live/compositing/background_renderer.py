@@ -39,6 +39,10 @@ _WORKING_SIGMA = 1.5
 _MAX_REDUCTION = 8
 """Greatest factor: more shows when it is enlarged again."""
 
+_HOLD_S = 0.05
+"""For so long a blurred room is shown again where it is reduced by `_MAX_REDUCTION`: in every second frame of thirty a
+second it is not made anew. What moves in it within that time moves by much less than it is blurred."""
+
 _EPSILON = 1e-4
 
 
@@ -62,13 +66,32 @@ def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     behind them the room is continued (Knutsson and Westin 1993).
     """
     height, width = matted.matte.shape
-    sigma = BLUR_SIGMA * strength * height
-    # Averaged as light: of codes, small lamps would come out too dark. In 16 bits that takes half the time.
-    light = halve(cv2.LUT(matted.image, _light_in_16_bits())) * np.float32(1 / 65535)
-    room = 1 - halve(matted.matte) * np.float32(1 / 255)
+    return _enlarged(_blurred_room(matted, strength), (width, height))
+
+
+def _reduction(height: int, strength: float) -> int:
+    """The factor by which a room of that height is reduced before it is blurred."""
     reduction = 2
-    while 2 * reduction <= min(sigma / _WORKING_SIGMA, _MAX_REDUCTION):
-        light, room, reduction = halve(light), halve(room), 2 * reduction
+    while 2 * reduction <= min(BLUR_SIGMA * strength * height / _WORKING_SIGMA, _MAX_REDUCTION):
+        reduction *= 2
+    return reduction
+
+
+def _enlarged(room: DisplayImage, size: tuple[int, int]) -> DisplayImage:
+    """A blurred room at its whole size (width, height)."""
+    enlarged: DisplayImage = cv2.resize(room, size, interpolation=cv2.INTER_LINEAR)
+    return enlarged
+
+
+def _blurred_room(matted: MattedFrame, strength: float) -> DisplayImage:
+    """See `blur_background`; reduced by about `_reduction`."""
+    height = len(matted.matte)
+    sigma, reduction = BLUR_SIGMA * strength * height, _reduction(height, strength)
+    steps, matte = _halved_light(matted.image), halve(matted.matte)
+    for _ in range(reduction.bit_length() - 2):
+        steps, matte = halve(steps), halve(matte)
+    light = steps * np.float32(1 / 65535)
+    room = 1 - matte * np.float32(1 / 255)
     for _ in range(4):  # so high a power, 16, that a pixel counts only when it is all but surely room
         room = np.square(room)
     weighted = cv2.multiply(cv2.cvtColor(light, cv2.COLOR_RGB2RGBA), cv2.merge([room] * 4))
@@ -79,9 +102,25 @@ def blur_background(matted: MattedFrame, strength: float) -> DisplayImage:
     working_sigma = max((sigma / reduction) ** 2 - 1 / 4, 0.01) ** 0.5
     blurred = cv2.add(cv2.GaussianBlur(weighted, (0, 0), working_sigma), (*constant[:3], _EPSILON))
     weights = cv2.cvtColor(cv2.extractChannel(blurred, 3), cv2.COLOR_GRAY2RGB)
-    filled = cv2.divide(cv2.cvtColor(blurred, cv2.COLOR_RGBA2RGB), weights)
-    enlarged: DisplayImage = cv2.resize(uint8_from_linear(filled), (width, height), interpolation=cv2.INTER_LINEAR)
-    return enlarged
+    return uint8_from_linear(cv2.divide(cv2.cvtColor(blurred, cv2.COLOR_RGBA2RGB), weights))
+
+
+def _halved_light(image: DisplayImage) -> NDArray[np.uint16]:
+    """Linear light of a picture at half its size, in steps of 1/65535.
+
+    Averaged as light: of codes, small lamps would come out too dark. In 16 bits that takes half the time of floats.
+    """
+    height, width = image.shape[:2]
+    halved = np.empty((max(height // 2, 1), max(width // 2, 1), 3), np.uint16)
+    for top in range(0, len(halved), _BAND_ROWS):
+        onto = halved[top : top + _BAND_ROWS]
+        light = cv2.LUT(image[2 * top : 2 * (top + len(onto))], _light_in_16_bits())
+        cv2.resize(light, onto.shape[1::-1], dst=onto, interpolation=cv2.INTER_AREA)
+    return halved
+
+
+_BAND_ROWS = 30
+"""Rows of half the picture that are made at a time: their light stays in the processor's cache."""
 
 
 @lru_cache(maxsize=1)
@@ -127,6 +166,15 @@ class BackgroundRequest:
         return self.lighting.background_gain_ev == other.lighting.background_gain_ev
 
 
+@dataclass(frozen=True)
+class _BlurredRoom:
+    """A blurred room, reduced, how strongly it is blurred, and the time of the frame that shows it."""
+
+    picture: DisplayImage
+    strength: float
+    time_s: float
+
+
 def needs_matte(background: Background, lighting: Lighting) -> bool:
     """Whether a live picture has to be parted into person and room: not while it is shown as it is."""
     return not isinstance(background, NoBackground) or lighting.background_gain_ev != 0
@@ -142,6 +190,7 @@ class BackgroundRenderer:
         self._goal = self._shown = self._previous = neutral_background(size)
         self._changed_at = self._last = 0.0
         self._view: tuple[Panorama, float, float, EnvironmentView] | None = None
+        self._room: _BlurredRoom | None = None
 
     def static_background(self, request: BackgroundRequest, now: float) -> DisplayImage:
         """The background at `now` seconds, without any live pixel; uint8 sRGB of the renderer's size.
@@ -170,11 +219,21 @@ class BackgroundRenderer:
             case NoBackground():
                 image = matted.image
             case BlurBackground() as blur:
-                image = blur_background(matted, blur.strength)
+                image = self._blurred(matted, blur.strength, now)
             case _:
+                self._room = None
                 return self.static_background(request, now)
         self._request = None
         return apply_exposure(image, request.lighting.background_gain_ev)
+
+    def _blurred(self, matted: MattedFrame, strength: float, now: float) -> DisplayImage:
+        """`blur_background`, or that of the last frames again."""
+        kept = self._room
+        height = len(matted.matte)
+        if kept is None or kept.strength != strength or not 0 < now - kept.time_s <= _HOLD_S:
+            kept = _BlurredRoom(_blurred_room(matted, strength), strength, now)
+            self._room = kept if _reduction(height, strength) == _MAX_REDUCTION else None
+        return _enlarged(kept.picture, self._size)
 
     def _render(self, request: BackgroundRequest) -> DisplayImage:
         background, gain_ev = request.background, request.lighting.background_gain_ev

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from relit_camera.base.config.look import BlurBackground
 from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.face.matting import Matting
 from relit_camera.live.compositing.alpha_compositing import over, replace_room, split_alpha
 from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
@@ -12,7 +14,6 @@ from relit_camera.live.compositing.background_renderer import (
     MattedFrame,
     needs_matte,
 )
-from relit_camera.live.compositing.matting import Matting
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.stage_timing import StageTimer
@@ -50,7 +51,8 @@ class Compositor:
         background = self._background_renderer.live_background(
             _background_request(scene), MattedFrame(picture, alpha), frame.time_s
         )
-        return replace_room(picture, alpha, background)
+        # A blurred room is this frame's own.
+        return replace_room(picture, alpha, background, in_place=isinstance(scene.look.background, BlurBackground))
 
 
 def composite_source_image(

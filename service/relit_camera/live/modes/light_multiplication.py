@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.color import linear_from_uint8, srgb_encode
+from relit_camera.base.images.color import WIDE_TABLES, linear_from_uint8, srgb_encode
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.images.tone_mapping import linear_from_display, tone_curve
 
@@ -23,8 +23,6 @@ _ONE = 1 << 14
 _POWER = 2.4
 _BAND_CELLS = 32
 """Rows of cells that are multiplied at a time: their 16-bit numbers stay in the processor's cache."""
-_WIDE_TABLES = int(cv2.__version__.split(".")[0]) >= 5
-"""Whether `cv2.LUT` takes 16-bit indices, which it does three times as fast as numpy."""
 
 
 def root_of_light(light: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -60,7 +58,7 @@ def multiply_light(image: DisplayImage, roots: NDArray[np.float32], step: int, a
         top, bottom = step * first, min(step * (first + _BAND_CELLS), height)
         product = _roots_of(image[top:bottom], as_shown)
         cv2.multiply(product, above[step : step + bottom - top, :width], dst=product, scale=1 / _ONE)
-        if _WIDE_TABLES:
+        if WIDE_TABLES:
             cv2.LUT(product, _codes_of_roots(), dst=shown[top:bottom])
         else:
             _codes_of_roots().take(product, out=shown[top:bottom], mode="clip")  # other modes would copy `out`
@@ -69,7 +67,7 @@ def multiply_light(image: DisplayImage, roots: NDArray[np.float32], step: int, a
 
 def _roots_of(image: DisplayImage, as_shown: float) -> NDArray[np.uint16]:
     """The roots of the light of a picture's codes, uint16 of its shape."""
-    if not _WIDE_TABLES or image.size % 2:
+    if not WIDE_TABLES or image.size % 2:
         return np.asarray(cv2.LUT(image, _roots_of_codes(as_shown)), np.uint16)
     pairs = cv2.LUT(image.reshape(1, -1).view(np.uint16), _roots_of_pairs(as_shown))
     return np.asarray(pairs, np.int32).view(np.uint16).reshape(image.shape)

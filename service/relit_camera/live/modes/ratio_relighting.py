@@ -34,10 +34,12 @@ MIN_CHANNEL_MEAN = 1e-3
 """Linear: the least mean of a channel under the room's light that counts; three sRGB codes."""
 EDGE_MARGIN = 0.02
 """Share of the source image's width at the matte's edge that is not trusted."""
-RATIO_CELLS = 180
-"""The ratio is made for cells of the frame, about so many on its shorter side: it is as soft as the source image."""
-EXTRAPOLATION_DOWNSAMPLING = 4
-"""The extrapolation beyond the person is computed at this fraction of that."""
+RATIO_CELLS = 120
+"""The ratio is made for cells of the frame, about so many on its shorter side: it is softer than the source image."""
+SMALL_FRAME_PX = 300
+"""Shorter side of frames below which each pixel is such a cell."""
+EXTRAPOLATION_CELLS, WIDE_REDUCTION = 45, 4
+"""The extrapolation beyond the person is computed for so many there, and its wide blurs for fewer by a factor."""
 
 
 class RoomLight(Protocol):
@@ -120,7 +122,8 @@ class RatioRelighting:
             pose: of the head in the frame.
             size: of the frame.
         """
-        return self._warp(motion, pose, size).grid((0, 0, *size), max(round(min(size) / RATIO_CELLS), 1))
+        step = 1 if min(size) < SMALL_FRAME_PX else round(min(size) / RATIO_CELLS)
+        return self._warp(motion, pose, size).grid((0, 0, *size), step)
 
     def apply(self, plan: RatioPlan, blend: float = 1.0) -> DisplayImage:
         """The planned frame in the light of the plan's ratio, uint8 sRGB.
@@ -185,11 +188,11 @@ def extrapolate_roots(warped: NDArray[np.float32]) -> NDArray[np.float32]:
         warped: (height, width, 4): roots of the ratio times weight, and the weight.
     """
     height, width = warped.shape[:2]
-    small = _shrunk(warped)
+    small = _shrunk(warped, max(min(height, width) / EXTRAPOLATION_CELLS, 1))
     roots, weight = small[..., :3], small[..., 3:]
     small[..., :3] = light_of_root(roots / (weight + np.float32(1e-9))) * weight
     # Narrow blurs win where they have weight: detail near the person, the mean far away. Wide ones need fewer pixels.
-    wide: NDArray = _sum_of_blurs(_shrunk(small), {2.0: 1 / 8**3, 5.0: 1 / 20**3})
+    wide: NDArray = _sum_of_blurs(_shrunk(small, WIDE_REDUCTION), {2.0: 1 / 8**3, 5.0: 1 / 20**3})
     spread = cv2.add(
         _sum_of_blurs(small, {1.0: 1.0, 3.0: 1 / 3**3}),
         cv2.resize(wide, small.shape[1::-1], interpolation=cv2.INTER_LINEAR),
@@ -202,8 +205,8 @@ def extrapolate_roots(warped: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(cv2.add(known, beyond, dst=known), np.float32)
 
 
-def _shrunk(picture: NDArray[np.float32]) -> NDArray[np.float32]:
-    size = [max(side // EXTRAPOLATION_DOWNSAMPLING, 1) for side in picture.shape[1::-1]]
+def _shrunk(picture: NDArray[np.float32], factor: float) -> NDArray[np.float32]:
+    size = [max(int(side / factor), 1) for side in picture.shape[1::-1]]
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
 
 

@@ -11,26 +11,24 @@ are read in place of the subject's components and the 2048 texels.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib import import_module
 from itertools import product
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.spatial import Delaunay
 
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage, Points
 from relit_camera.base.rotations import Rotation
+from relit_camera.face.landmarks.landmark_triangulation import delaunay_triangles
 from relit_camera.light.directions import (
     MAP_HEIGHT,
     MAP_WIDTH,
-    fibonacci_directions,
     texel_directions,
     texel_solid_angles,
 )
 from relit_camera.light.light_map import LightMap
+from relit_camera.light.soft_lights import SoftLights, regularized_nnls
 from relit_camera.light.spherical_harmonics import basis
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.subject.subject import Subject
@@ -41,8 +39,6 @@ class RoomLightTunables:
     """Constants of the estimation.
 
     Attributes:
-        lobe_count: soft lights whose amounts are fitted.
-        lobe_sharpness: k of a light's exp(k (cos − 1)): with 12 half its value at 20°, about the spacing of 80 lights.
         harmonics_degree: of the harmonics that a light is written in: finer light hardly changes a face.
         ridge: pull toward the last fit, relative to the normal matrix's mean diagonal.
         robust_iterations: solutions of the first fit, each with new weights; later fits have one, weighed by the last
@@ -57,8 +53,6 @@ class RoomLightTunables:
         gain_range: limits of that gain.
     """
 
-    lobe_count: int = 80
-    lobe_sharpness: float = 12.0
     harmonics_degree: int = 10
     ridge: float = 3e-3
     robust_iterations: int = 3
@@ -73,6 +67,8 @@ class RoomLightTunables:
 
 
 TUNABLES = RoomLightTunables()
+LIGHTS = SoftLights()
+"""The soft lights whose amounts are fitted."""
 BLUR_CELLS = 3
 """A large live picture is reduced until a sample is the mean of so many by so many pixels; odd: none is displaced."""
 CELLS_PER_BOX = 3.3
@@ -115,14 +111,13 @@ class RoomLightEstimator:
     """Fits the room's light to the face of one subject."""
 
     def __init__(self, subject: Subject, face: SourceFace) -> None:
-        import_module("scipy.optimize")  # takes a tenth of a second: not at the start, and not at the first fit
         self._triangles = _skin_triangles(face)
         harmonics = basis(texel_directions().reshape(-1, 3), TUNABLES.harmonics_degree)
         weighted = harmonics * texel_solid_angles().reshape(-1, 1)
         self._project = np.linalg.solve(harmonics.T @ weighted, weighted.T).astype(np.float32)
         samples = _sample_basis(subject, face.landmarks[self._triangles].mean(axis=1))
         self._response = samples @ (subject.coefficients @ weighted.astype(np.float32))
-        self._amounts = np.zeros((TUNABLES.lobe_count, 3), np.float32)
+        self._amounts = np.zeros((LIGHTS.count, 3), np.float32)
         self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
         self._fitted_at = -np.inf
         self._residual: float | None = None
@@ -140,9 +135,9 @@ class RoomLightEstimator:
         live, usable = _sample_frame(image, landmarks[self._triangles].mean(axis=1))
         due = time_s - self._fitted_at > 1 / TUNABLES.fits_per_s or time_s < self._fitted_at
         if due:
-            self._fit(live, usable, _lobe_maps(rotation))
+            self._fit(live, usable, LIGHTS.maps(rotation))
             self._fitted_at = time_s
-            self._light_map = (_lobe_maps(Rotation.identity()) @ self._amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3)
+            self._light_map = (LIGHTS.maps() @ self._amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3)
         if due or self._seen is None or (rotation * self._seen.rotation.inv()).magnitude() > TUNABLES.turn_tolerance:
             self._seen = self._predict_under(rotation)
         gain = _exposure_gain(live, self._seen.samples, usable)
@@ -157,7 +152,7 @@ class RoomLightEstimator:
         )
 
     def _predict_under(self, rotation: Rotation) -> _Prediction:
-        light = _lobe_maps(rotation) @ self._amounts
+        light = LIGHTS.maps(rotation) @ self._amounts
         return _Prediction(rotation, light.reshape(self._light_map.shape), self._predict(self._project @ light))
 
     def _predict(self, harmonics: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -175,7 +170,7 @@ class RoomLightEstimator:
             level = max(float(goal[usable].mean()) if usable.any() else 0.0, 1e-4)
             weight = usable if first else _robust_weight(predicted[:, channel], goal, level, usable)
             for _ in range(TUNABLES.robust_iterations if first else 1):
-                fitted = regularized_nnls(design, goal, weight, amounts)
+                fitted = regularized_nnls(design, goal, weight, amounts, TUNABLES.ridge)
                 weight = _robust_weight(design @ fitted, goal, level, usable)
             self._amounts[:, channel] = fitted if first else amounts + TUNABLES.light_smoothing * (fitted - amounts)
 
@@ -200,41 +195,10 @@ def _robust_weight(
     return np.asarray(usable * np.minimum(1, TUNABLES.huber_threshold / np.maximum(error, 1e-9)))
 
 
-def regularized_nnls(
-    design: NDArray[np.floating],
-    values: NDArray[np.float32],
-    weight: NDArray[np.floating] | NDArray[np.bool_],
-    prior: NDArray[np.floating],
-) -> NDArray[np.float64]:
-    """Solve argmin_{x ≥ 0} Σ w (A x − b)² + λ |x − prior|², with λ from `RoomLightTunables.ridge`.
-
-    It is solved on the Cholesky factor of the normal matrix, which is small.
-    """
-    from scipy.optimize import nnls
-
-    weighted = design * weight.astype(design.dtype)[:, None]
-    normal = (weighted.T @ design).astype(np.float64)
-    ridge = TUNABLES.ridge * max(float(np.trace(normal)) / len(normal), 1e-12)
-    normal[np.diag_indices_from(normal)] += ridge
-    right = weighted.T @ values + ridge * prior
-    factor = np.linalg.cholesky(normal)
-    solution, _ = nnls(factor.T, np.linalg.solve(factor, right))
-    return np.asarray(solution)
-
-
-def _lobe_maps(rotation: Rotation) -> NDArray[np.float32]:
-    """The soft lights, fixed in the room, in the frame of a head under `rotation`: (2048, lobe_count) float32."""
-    toward = fibonacci_directions(TUNABLES.lobe_count) @ rotation.as_matrix()
-    texels = texel_directions().reshape(-1, 3).astype(np.float32)
-    exponent = texels @ (TUNABLES.lobe_sharpness * toward.T).astype(np.float32)
-    exponent -= np.float32(TUNABLES.lobe_sharpness)
-    return np.exp(exponent, out=exponent)
-
-
 def _skin_triangles(face: SourceFace) -> NDArray[np.intp]:
     """Triangles (count, 3) of landmark indices that lie on skin: not in the eyes, nor between the lips."""
     scheme = face.scheme
-    triangles = np.asarray(Delaunay(face.landmarks).simplices, dtype=np.intp)
+    triangles = delaunay_triangles(face.landmarks)
     holes = [
         set(scheme.right_eye.lids) | set(scheme.right_eye.iris),
         set(scheme.left_eye.lids) | set(scheme.left_eye.iris),
@@ -252,16 +216,14 @@ def _sample_basis(subject: Subject, points: Points) -> NDArray[np.float32]:
     offsets = np.arange(reach) - reach // 2
     base = np.floor(points - 0.5)
     share = points - 0.5 - base
-    rows, columns, weights = [], [], []
+    pixels, weights = [], []
     for across, up in product((0, 1), repeat=2):
         corner = np.abs(1 - across - share[:, 0]) * np.abs(1 - up - share[:, 1]) / reach**2
         for x, y in product(offsets + across, offsets + up):
             column = np.clip(base[:, 0] + x, 0, width - 1)
-            columns.append((np.clip(base[:, 1] + y, 0, height - 1) * width + column).astype(int))
-            rows.append(np.arange(len(points)))
+            pixels.append((np.clip(base[:, 1] + y, 0, height - 1) * width + column).astype(np.intp))
             weights.append(corner)
-    entries = np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))
-    return subject.basis.rows(csr_array(entries, shape=(len(points), width * height)))
+    return subject.basis.rows(np.stack(pixels, axis=1), np.stack(weights, axis=1))
 
 
 def _sample_frame(image: DisplayImage, points: Points) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:

@@ -18,9 +18,9 @@ from relit_camera.live.status.stage_timing import StageTimer
 from relit_camera.subject.relighting.relighter import Relighter
 from relit_camera.subject.subject import Subject
 
-RATIO_INTERVAL_FACTOR, RATIO_MAX_STEP = 2, np.radians(4.0)
+RATIO_MORE_FRAMES, RATIO_MAX_STEP = 1, np.radians(4.0)
 """The ratio of two pictures changes less than one of them, and is seen under the texture of the live picture: while the
-head turns it is computed half as often, and for twice the turn."""
+head turns it is computed once in so many more frames, and for a larger turn."""
 
 
 class SceneRelighting:
@@ -74,7 +74,7 @@ class SceneRelighting:
             room: the room's light map; another object for another light.
             room_in_head_frame: the same as the head sees it.
             combine: makes an array (height, width, 3 or 4) of non-negative values.
-            every: as in `relight`; the comparison is made half as often.
+            every: as in `relight`; the comparison is made less often.
         """
         with self._timer.stage("light"):
             light = self._light.update(scene, time_s)
@@ -83,7 +83,7 @@ class SceneRelighting:
             return combine(*self._relighter.relight(np.stack([self._seen(light, rotation), room_in_head_frame])))
 
         with self._timer.stage("relight"):
-            return self._compared.picture(rotation, light, room, RATIO_INTERVAL_FACTOR * every, relit)
+            return self._compared.picture(rotation, light, room, every + RATIO_MORE_FRAMES, relit)
 
     def _seen(self, light: LightMap, rotation: Rotation) -> LightMap:
         return rotate_light_map(light, rotation) * self._gain

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from relit_camera.base.rotations import Rotation
 
-MAX_STEP = np.radians(2.0)
-"""Radians: shadow edges do not move evenly over such angles, and every other frame would stand out."""
+MAX_STEP = np.radians(3.5)
+"""Radians: shadow edges do not move evenly over such angles, and what is computed would stand out from the rest."""
 MAX_BASE = np.radians(8.0)
 """Two computed pictures further apart than this say nothing about what lies beyond them."""
 _UNMOVED = 1e-6
@@ -68,8 +68,9 @@ class TurnExtrapolation:
         """
         latest = self._latest
         if latest is None or whole is not self._whole:
-            self._whole, self._slope = whole, None
-            return self._keep(_Computed(rotation, part, compute()))
+            computed = _Computed(rotation, part, compute())
+            self._whole, self._slope = whole, None  # only now: after a failure it is tried again
+            return self._keep(computed)
         step = _turn(latest.rotation, rotation)
         self._age += 1
         same = part is latest.part

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+import weakref
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -21,6 +22,24 @@ KEY_DIRECTION, RIM_DIRECTION = np.array([-0.62, 0.55, 0.56]), np.array([0.93, -0
 
 TITLE_COLOR, REASON_COLOR = (222, 224, 228), (138, 144, 152)
 FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+class Placeholder:
+    """A placeholder that is drawn when it is shown, and kept only as long as somebody shows it. Of one thread."""
+
+    def __init__(self, draw: Callable[[], DisplayImage]) -> None:
+        """`draw` makes the picture, uint8 sRGB RGB (height, width, 3)."""
+        self._draw = draw
+        self._drawn: weakref.ref[DisplayImage] = weakref.ref(np.empty((0, 0, 3), np.uint8))
+
+    @property
+    def image(self) -> DisplayImage:
+        """The picture; the same object again while it is held."""
+        image = self._drawn()
+        if image is None:
+            image = self._draw()
+            self._drawn = weakref.ref(image)
+        return image
 
 
 def placeholder(size: tuple[int, int], reason: str = "", picture: Path | None = None) -> DisplayImage:
@@ -48,15 +67,14 @@ def _draw(size: tuple[int, int], reason: str) -> DisplayImage:
     width, height = size
     unit = min(width * 9 / 16, height)
     middle = height * 0.40
-    canvas = _ball(width, height, (width / 2, middle), unit * 0.13).copy()
+    canvas = _ball(width, height, (width / 2, middle), unit * 0.13)
     _write(canvas, TITLE, middle + unit * 0.255, unit * 0.052, TITLE_COLOR)
     _write(canvas, reason.encode("ascii", "replace").decode(), middle + unit * 0.345, unit * 0.028, REASON_COLOR)
     return canvas
 
 
-@lru_cache(maxsize=1)
 def _ball(width: int, height: int, center: tuple[float, float], radius: float) -> DisplayImage:
-    """The picture without text; kept, for the camera draws several placeholders of one size."""
+    """The picture without text."""
     x = (np.arange(width, dtype=np.float32) + np.float32(0.5 - center[0])) / np.float32(radius)
     y = (np.float32(center[1] - 0.5) - np.arange(height, dtype=np.float32)) / np.float32(radius)
     glow = np.float32(0.035) * np.outer(np.exp(y**2 / -9), np.exp(x**2 / -9))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import Indices, LandmarkScheme
@@ -101,7 +100,7 @@ def control_points(face: SourceFace, anchors: NDArray[np.float64]) -> ControlPoi
     chosen = select_landmarks(scheme, face.landmarks.astype(np.float64))
     source = np.vstack([face.landmarks[chosen], anchors]).astype(np.float64)
     # A point reaches about as far as its neighbours are: fine on lips and lids, coarse on cheeks and hair.
-    distance = np.asarray(KDTree(source).query(source, k=4)[0])[:, 1:].mean(axis=1)
+    distance = np.sort(np.linalg.norm(source[:, None] - source[None], axis=2), axis=1)[:, 1:4].mean(axis=1)
     reach = np.ones(len(source))
     reach[: len(chosen)][~np.isin(chosen, scheme.oval)] = FEATURE_REACH
     span = scheme.eye_span(face.landmarks)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.face.head_pose import HeadPose
+from relit_camera.face.landmarks.landmark_triangulation import delaunay_triangles, outline_edges
 from relit_camera.live.reenactment.dense_motion import box_around
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.warp import FlowPatch, Nodes, inverse_affine, patch_cover
@@ -138,40 +138,49 @@ def draw_triangles(
         (channels, rows, columns) float32.
     """
     rows, columns = shape
-    (x, y), (ax, ay), (bx, by) = corners.transpose(1, 2, 0)
+    (x, y), (ax, ay), (bx, by) = np.ascontiguousarray(corners.transpose(1, 2, 0))
+    first_row = np.maximum(np.ceil(np.minimum(np.minimum(y, ay), by)), 0)
+    last_row = np.minimum(np.floor(np.maximum(np.maximum(y, ay), by)), rows - 1)
     ax, ay, bx, by = ax - x, ay - y, bx - x, by - y
     area = ax * by - ay * bx
     flat = area == 0  # such a triangle shows nowhere
     area[flat] = 1
-    # The weights of the second and the third corner, and what is interpolated by them, are planes over the picture:
-    # the change a column, the change a row, and the value at column 0 of row 0.
-    second = np.stack([by, -bx, bx * y - by * x]) / area
-    third = np.stack([-ay, ax, ay * x - ax * y]) / area
-    first_row = np.maximum(np.ceil(corners[..., 1].min(axis=1)), 0)
-    last_row = np.minimum(np.floor(corners[..., 1].max(axis=1)), rows - 1)
-    lines = np.where(flat, 0, np.maximum(last_row - first_row + 1, 0)).astype(np.intp)
+    # The corners' weights, and what is interpolated by them, are planes over the picture: the change a column, the
+    # change a row, and the value at column 0 of row 0; (3 of these, corners or channels, triangles).
+    weights = np.empty((3, 3, len(corners)))
+    weights[:2, 1] = by / area, -bx / area
+    weights[:2, 2] = -ay / area, ax / area
+    weights[2, 1:] = -(weights[0, 1:] * x + weights[1, 1:] * y)
+    weights[:, 0] = -(weights[:, 1] + weights[:, 2])
+    weights[2, 0] += 1
+    base, *others = values.transpose(1, 2, 0)
+    planes = sum(weights[:, None, i] * (other - base) for i, other in enumerate(others, 1))
+    planes[2] += base
+    lines = np.maximum(last_row - first_row + 1, 0)
+    lines[flat] = 0
+    lines = lines.astype(np.intp)
     # In each line of nodes a triangle shows from where the last of its weights gets positive to where the first ends.
-    triangle = np.repeat(np.arange(len(corners)), lines)
+    triangle = np.repeat(np.arange(len(lines)), lines)
     line = np.arange(len(triangle)) + (first_row - (np.cumsum(lines) - lines)).take(triangle)
-    weights = np.stack([second, third, [[0.0], [0.0], [1.0]] - second - third], axis=1)
-    weights[0][weights[0] == 0] = np.finfo(np.float64).tiny ** 0.5
-    slope, down, start = weights.take(triangle, axis=2)
-    end = (-ON_BORDER - start - down * line) / slope
-    left = np.ceil(np.where(slope > 0, end, 0).max(axis=0).clip(0, columns))
-    right = np.floor(np.where(slope < 0, end, columns - 1).min(axis=0).clip(-1, columns - 1))
+    slope, down, start = weights
+    slope[slope == 0] = np.finfo(np.float64).tiny ** 0.5
+    ends = np.concatenate([(-ON_BORDER - start) / slope, down / slope]).take(triangle, axis=1)
+    end = ends[:3] - ends[3:] * line
+    rising = (slope > 0).take(triangle, axis=1)
+    left = np.ceil(np.where(rising, end, 0).max(axis=0).clip(0, columns))
+    right = np.floor(np.where(rising, columns - 1, end).min(axis=0).clip(-1, columns - 1))
     count = np.maximum(right - left + 1, 0).astype(np.intp)
-    before = np.cumsum(count) - count
-    number = np.arange(count.sum())
-    place = number + np.repeat((line * columns + left).astype(np.intp) - before, count)
-    along = (number - np.repeat(before, count)).astype(np.float32)
-    drawn = np.zeros((values.shape[2], rows * columns), np.float32)
-    for channel, (base, by_second, by_third) in zip(drawn, values.transpose(2, 1, 0), strict=True):
-        plane = second * (by_second - base) + third * (by_third - base)
-        plane[2] += base
-        across, downward, origin = plane.take(triangle, axis=1)
-        begin = (origin + across * left + downward * line).astype(np.float32)
-        # Where a place is given several times the last value stays.
-        channel[place] = np.repeat(begin, count) + along * np.repeat(across.astype(np.float32), count)
+    across, downward, origin = planes.take(triangle, axis=2)
+    begin = origin + across * left + downward * line
+    span = np.repeat(np.arange(len(count)), count)
+    along = np.arange(len(span)) - (np.cumsum(count) - count).take(span)
+    place = (line * columns + left).astype(np.intp).take(span) + along
+    shown = across.astype(np.float32).take(span, axis=1)
+    shown *= along.astype(np.float32)
+    shown += begin.astype(np.float32).take(span, axis=1)
+    drawn = np.zeros((len(planes[0]), rows * columns), np.float32)
+    for channel, value in zip(drawn, shown, strict=True):
+        channel[place] = value  # where a place is given several times the last value stays
     return drawn.reshape(-1, rows, columns)
 
 
@@ -180,9 +189,8 @@ def triangulate_face(face: SourceFace) -> FaceMesh:
     irises = {*face.scheme.right_eye.iris, *face.scheme.left_eye.iris}
     members = np.array([index for index in range(face.scheme.count) if index not in irises], dtype=np.intp)
     corners = face.landmarks[members].astype(np.float64)
-    delaunay = Delaunay(corners)
-    triangles = np.asarray(delaunay.simplices, dtype=np.intp)
-    outline = np.array([corners[row] for row in delaunay.convex_hull])
+    triangles = delaunay_triangles(face.landmarks[members])
+    outline = corners[outline_edges(triangles)]
     span = face.scheme.eye_span(face.landmarks)
     trust = smoothstep(_distance(corners, outline), 0, OUTLINE_BLEND * span)
     clockwise = np.sign(_doubled_areas(corners[triangles]))

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.spatial import KDTree
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import SubjectError
@@ -102,6 +100,9 @@ EDGE_SIGMA, EDGE_GROWTH = 0.5, 0.5
 the nearest of them is away."""
 EDGE_NEIGHBORS, NEGLIGIBLE = 9, 0.02
 """How many colors are averaged at most, and the share of the largest weight below which one does not count."""
+EDGE_COLUMNS = 256
+FLANN_INDEX_KDTREE_SINGLE, FLANN_CHECKS_UNLIMITED = 4, -1
+"""FLANN's names, which OpenCV does not export, for a search that is exact."""
 BEYOND = cv2.BORDER_REPLICATE
 """The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing."""
 REACH = 4
@@ -132,8 +133,7 @@ class Cutout:
         """
         codes, edge = display_from_linear(relit), self._edge
         if edge.pixels.size:
-            colors = edge.averages @ relit.reshape(-1, 3)
-            codes.reshape(-1, 3)[edge.pixels] = display_from_linear(colors[np.newaxis])[0]
+            codes.reshape(-1, 3)[edge.pixels] = display_from_linear(edge.averaged(relit)[np.newaxis])[0]
         colored = cv2.cvtColor(codes, cv2.COLOR_RGB2RGBA)
         cv2.insertChannel(self._alpha_codes, colored, 3)
         size = (UPSAMPLING * relit.shape[1], UPSAMPLING * relit.shape[0])
@@ -161,11 +161,21 @@ class _EdgeColors:
 
     Attributes:
         pixels: (count,) flat indices of those pixels.
-        averages: sparse (count, pixels of the picture) float32: straight colors of them from the picture's.
+        nearby: (`EDGE_NEIGHBORS` · rows, columns, 2) int16: x and y of what is averaged, the first of all pixels, then
+            the second; as rows of `EDGE_COLUMNS`, because OpenCV limits the sides of what it samples.
+        weights: (`EDGE_NEIGHBORS`, rows · columns · 3) float32 of it, the same for each channel: straight colors of the
+            pixels from the picture's.
     """
 
     pixels: NDArray[np.intp]
-    averages: csr_array
+    nearby: NDArray[np.int16]
+    weights: NDArray[np.float32]
+
+    def averaged(self, picture: LinearImage) -> NDArray[np.float32]:
+        """The colors (count, 3) from a picture (height, width, 3)."""
+        colors = cv2.remap(picture, self.nearby, None, cv2.INTER_NEAREST).reshape(self.weights.shape)
+        sums = cv2.reduce(cv2.multiply(colors, self.weights, dst=colors), 0, cv2.REDUCE_SUM)
+        return np.asarray(sums.reshape(-1, 3)[: len(self.pixels)], np.float32)
 
 
 def _edge_colors(matte: Mask, over_black: bool) -> _EdgeColors:
@@ -177,21 +187,40 @@ def _edge_colors(matte: Mask, over_black: bool) -> _EdgeColors:
     """
     sure = np.flatnonzero(matte >= min(COLORED, float(matte.max())))
     pixels = np.flatnonzero((matte < 1) & (_around(matte) > 0))
-    places = np.column_stack(np.unravel_index(sure, matte.shape))
     count = min(EDGE_NEIGHBORS, sure.size)
-    edge = np.column_stack(np.unravel_index(pixels, matte.shape))
-    found = KDTree(places).query(edge, k=[*range(1, count + 1)])
-    distance, near = np.asarray(found[0]), np.asarray(found[1])
-    share = matte.ravel()[sure][near]
+    index, distance = _nearest(_places(sure, matte), _places(pixels, matte), count)
+    near = sure[index]
+    share = matte.ravel()[near]
     nearest = distance[:, :1]
     sigma = EDGE_SIGMA + EDGE_GROWTH * nearest
     weight = share**TRUST_POWER * np.exp((nearest**2 - distance**2) / (2 * sigma**2))
     weight[weight < NEGLIGIBLE * weight.max(axis=1, keepdims=True)] = 0
     weight /= (weight * (share if over_black else 1)).sum(axis=1, keepdims=True)
-    starts = np.arange(len(pixels) + 1) * count
-    averages = csr_array((weight.astype(np.float32).ravel(), sure[near].ravel(), starts), (len(pixels), matte.size))
-    averages.eliminate_zeros()
-    return _EdgeColors(pixels, averages)
+    rows = -(-len(pixels) // EDGE_COLUMNS)
+    nearby = np.zeros((EDGE_NEIGHBORS, rows * EDGE_COLUMNS, 2), np.int16)
+    weights = np.zeros((EDGE_NEIGHBORS, rows * EDGE_COLUMNS, 3), np.float32)
+    nearby[:count, : len(pixels), 1], nearby[:count, : len(pixels), 0] = np.divmod(near.T, matte.shape[1])
+    weights[:count, : len(pixels)] = weight.T[..., None]
+    return _EdgeColors(pixels, nearby.reshape(-1, EDGE_COLUMNS, 2), weights.reshape(EDGE_NEIGHBORS, -1))
+
+
+def _places(pixels: NDArray[np.intp], matte: Mask) -> NDArray[np.float32]:
+    """Rows and columns (count, 2) of flat indices."""
+    return np.column_stack(np.unravel_index(pixels, matte.shape)).astype(np.float32)
+
+
+def _nearest(
+    points: NDArray[np.float32], around: NDArray[np.float32], count: int
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """The `count` of `points` (some, 2) that are nearest to each of `around` (others, 2), nearest first.
+
+    Indices and distances, (others, count) each. By OpenCV: SciPy's tree would cost the camera 16 MB.
+    """
+    if not len(around):
+        return np.zeros((0, count), np.int32), np.zeros((0, count))
+    tree = cv2.flann.Index(points, {"algorithm": FLANN_INDEX_KDTREE_SINGLE})
+    indices, squares = tree.knnSearch(around, count, params={"checks": FLANN_CHECKS_UNLIMITED})
+    return np.asarray(indices, np.int32), np.sqrt(np.asarray(squares, np.float64))
 
 
 def _around(matte: Mask) -> Mask:

@@ -105,11 +105,9 @@ class PositionGrid:
         """
         width, height = self.box[2] - self.box[0], self.box[3] - self.box[1]
         sampled = (np.empty if seen is None else np.zeros)((height, width, *image.shape[2:]), image.dtype)
-        # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
-        positions = self.positions * np.float32(enlarged) - np.float32(0.5)
         step = self.step
-        for first in range(0, len(positions) - 2, BAND_CELLS):
-            cells = positions[first : first + BAND_CELLS + 2]
+        for first in range(0, len(self.positions) - 2, BAND_CELLS):
+            cells = self.positions[first : first + BAND_CELLS + 2]
             top, bottom, left, right = first * step, min((first + BAND_CELLS) * step, height), 0, width
             if seen is not None:
                 columns = np.flatnonzero(seen[first : first + BAND_CELLS].any(axis=0))
@@ -117,6 +115,8 @@ class PositionGrid:
                     continue
                 left, right = columns[0] * step, min((columns[-1] + 1) * step, width)
                 cells = cells[:, columns[0] : columns[-1] + 3]
+            cells = cells * np.float32(enlarged)
+            cells -= np.float32(0.5)  # cv2 counts pixel centers as integers: x_ours = x_cv + ½
             fine = cv2.resize(cells, None, fx=step, fy=step, interpolation=cv2.INTER_LINEAR)
             band = fine[step : step + bottom - top, step : step + right - left]
             onto = sampled[top:bottom, left:right]

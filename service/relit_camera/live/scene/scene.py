@@ -21,6 +21,7 @@ class Scene:
         subject_name: name of the subject, for status and panel.
         subject: the person shown; None shows the live picture without relighting.
         frozen: whether the published picture is held.
+        unlit_allowed: whether the live picture may be shown as it is while there is no subject; else a placeholder is.
         revision: number of changes so far.
     """
 
@@ -30,4 +31,5 @@ class Scene:
     subject_name: str | None = None
     subject: Subject | None = None
     frozen: bool = False
+    unlit_allowed: bool = True
     revision: int = 0

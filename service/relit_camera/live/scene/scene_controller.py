@@ -10,7 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.base.config.look import Background, ColorBackground, EnvironmentBackground, ImageBackground, Look
+from relit_camera.base.config.look import (
+    Background,
+    ColorBackground,
+    EnvironmentBackground,
+    ImageBackground,
+    Look,
+    Mode,
+)
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import InputError, NotFoundError
 from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, uint8_from_linear
@@ -72,8 +79,11 @@ class SceneController:
             environment = self._unchanged_environment(look) or self._environment(look, image)
             return self._replace(look=look, environment=environment, background_image=image)
 
-    def choose_stored_subject(self, name: str | None) -> Scene:
+    def choose_stored_subject(self, name: str | None, mode: Mode | None = None) -> Scene:
         """Show a subject of the store, or none. For names from the API: never a file elsewhere.
+
+        Whoever asks for none may be shown the live picture unlit (`Scene.unlit_allowed`). With `mode` the mode changes
+        in the same step.
 
         Raises:
             NotFoundError: no stored subject has that name.
@@ -81,7 +91,9 @@ class SceneController:
         """
         with self._change:
             subject = None if name is None else self.subjects.load(name)
-            return self._replace(subject=subject, subject_name=name)
+            unlit_allowed = self.scene.unlit_allowed or name is None
+            look = self.scene.look if mode is None else self.scene.look.model_copy(update={"mode": mode})
+            return self._replace(subject=subject, subject_name=name, unlit_allowed=unlit_allowed, look=look)
 
     def load_configured_subject(self, name_or_path: str | None) -> Scene:
         """Show the subject that the command line or the configuration names: a stored one, else a file; or none.
@@ -103,6 +115,11 @@ class SceneController:
         """Hold the published picture, or continue."""
         with self._change:
             return self._replace(frozen=frozen)
+
+    def set_unlit_allowed(self, allowed: bool) -> Scene:
+        """Say whether the live picture may be shown as it is while there is no subject."""
+        with self._change:
+            return self._replace(unlit_allowed=allowed)
 
     def register_temporary_environment(self, name_or_path: str) -> str:
         """Make the environment of a file available under a name, for this run only; a stored one keeps its own name.

@@ -21,6 +21,8 @@ class CameraState(StrEnum):
     `output.fallback` says."""
     RELEASED = "released"
     """On demand, and nobody reads the camera: the webcam is released, the placeholder is shown."""
+    CAPTURING = "capturing"
+    """A first subject is being captured and the live picture may not be shown unlit: the placeholder says so."""
     FROZEN = "frozen"
     STOPPING = "stopping"
 

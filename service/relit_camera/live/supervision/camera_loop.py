@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import DeviceError
-from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.images.image_types import Frame
 from relit_camera.devices.sources.source import Source, SourceState
 from relit_camera.face.face_state import FaceStatus
+from relit_camera.live.frame_recorder import FrameRecorder
 from relit_camera.live.pipeline import RenderedFrame
+from relit_camera.live.publishing.placeholder_image import Placeholder
 from relit_camera.live.publishing.publisher import PublishedPicture, Publisher
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import CameraState, DegradationCode
@@ -36,15 +38,17 @@ class LoopTimings:
 
 @dataclass(frozen=True)
 class Placeholders:
-    """Pictures for when the source gives no frames: uint8 sRGB RGB (height, width, 3), of the output's size.
+    """Pictures for when no frame may be shown, of the output's size.
 
     Attributes:
         waiting: the source is looked for.
         released: nobody reads the camera, so the webcam is off.
+        capturing: there is no subject yet, and the live picture may not be shown unlit.
     """
 
-    waiting: DisplayImage
-    released: DisplayImage
+    waiting: Placeholder
+    released: Placeholder
+    capturing: Placeholder
 
 
 DEFAULT_TIMINGS = LoopTimings()
@@ -68,12 +72,13 @@ class CameraLoop:
         placeholders: Placeholders,
         scene: Callable[[], Scene],
         board: StatusBoard,
+        recorder: FrameRecorder,
         timings: LoopTimings = DEFAULT_TIMINGS,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         self._source, self._supervisor, self._fallback = source, supervisor, fallback
         self._publisher, self._placeholders, self._scene, self._board = publisher, placeholders, scene, board
-        self._timings, self._clock = timings, clock
+        self._recorder, self._timings, self._clock = recorder, timings, clock
         self._last_index = -1
         self.skipped = 0
         self.camera_rate, self.pipeline_rate = RateMeter(clock=clock), RateMeter(clock=clock)
@@ -92,8 +97,12 @@ class CameraLoop:
         if frame is None:
             return
         self._count(frame)
+        self._recorder.offer(frame)
         scene = self._scene()
         if scene.frozen:
+            return
+        if scene.subject is None and not scene.unlit_allowed:
+            self._show(self._placeholders.capturing, CameraState.CAPTURING)
             return
         if self._supervisor.submit_frame(frame):
             self._fallback.release()
@@ -129,8 +138,8 @@ class CameraLoop:
                 self._clock.wait(stopping, self._timings.read_timeout_s)  # its `read` returns at once
         return None
 
-    def _show(self, placeholder: DisplayImage, state: CameraState) -> None:
-        self._publisher.show_placeholder(placeholder, self._last_index)
+    def _show(self, placeholder: Placeholder, state: CameraState) -> None:
+        self._publisher.show_placeholder(placeholder.image, self._last_index)
         self._board.set_state(state)
 
     def _count(self, frame: Frame) -> None:
@@ -159,6 +168,8 @@ def publish_if_current(publisher: Publisher, scene: Callable[[], Scene], frame: 
     """
     now, then = scene(), rendered.scene
     if now.frozen or now.subject is not then.subject or now.look.mode is not then.look.mode:
+        return False
+    if now.subject is None and not now.unlit_allowed:
         return False
     publisher.pictures.put(PublishedPicture(rendered.image, frame.captured_at, frame.index))
     return True

@@ -6,13 +6,14 @@ import logging
 
 import numpy as np
 
-from relit_camera.base.concurrency.threads import return_freed_memory
+from relit_camera.base.concurrency.resident_memory import large_allocations_apart, return_freed_memory
 from relit_camera.base.config.settings import Fallback
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.light.light_map import LightMap
 from relit_camera.live.compositing.background_renderer import BackgroundRenderer
 from relit_camera.live.compositing.compositor import composite_source_image
+from relit_camera.live.publishing.placeholder_image import Placeholder
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.warp import Warp, source_from_output, visible_box
@@ -31,13 +32,13 @@ class FallbackRenderer:
     thread-safe.
     """
 
-    def __init__(self, size: tuple[int, int], fallback: Fallback, placeholder: DisplayImage) -> None:
+    def __init__(self, size: tuple[int, int], fallback: Fallback, placeholder: Placeholder) -> None:
         """Set up; nothing is rendered yet.
 
         Args:
             size: (width, height) of the output in pixels.
             fallback: what is shown where the source image cannot be relit.
-            placeholder: uint8 sRGB RGB (height, width, 3), of the output's size.
+            placeholder: of the output's size.
         """
         self._size, self._fallback, self._placeholder = size, fallback, placeholder
         self._background_renderer = BackgroundRenderer(size)
@@ -60,11 +61,12 @@ class FallbackRenderer:
             except Exception:  # this is what is shown when all else fails
                 log.exception("the source image cannot be relit either")
                 self._failed_subject = subject
-        return crop_to_fill(frame.image, self._size) if self._fallback is Fallback.LIVE else self._placeholder
+        return crop_to_fill(frame.image, self._size) if self._fallback is Fallback.LIVE else self._placeholder.image
 
     def _relit(self, subject: Subject, scene: Scene, now: float) -> DisplayImage:
         if self._source is None or self._source.subject is not subject:
-            self._source = _RelitSource(subject, self._size)
+            with large_allocations_apart():
+                self._source = _RelitSource(subject, self._size)
         light = self._light.update(scene, now) * np.float32(subject.metadata.display_gain)
         return composite_source_image(self._background_renderer, self._source.render(light), scene, now)
 

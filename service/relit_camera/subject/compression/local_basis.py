@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from relit_camera.base.images.image_types import Mask
 
@@ -81,21 +80,24 @@ class LocalBasis:
                 result[:, target[wanted]] = mixed.reshape(-1, 3, len(wanted)).transpose(0, 2, 1)
         return result
 
-    def rows(self, weights: csr_array) -> NDArray[np.float32]:
-        """Weighted sums (3, count, components) of the pixels' rows, by weights (count, pixels)."""
-        columns = weights.tocsc()
-        result = np.zeros((3, weights.shape[0], self.components), np.float32)
-        for cluster, part in self._clusters():
-            # A repeated pixel must count once.
-            unique, places = np.unique(cluster, return_index=True)
-            used = columns[:, unique]
-            touched = np.unique(used.indices)
-            if len(touched):
-                dense = used.tocsr()[touched].toarray().astype(np.float32)
-                mixes = self.scaled_mixes(part)
-                for channel in range(3):
-                    values = self.values[part][:, channel, places].astype(np.float32)
-                    result[channel, touched] += dense @ values.T @ mixes
+    def rows(self, pixels: NDArray[np.intp], weights: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Weighted sums (3, count, components) of rows: of the `pixels` (count, some), by `weights` (count, some)."""
+        places = self.pixels.shape[1]
+        found = np.full(self._end(pixels), -1, np.intp)
+        found[self.pixels.ravel()] = np.arange(self.pixels.size)  # of a repeated pixel the last place
+        place = found[pixels.ravel()]
+        order = np.argsort(place, kind="stable")
+        order = order[np.searchsorted(place[order], 0) :]
+        bounds = np.searchsorted(place[order], np.arange(len(self.pixels) + 1) * places)
+        result = np.zeros((3, len(pixels), self.components), np.float32)
+        for index, (_, part) in enumerate(self._clusters()):
+            entries = order[bounds[index] : bounds[index + 1]]
+            if len(entries):
+                touched, at = np.unique(entries // pixels.shape[1], return_inverse=True)
+                shares = np.zeros((len(touched), places), np.float32)
+                np.add.at(shares, (at, place[entries] - index * places), weights.ravel()[entries])
+                values = self.values[part].transpose(1, 2, 0).astype(np.float32)
+                result[:, touched] += shares @ values @ self.scaled_mixes(part)
         return result
 
     def gram(self) -> NDArray[np.float64]:

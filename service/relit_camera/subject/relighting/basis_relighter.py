@@ -121,4 +121,4 @@ class BasisRelighter:
         count = len(light_maps)
         light = weighted_light(light_maps).transpose(2, 0, 1).reshape(3 * count, -1)
         local = self._mixes(light @ self._coefficients.T).reshape(3, count, -1)
-        return self._clusters(local).take(self._source, axis=1).reshape(count, *self._shape, 3)
+        return self._clusters(local).take(self._source, axis=1, mode="clip").reshape(count, *self._shape, 3)

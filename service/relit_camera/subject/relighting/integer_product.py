@@ -9,15 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
-
-if TYPE_CHECKING:
-    from onnx import NodeProto, ValueInfoProto
+from relit_camera.subject.relighting.onnx_graph import ELEMENT_TYPES, model, node, tensor_value
 
 Values = NDArray[np.float32]
 
@@ -30,6 +28,7 @@ MAX_FACTOR = (63 << DIGIT_BITS) + 63
 PLACES_PER_TILE = 64
 """Larger clusters are divided into tiles of this: matrices that are packed and multiplied within the cache."""
 OPSET, IR_VERSION = 21, 9
+FLOAT = ELEMENT_TYPES["float32"]
 
 
 @dataclass(frozen=True)
@@ -111,27 +110,24 @@ def _encode(block: Values) -> list[QuantizedRows]:
 
 def _product_session(widths: Sequence[int], threads: int) -> Session:
     """`head` and `rest`, digits (count, columns), codes and scales of each part, → `product` (count, tiles, places)."""
-    from onnx import TensorProto, helper
-
     names = ["head", "head", "rest"][: len(widths)]
     nodes, inputs = [], []
     for i, (name, width) in enumerate(zip(names, widths, strict=True)):
         inputs += [
-            helper.make_tensor_value_info(f"codes_{i}", TensorProto.INT8, ["tiles", width, PLACES_PER_TILE]),
-            helper.make_tensor_value_info(f"scales_{i}", TensorProto.FLOAT, ["tiles", 1, PLACES_PER_TILE]),
+            tensor_value(f"codes_{i}", "int8", ["tiles", width, PLACES_PER_TILE]),
+            tensor_value(f"scales_{i}", "float32", ["tiles", 1, PLACES_PER_TILE]),
         ]
         nodes += [
-            helper.make_node("MatMulInteger", [name, f"codes_{i}", "zero"], [f"sum_{i}"]),
-            helper.make_node("Cast", [f"sum_{i}"], [f"number_{i}"], to=TensorProto.FLOAT),
-            helper.make_node("Mul", [f"number_{i}", f"scales_{i}"], [f"product_{i}"]),
+            node("MatMulInteger", [name, f"codes_{i}", "zero"], [f"sum_{i}"]),
+            node("Cast", [f"sum_{i}"], [f"number_{i}"], to=FLOAT),
+            node("Mul", [f"number_{i}", f"scales_{i}"], [f"product_{i}"]),
         ]
-    nodes.append(helper.make_node("Sum", [f"product_{i}" for i in range(len(widths))], ["tiles"]))
-    nodes.append(helper.make_node("Transpose", ["tiles"], ["product"], perm=[1, 0, 2]))
+    nodes.append(node("Sum", [f"product_{i}" for i in range(len(widths))], ["tiles"]))
+    nodes.append(node("Transpose", ["tiles"], ["product"], perm=[1, 0, 2]))
     inputs += [
-        helper.make_tensor_value_info(name, TensorProto.UINT8, ["count", width])
-        for name, width in dict(zip(names, widths, strict=True)).items()
+        tensor_value(name, "uint8", ["count", width]) for name, width in dict(zip(names, widths, strict=True)).items()
     ]
-    output = helper.make_tensor_value_info("product", TensorProto.FLOAT, ["count", "tiles", PLACES_PER_TILE])
+    output = tensor_value("product", "float32", ["count", "tiles", PLACES_PER_TILE])
     return _session("relight-mixes", nodes, {}, inputs, output, threads)
 
 
@@ -186,8 +182,6 @@ def _tiled(values: NDArray[np.int8]) -> NDArray[np.int8]:
 
 def _cluster_session(groups: Sequence[NDArray[np.int8]], threads: int) -> Session:
     """`digits` (2, count, 3, components) and `scales` (count, tiles · 3, 1) → `products` of `ClusterProducts`."""
-    from onnx import TensorProto, helper
-
     rows = sum(3 * len(values) * values.shape[1] for values in groups)
     places = PLACES_PER_TILE
     sizes = [len(values) * values.shape[3] for values in groups]
@@ -201,50 +195,41 @@ def _cluster_session(groups: Sequence[NDArray[np.int8]], threads: int) -> Sessio
         "one_more": np.array([0, 0, 0, 1], np.int64),
     }
     inputs = []
-    nodes = [helper.make_node("Split", ["digits", "sizes"], names, axis=3)]
+    nodes = [node("Split", ["digits", "sizes"], names, axis=3)]
     for i, values in enumerate(groups):
         constants[f"row_{i}"] = np.array([-1, len(values) * values.shape[1] * 3 * places], np.int64)
-        inputs.append(helper.make_tensor_value_info(f"values_{i}", TensorProto.INT8, values.shape))
+        inputs.append(tensor_value(f"values_{i}", "int8", values.shape))
         constants |= {f"shape_{i}": np.array([-1, 3, len(values), 1, values.shape[3]], np.int64)}
         nodes += [
-            helper.make_node("Reshape", [names[i], f"shape_{i}"], [f"by_light_{i}"]),
-            helper.make_node("Transpose", [f"by_light_{i}"], [f"by_cluster_{i}"], perm=[2, 3, 1, 0, 4]),
-            helper.make_node("MatMulInteger", [f"by_cluster_{i}", f"values_{i}", "zero"], [f"mixed_{i}"]),
-            helper.make_node("Transpose", [f"mixed_{i}"], [f"light_first_{i}"], perm=[3, 0, 1, 2, 4]),
-            helper.make_node("Reshape", [f"light_first_{i}", f"row_{i}"], [f"places_{i}"]),
+            node("Reshape", [names[i], f"shape_{i}"], [f"by_light_{i}"]),
+            node("Transpose", [f"by_light_{i}"], [f"by_cluster_{i}"], perm=[2, 3, 1, 0, 4]),
+            node("MatMulInteger", [f"by_cluster_{i}", f"values_{i}", "zero"], [f"mixed_{i}"]),
+            node("Transpose", [f"mixed_{i}"], [f"light_first_{i}"], perm=[3, 0, 1, 2, 4]),
+            node("Reshape", [f"light_first_{i}", f"row_{i}"], [f"places_{i}"]),
         ]
     nodes += [
-        helper.make_node("Concat", [f"places_{i}" for i in range(len(groups))], ["sums"], axis=1),
-        helper.make_node("Cast", ["sums"], ["numbers"], to=TensorProto.FLOAT),
-        helper.make_node("Reshape", ["numbers", "by_digit"], ["pairs"]),
-        helper.make_node("Split", ["pairs"], ["high", "low"], axis=0, num_outputs=2),
-        helper.make_node("Mul", ["high", "base"], ["shifted"]),
-        helper.make_node("Add", ["shifted", "low"], ["whole"]),
-        helper.make_node("Reshape", ["whole", "by_channel"], ["unscaled"]),
-        helper.make_node("Mul", ["unscaled", "scales"], ["scaled"]),
-        helper.make_node("Reshape", ["scaled", "flat"], ["all"]),
-        helper.make_node("Pad", ["all", "one_more"], ["products"]),
+        node("Concat", [f"places_{i}" for i in range(len(groups))], ["sums"], axis=1),
+        node("Cast", ["sums"], ["numbers"], to=FLOAT),
+        node("Reshape", ["numbers", "by_digit"], ["pairs"]),
+        node("Split", ["pairs"], ["high", "low"], axis=0, num_outputs=2),
+        node("Mul", ["high", "base"], ["shifted"]),
+        node("Add", ["shifted", "low"], ["whole"]),
+        node("Reshape", ["whole", "by_channel"], ["unscaled"]),
+        node("Mul", ["unscaled", "scales"], ["scaled"]),
+        node("Reshape", ["scaled", "flat"], ["all"]),
+        node("Pad", ["all", "one_more"], ["products"]),
     ]
     inputs += [
-        helper.make_tensor_value_info("digits", TensorProto.UINT8, [2, "count", 3, sum(sizes)]),
-        helper.make_tensor_value_info("scales", TensorProto.FLOAT, ["count", rows, 1]),
+        tensor_value("digits", "uint8", [2, "count", 3, sum(sizes)]),
+        tensor_value("scales", "float32", ["count", rows, 1]),
     ]
-    output = helper.make_tensor_value_info("products", TensorProto.FLOAT, ["count", rows * places + 1])
+    output = tensor_value("products", "float32", ["count", rows * places + 1])
     return _session("relight-clusters", nodes, constants, inputs, output, threads)
 
 
 def _session(
-    name: str,
-    nodes: list[NodeProto],
-    constants: dict[str, NDArray],
-    inputs: list[ValueInfoProto],
-    output: ValueInfoProto,
-    threads: int,
+    name: str, nodes: list[bytes], constants: dict[str, NDArray], inputs: list[bytes], output: bytes, threads: int
 ) -> Session:
-    from onnx import helper, numpy_helper
-
     constants = {**constants, "zero": np.array(DIGIT_ZERO, np.uint8)}
-    tensors = [numpy_helper.from_array(value, each) for each, value in constants.items()]
-    graph = helper.make_graph(nodes, name, inputs, [output], tensors)
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
-    return open_session(model.SerializeToString(), name, SessionOptions("cpu", threads))
+    serialized = model(name, nodes, inputs, output, constants, OPSET, IR_VERSION)
+    return open_session(serialized, name, SessionOptions("cpu", threads))

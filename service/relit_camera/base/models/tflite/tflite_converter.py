@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from onnx import helper
 
-from relit_camera.base.models.tflite import operators
+from relit_camera.base.models.tflite import operators, region_operators
 from relit_camera.base.models.tflite.onnx_graph_builder import Layout, OnnxGraphBuilder
 from relit_camera.base.models.tflite.operators import (
     binary,
@@ -49,6 +49,7 @@ OPERATORS: Mapping[str, Callable[[OnnxGraphBuilder, Operator], None]] = {
     "DEQUANTIZE": dequantize,
     "DIV": binary("Div"),
     "HARD_SWISH": unary("HardSwish"),
+    "Landmarks2TransformMatrix": region_operators.region_matrix,
     "LOGISTIC": unary("Sigmoid"),
     "MAX_POOL_2D": pool("MaxPool"),
     "MEAN": operators.reduce("ReduceMean"),
@@ -66,6 +67,8 @@ OPERATORS: Mapping[str, Callable[[OnnxGraphBuilder, Operator], None]] = {
     "SUB": binary("Sub"),
     "SUM": operators.reduce("ReduceSum"),
     "TRANSPOSE": operators.transpose,
+    "TransformLandmarks": region_operators.transform_landmarks,
+    "TransformTensorBilinear": region_operators.cut_region,
 }
 """Each adds the ONNX nodes of one TFLite operator to the graph."""
 

@@ -39,7 +39,8 @@ class Operator:
         kind: TFLite's name, such as CONV_2D; for a custom operator, its own name.
         inputs: indices of tensors; -1 is an optional one left out.
         outputs: indices of tensors.
-        options: the options table of `tflite`, such as `tflite.Conv2DOptions`; None where there is none.
+        options: the options table of `tflite`, such as `tflite.Conv2DOptions`, or a custom operator's as a dictionary;
+            None where there is none.
     """
 
     kind: str
@@ -101,10 +102,11 @@ def _operator(model: Any, operator: Any) -> Operator:
 
     code = model.OperatorCodes(operator.OpcodeIndex())
     kind = _constant_names(tflite.BuiltinOperator)[code.BuiltinCode()]
+    options = _options(operator)
     if kind == "CUSTOM":
-        kind = code.CustomCode().decode()
+        kind, options = code.CustomCode().decode(), _custom_options(operator)
     inputs, outputs = operator.InputsAsNumpy().tolist(), operator.OutputsAsNumpy().tolist()
-    return Operator(kind, tuple(inputs), tuple(outputs), _options(operator))
+    return Operator(kind, tuple(inputs), tuple(outputs), options)
 
 
 def _options(operator: Any) -> Any:
@@ -116,6 +118,18 @@ def _options(operator: Any) -> Any:
     options = getattr(tflite, _constant_names(tflite.BuiltinOptions)[operator.BuiltinOptionsType()])()
     options.Init(table.Bytes, table.Pos)
     return options
+
+
+def _custom_options(operator: Any) -> Any:
+    """The options of a custom operator, which are a FlexBuffer of their own; None where there are none, or others."""
+    from flatbuffers import flexbuffers
+
+    if not operator.CustomOptionsLength():
+        return None
+    try:
+        return flexbuffers.Loads(bytes(operator.CustomOptionsAsNumpy()))
+    except (ValueError, struct.error):
+        return None
 
 
 @cache

@@ -21,11 +21,12 @@ from safetensors import SafetensorError, safe_open
 
 from relit_camera import __version__
 from relit_camera.base.errors import InputError, StorageError
-from relit_camera.base.models.model_store import ModelState, ModelStore
+from relit_camera.base.models.model_store import installed_model
 from relit_camera.base.storage.atomic_files import make_folder, storage_error, write_tensors
 from relit_camera.base.video.video_decoding import open_stream
 from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
+from relit_camera.face.detection.installed_detector import DETECTORS
 
 CHECKPOINT_VERSION = 1
 FOLDER_SUFFIX = ".partial"
@@ -49,7 +50,7 @@ class Checkpoint:
 
 
 def input_fingerprint(video: Path, options: CaptureOptions) -> str:
-    """Text of all that samples depend on: film name and content, options, version, and whether a detector is installed.
+    """Text of all that samples depend on: film name and content, options, version, and the detector that is installed.
 
     Raises:
         VideoError: there is no such film, or nothing of it can be read.
@@ -57,7 +58,7 @@ def input_fingerprint(video: Path, options: CaptureOptions) -> str:
     open_stream(video)[0].close()
     with video.open("rb") as file:
         content = hashlib.file_digest(file, "sha256").hexdigest()
-    detector = ModelStore().state("face_detector_yunet") is ModelState.PULLED
+    detector = installed_model(DETECTORS)
     return json.dumps([CHECKPOINT_VERSION, __version__, video.name, content, asdict(options), detector])
 
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from relit_camera.base.errors import ModelError
 from relit_camera.base.images.color import Gamma
-from relit_camera.base.models.model_store import model_path
 from relit_camera.base.video.video_readers import LinearVideoFrame, LinearVideoReader
 from relit_camera.capture.film.ball.ball_detection import find_balls
 from relit_camera.capture.film.ball.frame_sample import MAX_FRAMES, FrameSample, sample_frames
@@ -48,7 +47,8 @@ from relit_camera.capture.film.pipeline.capture_report import CaptureFindings
 from relit_camera.capture.film.pipeline.film_measurement import UsableFrames, measure_film
 from relit_camera.capture.film.stabilization.film_stabilization import stabilize_film
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
-from relit_camera.face.tracking.face_detector import FaceDetector
+from relit_camera.face.detection.face_detector import FaceDetector
+from relit_camera.face.detection.installed_detector import open_face_detector
 
 _BALL_REACH = 1.15
 """Radii about a ball within which the person cannot be."""
@@ -221,6 +221,6 @@ def _sample_frames(video: Path, flashes: Flashes, gamma: Gamma, threads: int) ->
 def _installed_detector() -> FaceDetector | None:
     """The face detector; None where it is not installed, which the report's warnings say."""
     try:
-        return FaceDetector(model_path("face_detector_yunet"))
+        return open_face_detector()
     except ModelError:
         return None

@@ -17,7 +17,7 @@ from relit_camera.capture.film.ball.sphere_projection import PinholeView
 from relit_camera.capture.film.face_localization import median_eye_distance_px
 from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass
 from relit_camera.capture.film.olat.camera_gains import FrameGains, downsample_for_gains, estimate_gains
-from relit_camera.face.tracking.face_detector import FaceDetector
+from relit_camera.face.detection.face_detector import FaceDetector
 
 _PORTRAITS = 8
 """Bright frames in which the eyes are looked for."""

@@ -79,9 +79,8 @@ class BlendField:
         `covered` is the weight of the smooth field, whose values have it as a factor already.
         """
         rest = 1 - self.fraction
-        total = self.fraction + rest * covered + 1e-9
-        modelled *= self.fraction / total
-        modelled += np.maximum(smooth, 0) * (rest / total)
+        modelled *= self.fraction + rest * (1 - covered)
+        modelled += np.maximum(smooth, 0) * rest
         return modelled
 
 

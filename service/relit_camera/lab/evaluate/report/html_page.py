@@ -7,7 +7,7 @@ figures in JSON and in plain text need neither.
 from __future__ import annotations
 
 import math
-from base64 import b64encode
+from base64 import b64decode, b64encode
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -119,6 +119,11 @@ def picture(image: DisplayImage, caption: str, *, lossless: bool = True) -> Figu
 def data_uri(content: bytes, media_type: str) -> str:
     """`data:` URI of a file's content."""
     return f"data:{media_type};base64,{b64encode(content).decode()}"
+
+
+def data_of_uri(uri: str) -> bytes:
+    """The content of a `data_uri`."""
+    return b64decode(uri.partition(",")[2])
 
 
 def table(

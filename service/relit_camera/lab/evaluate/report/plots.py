@@ -46,6 +46,9 @@ def line_plot(
     caption: str,
     *,
     from_zero: bool = False,
+    logarithmic: bool = False,
+    bounds: Mapping[str, ArrayLike] | None = None,
+    bounds_label: str = "",
 ) -> Figure:
     """Figure of one line a series over common x values (count,), as SVG. Values that are not finite leave a gap.
 
@@ -56,7 +59,12 @@ def line_plot(
         y_label: name of the vertical axis.
         caption: of the figure.
         from_zero: whether the vertical axis begins at zero.
+        logarithmic: whether both axes are; the horizontal one is then marked at the x values.
+        bounds: name of a series → values (count,), a dashed line in its color.
+        bounds_label: what such a line is, for the legend.
     """
+    from matplotlib.ticker import LogLocator
+
     across = np.asarray(x, np.float64)
     with _style():
         canvas = _canvas(10.2, 3.6)
@@ -74,12 +82,22 @@ def line_plot(
                 marker="." if len(across) <= _MARKED_POINTS else "",
                 zorder=2 if index >= 0 else 3,
             )
+            if bounds and name in bounds:
+                color, label = axes.lines[-1].get_color(), f"{name}: {bounds_label}"
+                axes.plot(across, np.asarray(bounds[name], np.float64), "--", label=label, color=color, linewidth=1)
         axes.set_xlabel(x_label)
         axes.set_ylabel(y_label)
         axes.margins(x=0.01)
+        if logarithmic:
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_xticks(across, [f"{each:.0f}" for each in across])
+            axes.minorticks_off()
+            axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axes.yaxis.set_major_formatter("{x:g}")
         if from_zero:
             axes.set_ylim(bottom=0)
-        if len(series) >= _LEGEND_COLUMN_FROM:
+        if len(axes.lines) >= _LEGEND_COLUMN_FROM:
             axes.legend(loc="center left", bbox_to_anchor=(1, 0.5))
         elif len(series) > 1:
             axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=len(series))

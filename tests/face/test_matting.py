@@ -13,7 +13,7 @@ from onnx import TensorProto, helper
 from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.live.compositing.matting import (
+from relit_camera.face.matting import (
     LANDSCAPE_MODEL,
     SQUARE_MODEL,
     SelfieMatting,

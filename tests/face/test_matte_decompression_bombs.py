@@ -11,7 +11,7 @@ import pytest
 
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.image_types import Frame
-from relit_camera.live.compositing.matting import RecordedMatting
+from relit_camera.face.matting import RecordedMatting
 
 
 def npz(path: Path, header_shape: tuple[int, ...], content: bytes, dtype: str = "|u1") -> Path:

@@ -11,7 +11,7 @@ from relit_camera.base.errors import InputError, NotFoundError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.live.compositing.matting import RecordedMatting, matting_factory, write_mattes
+from relit_camera.face.matting import RecordedMatting, matting_factory, write_mattes
 
 
 def frame(index: int, width: int = 64, height: int = 36) -> Frame:

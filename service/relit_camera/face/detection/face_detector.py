@@ -1,27 +1,21 @@
-"""Face detection in a whole picture with YuNet (Wu et al. 2023), through OpenCV."""
+"""What a face detector gives, and what all of them share."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import DisplayImage, Points
 
 Box = tuple[float, float, float, float]
 """x, y, width, height in pixels."""
 
 _SAME_FACE_OVERLAP = 0.1
-_LOG_ERRORS = 2
 _SURROUNDINGS = 2.5
-_SURROUNDINGS_PX = 128
-"""Side of the surroundings of a face, in sides of its box and in pixels of the network's input."""
+"""Side of the surroundings of a face, in sides of its box."""
 _SMALLEST_REGION_PX = 8
 
 
@@ -45,28 +39,17 @@ class Detection:
         return Detection((left + x, top + y, width, height), self.eyes + np.array([x, y], np.float32), self.score)
 
 
-class FaceDetector:
-    """YuNet on the picture scaled so that its longer side is `longer_side`. Not thread-safe."""
-
-    def __init__(self, model: Path, longer_side: int = 320, threshold: float = 0.7) -> None:
-        """Open the model.
-
-        Raises:
-            ModelError: the file is missing or is no YuNet model.
-        """
-        if not model.is_file():
-            raise ModelError(f"face detector {model} does not exist", "get it with `relit models pull`")
-        try:
-            with _quiet_opencv():
-                self._network = cv2.FaceDetectorYN.create(str(model), "", (longer_side, longer_side), threshold)
-        except cv2.error as error:
-            raise ModelError(f"face detector {model} is damaged", "get it again with `relit models pull`") from error
-        self._longer_side = longer_side
+class FaceDetector(ABC):
+    """Finds faces in a picture. Not thread-safe."""
 
     def detect(self, image: DisplayImage, near: Box | None = None) -> Detection | None:
         """Find the face that overlaps `near` most, or else the largest; None where there is no face."""
-        faces = self._faces(image, self._longer_side)
+        faces = self._faces(image)
         return max(faces, key=lambda face: _detection_priority(face.box, near)) if faces else None
+
+    def detect_all(self, image: DisplayImage) -> list[Detection]:
+        """Find every face of a picture."""
+        return self._faces(image)
 
     def detect_nearby(self, image: DisplayImage, box: Box) -> Detection | None:
         """Find the largest face in the surroundings of `box` alone: a quick check of a face that is there already."""
@@ -77,22 +60,28 @@ class FaceDetector:
         region = image[top : max(round(center_y + half), 0), left : max(round(center_x + half), 0)]
         if min(region.shape[:2]) < _SMALLEST_REGION_PX:
             return None
-        faces = self._faces(region, _SURROUNDINGS_PX)
+        faces = self._faces_in_surroundings(region)
         return max((face.moved(left, top) for face in faces), key=lambda face: face.box[2] * face.box[3], default=None)
 
-    def _faces(self, image: DisplayImage, longer_side: int) -> list[Detection]:
-        height, width = image.shape[:2]
-        scale = longer_side / max(width, height)
-        small_size = (max(1, round(width * scale)), max(1, round(height * scale)))
-        # Averaging over areas that are no whole pixels takes ten times as long as the sampling before it.
-        if scale < 0.5:
-            image = cv2.resize(image, (2 * small_size[0], 2 * small_size[1]), interpolation=cv2.INTER_LINEAR)
-        small = cv2.resize(image, small_size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
-        self._network.setInputSize(small_size)
-        rows = self._network.detect(cv2.cvtColor(small, cv2.COLOR_RGB2BGR))[1]
-        if rows is None:
-            return []
-        return [_detection(row, width / small_size[0], height / small_size[1]) for row in rows]
+    @abstractmethod
+    def _faces(self, image: DisplayImage) -> list[Detection]:
+        """All faces in a picture."""
+
+    @abstractmethod
+    def _faces_in_surroundings(self, region: DisplayImage) -> list[Detection]:
+        """All faces in the surroundings of one, quickly."""
+
+
+def reduced(image: DisplayImage, longer_side: int) -> DisplayImage:
+    """Scale a picture so that its longer side has so many pixels."""
+    height, width = image.shape[:2]
+    scale = longer_side / max(width, height)
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    # Averaging over areas that are no whole pixels takes ten times as long as the sampling before it.
+    if scale < 0.5:
+        image = cv2.resize(image, (2 * size[0], 2 * size[1]), interpolation=cv2.INTER_LINEAR)
+    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    return np.asarray(small, dtype=np.uint8)
 
 
 def intersection_over_union(first: Box, second: Box) -> float:
@@ -109,24 +98,6 @@ def is_same_face(first: Box, second: Box) -> bool:
     return intersection_over_union(first, second) > _SAME_FACE_OVERLAP
 
 
-@contextmanager
-def _quiet_opencv() -> Iterator[None]:
-    # OpenCV 5 warns about its graph engine, which is not used here; it also moved these functions.
-    logging = getattr(cv2.utils, "logging", cv2)
-    level = logging.getLogLevel()
-    logging.setLogLevel(_LOG_ERRORS)
-    try:
-        yield
-    finally:
-        logging.setLogLevel(level)
-
-
 def _detection_priority(box: Box, near: Box | None) -> tuple[float, float]:
     shared = intersection_over_union(box, near) if near else 0.0
     return (shared if shared > _SAME_FACE_OVERLAP else 0.0), box[2] * box[3]
-
-
-def _detection(row: NDArray[np.float32], scale_x: float, scale_y: float) -> Detection:
-    scaled = row[:14].reshape(7, 2) * [scale_x, scale_y]
-    box = (float(scaled[0, 0]), float(scaled[0, 1]), float(scaled[1, 0]), float(scaled[1, 1]))
-    return Detection(box, scaled[2:4].astype(np.float32), float(row[14]))

@@ -63,7 +63,7 @@ def matting_factory(name: str, options: SessionOptions) -> Callable[[], Matting]
 class MattingTunables:
     """Numbers of `SelfieMatting`, chosen by looking at mattes of real recordings.
 
-    `pytest tests/live/compositing/test_matting.py` checks them on such recordings: overlap with a green screen's matte,
+    `pytest tests/face/test_matting.py` checks them on such recordings: overlap with a green screen's matte,
     and flicker of a head that keeps still.
 
     Attributes:

@@ -1,0 +1,105 @@
+"""How much memory the process keeps that it does not need now: freed blocks, and pages of the libraries' files."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_GLIBC = ctypes.CDLL(None) if "CS_GNU_LIBC_VERSION" in getattr(os, "confstr_names", ()) else None
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8
+"""Parameters of mallopt(3)."""
+_MADV_DONTNEED = 4
+"""Of madvise(2)."""
+RETAINED_BYTES = 32 << 20
+"""More than any array of a frame, and the most that glibc takes."""
+APART_BYTES = 128 << 10
+"""What glibc begins with. Smaller blocks would waste much of their last page."""
+
+_apart_lock = threading.Lock()
+_contexts_apart = 0
+
+
+def retain_large_allocations() -> None:
+    """Make the C library keep freed arrays of a frame's size for the process. Only with glibc.
+
+    It returns every large block to the system when it is freed, and requests it again for the next frame, page by page:
+    several milliseconds a frame.
+    """
+    _set_thresholds(RETAINED_BYTES, 2 * RETAINED_BYTES)
+
+
+@contextmanager
+def large_allocations_apart() -> Iterator[None]:
+    """While the context lasts, keep large blocks outside of the heap, and return freed ones at once. Only with glibc.
+
+    For what is opened: files are unpacked and networks loaded in large blocks, most of them for a moment. In the heap
+    they would leave gaps between what stays, which the arrays of frames then spread over. At the end of the last such
+    context, whichever thread it is in, blocks are retained again, and `drop_library_pages` is called.
+    """
+    global _contexts_apart
+    with _apart_lock:
+        _contexts_apart += 1
+        _set_thresholds(APART_BYTES, APART_BYTES)
+    try:
+        yield
+    finally:
+        with _apart_lock:
+            _contexts_apart -= 1
+            if not _contexts_apart:
+                return_freed_memory()
+                retain_large_allocations()
+                drop_library_pages()
+
+
+def _set_thresholds(apart_bytes: int, trimmed_bytes: int) -> None:
+    """Sizes from which a block is outside of the heap, and from which the heap's free end is returned."""
+    if _GLIBC is not None:
+        _GLIBC.mallopt(_M_MMAP_THRESHOLD, apart_bytes)
+        _GLIBC.mallopt(_M_TRIM_THRESHOLD, trimmed_bytes)
+
+
+def share_freed_memory() -> None:
+    """Make all threads allocate from one heap, so that one takes what another has freed. Only with glibc.
+
+    It gives each thread a heap of its own otherwise, and each keeps the arrays of a frame that were freed in it: a
+    hundred megabytes with five threads. They allocate large blocks and few, so they do not wait for each other.
+    """
+    if _GLIBC is not None:
+        _GLIBC.mallopt(_M_ARENA_MAX, 1)
+
+
+def return_freed_memory() -> None:
+    """Give freed memory back to the system, after work that needed much for a moment. Only with glibc."""
+    if _GLIBC is not None:
+        _GLIBC.malloc_trim(0)
+
+
+def drop_library_pages() -> None:
+    """Let go of the pages of the libraries' files; what is still needed comes back as it is used. Only with glibc.
+
+    Half of them were needed only while modules were imported and networks opened. Nothing that was written is lost:
+    only machine code is chosen, of which no page was written to. The libraries' constants are not: a library that
+    another thread opens at this moment has read-only pages that the loader is about to replace by ones it writes to.
+    """
+    if _GLIBC is not None:
+        with suppress(OSError):  # no /proc
+            for start, end in _unwritten_library_mappings(Path("/proc/self/smaps").read_text()):
+                _GLIBC.madvise(ctypes.c_void_p(start), ctypes.c_size_t(end - start), _MADV_DONTNEED)
+
+
+def _unwritten_library_mappings(smaps: str) -> Iterator[tuple[int, int]]:
+    """First address and end of the libraries' private mappings of machine code without pages of their own (proc(5)).
+
+    Of libraries alone: another file might be unmapped meanwhile, and its addresses be memory of another kind.
+    """
+    # A mapping's first line is the only one that begins with a digit or a small letter.
+    for mapping in re.split(r"\n(?=[0-9a-f])", smaps):
+        first, _, fields = mapping.partition("\n")
+        found = re.match(r"([0-9a-f]+)-([0-9a-f]+) r-xp [0-9a-f]+ \S+ \d+ +/.*\.so[.0-9]*$", first)
+        if found and all(re.search(rf"^{name}: +0 kB$", fields, re.MULTILINE) for name in ("Anonymous", "Swap")):
+            yield int(found[1], 16), int(found[2], 16)

@@ -1,0 +1,1 @@
+"""A subject from the light of the person's own screen: patches that light up in patterns before a webcam."""

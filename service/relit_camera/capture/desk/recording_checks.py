@@ -1,0 +1,133 @@
+"""What can be wrong with a desk recording: each fault found is one clear line, an error or a warning."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.array_types import Float32Array, Float64Array
+from relit_camera.base.errors import CaptureError
+from relit_camera.base.images.color import luminance
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.capture.alignment.rigid_transform import RigidTransform
+from relit_camera.capture.desk.desk_recording import DeskSetup
+from relit_camera.capture.desk.patterns.pattern_sequence import undetermined_patches
+from relit_camera.capture.desk.person.desk_face import DeskFace
+
+DARK_CODE, CLIPPED_CODE = 40, 250
+"""Codes of 255: the 90th percentile of a face must be above the one, few of its pixels may reach the other."""
+MAX_CLIPPED = 0.05
+MAX_GAIN_DRIFT, NOTED_GAIN_DRIFT = 0.25, 0.05
+"""Change of the light under the same white: automatic exposure, or a screen that dims itself."""
+NOTED_COLOR_DRIFT = 0.03
+"""Change of its color: automatic white balance, or night light that sets in."""
+NOTED_NONLINEARITY = 0.15
+"""Difference of the sum of all patches from white: local dimming, HDR, a screen or webcam with a curve of its own."""
+MAX_MOTION_CM, NOTED_MOTION_CM = 4.0, 0.8
+_FOCAL_WIDTHS = 0.45, 2.2
+"""Focal length of a webcam in widths of its picture, from very wide to narrow."""
+
+
+def require_exposure(picture: DisplayImage, face: NDArray[np.bool_]) -> None:
+    """Check a frame under a pattern that lights much of the screen.
+
+    Raises:
+        CaptureError: the face (height, width) in it is too dark, or over-exposed.
+    """
+    codes = picture[face].max(axis=1)
+    bright = float(np.percentile(codes, 90))
+    if bright < DARK_CODE:
+        what = f"the face is too dark: its bright parts have codes of {bright:.0f} of 255"
+        raise CaptureError(what, "raise the screen's brightness, come nearer, or clean the lens")
+    clipped = float((codes >= CLIPPED_CODE).mean())
+    if clipped > MAX_CLIPPED:
+        what = f"the face is over-exposed: {clipped:.0%} of it is white"
+        raise CaptureError(what, "lower the webcam's exposure or gain, or the screen's brightness")
+
+
+def require_patterns(found: NDArray[np.intp], lights: Float64Array, frames: int) -> None:
+    """Check that the patterns that were found (count,) suffice.
+
+    Args:
+        found: index in the sequence of each matched plateau.
+        lights: (patterns, patches) of the sequence.
+        frames: number of frames of the recording.
+
+    Raises:
+        CaptureError: they do not; patterns were missed, or the filming ended early.
+    """
+    undetermined = undetermined_patches(lights[np.unique(found)])
+    if not undetermined:
+        return
+    last, count = int(found.max()) + 1, len(lights)
+    seen = len(np.unique(found))
+    if seen < last:
+        what = f"frames are missing: only {seen} of the first {last} patterns were seen in {frames} frames"
+    else:
+        what = f"the recording ends early: {seen} of {count} patterns were seen in {frames} frames"
+    raise CaptureError(what, "film again, and leave the page open and the webcam free until it is done")
+
+
+def white_drift_warnings(whites: Sequence[Float32Array]) -> list[str]:
+    """Warnings about means (3,) of the face under white, in order of time.
+
+    Raises:
+        CaptureError: they differ so much that the patterns cannot be compared.
+    """
+    if len(whites) < 2:
+        return []
+    first = whites[0]
+    gains = [float(luminance(white) / max(float(luminance(first)), 1e-9)) for white in whites]
+    worst = max(gains, key=lambda gain: abs(np.log(max(gain, 1e-3))))
+    change = abs(worst - 1)
+    if change > MAX_GAIN_DRIFT:
+        what = f"the same white screen gave {worst:.2f} times the light later on"
+        raise CaptureError(what, "hold the webcam's exposure, switch off automatic brightness, and keep still")
+    warnings = []
+    if change > NOTED_GAIN_DRIFT:
+        warnings.append(f"the light under the same white changed by {change:.0%}: is the exposure automatic?")
+    colors = [white / max(float(white.mean()), 1e-9) for white in whites]
+    drift = max(float(np.abs(color / np.maximum(colors[0], 1e-6) - 1).max()) for color in colors)
+    if drift > NOTED_COLOR_DRIFT:
+        warnings.append(f"the color of the same white changed by {drift:.0%}: night light, or automatic white balance?")
+    return warnings
+
+
+def linearity_warnings(patches: Float32Array, whites: Sequence[Float32Array], room: Float32Array) -> list[str]:
+    """Warnings about the sum of the patches' means (patches, 3), compared with those (3,) of white and of the room."""
+    if not whites:
+        return []
+    added = float(luminance(np.mean(whites, axis=0)) - luminance(room))
+    total = float(luminance(patches.sum(axis=0)))
+    ratio = total / added if added > 0 else 1.0
+    if abs(ratio - 1) <= NOTED_NONLINEARITY:
+        return []
+    return [
+        f"all patches together give {ratio:.2f} times the light of white: local dimming, HDR, a dimming screen, or a "
+        "webcam that changes contrast"
+    ]
+
+
+def motion_warnings(transforms: Sequence[RigidTransform], pixels_per_cm: float) -> list[str]:
+    """Warnings about how far the head moved.
+
+    Raises:
+        CaptureError: so far that it was not the same pose.
+    """
+    moved = [float(np.hypot(each.x, each.y)) / pixels_per_cm for each in transforms]
+    worst = max(moved, default=0.0)
+    if worst > MAX_MOTION_CM:
+        raise CaptureError(f"the head moved by {worst:.0f} cm", "lean on something, and keep still for the patterns")
+    if worst > NOTED_MOTION_CM:
+        return [f"the head moved by {worst:.1f} cm: keep stiller for a sharper result"]
+    return []
+
+
+def scale_warnings(face: DeskFace, setup: DeskSetup, width: int) -> list[str]:
+    """Warnings about a distance that does not fit to how large the face is in frames of this width."""
+    focal = face.pixels_per_cm * setup.distance_cm / width
+    if _FOCAL_WIDTHS[0] <= focal <= _FOCAL_WIDTHS[1]:
+        return []
+    return [f"the face is as large as at another distance than {setup.distance_cm:.0f} cm: measure from eyes to screen"]

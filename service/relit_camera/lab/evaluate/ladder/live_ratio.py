@@ -1,0 +1,88 @@
+"""The live picture in another light, by the program's own mode ratio and its own estimate of the room's light."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from relit_camera.app.wiring import make_follower
+from relit_camera.base.config.settings import TrackerSettings
+from relit_camera.base.errors import SubjectError
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.face.face_state import Tracker
+from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.light.light_map import LightMap
+from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
+from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
+from relit_camera.live.reenactment.dense_motion import DenseMotion
+from relit_camera.live.reenactment.source_image import find_source_face
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.subject import Subject
+
+FRAME_INTERVAL_S = 0.25
+"""Time from one frame to the next: the room's light is fitted in each."""
+
+
+@dataclass(frozen=True)
+class FollowedFrame:
+    """A frame, and what the face does in it."""
+
+    frame: Frame
+    motion: FaceMotion
+
+
+def follow(images: Sequence[DisplayImage], tracker: Tracker) -> list[FollowedFrame]:
+    """Follow the face through frames as the program does.
+
+    Raises:
+        SubjectError: no face is found in the last one.
+    """
+    follower = make_follower(TrackerSettings(), tracker)
+    tracker.reset()
+    followed = []
+    for index, image in enumerate(images):
+        time_s = index * FRAME_INTERVAL_S
+        frame = Frame(image, index, time_s, time_s)
+        followed.append(FollowedFrame(frame, follower.follow(tracker.track(frame), frame.size, time_s)))
+    tracker.reset()
+    if followed[-1].motion.pose is None:
+        raise SubjectError("no face is found in the simulated webcam frames", "give a person who looks to the camera")
+    return followed
+
+
+class LiveRatio:
+    """Mode ratio with one subject, after it has seen some frames.
+
+    Attributes:
+        residual: how badly the estimated light explains the face, 0..1 (see `RoomLightEstimate`).
+    """
+
+    def __init__(self, subject: Subject, tracker: Tracker, followed: Sequence[FollowedFrame]) -> None:
+        """Estimate the room's light from the frames.
+
+        Raises:
+            SubjectError: there is no face in the subject's picture.
+        """
+        face = find_source_face(subject, tracker)
+        self._relighter = BasisRelighter(subject)
+        estimator = RoomLightEstimator(subject, face)
+        self._relighting = RatioRelighting(subject, face, estimator, DenseMotion(SessionOptions("cpu")))
+        self._gain = np.float32(subject.metadata.display_gain)
+        for each in followed:
+            room = estimator.update(each.frame.image, each.motion.landmarks, each.motion.rotation, each.frame.time_s)
+        self._room, self._last = room, followed[-1]
+        self.residual = room.residual
+        pose = self._last.motion.pose
+        assert pose is not None
+        self._positions = self._relighting.positions(self._last.motion, pose, self._last.frame.size)
+
+    def relit(self, light: LightMap) -> DisplayImage:
+        """The last frame, as the program shows it in a light in display exposure."""
+        maps = np.stack([light * self._gain, self._room.in_head_frame])
+        roots = self._relighting.ratio_roots(*self._relighter.relight(maps))
+        presence = float(self._last.motion.presence)
+        plan = RatioPlan(self._last.frame, presence, self._room.gain, roots, self._positions)
+        return self._relighting.apply(plan)

@@ -1,0 +1,102 @@
+"""Work in a process of its own: what it returns, and every way in which it ends early."""
+
+from __future__ import annotations
+
+import multiprocessing.resource_tracker
+import multiprocessing.spawn
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from relit_camera.base.concurrency.worker_process import NICENESS, run_in_worker_process
+from relit_camera.base.errors import CaptureError, WorkerError
+from tests.small_camera import wait_until
+
+
+def add(first: int, second: int) -> tuple[int, int, int]:
+    return first + second, os.getpid(), os.nice(0)
+
+
+def refuse() -> None:
+    raise CaptureError("no face is in the frames", "look at the camera")
+
+
+def fail() -> None:
+    raise ZeroDivisionError("one")
+
+
+def die() -> None:
+    os._exit(7)
+
+
+def sleep(file: Path) -> None:
+    file.write_text(str(os.getpid()))
+    time.sleep(60)
+
+
+def workers() -> list[psutil.Process]:
+    """The worker processes of this process that run."""
+    return [child for child in psutil.Process().children() if "spawn_main" in " ".join(child.cmdline())]
+
+
+def test_the_result_comes_from_another_process_of_low_priority() -> None:
+    total, process, niceness = run_in_worker_process(add, 2, 3, timeout_s=30)
+    assert (total, niceness) == (5, min(19, os.nice(0) + NICENESS))
+    assert process != os.getpid()
+
+
+def test_an_error_with_a_cure_arrives_whole() -> None:
+    with pytest.raises(CaptureError, match="no face is in the frames; look at the camera"):
+        run_in_worker_process(refuse, timeout_s=30)
+
+
+def test_a_fault_and_a_death_are_errors() -> None:
+    with pytest.raises(WorkerError, match="ZeroDivisionError: one"):
+        run_in_worker_process(fail, timeout_s=30)
+    with pytest.raises(WorkerError, match="exit code 7"):
+        run_in_worker_process(die, timeout_s=30)
+
+
+def test_a_worker_that_takes_too_long_is_ended(tmp_path: Path) -> None:
+    with pytest.raises(WorkerError, match="more than 1 s"):
+        run_in_worker_process(sleep, tmp_path / "process", timeout_s=1)
+    assert workers() == []
+
+
+def test_a_canceled_worker_is_ended_at_once(tmp_path: Path) -> None:
+    canceled = threading.Event()
+    threading.Timer(0.3, canceled.set).start()
+    began = time.monotonic()
+    with pytest.raises(WorkerError, match="canceled"):
+        run_in_worker_process(sleep, tmp_path / "process", timeout_s=60, canceled=canceled)
+    assert time.monotonic() - began < 10
+    assert workers() == []
+
+
+@pytest.mark.skipif(shutil.which("false") is None, reason="no program that only ends")
+@pytest.mark.timeout(60)
+def test_a_worker_that_dies_at_its_start_does_not_block_large_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
+    multiprocessing.resource_tracker.ensure_running()  # it is started with the same program
+    monkeypatch.setattr(multiprocessing.spawn, "_python_exe", os.fsencode(shutil.which("false") or ""))
+    with pytest.raises(WorkerError, match=r"died \(exit code 1\)"):
+        run_in_worker_process(len, bytes(10_000_000), timeout_s=30)
+
+
+def test_a_worker_ends_with_the_process_that_started_it(tmp_path: Path) -> None:
+    file = tmp_path / "process"
+    code = (
+        "import sys; from pathlib import Path; from tests.base import test_worker_process as it\n"
+        "it.run_in_worker_process(it.sleep, Path(sys.argv[1]), timeout_s=60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code, str(file)]) as parent:
+        wait_until(lambda: file.exists() and file.read_text() != "")
+        worker = psutil.Process(int(file.read_text()))
+        parent.kill()
+    wait_until(lambda: not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE)

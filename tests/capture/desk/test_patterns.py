@@ -1,0 +1,138 @@
+"""Patterns and their demultiplexing, and the light of patches, against what is known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relit_camera.base.errors import CaptureError
+from relit_camera.capture.desk.desk_recording import CameraPlace, DeskSetup, PatchGrid, Screen
+from relit_camera.capture.desk.patterns.pattern_sequence import (
+    demultiplex,
+    pattern_light,
+    pattern_lights,
+    s_matrix,
+    standard_sequence,
+    undetermined_patches,
+)
+from relit_camera.capture.desk.patterns.plateaus import find_plateaus
+from relit_camera.capture.desk.person.patch_light import Patches, place_patches
+
+
+@pytest.mark.parametrize("patches", [4, 6, 7, 9, 11, 12, 15, 20, 28])
+def test_an_s_matrix_determines_every_patch_with_half_of_them_lit(patches: int) -> None:
+    matrix = s_matrix(patches)
+    assert set(np.unique(matrix)) == {0, 1}
+    assert np.linalg.matrix_rank(matrix) == patches
+    assert len(matrix) < patches + 5
+    assert undetermined_patches(matrix.astype(float)[1:]) or len(matrix) > patches
+    # The room's own light is one more unknown, and black shows it.
+    assert not undetermined_patches(np.concatenate([matrix, np.zeros((1, patches))]))
+
+
+def test_an_s_matrix_of_full_order_is_balanced() -> None:
+    matrix = s_matrix(15)
+    assert matrix.shape == (15, 15)
+    assert (matrix.sum(axis=1) == 8).all()
+    assert (matrix @ matrix.T == 4 + 4 * np.eye(15)).all()
+
+
+def test_demultiplexing_returns_the_single_patches_and_the_room() -> None:
+    random = np.random.default_rng(0)
+    alone, room = random.uniform(0, 1, (6, 5, 3)).astype(np.float32), random.uniform(0, 1, (5, 3)).astype(np.float32)
+    lights = pattern_lights(standard_sequence(3, 2), 6)
+    pictures = np.tensordot(lights, alone, axes=1).astype(np.float32) + room
+    found, found_room = demultiplex(pictures, lights)
+    np.testing.assert_allclose(found, alone, atol=1e-5)
+    np.testing.assert_allclose(found_room, room, atol=1e-5)
+
+
+def test_multiplexing_lowers_noise() -> None:
+    """By (N + 1) / (2 √N) for noise that does not depend on light (Harwit and Sloane 1979)."""
+    noise = np.random.default_rng(0).normal(size=(15, 20000)).astype(np.float32)
+    matrix = s_matrix(15).astype(float)
+    # Room known: without the column of ones.
+    found = np.linalg.inv(matrix) @ noise
+    assert noise.std() / found.std() == pytest.approx(16 / (2 * np.sqrt(15)), rel=0.03)
+
+
+def test_a_missing_pattern_leaves_patches_undetermined() -> None:
+    lights = pattern_lights(["black", *standard_sequence(5, 3)[3:10]], 15)
+    assert undetermined_patches(lights)
+
+
+def test_successive_patterns_differ_in_their_middle() -> None:
+    rows = np.array([row for row in standard_sequence(5, 3) if not isinstance(row, str)])
+    places = np.stack(np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-0.6, 0.6, 3)), axis=-1).reshape(-1, 2)
+    apart = np.linalg.norm(np.diff(rows @ places, axis=0), axis=1)
+    plain = np.linalg.norm(np.diff(s_matrix(15) @ places, axis=0), axis=1)
+    assert apart.min() > max(1.0, 2 * plain.min())
+
+
+def test_light_follows_the_display_curve() -> None:
+    half = pattern_light([0.5, 1, 0, 0.25], 4, gamma=2.2)
+    np.testing.assert_allclose(half, [0.5**2.2, 1, 0, 0.25**2.2])
+    leaking = pattern_light([0.5, 1, 0, 0], 4, gamma=2.0, black=0.1)
+    np.testing.assert_allclose(leaking[:3], [(0.36 - 0.01) / (1.21 - 0.01), 1, 0])
+
+
+def test_a_small_patch_follows_the_inverse_square_and_cosine_laws() -> None:
+    patches = Patches(np.array([[30.0, 0, 40.0]]), (0.1, 0.1))
+    found = patches.irradiance(np.array([[0.0, 0, 0], [3.0, 4.0, -2.0]]), 0)
+    for point, vector in zip(([0, 0, 0], [3, 4, -2]), found, strict=True):
+        toward = np.array([30.0, 0, 40.0]) - point
+        distance = np.linalg.norm(toward)
+        expected = 0.01 * (toward[2] / distance) / distance**2
+        np.testing.assert_allclose(vector, expected * toward / distance, rtol=1e-4)
+
+
+def test_a_large_patch_is_as_good_as_many_small_ones() -> None:
+    large = Patches(np.array([[5.0, 3.0, 50.0]]), (12.0, 11.5))
+    fine = (np.arange(40) + 0.5) / 40 - 0.5
+    small = np.array([[5 + 12 * x, 3 + 11.5 * y, 50.0] for x in fine for y in fine])
+    many = Patches(small, (12 / 40, 11.5 / 40))
+    point = np.array([[2.0, -8.0, 1.0]])
+    total = sum(many.irradiance(point, k) for k in range(len(small)))
+    np.testing.assert_allclose(large.irradiance(point, 0), total, rtol=0.01)
+
+
+def test_the_right_of_the_screen_lights_the_left_of_the_picture() -> None:
+    setup = DeskSetup(
+        screen=Screen(width_cm=60, height_cm=30),
+        distance_cm=60,
+        camera=CameraPlace(up_cm=16, right_cm=2),
+        patches=PatchGrid(columns=2, rows=2),
+    )
+    centers = place_patches(setup).centers_cm
+    np.testing.assert_allclose(centers, [[17, -8.5, 60], [-13, -8.5, 60], [17, -23.5, 60], [-13, -23.5, 60]])
+    moved = place_patches(setup, (3, -2)).centers_cm
+    np.testing.assert_allclose(moved - centers, np.tile([-3, 2, 0], (4, 1)))
+
+
+def test_a_distant_patch_needs_no_correction() -> None:
+    patches = Patches(np.array([[1e4, 2e3, 3e4]]), (10.0, 10.0))
+    normals = np.tile(np.array([0, 0.3, 0.954], np.float32), (5, 1))
+    points = np.random.default_rng(0).uniform(-10, 10, (5, 3)).astype(np.float32)
+    np.testing.assert_allclose(patches.distant_light_factor(points, normals, 0), 1, atol=2e-3)
+
+
+def test_the_near_field_of_a_lambertian_surface_is_undone_where_it_faces_the_light() -> None:
+    patches = Patches(np.array([[20.0, -10.0, 50.0]]), (1.0, 1.0))
+    points = np.array([[4.0, 3.0, 1.0], [-6.0, 2.0, -5.0]], np.float32)
+    normals = np.array([[0.1, 0.0, 0.995], [-0.2, 0.1, 0.975]], np.float32)
+    near = np.einsum("nc,nc->n", patches.irradiance(points, 0), normals)
+    far = normals @ patches.directions[0] * patches.strengths()[0]
+    np.testing.assert_allclose(near * patches.distant_light_factor(points, normals, 0), far, rtol=0.05)
+
+
+def test_plateaus_end_where_light_changes() -> None:
+    levels = np.concatenate([np.full(9, 0.2), np.linspace(0.2, 0.8, 6)[1:-1], np.full(7, 0.8), np.full(8, 0.3)])
+    random = np.random.default_rng(0)
+    cells = (levels[:, None, None] + 0.002 * random.normal(size=(len(levels), 24, 32))).astype(np.float32)
+    assert [(each.start, each.stop) for each in find_plateaus(cells)] == [(0, 9), (13, 20), (20, 28)]
+
+
+def test_noise_alone_has_no_plateaus() -> None:
+    cells = 0.2 + 0.01 * np.random.default_rng(0).normal(size=(60, 24, 32))
+    with pytest.raises(CaptureError, match="no patterns are seen"):
+        find_plateaus(cells.astype(np.float32))
