@@ -90,6 +90,14 @@ def test_a_captured_direction_returns_the_captured_frame(sphere: Subject) -> Non
         assert psnr(picture, samples.pictures[index], samples.matte) > 45
 
 
+def test_a_subject_without_captured_directions_is_relit_from_its_map(sphere: Subject) -> None:
+    """An instant capture has the room's light alone, and its method's name is none of the reflectance methods."""
+    metadata = sphere.metadata.model_copy(update={"rung": "instant", "method": "instant"})
+    instant = replace(sphere, metadata=metadata)
+    light = direction_from_degrees(35, 25)
+    assert psnr(relight_from_direction(instant, light), relight_from_direction(sphere, light), sphere.matte) > 30
+
+
 POSES = [(30, 0, 0), (-30, 0, 0), (0, 25, 0), (0, -25, 0), (0, 0, 40), (0, 0, -40), (25, -15, 20), (-35, 20, -30)]
 
 

@@ -18,12 +18,16 @@ CAPTURED_LIGHT_RADIUS_DEG = 3.0
 def relight_from_direction(subject: Subject, direction: NDArray[np.float64]) -> LinearImage:
     """The picture under a light of unit irradiance from `direction` (3,), a unit vector.
 
-    At a captured direction this is the captured frame, within the subject's compression accuracy.
+    At a captured direction this is the captured frame, within the subject's compression accuracy. A subject of an
+    instant capture has no captured direction, and none of the methods: the texels in its file are interpolated.
 
     Raises:
         NotFoundError: the subject's method is not installed.
     """
-    amounts = directional_coefficients(subject, open_method(subject.metadata.method), direction[None, :])
+    if subject.metadata.rung == "instant":
+        amounts = _interpolated_coefficients(subject, direction[None, :])
+    else:
+        amounts = directional_coefficients(subject, open_method(subject.metadata.method), direction[None, :])
     return np.asarray(subject.pictures(amounts)[0])
 
 
@@ -38,12 +42,17 @@ def directional_coefficients(
     captured = subject.light_directions.astype(np.float64)
     if isinstance(method, LinearMethod):
         return np.asarray(subject.light_coefficients @ method.weights(captured, directions), np.float32)
-    from_map = (bilinear_map_lookup(directions) @ subject.coefficients.T).T
+    from_map = _interpolated_coefficients(subject, directions)
     cosines = directions @ captured.T
     nearest = cosines.argmax(axis=1)
     distance_deg = np.degrees(np.arccos(np.clip(cosines.max(axis=1), -1, 1)))
     fraction = np.clip(1 - distance_deg / CAPTURED_LIGHT_RADIUS_DEG, 0, 1)
     return np.asarray(fraction * subject.light_coefficients[:, nearest] + (1 - fraction) * from_map, np.float32)
+
+
+def _interpolated_coefficients(subject: Subject, directions: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Coefficients (components, count) between those of the texels in the subject's file."""
+    return np.asarray((bilinear_map_lookup(directions) @ subject.coefficients.T).T, np.float32)
 
 
 def bilinear_map_lookup(directions: NDArray[np.float64]) -> csr_array:
