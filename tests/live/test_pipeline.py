@@ -233,6 +233,40 @@ def test_any_mode_may_find_a_mismatch_and_the_fallback_takes_over_until_the_subj
     assert [trouble.code for trouble in made.troubles] == [DegradationCode.NO_SUBJECT]
 
 
+class Reappearing(SteadyTracker):
+    """Shows no face in frames 5 to 29."""
+
+    def track(self, frame: Frame) -> FaceState:
+        return LOST if 5 <= frame.index < 30 else super().track(frame)
+
+
+class OneGreyUntilSeen(OneGrey):
+    """The third mode, which takes a face that is found again."""
+
+    def begin(
+        self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
+    ) -> RenderTask | FaceMismatch:
+        task = super().begin(frame, motion, scene, quality)
+        return replace(task, is_over=_is_found) if isinstance(task, FaceMismatch) else task
+
+
+def _is_found(motion: FaceMotion) -> bool:
+    return motion.status is FaceStatus.FOUND
+
+
+def test_the_mode_comes_back_when_the_mismatch_is_over() -> None:
+    modes = {**mode_factories(CPU), Mode.RATIO: OneGreyUntilSeen}
+    tracker = Reappearing()
+    follower = make_follower(CPU.tracker, tracker)
+    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
+    shown = []
+    for index in range(70):
+        picture = made.process(frame(index), scene(mode=Mode.RATIO)).image
+        shown.append((len(np.unique(picture)) == 1, [trouble.code for trouble in made.troubles]))
+    assert (False, [DegradationCode.FACE_MISMATCH]) in shown
+    assert shown[0] == shown[-1] == (True, [])
+
+
 def test_a_frame_in_which_a_subject_is_chosen_is_not_shown_unlit() -> None:
     wanted = scene()
     scenes = iter([replace(wanted, subject=None), wanted])

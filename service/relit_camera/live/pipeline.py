@@ -54,10 +54,11 @@ class _ActiveMode:
 
 @dataclass(frozen=True)
 class _MismatchedSubject:
-    """A subject whose face is not the live one, and the mode that found out."""
+    """A subject whose face is not the live one, the mode that found out, and what it said."""
 
     subject: Subject
     found_in: Mode
+    mismatch: FaceMismatch
 
 
 class Pipeline:
@@ -156,6 +157,8 @@ class Pipeline:
         self._troubles.pop("subject", None)
         if motion is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
             motion = self._track(frame, quality)
+        if self._mismatch is not None and self._mismatch.mismatch.is_over(motion):
+            self._forget_mismatch()
         name = self._mode_for(scene.look.mode)
         task = self._mode(scene.subject, name).begin(frame, motion, scene, quality)
         if isinstance(task, FaceMismatch):
@@ -185,12 +188,15 @@ class Pipeline:
     def _forget_mismatch_of_other(self, subject: Subject | None) -> None:
         """Drop what was found about the live face and another subject; without a subject nothing holds."""
         if self._mismatch is not None and self._mismatch.subject is not subject:
-            self._mismatch = None
-            self._troubles.pop("mode", None)
+            self._forget_mismatch()
+
+    def _forget_mismatch(self) -> None:
+        self._mismatch = None
+        self._troubles.pop("mode", None)
 
     def _note_mismatch(self, subject: Subject, name: Mode, mismatch: FaceMismatch) -> None:
         log.warning("mode %s falls back to %s: %s; %s", name, FALLBACK_MODE, mismatch.why, mismatch.cure)
-        self._mismatch = _MismatchedSubject(subject, name)
+        self._mismatch = _MismatchedSubject(subject, name, mismatch)
         what = f"mode {FALLBACK_MODE} is shown in place of mode {name}"
         self._troubles["mode"] = Degradation(what, mismatch.why, mismatch.cure, code=DegradationCode.FACE_MISMATCH)
 

@@ -61,6 +61,16 @@ def test_a_stranger_who_takes_the_persons_place_is_found_out() -> None:
     assert isinstance(found[-1], FaceMismatch)
 
 
+def test_a_mismatch_is_over_when_the_subject_is_back_and_not_before() -> None:
+    check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
+    found = [check.check(stranger, NO_LIGHT_EXPLAINS, time_s) for time_s in (0.0, 5.0)][-1]
+    assert isinstance(found, FaceMismatch)
+    assert not found.is_over(stranger)
+    assert not found.is_over(replace(before_the_camera(), presence=0.5))
+    assert not found.is_over(replace(before_the_camera(), neutral=None))
+    assert found.is_over(before_the_camera())
+
+
 def test_one_measure_alone_decides_only_when_it_is_far_off() -> None:
     """A beard changes the shape, a cap the light: only the product of both counts."""
     check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())

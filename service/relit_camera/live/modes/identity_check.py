@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,19 +21,22 @@ class IdentityTunables:
     The same person reached a shape distance of 0.04 cm and a residual of 0.08 to 0.10 (a generated one 0.18 cm and
     0.08), other people 0.14 to 0.29 cm and 0.10 to 0.20. Either alone can mislead (a beard, a cap), so the product of
     both, each divided by its threshold, decides. A grimace changes the shape by up to 0.5 cm, so the least distance
-    counts that was seen so far: over some seconds of talking it is 0.02 to 0.04 cm for the same person, 0.16 to 0.22 cm
-    for others.
+    counts that was seen so far. On five recorded people before eleven subjects it was 0.02 to 0.07 cm for the same
+    person (residual 0.03 to 0.07 in the room of the capture) and 0.09 to 0.42 cm for others (0.10 to 0.35).
 
     Attributes:
         shape_cm: RMS distance of the landmarks from the subject's, seen from the front.
+        return_shape_cm: the distance at which the face of a stranger is the subject's after all: they came back, or had
+            grimaced until then.
         residual: relative deviation of the live face from the relit one under the best light, 0..1.
         delay_s: how long a face is watched before it is judged.
         interval_s: time between two measurements of its shape.
     """
 
     shape_cm: float = 0.14
+    return_shape_cm: float = 0.08
     residual: float = 0.12
-    delay_s: float = 3.0
+    delay_s: float = 1.5
     interval_s: float = 0.25
 
 
@@ -76,7 +80,16 @@ class IdentityCheck:
             "the live face is not the subject's: it has another shape "
             f"({10 * shape_cm:.1f} mm) and looks so under no light (deviation {residual:.2f})",
             "choose your own subject, or mode reenact",
+            partial(self._has_changed_into_the_subjects, shape_cm),
         )
+
+    def _has_changed_into_the_subjects(self, found_cm: float, motion: FaceMotion) -> bool:
+        """Whether a face that was found out at `found_cm` has the subject's shape now."""
+        limit_cm = self._tunables.return_shape_cm
+        if found_cm < limit_cm or motion.neutral is None or motion.presence < 1:
+            return False
+        points = motion.neutral.points + motion.expression
+        return shape_distance_cm(points, self._face) < limit_cm
 
 
 def shape_distance_cm(points: NDArray[np.float64], face: SourceFace) -> float:

@@ -46,10 +46,12 @@ class FaceMismatch:
     Attributes:
         why: one clause with what was measured.
         cure: what the person can do.
+        is_over: whether a later live face is the subject's after all; called with each frame's motion.
     """
 
     why: str
     cure: str
+    is_over: Callable[[FaceMotion], bool] = lambda _: False
 
 
 @dataclass(frozen=True)
