@@ -69,10 +69,8 @@ def test_a_listener_first_gets_what_stands(listener: Listener, camera: FakeCamer
         "mode": "reenact",
         "subject": None,
         "rung": None,
-        "unlit_allowed": False,
+        "unlit_allowed": True,
         "frozen": False,
-        "can_undo": False,
-        "can_redo": False,
     }
     kind, status = next(stream)
     assert kind == "status"

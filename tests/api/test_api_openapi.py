@@ -18,10 +18,6 @@ from tests.api.api_client import Client
 KEPT = Path(__file__).resolve().parents[2] / "docs" / "openapi.json"
 FIXED = {  # what the design promises
     "status": "get",
-    "scene": "get patch",
-    "scene/undo": "post",
-    "scene/redo": "post",
-    "scene/reset": "post",
     "lighting": "get put patch",
     "environments": "get post",
     "environments/{name}": "get delete",
@@ -30,7 +26,7 @@ FIXED = {  # what the design promises
     "mode": "get put",
     "freeze": "get put",
     "presets": "get",
-    "presets/{name}": "get put patch delete",
+    "presets/{name}": "get put delete",
     "neutral-pose": "post",
     "subjects": "get",
     "subjects/{name}": "get delete",
@@ -38,12 +34,6 @@ FIXED = {  # what the design promises
     "snapshot.jpg": "get",
     "preview.mjpg": "get",
     "events": "get",
-    "checks": "get",
-    "devices": "get",
-    "source": "get patch",
-    "tracker": "get put",
-    "framing": "get put",
-    "models": "get post delete",
 }
 
 

@@ -4,16 +4,8 @@ const BASE = "/api/v1/";
 const TOAST_MS = 8000;
 const SPACING_MS = 40;
 
-/** What the camera refused: `what` is wrong, its `cure`, and the HTTP `status`, 0 where nothing answered. */
-export class Refused extends Error {
-  constructor(what, cure = "", status = 0) {
-    super(cure ? `${what}; ${cure}` : what);
-    Object.assign(this, { what, cure, status });
-  }
-}
-
-/** Asks the camera; answers the JSON body, or null for none. Throws `Refused`. */
-export async function call(method, path, body) {
+/** Asks the camera; answers the JSON body, or null for none. A refusal is shown as a toast and thrown. */
+export async function request(method, path, body) {
   const form = body instanceof FormData;
   const options = { method };
   if (body !== undefined) {
@@ -23,43 +15,18 @@ export async function call(method, path, body) {
   let answer;
   try {
     answer = await fetch(BASE + path, options);
-  } catch {
-    throw new Refused("the camera does not answer", "is it still running?");
-  }
-  return understood(answer.status, await answer.text());
-}
-
-/** The JSON of an answer, or null for none. Throws `Refused` where it is an error. */
-export function understood(status, text) {
-  if (status === 401) location.assign("/login"); // the camera began anew, or has another token
-  let json = null;
-  try {
-    json = JSON.parse(text);
-  } catch {
-    // An answer without a body, or of a proxy.
-  }
-  if (status >= 400) {
-    const { what, cure } = forPeople(json);
-    throw new Refused(what, cure, status);
-  }
-  return json;
-}
-
-/** Like `call`; a refusal is also shown as a toast. */
-export async function request(method, path, body) {
-  try {
-    return await call(method, path, body);
   } catch (error) {
-    toast(error.what, error.cure);
+    toast("The camera does not answer", "Is it still running?");
     throw error;
   }
-}
-
-/** What went wrong, without the advice that is meant for the authors of programs. */
-function forPeople(problem) {
-  if (!problem?.what || problem.type?.endsWith(":fault")) return { what: "The camera could not do that", cure: "Try again; the camera’s log says more" };
-  const forPrograms = /\/api\/|\/healthz|\/readyz/.test(problem.cure ?? "");
-  return { what: problem.what, cure: forPrograms ? "" : (problem.cure ?? "") };
+  if (answer.status === 401) location.assign("/login"); // the camera began anew, or has another token
+  const text = await answer.text();
+  const json = text ? JSON.parse(text) : null;
+  if (!answer.ok) {
+    toast(json?.what ?? answer.statusText, json?.cure ?? "");
+    throw new Error(json?.detail ?? answer.statusText);
+  }
+  return json;
 }
 
 /** Like `request`, for buttons: the toast has said what went wrong, nothing more is to be done. */
@@ -103,36 +70,36 @@ const merged = (before, change) => ({ ...before, ...change });
 
 /**
  * Sends changes one at a time. What is pushed meanwhile is joined into one, so that the latest wins and none queues up.
- * The option `settled()` is called when all is sent; the method answers then.
+ * `settled()` is called when all is sent.
  */
 export class Latest {
   #pending = null;
-  #drained = null;
+  #busy = false;
 
   constructor(send, { join = merged, settled = () => {} } = {}) {
     this.send = send;
     this.join = join;
-    this.onSettled = settled;
+    this.settled = settled;
   }
 
   push(change) {
     this.#pending = this.#pending ? this.join(this.#pending, change) : change;
-    this.#drained ??= this.#drain();
+    if (!this.#busy) this.#drain();
   }
 
-  /** Answers when nothing is left to be sent. */
-  async settled() {
-    await this.#drained;
+  get idle() {
+    return !this.#busy;
   }
 
   async #drain() {
+    this.#busy = true;
     while (this.#pending) {
       const change = this.#pending;
       this.#pending = null;
       await this.send(change).catch(() => null);
       await new Promise((done) => setTimeout(done, SPACING_MS));
     }
-    this.#drained = null;
-    this.onSettled();
+    this.#busy = false;
+    this.settled();
   }
 }

@@ -1,1 +1,0 @@
-"""Routes of work that goes on after the answer: captures and replays."""

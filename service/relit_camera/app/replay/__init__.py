@@ -1,1 +1,0 @@
-"""Relighting recorded videos."""
