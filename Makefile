@@ -8,7 +8,7 @@ PROCESSES ?= 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest coverage vm test-vm vm-picture clean
+.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest coverage browser test-browser vm test-vm vm-picture clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -43,7 +43,7 @@ generated: setup ## files that are built from code are what the code builds
 	cmp docs/openapi.json build/openapi.json
 
 scripts: setup ## shell scripts, Dockerfile and compose files
-	$(BIN)/shellcheck scripts/*.sh docker/*.sh tests/vm/*.sh tests/vm/guest/*.sh .ci/run
+	$(BIN)/shellcheck scripts/*.sh docker/*.sh tests/browser/*.sh tests/vm/*.sh tests/vm/guest/*.sh .ci/run
 	$(BIN)/hadolint docker/Dockerfile
 	$(BIN)/check-jsonschema --builtin-schema vendor.compose-spec docker/compose*.yaml
 
@@ -58,13 +58,20 @@ tool-install: setup ## the wheel as users install it, used from an empty home; m
 	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
 pytest: setup ## the tests alone, in two processes, and the share of lines they execute; make pytest PROCESSES=4
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --cov --cov-report=
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --cov --cov-report=
 	$(BIN)/python scripts/coverage_summary.py
-	# By themselves: the emulated machine takes both cores, and tests that hold in real time would not.
+	# By themselves: browser and emulated machine take both cores, and tests that hold in real time would not.
+	$(BIN)/python -m pytest tests/browser
 	$(BIN)/python -m pytest tests/vm
 
 coverage: pytest ## the same, and which lines: build/coverage/index.html
 	$(BIN)/coverage html --quiet --directory build/coverage
+
+browser: ## Debian's Chromium, in which the panel is tested (root on Debian)
+	sh tests/browser/install.sh
+
+test-browser: setup ## the panel in a real browser
+	$(BIN)/python -m pytest tests/browser
 
 vm: ## build the virtual machine in which the camera is tried on a real kernel (root on Debian 12, two minutes)
 	sh tests/vm/build.sh

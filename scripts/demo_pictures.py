@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from relit_camera.app.demo import demo_files
-from relit_camera.app.video_replay import replay
+from relit_camera.app.replay.video_replay import replay
 from relit_camera.app.wiring import make_pipeline, make_tracker
 from relit_camera.base.config.look import EnvironmentBackground, Lighting, Look, Mode
 from relit_camera.base.config.settings import RelitSettings, TrackerSettings

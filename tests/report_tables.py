@@ -10,6 +10,8 @@ Row = tuple[str, ...]
 TABLES = {
     "what a picture costs, in runs of a network like the face mesh": ("mode", "now", "recorded", "recorded at"),
     "faults survived": ("fault", "longest gap between frames", "lasted"),
+    "steps in the browser": ("flow", "step", "took"),
+    "what the panel costs": ("what", "measured", "at most"),
     "readers of the virtual camera": ("reader", "v4l2loopback", "saw"),
 }
 """Title and columns of every table."""

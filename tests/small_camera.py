@@ -127,6 +127,7 @@ def running_camera(
     fallback: Fallback = Fallback.PLACEHOLDER,
     on_viewer: Callable[[], None] = lambda: None,
     timings: CameraTimings = DEFAULT_TIMINGS,
+    unlit_allowed: bool = False,
 ) -> Iterator[Camera]:
     """Run a camera with its API on a real port; `folder` is for what it stores."""
     settings = RelitSettings(
@@ -135,6 +136,7 @@ def running_camera(
         storage=StorageSettings(data_dir=folder),
     )
     scene_controller = SceneController(settings.storage)
+    scene_controller.set_unlit_allowed(unlit_allowed)
     scene_controller.set_look(look or Look(lighting=Lighting(transition_s=0)))
     scene_controller.show_subject("small", subject or small_subject())
     sink, tracker = sink or RememberingSink(), tracker or SteadyTracker()

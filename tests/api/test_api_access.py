@@ -53,7 +53,9 @@ def paths() -> list[tuple[str, str]]:
         if path != "/healthz"
     ]
     files = [
-        ("GET", f"/panel/{file.name}") for file in PANEL_FOLDER.iterdir() if file.name not in ("panel.css", "icon.svg")
+        ("GET", f"/panel/{file.relative_to(PANEL_FOLDER).as_posix()}")
+        for file in PANEL_FOLDER.rglob("*")
+        if file.is_file() and file.name not in ("panel.css", "icon.svg")
     ]
     return [*operations, *files, ("GET", "/api/v1/openapi.json"), ("GET", "/nothing"), ("HEAD", "/api/v1/status")]
 

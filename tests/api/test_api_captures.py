@@ -68,8 +68,18 @@ def test_the_page_of_the_desk_capture_warns_first(client: Client) -> None:
     assert page.text.index("epilepsy") < page.text.index('id="start"')
     assert 'id="start" disabled' in page.text
     for file in ("desk.js", "desk.css"):
-        assert f"/panel/{file}" in page.text
-        assert client.get(f"/panel/{file}").status_code == 200
+        assert f"/panel/capture/{file}" in page.text
+        assert client.get(f"/panel/capture/{file}").status_code == 200
+
+
+def test_the_page_of_the_film_capture_warns_first(client: Client) -> None:
+    page = client.get("/film")
+    assert page.status_code == 200
+    assert page.text.index("epilepsy") < page.text.index('id="film-upload"')
+    assert 'id="accept" disabled' in page.text
+    for file in ("film.js", "film.css"):
+        assert f"/panel/capture/{file}" in page.text
+        assert client.get(f"/panel/capture/{file}").status_code == 200
 
 
 def test_one_kind_of_capture_at_a_time(client: Client, camera: FakeCamera) -> None:

@@ -8,9 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
+from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
 from tests.api.api_client import Client, check_problem, decoded_picture, hdr, png
 from tests.api.fake_camera import FakeCamera
+from tests.small_camera import difference, small_subject
 
 ENVIRONMENTS = "/api/v1/environments"
 
@@ -118,3 +120,29 @@ def test_unknown_names_are_not_found(client: Client, name: str) -> None:
 def test_a_name_that_is_no_name_is_refused(client: Client) -> None:
     check_problem(client.get(f"{ENVIRONMENTS}/.hidden"), 422)
     check_problem(client.get(f"{ENVIRONMENTS}/%2e%2e%2f%2e%2e%2fetc"), 404)
+
+
+def test_a_place_on_the_person_who_is_shown(client: Client, camera: FakeCamera) -> None:
+    path = f"{ENVIRONMENTS}/sunset/on-me.jpg"
+    check_problem(client.get(path), 404)
+    camera.scene_controller.show_subject("small", small_subject())
+    first = client.get(path)
+    picture = decoded_picture(first.content)
+    assert picture.shape == (192, 256, 3)
+    assert client.get(path, headers={"if-none-match": first.headers["etag"]}).status_code == 304
+    other = decoded_picture(client.get(f"{ENVIRONMENTS}/party/on-me.jpg").content)
+    middle = (slice(60, 130), slice(100, 156))
+    assert difference(picture[middle], other[middle]) > 5  # the person's light too, not only the place
+    check_problem(client.get(f"{ENVIRONMENTS}/nowhere/on-me.jpg"), 404)
+    assert client.get(path).content == first.content
+
+
+def test_another_person_has_other_pictures(client: Client, camera: FakeCamera) -> None:
+    camera.scene_controller.show_subject("small", small_subject())
+    client.upload(ENVIRONMENTS, "room", hdr(), "room.hdr")
+    one = client.get(f"{ENVIRONMENTS}/room/on-me.jpg").content
+    camera.scene_controller.show_subject("other", synthetic_subject(64, 96))
+    assert client.get(f"{ENVIRONMENTS}/room/on-me.jpg").content != one
+    camera.scene_controller.environments.remove("room")
+    client.upload(ENVIRONMENTS, "room", hdr(128, 64), "room.hdr")
+    assert client.get(f"{ENVIRONMENTS}/room/on-me.jpg").content != one

@@ -69,8 +69,10 @@ def test_a_listener_first_gets_what_stands(listener: Listener, camera: FakeCamer
         "mode": "reenact",
         "subject": None,
         "rung": None,
-        "unlit_allowed": True,
+        "unlit_allowed": False,
         "frozen": False,
+        "can_undo": False,
+        "can_redo": False,
     }
     kind, status = next(stream)
     assert kind == "status"

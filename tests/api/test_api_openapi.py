@@ -18,6 +18,10 @@ from tests.api.api_client import Client
 KEPT = Path(__file__).resolve().parents[2] / "docs" / "openapi.json"
 FIXED = {  # what the design promises
     "status": "get",
+    "scene": "get patch",
+    "scene/undo": "post",
+    "scene/redo": "post",
+    "scene/reset": "post",
     "lighting": "get put patch",
     "environments": "get post",
     "environments/{name}": "get delete",
@@ -26,7 +30,7 @@ FIXED = {  # what the design promises
     "mode": "get put",
     "freeze": "get put",
     "presets": "get",
-    "presets/{name}": "get put delete",
+    "presets/{name}": "get put patch delete",
     "neutral-pose": "post",
     "subjects": "get",
     "subjects/{name}": "get delete",
@@ -34,6 +38,12 @@ FIXED = {  # what the design promises
     "snapshot.jpg": "get",
     "preview.mjpg": "get",
     "events": "get",
+    "checks": "get",
+    "devices": "get",
+    "source": "get patch",
+    "tracker": "get put",
+    "framing": "get put",
+    "models": "get post delete",
 }
 
 

@@ -29,7 +29,7 @@ def test_unknown_paths_are_not_found(client: Client) -> None:
         ("POST", "lighting", "GET, PUT, PATCH"),
         ("DELETE", "mode", "GET, PUT"),
         ("GET", "neutral-pose", "POST"),
-        ("PATCH", "presets/evening", "GET, PUT, DELETE"),
+        ("POST", "presets/evening", "GET, PUT, PATCH, DELETE"),
     ],
 )
 def test_other_methods_are_told_which_are_allowed(client: Client, method: str, path: str, allowed: str) -> None:
@@ -119,4 +119,57 @@ def test_a_form_may_be_longer_than_json(client: Client) -> None:
 def test_json_that_does_not_say_so_is_refused(app: FastAPI, client: Client) -> None:
     """A form of another site can send text/plain without asking; it must not pass as JSON."""
     answer = client.request("PUT", "/api/v1/mode", content='{"mode": "ratio"}', headers={"content-type": "text/plain"})
-    check_problem(answer, 422)
+    assert "application/json" in check_problem(answer, 415)["cure"]
+
+
+@pytest.mark.parametrize("path", ["mode", "scene", "presets/look"])
+def test_a_body_without_a_content_type_is_refused(client: Client, path: str) -> None:
+    method = "PATCH" if path == "scene" else "PUT"
+    check_problem(client.request(method, f"/api/v1/{path}", content='{"mode": "ratio"}'), 415)
+
+
+def test_a_body_may_be_left_out_without_a_content_type(client: Client) -> None:
+    assert client.request("PUT", "/api/v1/presets/look").status_code == 201
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "field", "meant"),
+    [
+        ("lighting", {"yaw_dge": 3}, "yaw_dge", "yaw_deg"),
+        ("scene", {"lighting": {"exposure": 3}}, "lighting.exposure", "exposure_ev"),
+        ("scene", {"lighting": {"lamps": [{}, {"kelvni": 3000}]}}, "lighting.lamps.1.kelvni", "kelvin"),
+        ("scene", {"background": {"kind": "color", "colour": "#112233"}}, "background.color.colour", "color"),
+        ("scene", {"zzz": 1}, "zzz", None),
+    ],
+)
+def test_a_misspelt_field_is_offered_right(
+    client: Client, path: str, body: object, field: str, meant: str | None
+) -> None:
+    problem = check_problem(client.patch(f"/api/v1/{path}", body), 422)
+    assert problem["errors"][0]["field"] == field
+    assert "openapi" not in problem["detail"]
+    if meant is None:
+        assert "did you mean" not in problem["detail"]
+    else:
+        assert problem["cure"] == f"did you mean {meant}?"
+        assert f"did you mean {meant}?" in problem["errors"][0]["message"]
+
+
+@pytest.mark.parametrize(
+    ("path", "body"),
+    [
+        ("scene", {"frozen": "true"}),
+        ("scene", {"unlit_allowed": 1}),
+        ("scene", {"lighting": {"yaw_deg": "3"}}),
+        ("scene", {"lighting": {"lamps": [{"color": ["1", 0, 0]}]}}),
+        ("lighting", {"blend": True}),
+    ],
+)
+def test_a_value_of_another_type_is_refused(client: Client, path: str, body: object) -> None:
+    check_problem(client.patch(f"/api/v1/{path}", body), 422)
+
+
+def test_a_whole_number_may_be_written_with_a_point(client: Client) -> None:
+    assert client.put("/api/v1/captures/desk/shown", {"step": 3.0}).status_code == 200
+    for step in (3.5, "3", True):
+        check_problem(client.put("/api/v1/captures/desk/shown", {"step": step}), 422)

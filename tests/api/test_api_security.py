@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 
 import pytest
@@ -11,7 +12,9 @@ from relit_camera.api.middleware.same_origin import AllowedHosts, ServerEndpoint
 from tests.api.api_client import BASE_URL, Client, check_problem
 from tests.api.fake_camera import FakeCamera
 
-PAGES = [f"/panel/{path.name}" for path in sorted(PANEL_FOLDER.iterdir())]
+PAGES = [
+    f"/panel/{path.relative_to(PANEL_FOLDER).as_posix()}" for path in sorted(PANEL_FOLDER.rglob("*")) if path.is_file()
+]
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8470", "localhost:8470", "LOCALHOST:8470", "[::1]:8470"])
@@ -125,5 +128,5 @@ def test_the_panel_asks_nobody_else_and_fits_its_policy(client: Client, path: st
     assert not re.search(r"(?:https?:)?//[a-z0-9.-]+\.[a-z]{2,}", text)
     if path.endswith(".html"):
         assert not re.search(r"<script(?![^>]*\ssrc=)|<style|\sstyle=|\son[a-z]+=", text)
-    for module in re.findall(r'from "\./([^"]+)"', text):
-        assert f"/panel/{module}" in PAGES
+    for module in re.findall(r'^(?:import|export) [^;]*"(\.[^"]+)"|import\("(\.[^"]+)"\)', text, re.MULTILINE):
+        assert posixpath.normpath(posixpath.join(posixpath.dirname(path), "".join(module))) in PAGES

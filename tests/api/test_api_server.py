@@ -189,3 +189,14 @@ def test_signals_are_the_program_s_and_it_exits_clean(tmp_path: Path, number: si
         process.wait()
     assert process.returncode == 0
     assert "Traceback" not in errors
+
+
+def test_answers_do_not_wait_for_the_client_s_acknowledgement(server: ApiServer) -> None:
+    """An answer is written in two parts: with Nagle's algorithm the second is sent 40 ms later."""
+    took = []
+    with httpx.Client(base_url=server.address.url) as client:
+        for _ in range(20):
+            began = time.perf_counter()
+            client.get("healthz")
+            took.append(time.perf_counter() - began)
+    assert min(took[1:]) < 0.03

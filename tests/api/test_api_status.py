@@ -24,7 +24,7 @@ def test_status_tells_everything(client: Client, camera: FakeCamera) -> None:
     status = client.get("/api/v1/status").json()
     assert status["state"] == "live"
     assert status["tracker"] == {"name": "mesh", "state": "found"}
-    assert status["fps"] == {"camera": 29.9, "pipeline": 29.8, "published": 30.0}
+    assert status["fps"] == {"camera": 29.9, "pipeline": 29.8, "published": 30.0, "new": 29.7}
     assert status["latency_ms"] == {"p50": 31.0, "p95": 44.0, "max": 60.0}
     assert status["stage_ms"] == {"track": {"p50": 5.0, "p95": 7.5, "max": 9.0}}
     assert status["frames"] == {"published": 900, "dropped": 3, "repeated": 4, "composed": 899}

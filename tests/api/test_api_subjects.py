@@ -56,7 +56,7 @@ def test_nobody_and_no_subjects_at_first(client: Client) -> None:
 
 
 def test_a_subject_is_listed_chosen_and_deleted(client: Client, camera: FakeCamera, stored: Path) -> None:
-    item = {"name": "ada", "is_current": False, "thumbnail": "/api/v1/subjects/ada/thumbnail.jpg"}
+    item = {"name": "ada", "is_current": False, "temporary": False, "thumbnail": "/api/v1/subjects/ada/thumbnail.jpg"}
     assert client.get("/api/v1/subjects").json() == [item]
     details = client.get("/api/v1/subjects/ada").json()
     assert details["metadata"]["method"] == "nearest"
@@ -127,3 +127,63 @@ def test_what_is_too_large_to_be_shown_is_told_and_seen(client: Client, camera: 
     assert client.get("/api/v1/subjects/ada").json()["metadata"]["method"] == "nearest"
     assert client.get("/api/v1/subjects/ada/thumbnail.jpg").status_code == 200
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100 << 10  # KiB
+
+
+def test_the_demo_person_is_stored_once(client: Client, camera: FakeCamera) -> None:
+    item = client.post("/api/v1/subjects/demo").json()
+    assert item["name"] == "demo person"
+    stored = camera.scene_controller.subjects.path("demo person")
+    assert stored.read_bytes() == camera.demo_subject.read_bytes()
+    before = stored.stat().st_mtime_ns
+    assert client.post("/api/v1/subjects/demo").json() == item
+    assert stored.stat().st_mtime_ns == before
+    assert client.put("/api/v1/subject", {"name": "demo person"}).json() == {"name": "demo person"}
+
+
+def test_a_subject_of_that_name_is_no_demo_person(client: Client, stored: Path) -> None:
+    (stored / "ada.relit").rename(stored / "demo person.relit")
+    check_problem(client.post("/api/v1/subjects/demo"), 409)
+
+
+def test_a_subject_s_file_is_sent_and_stored(client: Client, camera: FakeCamera, stored: Path) -> None:
+    data = (stored / "ada.relit").read_bytes()
+    answer = client.upload("/api/v1/subjects", "bea", data, "evening.relit")
+    assert answer.status_code == 201, answer.text
+    assert answer.json() == {
+        "name": "bea",
+        "temporary": False,
+        "is_current": False,
+        "thumbnail": "/api/v1/subjects/bea/thumbnail.jpg",
+    }
+    assert (stored / "bea.relit").read_bytes() == data
+    assert client.put("/api/v1/subject", {"name": "bea"}).json() == {"name": "bea"}
+    check_problem(client.upload("/api/v1/subjects", "ada", data, "evening.relit"), 409)
+
+
+def test_what_is_no_subject_is_told_by_its_own_name_and_not_kept(
+    client: Client, camera: FakeCamera, stored: Path
+) -> None:
+    data = (stored / "ada.relit").read_bytes()
+    for wrong in (b"no subject", data[:-40]):
+        problem = check_problem(client.upload("/api/v1/subjects", "bea", wrong, "evening.relit"), 422)
+        assert problem["what"].startswith("'evening.relit' is not a usable subject file")
+    check_problem(client.upload("/api/v1/subjects", "../bea", data, "evening.relit"), 422)
+    check_problem(client.upload("/api/v1/subjects", "bea", b"", "evening.relit"), 422)
+    assert [path.name for path in stored.iterdir()] == ["ada.relit"]
+
+
+def test_a_subject_is_renamed_also_while_it_is_shown(client: Client, camera: FakeCamera, stored: Path) -> None:
+    client.put("/api/v1/subject", {"name": "ada"})
+    revision = camera.scene_controller.scene.revision
+    answer = client.patch("/api/v1/subjects/ada", {"name": "bea"})
+    assert answer.status_code == 200, answer.text
+    assert (answer.json()["name"], answer.json()["is_current"]) == ("bea", True)
+    assert client.get("/api/v1/subject").json() == {"name": "bea"}
+    assert camera.scene_controller.scene.revision > revision
+    assert [path.name for path in stored.iterdir()] == ["bea.relit"]
+    check_problem(client.patch("/api/v1/subjects/ada", {"name": "cem"}), 404)
+    check_problem(client.patch("/api/v1/subjects/bea", {"name": "../x"}), 422)
+    write_subject(stored / "cem.relit", small_subject())
+    check_problem(client.patch("/api/v1/subjects/bea", {"name": "cem"}), 409)
+    assert client.patch("/api/v1/subjects/bea", {"name": "bea"}).status_code == 200
+    assert client.get("/api/v1/subject").json() == {"name": "bea"}

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_files import decode_display
+from relit_camera.base.storage.atomic_files import atomic_path
 from relit_camera.capture.desk.desk_recording import DeskSetup
 from relit_camera.subject.subject_file import write_subject
 from tests.app.subject_builders import captured
+
+HALF = b"half a subject"
 
 
 def check_and_build(frames: Sequence[bytes], setup: str, path: Path) -> Sequence[str]:
@@ -27,3 +31,11 @@ def check_and_build(frames: Sequence[bytes], setup: str, path: Path) -> Sequence
 def refuse_desk(frames: Sequence[bytes], setup: str, path: Path) -> Sequence[str]:
     """Say that the person left."""
     raise CaptureError("the person left", "come back")
+
+
+def begin_and_wait(frames: Sequence[bytes], setup: str, path: Path) -> Sequence[str]:
+    """Write half a subject, and wait until this process is killed."""
+    with atomic_path(path) as unfinished:
+        unfinished.write_bytes(HALF)
+        threading.Event().wait(120)
+    return []

@@ -21,6 +21,7 @@ TOUR_S = sum(stop.seconds for stop in TOUR_STOPS)
 @pytest.fixture
 def scene_controller(tmp_path: Path) -> SceneController:
     made = SceneController(StorageSettings(data_dir=tmp_path))
+    made.set_unlit_allowed(True)  # as the demonstration does: the clip as filmed is part of the tour
     made.set_look(tour_at(0.0)[1])
     return made
 

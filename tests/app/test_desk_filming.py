@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.app.desk.desk_filming import DeskBuilder, DeskFilming, FilmingTimings
+from relit_camera.app.captures.desk.controls_note import ControlsNote
+from relit_camera.app.captures.desk.desk_filming import DeskBuilder, DeskFilming, FilmingTimings
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import ConflictError, DeviceError, InputError
@@ -22,7 +23,7 @@ from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.desk_status import DeskPlace, DeskStage
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.subject.subject_file import write_subject
-from tests.app.desk_builders import check_and_build, refuse_desk
+from tests.app.desk_builders import HALF, begin_and_wait, check_and_build, refuse_desk
 from tests.app.subject_builders import captured
 from tests.devices.test_webcam_controls import FakeWebcam
 from tests.small_camera import wait_until
@@ -47,12 +48,14 @@ class Desk:
         self.before = dict(self.webcam.values)
         self.recorder = FrameRecorder()
         self.opening: Callable[[], AbstractContextManager[ControlDevice]] = lambda: nullcontext(self.webcam)
+        self.note = ControlsNote(folder, lambda: "fake webcam")
         self.filming = DeskFilming(
             self.recorder,
             self.scenes,
             EventHub(),
             build,
             lambda: self.opening(),
+            self.note,
             lambda: 1 / 30,
             timings=TIMINGS,
         )
@@ -133,6 +136,19 @@ def test_what_the_worker_refuses_is_told_and_nothing_is_stored(desk: Callable[[D
     assert there.webcam.values == there.before
 
 
+def test_a_canceled_worker_leaves_nothing(desk: Callable[[DeskBuilder], Desk]) -> None:
+    """Nor does it replace the subject that is there."""
+    there = desk(begin_and_wait)
+    write_subject(there.scenes.subjects.new_path("desk"), captured("desk"))
+    folder = there.scenes.subjects.folder
+    before = (folder / "desk.relit").read_bytes()
+    there.start()
+    wait_until(lambda: any(path.read_bytes() == HALF for path in folder.iterdir()), 60)
+    assert there.filming.cancel().stage is DeskStage.CANCELED
+    assert [path.name for path in folder.iterdir()] == ["desk.relit"]
+    assert (folder / "desk.relit").read_bytes() == before
+
+
 def test_a_page_that_is_closed_midway_ends_it_and_frees_the_webcam(desk: Callable[[DeskBuilder], Desk]) -> None:
     there = desk(check_and_build)
     there.closed_after = 5
@@ -148,10 +164,12 @@ def test_it_can_be_canceled_while_it_films(desk: Callable[[DeskBuilder], Desk]) 
     there.start()
     wait_until(lambda: there.filming.status().stage is DeskStage.FILMING, 30)
     assert there.webcam.values != there.before
+    assert there.note.path.exists()
     with pytest.raises(ConflictError, match="runs already"):
         there.start()
     assert there.filming.cancel().stage is DeskStage.CANCELED
     assert there.webcam.values == there.before
+    assert not there.note.path.exists()
 
 
 def test_a_webcam_that_gives_no_frames_is_told(desk: Callable[[DeskBuilder], Desk]) -> None:

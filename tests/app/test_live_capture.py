@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.app.live_capture import LiveCapture, LiveCaptureTimings, SubjectBuilder
+from relit_camera.app.captures.live_capture import LiveCapture, LiveCaptureTimings, SubjectBuilder
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import ConflictError, InputError

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import socket
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,18 +13,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from relit_camera.app.camera_service import CameraService
 from relit_camera.app.run_camera import run_camera
-from relit_camera.app.startup_checks import check_before_devices
+from relit_camera.app.setup.startup_checks import check_before_devices
 from relit_camera.app.wiring import make_pipeline
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings, StorageSettings
-from relit_camera.base.errors import ConfigError, DeviceError, RelitError
+from relit_camera.base.errors import ConfigError, DeviceError, ModelError, RelitError, VideoError
 from relit_camera.devices.on_demand import on_demand_source
-from relit_camera.devices.sinks.sink import Sink
+from relit_camera.devices.sinks.sink import NullSink, Sink
 from relit_camera.devices.sources.source import Source
 from relit_camera.face import matting
 from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.live.status.camera_status import DegradationCode
 from tests.cli.relit_command import Material, write_material
-from tests.small_camera import SteadyTracker, memory_source
+from tests.small_camera import SteadyTracker, memory_source, wait_until
 
 PLUGINS = Path(__file__).parents[1] / "plugins"
 """Where the example package is, some plug-ins of which fail."""
@@ -44,18 +47,18 @@ def signal_handlers() -> Iterator[None]:
 
 
 class Devices:
-    """Records what is opened; the sink then fails, so that no camera runs."""
+    """Records what is opened; the source then fails, so that no camera runs."""
 
     def __init__(self) -> None:
         self.opened: list[str] = []
 
     def source(self, settings: SourceSettings, own_label: str) -> Source:
         self.opened.append("source")
-        return memory_source()
+        raise VideoError("the source was reached", "this is the end of the test")
 
     def sink(self, settings: OutputSettings) -> Sink:
         self.opened.append("sink")
-        raise DeviceError("the sink was reached", "this is the end of the test")
+        return NullSink((settings.width, settings.height))
 
 
 def run(material: Material, folder: Path, devices: Devices, changes: dict[str, Any], **more: Any) -> None:
@@ -71,9 +74,9 @@ def run(material: Material, folder: Path, devices: Devices, changes: dict[str, A
 
 def test_sound_settings_reach_the_devices(material: Material, tmp_path: Path) -> None:
     devices = Devices()
-    with pytest.raises(DeviceError, match="the sink was reached"):
+    with pytest.raises(VideoError, match="the source was reached"):
         run(material, tmp_path, devices, {})
-    assert devices.opened == ["source", "sink"]
+    assert devices.opened == ["sink", "source"]
 
 
 def test_instant_shows_neither_the_configured_subject_nor_the_unlit_picture(
@@ -86,7 +89,7 @@ def test_instant_shows_neither_the_configured_subject_nor_the_unlit_picture(
         return made[-1]
 
     monkeypatch.setattr("relit_camera.app.run_camera.SceneController", make)
-    with pytest.raises(DeviceError, match="the sink was reached"):
+    with pytest.raises(VideoError, match="the source was reached"):
         run(material, tmp_path, Devices(), {}, instant=True)
     assert made[0].scene.subject is None
     assert not made[0].scene.unlit_allowed
@@ -132,6 +135,47 @@ def test_faults_are_found_before_a_device_is_opened(
     assert devices.opened == []
 
 
+def no_device(*_: object) -> Any:
+    raise DeviceError("there is no such device", "plug one in")
+
+
+@pytest.mark.parametrize("missing", ["source_for", "sink_for"])
+def test_a_missing_device_is_an_error_only_if_that_is_asked_for(
+    missing: str, material: Material, tmp_path: Path
+) -> None:
+    devices: dict[str, Any] = {"source_for": lambda *_: memory_source(), "sink_for": Devices().sink, missing: no_device}
+    settings = RelitSettings(
+        storage=StorageSettings(data_dir=tmp_path / "data"),
+        server={"port": 0},
+        subject=str(material.subject),
+        tracker={"name": material.tracker},
+    )
+    with pytest.raises(DeviceError, match="there is no such device; plug one in"):
+        run_camera(settings, strict=True, **devices)
+    seen: list[str] = []
+
+    @contextmanager
+    def watch(camera_service: CameraService, url: str) -> Iterator[None]:
+        code = DegradationCode.SOURCE_FAILED if missing == "source_for" else DegradationCode.SINK_FAILED
+        wait_until(lambda: any(found.code is code for found in camera_service.status().degraded))
+        seen.extend(f"{found.why}; {found.cure}" for found in camera_service.status().degraded if found.code is code)
+        yield
+
+    run_camera(settings, side_task=watch, seconds=0.1, **devices)
+    assert seen == ["there is no such device; plug one in"]
+
+
+def test_missing_models_are_an_error_only_if_that_is_asked_for(
+    material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
+    with pytest.raises(ModelError, match="relit models pull"):
+        run(material, tmp_path, Devices(), {"tracker": {"name": "mesh"}}, strict=True)
+    devices = Devices()
+    with pytest.raises(VideoError, match="the source was reached"):
+        run(material, tmp_path, devices, {"tracker": {"name": "mesh"}})
+
+
 @pytest.mark.parametrize("system", ["darwin", "win32"])
 def test_on_demand_where_no_system_tells_the_readers_is_found_before_a_device_is_opened(
     system: str, material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -141,7 +185,7 @@ def test_on_demand_where_no_system_tells_the_readers_is_found_before_a_device_is
     with pytest.raises(ConfigError, match="only Linux tells who reads a virtual camera; leave it out"):
         run(material, tmp_path, devices, {"source": {"on_demand": True}})
     assert devices.opened == []
-    with pytest.raises(DeviceError, match="the sink was reached"):  # a file and `null` need nobody to tell
+    with pytest.raises(VideoError, match="the source was reached"):  # a file and `null` need nobody to tell
         run(material, tmp_path, devices, {"source": {"on_demand": True}, "output": {"sink": "null"}})
 
 

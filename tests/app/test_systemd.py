@@ -175,6 +175,13 @@ def test_a_sink_that_fails_and_is_reported_is_no_camera_that_hangs() -> None:
     assert sent == ["READY", "STATUS", "STATUS", "WATCHDOG", "WATCHDOG", "WATCHDOG"]
 
 
+def test_a_camera_without_its_virtual_camera_is_ready_to_be_told_about() -> None:
+    camera = Camera(watchdog_s=30.0)
+    missing = replace(STATUS, degraded=[Degradation(code=DegradationCode.SINK_FAILED, what="x", why="y")])
+    camera.clock.at(0.98, lambda: setattr(camera, "base", missing))
+    assert camera.report_for(40.0) == [(1.0, "READY"), (16.0, "WATCHDOG"), (31.0, "WATCHDOG")]
+
+
 @pytest.mark.parametrize("kind", ["listener", "abstract_listener"])
 def test_what_is_reported_reaches_the_socket(kind: str, request: pytest.FixtureRequest) -> None:
     listener: Listener = request.getfixturevalue(kind)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from relit_camera.app.video_replay import ReplayedFrame, replay
+from relit_camera.app.replay.video_replay import ReplayedFrame, replay
 from relit_camera.app.wiring import make_pipeline
 from relit_camera.base.config.look import Lighting, Look
 from relit_camera.base.config.settings import InferenceSettings, RelitSettings

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import pickle
 import re
 from pathlib import Path
 
@@ -60,3 +61,11 @@ def test_public_errors_are_defined_in_the_tree_alone() -> None:
 def test_an_error_says_what_is_wrong_and_the_cure() -> None:
     assert str(errors.ConfigError("it is wrong", "correct it")) == "it is wrong; correct it"
     assert str(errors.ConfigError("it is wrong")) == "it is wrong"
+
+
+def test_every_error_comes_whole_from_another_process() -> None:
+    for kind in error_classes().values():
+        if issubclass(kind, errors.RelitError):
+            error = kind("what is wrong", "what to do")
+            arrived = pickle.loads(pickle.dumps(error))
+            assert (type(arrived), arrived.what, arrived.cure) == (kind, "what is wrong", "what to do")

@@ -6,6 +6,7 @@ import multiprocessing.resource_tracker
 import multiprocessing.spawn
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -15,7 +16,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from relit_camera.base.concurrency.worker_process import NICENESS, run_in_worker_process
+from relit_camera.base.concurrency.worker_process import NICENESS, Progress, run_in_worker_process
 from relit_camera.base.errors import CaptureError, WorkerError
 from tests.small_camera import wait_until
 
@@ -100,3 +101,49 @@ def test_a_worker_ends_with_the_process_that_started_it(tmp_path: Path) -> None:
         worker = psutil.Process(int(file.read_text()))
         parent.kill()
     wait_until(lambda: not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE)
+
+
+def count_up(last: int, tell: Progress) -> str:
+    for index in range(last):
+        tell("counting", index + 1, last)
+    return "done"
+
+
+def test_progress_is_told_in_order_and_at_once() -> None:
+    told: list[tuple[str, int, int | None]] = []
+    assert run_in_worker_process(count_up, 3, timeout_s=30, progress=lambda *stage: told.append(stage)) == "done"
+    assert told == [("counting", 1, 3), ("counting", 2, 3), ("counting", 3, 3)]
+
+
+def take_memory(count: int) -> int:
+    return len(bytearray(count))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limit is Linux's")
+def test_a_worker_may_not_take_more_memory_than_it_is_given() -> None:
+    assert run_in_worker_process(take_memory, 1 << 20, timeout_s=30, most_bytes=1 << 30) == 1 << 20
+    with pytest.raises(WorkerError, match="needs more memory than is free"):
+        run_in_worker_process(take_memory, 2 << 30, timeout_s=30, most_bytes=1 << 30)
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="a signal of POSIX systems")
+def test_ctrl_c_while_a_worker_starts_is_the_camera_s_alone() -> None:
+    """The whole process group gets SIGINT at every moment of its start; nothing is printed, the work is done."""
+    code = (
+        "import os, signal, threading, time\n"
+        "from tests.base import test_worker_process as it\n"
+        "signal.signal(signal.SIGINT, lambda *_: None)\n"
+        "stop = threading.Event()\n"
+        "def press():\n"
+        "    while not stop.wait(0.01): os.killpg(0, signal.SIGINT)\n"
+        "presser = threading.Thread(target=press)\n"
+        "presser.start()\n"
+        "try:\n"
+        "    print(it.run_in_worker_process(it.add, 2, 3, timeout_s=60)[0])\n"
+        "finally:\n"
+        "    stop.set(); presser.join()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, start_new_session=True
+    )
+    assert (done.stdout, done.stderr) == ("5\n", "")

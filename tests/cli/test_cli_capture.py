@@ -114,7 +114,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def refuse(*_: object) -> None:
         raise CaptureError("no flash found", "let a light blink")
 
-    monkeypatch.setattr("relit_camera.capture.film.pipeline.film_capture.build_samples", refuse)
+    monkeypatch.setattr("relit_camera.capture.film.pipeline.film_subject.build_samples", refuse)
     film = write_film(tmp_path / "film.mp4", np.zeros((12, 64, 64, 3), np.uint8))
     folder = CheckpointFolder(tmp_path / "me.relit", input_fingerprint(film, CaptureOptions()), print)
     folder.write(Checkpoint(sphere_samples(40, 24), {"warnings": ["a guess"], "light": {"frames": 77}}))

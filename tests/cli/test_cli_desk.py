@@ -2,27 +2,47 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from relit_camera.base.images.image_files import write_display
+from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.capture.desk import desk_capture
+from relit_camera.capture.desk.desk_recording import DeskRecording
+from relit_camera.capture.desk.person import desk_face
+from relit_camera.face.detection.face_detector import Detection
 from relit_camera.subject.subject_file import read_metadata
-from tests.capture.desk.desk_person import film, lambertian_person
+from tests.capture.desk.desk_person import SETUP, film, lambertian_person
 from tests.cli.relit_command import call
+
+
+@dataclass(frozen=True)
+class Found:
+    """A detector that finds these faces in every picture."""
+
+    faces: list[Detection]
+
+    def detect_all(self, picture: DisplayImage) -> list[Detection]:
+        return self.faces
+
+
+def write_recording(folder: Path, recording: DeskRecording) -> Path:
+    """The folder with the recording's frames and setup."""
+    folder.mkdir()
+    for index in range(len(recording.frames)):
+        write_display(folder / f"{index:04d}.png", recording.frames[index])
+    (folder / "desk.json").write_text(recording.setup.model_dump_json(), encoding="utf-8")
+    return folder
 
 
 def test_a_recorded_folder_becomes_a_subject(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # An ellipsoid is no person to a network.
     monkeypatch.setattr(desk_capture, "segment_person", lambda picture: None)
     monkeypatch.setattr(desk_capture, "find_mesh_landmarks", lambda picture: None)
-    folder, out = tmp_path / "evening", tmp_path / "me.relit"
-    folder.mkdir()
-    recording = film(lambertian_person())
-    for index in range(len(recording.frames)):
-        write_display(folder / f"{index:04d}.png", recording.frames[index])
-    (folder / "desk.json").write_text(recording.setup.model_dump_json(), encoding="utf-8")
+    folder, out = write_recording(tmp_path / "evening", film(lambertian_person())), tmp_path / "me.relit"
     answer = call("capture", "desk", "--frames", folder, "--out", out)
     assert answer.code == 0, answer.err
     assert "6 patches" in answer.out
@@ -37,3 +57,34 @@ def test_what_is_missing_or_wrong_is_named_and_nothing_is_left(tmp_path: Path) -
     (tmp_path / "desk.json").write_text('{"distance_cm": 1}', encoding="utf-8")
     call("capture", "desk", "--frames", tmp_path, "--out", out).complains("desk.json", "screen")
     assert [path.name for path in tmp_path.iterdir()] == ["desk.json"]
+
+
+def test_a_bad_recording_is_one_clear_line_and_nothing_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(desk_capture, "segment_person", lambda picture: None)
+    monkeypatch.setattr(desk_capture, "find_mesh_landmarks", lambda picture: None)
+    out, person = tmp_path / "me.relit", lambertian_person()
+    good = film(person)
+    frames = [good.frames[index] for index in range(len(good.frames))]
+    walls = [np.full_like(frame, frame[:20, :20].mean(axis=(0, 1)).astype(np.uint8)) for frame in frames]
+    gone = [*frames[:96], *walls[96:]]
+    grid = SETUP.patches
+    order = np.arange(grid.count).reshape(grid.rows, grid.columns)[:, ::-1].ravel()
+    turned = SETUP.model_copy(
+        update={
+            "sequence": [
+                pattern if isinstance(pattern, str) else [pattern[k] for k in order] for pattern in SETUP.patterns
+            ]
+        }
+    )
+    searched = good.setup.model_copy(update={"face": None, "pixels_per_cm": None})
+    face = Detection((150, 90, 100, 120), np.array([[180, 140], [220, 140]], np.float32), 0.9)
+    for name, recording, faces, words in (
+        ("left", replace(good, frames=gone), [], "stay before the webcam"),
+        ("turned", film(person, turned, said=SETUP), [], "mirrored"),
+        ("nobody", replace(good, setup=searched), [], "no face is seen"),
+        ("two", replace(good, setup=searched), [face, face], "two faces are seen"),
+    ):
+        monkeypatch.setattr(desk_face, "open_face_detector", lambda faces=faces: Found(faces))
+        folder = write_recording(tmp_path / name, recording)
+        call("capture", "desk", "--frames", folder, "--out", out).complains(words)
+        assert not out.exists()

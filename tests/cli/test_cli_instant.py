@@ -10,6 +10,7 @@ import pytest
 
 from relit_camera.base.images.image_files import write_display
 from relit_camera.subject.subject_file import write_subject
+from tests.app.subject_builders import captured
 from tests.capture.instant.conftest import models, pulled_models
 from tests.capture.instant.lit_person import SKIN, picture_of, window
 from tests.cli.relit_command import call
@@ -69,3 +70,13 @@ def test_info_tells_of_a_subject_whose_rung_nobody_noted(tmp_path: Path) -> None
     object.__setattr__(subject, "metadata", old)
     write_subject(tmp_path / "old.relit", subject)
     assert "older version" in call("subject", "info", tmp_path / "old.relit").out
+
+
+def test_a_better_subject_of_that_name_is_told_before_a_device_is_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RELIT_STORAGE__DATA_DIR", str(tmp_path))
+    (tmp_path / "subjects").mkdir()
+    write_subject(tmp_path / "subjects" / "instant.relit", captured("film"))
+    answer = call("run", "--instant", "--source", tmp_path / "no such film.mp4", "--sink", "null", "--no-pull")
+    answer.complains("subject 'instant' was captured in a better way", "--subject instant")

@@ -160,23 +160,53 @@ def test_port_in_use(material: Material, tmp_path: Path) -> None:
 
 
 def test_missing_camera(material: Material, tmp_path: Path) -> None:
-    options = arguments(material)
+    options = arguments(material, "--strict")
     options[2] = "No Such Camera"
     finish(*options, folder=tmp_path).complains("No Such Camera")
 
 
 def test_missing_virtual_camera(material: Material, tmp_path: Path) -> None:
-    options = arguments(material)
+    options = arguments(material, "--strict")
     options[4] = "/dev/video97"
     finish(*options, folder=tmp_path).complains("/dev/video97")
     assert not (tmp_path / "data").exists()
+
+
+def test_it_starts_without_devices_and_models_and_says_what_to_do(
+    material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
+    missing = ("--source", "No Such Camera", "--sink", "/dev/video97", "--tracker", "mesh", "--no-pull")
+    with running(material, tmp_path, *missing) as (process, http):
+
+        def told() -> dict[str, str]:
+            return {each["code"]: f"{each['why']}; {each['cure']}" for each in http.get("status").json()["degraded"]}
+
+        wait_until(lambda: told().keys() >= {"source-failed", "sink-failed", "models-missing"}, START_S)
+        assert "there is no webcam 'No Such Camera'" in told()["source-failed"]
+        assert "/dev/video97" in told()["sink-failed"]
+        assert "run `relit models pull" in told()["models-missing"]
+        assert http.get("snapshot.jpg").content.startswith(b"\xff\xd8")  # the placeholder
+        assert http.get("source").json()["what"] == "there is no webcam 'No Such Camera'"
+        assert "face_detector_yunet" in http.get("models").json()["missing"]
+        states = {each["id"]: each["state"] for each in http.get("checks").json()}
+        assert states["models"] == states["webcam"] == "failed"
+        # The page recovers by itself: another source is chosen, and the tracker needs no models.
+        assert http.patch("source", json={"device": "pattern"}).status_code == 200
+        wait_until(lambda: "source-failed" not in told(), START_S)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(START_S) == 0
+        assert process.stderr is not None
+        said = process.stderr.read()
+        assert "Waiting: there is no webcam 'No Such Camera'; " in said
+        assert "Traceback" not in said
 
 
 def test_missing_subject_model_and_track(material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
     for changed, words in (
         (("--subject", "nobody"), ("nobody", "there are")),
-        (("--tracker", "mesh"), ("relit models pull",)),
+        (("--tracker", "mesh", "--strict"), ("relit models pull",)),
         (("--tracker", "recorded:none.json"), ("none.json",)),
         (("--environment", "stuido"), ("stuido", "studio")),
         (("--source", "none.mp4"), ("none.mp4",)),

@@ -115,3 +115,9 @@ def test_no_is_clear_and_remembered(at_terminal: Callable[..., tuple[int, str]],
     status, shown = at_terminal("y\n")
     assert status == 1
     assert QUESTION not in shown
+
+
+def test_a_no_that_cannot_be_noted_is_no_error(tmp_path: Path) -> None:
+    (tmp_path / "models").touch()
+    model_offer._remember(tmp_path / "models" / model_offer.REFUSED_FILE_NAME)
+    assert (tmp_path / "models").is_file()

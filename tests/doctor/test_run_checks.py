@@ -15,7 +15,7 @@ from typing import NoReturn
 import psutil
 import pytest
 
-from relit_camera.app.needed_models import OF_TRACKER
+from relit_camera.app.setup.needed_models import OF_TRACKER
 from relit_camera.base.config.settings import RelitSettings, ServerSettings
 from relit_camera.base.models.model_store import ModelState, ModelStore
 from relit_camera.doctor import run_checks as examining

@@ -194,7 +194,7 @@ def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, mo
 def test_not_even_the_source_image_can_be_relit(
     fallback: Fallback, tmp_path: Path, survived: Survived, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with watched_camera(tmp_path, fallback=fallback) as watched:
+    with watched_camera(tmp_path, fallback=fallback, unlit_allowed=fallback is Fallback.LIVE) as watched:
 
         def fail(self: BasisRelighter, lights: object) -> LinearImage:
             raise MemoryError("no memory for a picture")

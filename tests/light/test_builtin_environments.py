@@ -9,6 +9,7 @@ import pytest
 from relit_camera.base.images.color import LUMINANCE
 from relit_camera.light.directions import direction_from_degrees, texel_directions
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.environments.builtin.builtin_thumbnails import builtin_thumbnail, drawn_thumbnail
 from relit_camera.light.environments.builtin.canvas import bearings, directions
 from relit_camera.light.environments.environment_store import EnvironmentStore
 from relit_camera.light.environments.panorama_axes import between_map_and_viewer_axes
@@ -52,6 +53,19 @@ def test_each_wraps_at_its_sides(name: str) -> None:
     cut = np.abs(radiance[:, middle] - radiance[:, middle - 1]).mean()
     typical = np.abs(np.diff(radiance, axis=1)).mean()
     assert cut < 4 * typical + 0.005
+
+
+@pytest.mark.parametrize("name", BUILTIN_NAMES)
+def test_each_thumbnail_of_the_package_is_what_is_drawn(name: str) -> None:
+    kept, drawn = (
+        cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        for data in (builtin_thumbnail(name), drawn_thumbnail(name))
+    )
+    assert kept is not None
+    assert drawn is not None
+    cure = "write them again: python -m relit_camera.light.environments.builtin.builtin_thumbnails"
+    assert np.abs(kept.astype(int) - drawn).mean() < 1.5, cure  # JPEG encoders differ
+    assert len(builtin_thumbnail(name)) < 10_000
 
 
 @pytest.mark.parametrize("name", BUILTIN_NAMES)

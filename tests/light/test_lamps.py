@@ -87,3 +87,9 @@ def test_lamps_add_up() -> None:
 
 def test_no_lamp_is_no_light() -> None:
     np.testing.assert_array_equal(lamp_light_map([]), np.zeros((32, 64, 3)))
+
+
+def test_a_muted_lamp_gives_no_light_and_a_name_changes_none() -> None:
+    bright, muted = Lamp(azimuth_deg=40, name="key"), Lamp(azimuth_deg=-40, muted=True)
+    np.testing.assert_array_equal(lamp_light_map([bright, muted]), lamp_light_map([Lamp(azimuth_deg=40)]))
+    assert not lamp_light_map([muted]).any()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -23,7 +24,7 @@ from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
-from relit_camera.live.pipeline import Pipeline
+from relit_camera.live.pipeline import Pipeline, subject_troubles
 from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import DegradationCode
@@ -40,10 +41,10 @@ def pipeline(tracker: Tracker | None = None, size: tuple[int, int] = SIZE) -> Pi
     return make_pipeline(CPU, tracker or SteadyTracker(), size)
 
 
-def scene(subject: bool = True, mode: Mode = Mode.REENACT, **look: object) -> Scene:
+def scene(subject: bool = True, mode: Mode = Mode.REENACT, unlit_allowed: bool = True, **look: object) -> Scene:
     wanted = Look.model_validate({"mode": mode, **look})
     lit = STUDIO if wanted.lighting.environment == "studio" else None
-    return Scene(wanted, lit, None, "small", small_subject() if subject else None)
+    return Scene(wanted, lit, None, "small", small_subject() if subject else None, unlit_allowed=unlit_allowed)
 
 
 def frame(index: int = 0, image: np.ndarray | None = None) -> Frame:
@@ -65,11 +66,17 @@ def test_reenact_lets_no_live_pixel_through() -> None:
 
 
 def test_without_a_subject_the_live_picture_passes() -> None:
-    made = pipeline()
-    assert difference(made.process(frame(), scene(subject=False)).image, grey()) <= 1
-    assert [trouble.why for trouble in made.troubles] == ["no subject is chosen"]
-    made.process(frame(1), scene())
-    assert made.troubles == []
+    rendered = pipeline().process(frame(), scene(subject=False))
+    assert difference(rendered.image, grey()) <= 1
+    assert rendered.unlit  # the publisher shows it only where that is allowed
+
+
+@pytest.mark.parametrize(("allowed", "shown"), [(True, "the live picture"), (False, "a placeholder")])
+def test_nobody_is_a_trouble(allowed: bool, shown: str) -> None:
+    (trouble,) = subject_troubles(scene(subject=False, unlit_allowed=allowed))
+    assert trouble.code is DegradationCode.NO_SUBJECT
+    assert trouble.what.startswith(shown)
+    assert subject_troubles(scene()) == []
 
 
 def test_ratio_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
@@ -175,15 +182,60 @@ def test_reenact_stands_before_its_background_without_any_model() -> None:
     assert (red[:, 0] == [255, 0, 0]).all()
 
 
-def test_without_a_face_mode_ratio_shows_the_live_picture() -> None:
-    class Blind(SteadyTracker):
-        def track(self, frame: Frame) -> FaceState:
-            return LOST
-
+def test_without_a_face_mode_ratio_shows_the_live_picture_where_that_is_allowed() -> None:
     bright = np.tile(np.arange(0, 256, 2, dtype=np.uint8), (SIZE[1], 1))[..., None].repeat(3, axis=2)
     assert bright.shape == (SIZE[1], SIZE[0], 3)
     picture = pipeline(Blind()).process(frame(0, bright), scene(mode=Mode.RATIO)).image
     assert np.abs(picture.astype(int) - bright).max() <= 2  # highlights are not dimmed
+
+
+class Blind(SteadyTracker):
+    """Sees no face."""
+
+    def track(self, frame: Frame) -> FaceState:
+        return LOST
+
+
+def test_without_a_face_mode_ratio_shows_what_reenact_does_unless_the_live_picture_is_allowed() -> None:
+    noise = np.random.default_rng(0).integers(60, 200, grey().shape, dtype=np.uint8)
+    light = {"exposure_ev": -1, "transition_s": 0}
+    ratio, reenact = (
+        pipeline(Blind()).process(frame(0, noise), scene(mode=mode, unlit_allowed=False, lighting=light))
+        for mode in Mode
+    )
+    assert not ratio.unlit
+    assert difference(ratio.image, reenact.image) < 2
+
+
+def test_a_face_that_comes_or_goes_is_eased_between_the_subject_at_rest_and_the_relit_picture() -> None:
+    """No step is larger than easing makes it, and the live picture is in none of them."""
+
+    class Going(SteadyTracker):
+        def track(self, frame: Frame) -> FaceState:
+            return super().track(frame) if frame.index < 30 else LOST
+
+    shown = scene(mode=Mode.RATIO, unlit_allowed=False, lighting={"exposure_ev": -2, "transition_s": 0})
+    made = pipeline(Going())
+    live = grey(220)
+    rendered = [made.process(frame(index, live), shown) for index in range(60)]
+    pictures = [each.image for each in rendered]
+    followed = difference(pictures[0], pictures[25])
+    assert followed > 20
+    steps = [difference(one, next_one) for one, next_one in pairwise(pictures)]
+    assert max(steps) < 0.35 * followed
+    assert difference(pictures[0], pictures[-1]) < 2
+    assert not any(each.unlit for each in rendered)
+    assert min(difference(picture, live) for picture in pictures) > 20
+
+
+@pytest.mark.parametrize(
+    ("changes", "unlit"), [({}, False), ({"split": 0.5}, True), ({"blend": 0.0}, True), ({"blend": 0.5}, False)]
+)
+def test_a_picture_says_whether_a_part_of_it_is_as_filmed(changes: dict[str, float], unlit: bool) -> None:
+    made, shown = pipeline(), scene(mode=Mode.RATIO, lighting=changes)
+    rendered = [made.process(frame(index), shown) for index in range(25)]
+    assert rendered[0].unlit  # a face that just came is eased in
+    assert rendered[-1].unlit is unlit
 
 
 class OneGrey:
@@ -230,7 +282,7 @@ def test_any_mode_may_find_a_mismatch_and_the_fallback_takes_over_until_the_subj
         ("mode reenact is shown in place of mode ratio", "nobody is there", "come back")
     ]
     made.process(frame(30), replace(wanted, subject=None))
-    assert [trouble.code for trouble in made.troubles] == [DegradationCode.NO_SUBJECT]
+    assert made.troubles == []
 
 
 class Reappearing(SteadyTracker):

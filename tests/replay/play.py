@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from relit_camera.app.video_replay import ReplayedFrame, replay
+from relit_camera.app.replay.video_replay import ReplayedFrame, replay
 from relit_camera.app.wiring import make_pipeline, make_tracker
 from relit_camera.base.config.look import Lighting, Look
 from relit_camera.base.config.settings import RelitSettings, StorageSettings

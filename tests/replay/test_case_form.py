@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.app.video_replay import ReplayedFrame
+from relit_camera.app.replay.video_replay import ReplayedFrame
 from relit_camera.base.images.image_files import read_display
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.face_state import FaceStatus

@@ -21,7 +21,7 @@ START_S = 240.0
 ADDRESS = "http://127.0.0.1:8470/api/v1"
 TRACK = f"{GUEST_PROGRAM}/relit_camera/app/demo/data/track.json"
 EXPECTED = ("no-subject", "reduced-quality")
-"""What a camera here may say: it has no subject, and an emulated machine is slow."""
+"""What a camera here may say: it has no subject, and shows its source as it is, and an emulated machine is slow."""
 ROOM = "room.hdr"
 """A small environment: an emulated machine takes a quarter of a minute to paint one of the built-in ones."""
 
@@ -71,7 +71,7 @@ def running(
 ) -> Iterator[Camera]:
     """Run the camera until the block ends, from when it is in the state."""
     # The last of an option counts, so `more` may name another environment.
-    camera = Camera(machine, f"--source {source} --size {size[0]}x{size[1]} {without_models(machine)} {more}")
+    camera = Camera(machine, f"--source {source} --size {size[0]}x{size[1]} {without_models(machine)} --unlit {more}")
     try:
         camera.wait_for(state)
         yield camera

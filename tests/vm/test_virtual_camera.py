@@ -51,7 +51,7 @@ class TestWhileItRuns:
     @NEWEST
     def test_a_second_camera_is_refused(self, camera: Camera, machine: Machine) -> None:
         before = camera.status()["frames"]["published"]
-        outcome = relit(machine, f"run --source pattern --port 0 {without_models(machine)}")
+        outcome = relit(machine, f"run --strict --source pattern --port 0 {without_models(machine)}")
         assert outcome.status == 1
         assert outcome.errors.strip() == (
             f"relit: another Relit Camera publishes to {NODE} already; "
@@ -61,7 +61,7 @@ class TestWhileItRuns:
 
     @NEWEST
     def test_it_never_films_itself(self, camera: Camera, machine: Machine) -> None:
-        outcome = relit(machine, f"run --source {NODE} --port 0 {without_models(machine)}")
+        outcome = relit(machine, f"run --strict --source {NODE} --port 0 {without_models(machine)}")
         assert outcome.status == 1
         assert outcome.errors == (
             f"relit: '{NODE}' is our own virtual camera: it would film itself; choose another source\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from starlette.responses import FileResponse
 from starlette.staticfiles import StaticFiles
 
@@ -13,12 +13,12 @@ from relit_camera import __version__
 from relit_camera.api.dependencies import create_context
 from relit_camera.api.middleware.body_limits import BodyLimitMiddleware, HeadRequestMiddleware
 from relit_camera.api.middleware.error_handlers import install_error_handlers
+from relit_camera.api.middleware.json_bodies import require_strict_json
 from relit_camera.api.middleware.same_origin import AllowedHosts, SameOriginMiddleware
 from relit_camera.api.middleware.token_authentication import TokenAuthMiddleware
 from relit_camera.api.openapi.openapi_document import openapi_document, operation_id
 from relit_camera.api.routes import (
     backgrounds,
-    captures,
     environments,
     lighting,
     mode_and_freeze,
@@ -27,7 +27,10 @@ from relit_camera.api.routes import (
     preview,
     server_sent_events,
     subjects,
+    whole_scene,
 )
+from relit_camera.api.routes.jobs import captures, film_captures, replays
+from relit_camera.api.routes.setup import framing_help, model_pulling, source_and_tracker, system_checks
 from relit_camera.base.config.access_token import read_token
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.live.camera_control import CameraControl
@@ -65,15 +68,22 @@ def create_app_without_camera() -> FastAPI:
         redoc_url=None,
         generate_unique_id_function=operation_id,
     )
-    api = APIRouter(prefix=API_PREFIX)
+    api = APIRouter(prefix=API_PREFIX, dependencies=[Depends(require_strict_json)])
     for topic in (
+        whole_scene,
         lighting,
         environments,
         backgrounds,
         mode_and_freeze,
         subjects,
         captures,
+        film_captures,
+        replays,
         presets,
+        system_checks,
+        source_and_tracker,
+        model_pulling,
+        framing_help,
         preview,
         server_sent_events,
         monitoring,
@@ -83,6 +93,7 @@ def create_app_without_camera() -> FastAPI:
     app.include_router(monitoring.probe_router)
     app.add_api_route("/", _panel_page, include_in_schema=False)
     app.add_api_route("/desk", _desk_page, include_in_schema=False)
+    app.add_api_route("/film", _film_page, include_in_schema=False)
     app.mount("/panel", StaticFiles(directory=PANEL_FOLDER), "panel")
     install_error_handlers(app)
     app.openapi = lambda: _cached_openapi(app)  # type: ignore[method-assign]
@@ -94,7 +105,11 @@ def _panel_page() -> FileResponse:
 
 
 def _desk_page() -> FileResponse:
-    return FileResponse(PANEL_FOLDER / "desk.html", media_type="text/html")
+    return FileResponse(PANEL_FOLDER / "capture" / "desk.html", media_type="text/html")
+
+
+def _film_page() -> FileResponse:
+    return FileResponse(PANEL_FOLDER / "capture" / "film.html", media_type="text/html")
 
 
 def _cached_openapi(app: FastAPI) -> dict[str, Any]:

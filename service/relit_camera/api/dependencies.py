@@ -11,6 +11,7 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from relit_camera.api.preview_stream import PreviewBroadcaster
+from relit_camera.api.subject_in_places import SubjectInPlaces
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import NotReadyError
@@ -25,6 +26,7 @@ class ApiContext:
         camera: the running camera.
         presets: stored looks.
         preview: pictures for viewers, each encoded once.
+        subject_in_places: pictures of the subject in the environments.
         closing: set when the server shuts down: endless answers must end.
         image_work_lock: held while a picture is read, drawn or encoded.
     """
@@ -32,6 +34,7 @@ class ApiContext:
     camera: CameraControl
     presets: PresetStore
     preview: PreviewBroadcaster
+    subject_in_places: SubjectInPlaces = field(default_factory=SubjectInPlaces)
     closing: threading.Event = field(default_factory=threading.Event)
     image_work_lock: threading.Lock = field(default_factory=threading.Lock)
 

@@ -48,11 +48,13 @@ class PreviewVariant:
         width: in pixels; never scaled up. None is as published.
         mirror: left and right exchanged, as in a mirror.
         fps: at most so many pictures a second.
+        before: the frames as filmed, in place of the published pictures.
     """
 
     width: int | None = None
     mirror: bool = False
     fps: float = 30.0
+    before: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,8 @@ class PreviewStream:
             self._wake()
 
     def _make(self) -> EncodedFrame | None:
-        published = self._camera.picture(self._newest.count, FRAME_WAIT_S)
+        picture = self._camera.filmed_picture if self._variant.before else self._camera.picture
+        published = picture(self._newest.count, FRAME_WAIT_S)
         if published is None:
             return None
         began_s = time.thread_time()

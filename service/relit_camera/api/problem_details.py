@@ -19,9 +19,11 @@ from relit_camera.base.errors import (
     InputError,
     NotFoundError,
     NotReadyError,
+    PreconditionFailedError,
     RelitError,
     StorageError,
     TooLargeError,
+    UnlitNotAllowedError,
 )
 
 MEDIA_TYPE = "application/problem+json"
@@ -65,6 +67,7 @@ STATUS_BY_ERROR = {
     StorageError: HTTPStatus.INSUFFICIENT_STORAGE,
     DeviceError: HTTPStatus.SERVICE_UNAVAILABLE,
     ConflictError: HTTPStatus.CONFLICT,
+    PreconditionFailedError: HTTPStatus.PRECONDITION_FAILED,
     TooLargeError: HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
     ForbiddenError: HTTPStatus.FORBIDDEN,
     NotReadyError: HTTPStatus.SERVICE_UNAVAILABLE,
@@ -77,6 +80,7 @@ PROBLEM_TYPES = {
     404: ("not-found", "Not found"),
     405: ("method-not-allowed", "Method not allowed"),
     409: ("conflict", "In conflict with what is there"),
+    412: ("precondition-failed", "Changed meanwhile"),
     413: ("too-large", "Too large"),
     415: ("media-type", "Of a kind that is not taken"),
     421: ("wrong-host", "Wrong host"),
@@ -86,6 +90,8 @@ PROBLEM_TYPES = {
     507: ("not-stored", "Could not be stored"),
 }
 """Status → the last part of the problem's type, and its title."""
+UNLIT_NOT_ALLOWED = ("unlit-not-allowed", "Nobody has allowed the picture as filmed")
+"""The same of a 409 that goes away once a person has confirmed it."""
 
 # Folders of a path would reveal the person's machine: only the last part is shown. Paths of the API itself stay.
 _FOLDER_PATTERN = re.compile(r"(?<![\w.:/\\])(?!/api/|/panel/)(?:[A-Za-z]:)?[/\\](?:[^\s/\\:'\",;]+[/\\])+")
@@ -105,9 +111,13 @@ def problem_response(
     cure: str = "",
     errors: Sequence[FieldProblem] | None = None,
     headers: Mapping[str, str] | None = None,
+    kind: tuple[str, str] | None = None,
 ) -> Response:
-    """The error answer of this status, with what is wrong and what cures it."""
-    slug, title = PROBLEM_TYPES.get(status) or ("http", HTTPStatus(status).phrase)
+    """The error answer of this status, with what is wrong and what cures it.
+
+    `kind` is the last part of its type, and its title; those of `PROBLEM_TYPES` if not given.
+    """
+    slug, title = kind or PROBLEM_TYPES.get(status) or ("http", HTTPStatus(status).phrase)
     body = Problem(
         type=f"urn:relit-camera:problem:{slug}",
         title=title,
@@ -122,7 +132,8 @@ def problem_response(
 
 def problem_response_from(error: RelitError) -> Response:
     """The error answer for a `RelitError`, without the folders of this machine."""
-    return problem_response(status_for_error(error), redact_folders(error.what), redact_folders(error.cure))
+    kind = UNLIT_NOT_ALLOWED if isinstance(error, UnlitNotAllowedError) else None
+    return problem_response(status_for_error(error), redact_folders(error.what), redact_folders(error.cure), kind=kind)
 
 
 def redact_folders(text: str) -> str:

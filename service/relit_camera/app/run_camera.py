@@ -20,21 +20,29 @@ import typer
 
 from relit_camera.api.server.listener import open_listener
 from relit_camera.app.camera_service import CameraService
+from relit_camera.app.captures.desk.controls_note import restore_noted_controls
+from relit_camera.app.captures.live_capture import require_instant_name
 from relit_camera.app.config_reload import apply_edited_settings
-from relit_camera.app.startup_checks import check_before_devices
+from relit_camera.app.setup.check_runner import Checks
+from relit_camera.app.setup.needed_models import missing_models
+from relit_camera.app.setup.startup_checks import check_before_devices
 from relit_camera.app.systemd import notify_systemd
 from relit_camera.app.wiring import make_tracker
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.concurrency.threads import freeze_gc, limit_threads
 from relit_camera.base.config.config_watcher import watch_config
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
-from relit_camera.base.errors import RelitError
+from relit_camera.base.errors import ModelError, RelitError
 from relit_camera.base.storage.atomic_files import remove_unfinished_files
-from relit_camera.devices.on_demand.on_demand_source import OnDemandController
+from relit_camera.devices.on_demand.on_demand_source import DemandWatch
+from relit_camera.devices.sinks.reopening_sink import ReopeningSink
 from relit_camera.devices.sinks.sink import Sink
 from relit_camera.devices.sinks.sink_factory import open_sink, published_label
+from relit_camera.devices.sources.changeable_source import ChangeableSource
 from relit_camera.devices.sources.source import Source
 from relit_camera.devices.sources.source_factory import open_source
+from relit_camera.face.face_state import Tracker
+from relit_camera.live.scene.kept_scene import GivenOptions, SceneKeeper, keep_scene, show_first_scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import DegradationCode
 
@@ -57,11 +65,15 @@ def run_camera(
     sink_for: Callable[[OutputSettings], Sink] = open_sink,
     reload: tuple[Path, Callable[[Path], RelitSettings]] | None = None,
     instant: bool = False,
+    strict: bool = False,
+    checks: Checks = lambda settings: (),
+    given: GivenOptions | None = None,
 ) -> None:
     """Run the camera until SIGTERM or SIGINT, then end within 3 s.
 
     Names and files in the settings are checked before a device is opened: look, subject, address and token, tracker,
-    and what `check_before_devices` lists. Source and sink are checked by opening them.
+    and what `check_before_devices` lists. Source and sink are checked by opening them. What may come later is waited
+    for, with a placeholder in its place: a webcam, a virtual camera, the public models.
 
     Args:
         settings: of this run.
@@ -73,52 +85,67 @@ def run_camera(
         reload: the configuration file, to be watched for edits, and the function that reads it.
         instant: capture the person before the camera as subject `INSTANT_SUBJECT` first, and show nothing until then;
             the subject that the settings name is not shown.
+        strict: raise for a device or model that is missing, in place of waiting for it.
+        checks: what the API answers with to `GET checks`; called in a worker process.
+        given: options of the command line, where look and subject are kept from run to run; None keeps nothing.
 
     Raises:
-        RelitError: the port is in use, a file, device or model is missing …
+        RelitError: the port is in use, a file is missing; with `strict`, a device or model …
     """
     limit_threads()
     opening = contextlib.ExitStack()
     opening.enter_context(large_allocations_apart())
-    for folder in settings.storage.folders:
+    for folder in (settings.storage.data_dir, *settings.storage.folders):
         remove_unfinished_files(folder)  # of an earlier run that was killed
-    look, scene_controller = settings.look, SceneController(settings.storage)
-    if environment is not None:
-        named = look.lighting.model_copy(
-            update={"environment": scene_controller.register_temporary_environment(environment)}
-        )
-        look = look.model_copy(update={"lighting": named})
-    scene_controller.set_look(look)
-    scene_controller.load_configured_subject(None if instant else settings.subject)
+    scene_controller = SceneController(settings.storage)
     if instant:
-        scene_controller.set_unlit_allowed(False)
+        cure = f"show it with --subject {INSTANT_SUBJECT}, or give it another name"
+        require_instant_name(scene_controller.subjects, INSTANT_SUBJECT, cure)
+    show_first_scene(scene_controller, settings, environment, instant, given)
     check_before_devices(settings)
+    restore_noted_controls(settings.storage.data_dir)
     stop = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     with contextlib.ExitStack() as cleanup:
         cleanup.push(opening)
         listener = cleanup.enter_context(open_listener(settings.server))
-        tracker = make_tracker(settings)
-        make_source = partial(source_for, settings.source, published_label(settings.output))
-        source = make_source()
-        cleanup.callback(source.close)
-        sink = sink_for(settings.output)
+        tracker, models_error = _open_tracker(settings, strict)
+        sink = ReopeningSink(partial(sink_for, settings.output), (settings.output.width, settings.output.height))
         until_owned = cleanup.enter_context(contextlib.ExitStack())
         until_owned.callback(sink.close)
-        new_tracker = partial(make_tracker, settings)
+        demand = None
         if settings.source.on_demand:
-            on_demand = OnDemandController(source, make_source, sink)
-            cleanup.callback(on_demand.close)
-            camera_service = CameraService(
-                settings, scene_controller, on_demand.source, sink, tracker, new_tracker, on_demand.note_viewer
-            )
-        else:
-            camera_service = CameraService(settings, scene_controller, source, sink, tracker, new_tracker)
+            demand = DemandWatch(sink)
+            cleanup.callback(demand.close)
+        source = ChangeableSource(
+            settings.source,
+            lambda asked: source_for(asked, published_label(settings.output)),
+            demand.wanted if demand else None,
+        )
+        cleanup.callback(source.close)
+        missing = source.opening_error or sink.opening_error
+        if strict and missing is not None:
+            raise missing
+        camera_service = CameraService(
+            settings,
+            scene_controller,
+            source,
+            sink,
+            tracker,
+            partial(make_tracker, settings),
+            demand.note_viewer if demand else lambda: None,
+            checks=checks,
+        )
+        if models_error is not None:
+            camera_service.setup.wait_for_models(models_error)
         until_owned.pop_all()  # from here on the camera service closes the sink, unless a driver hangs in it
         cleanup.push(partial(_exit_if_threads_hang, camera_service))
         cleanup.callback(camera_service.stop)
         camera_service.start()
+        for waited_for in (source.opening_error, sink.opening_error, models_error):
+            if waited_for is not None:
+                typer.echo(f"Waiting: {waited_for}", err=True)
         if instant:
             camera_service.instant_capture.start(INSTANT_SUBJECT, until_done=True)
         # The web framework is loaded while the first picture is made.
@@ -132,6 +159,8 @@ def run_camera(
         typer.echo(f"Relit Camera runs; the panel is at {server.address.url}")
         if side_task is not None:
             cleanup.enter_context(side_task(camera_service, server.address.url))
+        if given is not None:
+            cleanup.enter_context(keep_scene(SceneKeeper(scene_controller, settings, given)))
         if reload is not None:
             apply, report_degradation = (
                 partial(apply_edited_settings, scene_controller, settings),
@@ -143,6 +172,20 @@ def run_camera(
         while not stop.is_set() and (left := ends_at - time.monotonic()) > 0:
             stop.wait(min(left, 0.5))
         camera_service.request_stop()
+
+
+def _open_tracker(settings: RelitSettings, strict: bool) -> tuple[Tracker | None, ModelError | None]:
+    """The tracker that the settings name; or none, and the error, where public models are missing that can be pulled.
+
+    Raises:
+        RelitError: it cannot be opened for another reason; with `strict`, for that one too.
+    """
+    try:
+        return make_tracker(settings), None
+    except ModelError as error:
+        if strict or not missing_models(settings.tracker.name):
+            raise
+        return None, error
 
 
 def _exit_if_threads_hang(

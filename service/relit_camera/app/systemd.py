@@ -88,14 +88,14 @@ def report_until(
 ) -> None:
     """Report the camera's status in the calling thread until `over` is set.
 
-    `READY=1` is sent when the first picture was published, then `WATCHDOG=1` at half the watchdog's time, but only if
+    `READY=1` is sent when the first picture was published, or the status says that the sink fails: the panel then says
+    what to do. After that comes `WATCHDOG=1` at half the watchdog's time, but only if
     pictures were published since the last one, or if the status says that the sink fails: a camera that hangs is to be
     restarted, not one that knows what is wrong and tries again.
     """
-    while status().frames.published == 0:
+    while (now := status()).frames.published == 0 and not _sink_failed(now):
         if clock.wait(over, FIRST_PICTURE_POLL_S):
             return
-    now = status()
     manager.notify("READY=1", f"STATUS={status_line(now)}")
     published = now.frames.published
     while not clock.wait(over, STATUS_INTERVAL_S if manager.watchdog_s is None else manager.watchdog_s / 2):

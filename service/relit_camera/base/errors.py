@@ -21,6 +21,8 @@ RelitError                       what is wrong, and what cures it
 ├── PipelineHangError            a frame took so long that its thread was given up
 ├── WorkerError                  work in a process of its own died, took too long or was canceled
 ├── ConflictError                API: the thing is in use, built in, or has that name already (409)
+│   └── UnlitNotAllowedError     the picture as filmed would be published, which nobody has allowed
+├── PreconditionFailedError      API: the scene is no longer the one that the request was made for (412)
 ├── TooLargeError                API: the request's body is too large (413)
 ├── ForbiddenError               API: the request came from another site (403)
 └── NotReadyError                API: the camera cannot answer that now (503)
@@ -102,7 +104,7 @@ class DownloadError(ModelError):
         reasons: one for each host, such as "no connection to example.org".
     """
 
-    def __init__(self, what: str, cure: str, reasons: tuple[str, ...]) -> None:
+    def __init__(self, what: str, cure: str = "", reasons: tuple[str, ...] = ()) -> None:
         super().__init__(what, cure)
         self.reasons = reasons
 
@@ -137,6 +139,14 @@ class WorkerError(RelitError):
 
 class ConflictError(RelitError):
     """What the request names is in use, built in, or exists already."""
+
+
+class UnlitNotAllowedError(ConflictError):
+    """The picture as filmed would be published, which nobody has allowed."""
+
+
+class PreconditionFailedError(RelitError):
+    """The scene has changed since the request was made."""
 
 
 class TooLargeError(RelitError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
@@ -58,7 +59,7 @@ def build_subject(
     """
     method = DEFAULT_METHOD if method == "default" else method
     field = open_method(method).build(samples)
-    return subject_from_field(field, samples, method, source, gamma, landmarks, with_geometry, rung, progress)
+    return subject_from_field(field, samples, method, source, gamma, landmarks, with_geometry, rung, progress=progress)
 
 
 def subject_from_field(
@@ -70,6 +71,7 @@ def subject_from_field(
     landmarks: Mapping[str, Points] | None = None,
     with_geometry: bool = True,
     rung: Rung = "pictures",
+    accuracy: CompressionTarget | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Subject:
     """Compress a field that was built from samples.
@@ -83,10 +85,12 @@ def subject_from_field(
         landmarks: known landmarks by scheme; None finds them with the installed trackers.
         with_geometry: whether to store the person's geometry in the subject.
         rung: how the person was captured.
+        accuracy: of the compression; the default one where None.
         progress: called with the number of tiles that are compressed and the total.
     """
     maps = [builtin_environment(name).light_map for name in BUILTIN_NAMES]
-    compressed = compress_field(field, samples.pictures, samples.matte, CompressionTarget(maps=maps), progress)
+    target = replace(accuracy or CompressionTarget(), maps=maps)
+    compressed = compress_field(field, samples.pictures, samples.matte, target, progress)
     quality = compressed.quality
     frontal = frontal_picture(compressed, samples.matte)
     neutral = neutral_picture(frontal, samples.matte)

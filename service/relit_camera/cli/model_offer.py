@@ -34,7 +34,7 @@ def offer_models(tracker: str, matte: str, pull: bool | None, setting: str) -> N
         ModelError: the user agreed, and a model cannot be had.
         StorageError: the models folder cannot be written.
     """
-    from relit_camera.app.needed_models import missing_models
+    from relit_camera.app.setup.needed_models import missing_models
 
     missing = missing_models(tracker, matte)
     if not missing or pull is False or (pull is None and setting == "never"):
@@ -72,7 +72,12 @@ def _is_terminal() -> bool:
 
 
 def _remember(refused: Path) -> None:
+    """Note that the answer was no; where that cannot be written, the user is asked again, and may go on now."""
+    from contextlib import suppress
+
+    from relit_camera.base.errors import StorageError
     from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 
-    make_folder(refused.parent)
-    write_atomic(refused, b"")
+    with suppress(StorageError):
+        make_folder(refused.parent)
+        write_atomic(refused, b"")

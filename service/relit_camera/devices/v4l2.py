@@ -1,7 +1,7 @@
 """The V4L2 calls (ioctl) that Relit Camera makes, on an open device; all of them are here.
 
 Names, numbers and structures are those of linux/videodev2.h, but for the event of v4l2loopback. The Python libraries
-for V4L2 are under the GPL, so the eight calls are written out. They raise OSError as the kernel answers.
+for V4L2 are under the GPL, so the calls are written out. They raise OSError as the kernel answers.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import struct
 import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from relit_camera.base.errors import UnsupportedByDriverError
@@ -23,13 +24,17 @@ VIDIOC_STREAMON = 0x40045612
 VIDIOC_SUBSCRIBE_EVENT = 0x4020565A
 VIDIOC_DQEVENT = 0x80885659
 
+VIDIOC_ENUM_FMT = 0xC0405602
+VIDIOC_ENUM_FRAMESIZES = 0xC02C564A
+VIDIOC_ENUM_FRAMEINTERVALS = 0xC034564B
+
 VIDIOC_QUERYCTRL = 0xC0445624
 VIDIOC_G_CTRL = 0xC008561B
 VIDIOC_S_CTRL = 0xC008561C
 
 CAPABILITY_BYTES, DEVICE_CAPS_OFFSET = 104, 88
 CAP_VIDEO_CAPTURE, CAP_VIDEO_OUTPUT = 0x1, 0x2
-BUF_TYPE_VIDEO_OUTPUT = 2
+BUF_TYPE_VIDEO_CAPTURE, BUF_TYPE_VIDEO_OUTPUT = 1, 2
 FIELD_NONE, COLORSPACE_SRGB = 1, 8
 YU12 = int.from_bytes(b"YU12", "little")
 """The pixel format I420: planes Y, U, V, the last two of half width and height."""
@@ -48,6 +53,16 @@ V4L2_QUERYCTRL = struct.Struct("=II32siiiiI8x")
 V4L2_CONTROL = struct.Struct("=Ii")
 """v4l2_control: id and value."""
 CTRL_FLAG_DISABLED, CTRL_FLAG_READ_ONLY = 0x1, 0x4
+
+V4L2_FMTDESC = struct.Struct("=III32sI16x")
+"""v4l2_fmtdesc: index, the buffers' type, flags, description, pixel format."""
+V4L2_FRMSIZEENUM = struct.Struct("=IIIII24x")
+"""v4l2_frmsizeenum: index, pixel format, type, and of a discrete size width and height."""
+V4L2_FRMIVALENUM = struct.Struct("=IIIIIII24x")
+"""v4l2_frmivalenum: index, pixel format, width, height, type, and of a discrete interval its seconds as a fraction."""
+DISCRETE = 1
+MAX_ENUMERATED = 256
+"""A driver that never says that its list is over is not asked for more."""
 
 OutputFormat = tuple[tuple[int, int], int]
 """Width and height, and the pixel format, such as `YU12`."""
@@ -76,8 +91,8 @@ def start_output_stream(descriptor: int) -> None:
     fcntl.ioctl(descriptor, VIDIOC_STREAMON, struct.pack("=i", BUF_TYPE_VIDEO_OUTPUT))
 
 
-def query_has_readers(descriptor: int) -> bool:
-    """Whether any program takes pictures from the v4l2loopback device.
+def count_readers(descriptor: int) -> int:
+    """How many programs take pictures from the v4l2loopback device.
 
     Each call subscribes anew, so `descriptor` must be freshly opened: the subscription's first event is the present
     state, and a lost event cannot mislead for good.
@@ -96,8 +111,58 @@ def query_has_readers(descriptor: int) -> bool:
             what = "this v4l2loopback does not report its readers"
             raise UnsupportedByDriverError(what, "use version 0.13 or newer") from error
         raise
-    (count,) = struct.unpack_from("=I", event, EVENT_DATA_OFFSET)
-    return bool(count)
+    count: int = struct.unpack_from("=I", event, EVENT_DATA_OFFSET)[0]
+    return count
+
+
+def enumerate_frame_rates(descriptor: int) -> dict[tuple[int, int], set[float]]:
+    """The sizes that the device films in, in any pixel format, and the frames a second of each.
+
+    Sizes and rates that a driver gives as a range are left out: webcams have lists.
+    """
+    found: dict[tuple[int, int], set[float]] = {}
+    formats = _enumerated(
+        descriptor, VIDIOC_ENUM_FMT, lambda index: V4L2_FMTDESC.pack(index, BUF_TYPE_VIDEO_CAPTURE, 0, b"", 0)
+    )
+    for pixel_format in [V4L2_FMTDESC.unpack(answer)[4] for answer in formats]:
+        for size in _sizes(descriptor, pixel_format):
+            found.setdefault(size, set()).update(_rates(descriptor, pixel_format, *size))
+    return found
+
+
+def _sizes(descriptor: int, pixel_format: int) -> Iterator[tuple[int, int]]:
+    answers = _enumerated(
+        descriptor, VIDIOC_ENUM_FRAMESIZES, lambda index: V4L2_FRMSIZEENUM.pack(index, pixel_format, 0, 0, 0)
+    )
+    for _, _, kind, width, height in map(V4L2_FRMSIZEENUM.unpack, answers):
+        if kind == DISCRETE:
+            yield width, height
+
+
+def _rates(descriptor: int, pixel_format: int, width: int, height: int) -> Iterator[float]:
+    answers = _enumerated(
+        descriptor,
+        VIDIOC_ENUM_FRAMEINTERVALS,
+        lambda index: V4L2_FRMIVALENUM.pack(index, pixel_format, width, height, 0, 0, 0),
+    )
+    for *_, kind, numerator, denominator in map(V4L2_FRMIVALENUM.unpack, answers):
+        if kind == DISCRETE and numerator:
+            yield denominator / numerator
+
+
+def _enumerated(descriptor: int, request: int, question: Callable[[int], bytes]) -> list[bytes]:
+    """What the driver answers to a question for the indices 0, 1, … until it says that there are no more."""
+    answers: list[bytes] = []
+    for index in range(MAX_ENUMERATED):
+        answer = bytearray(question(index))
+        try:
+            fcntl.ioctl(descriptor, request, answer)
+        except OSError as error:
+            if error.errno in (errno.EINVAL, errno.ENOTTY):
+                break
+            raise
+        answers.append(bytes(answer))
+    return answers
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -126,8 +126,8 @@ class HeldControls:
             return False
         return True
 
-    def hold(self) -> None:
-        """Stop what is automatic, at the values that it had chosen."""
+    def read(self) -> None:
+        """Note the present values of all controls that the webcam has."""
         for control in (*AUTOMATIC, *VALUES):
             allowed = self.device.query(control)
             if allowed is None:
@@ -138,6 +138,9 @@ class HeldControls:
                 log.info("the webcam does not tell %s: %s", allowed.name, error)
                 continue
             self.ranges[control] = allowed
+
+    def hold(self) -> None:
+        """Stop what is automatic, at the values that it had chosen."""
         for control, value in AUTOMATIC.items():
             self.set(control, value)
         # Set again: some webcams jump to a default as soon as the automatic is off.
@@ -153,8 +156,14 @@ class HeldControls:
 
 
 @contextmanager
-def hold_controls(device: ControlDevice) -> Iterator[HeldControls]:
+def hold_controls(
+    device: ControlDevice, keep: Callable[[Mapping[int, int]], None] = lambda values: None
+) -> Iterator[HeldControls]:
     """Hold what a webcam changes by itself for the length of a block.
+
+    Args:
+        device: the webcam's controls.
+        keep: is given the value of each control before any is changed.
 
     Raises:
         DeviceError: it lets nothing be held.
@@ -162,6 +171,8 @@ def hold_controls(device: ControlDevice) -> Iterator[HeldControls]:
     held = HeldControls(device, {})
     try:
         try:
+            held.read()
+            keep(held.found)
             held.hold()
         except OSError as error:
             what = f"the webcam's controls cannot be read: {error.strerror}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-from relit_camera.app.needed_models import OF_TRACKER
+from relit_camera.app.setup.needed_models import OF_TRACKER
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import DeviceError, RelitError
 from relit_camera.base.models.model_store import ModelState, ModelStore
@@ -72,14 +72,14 @@ def _provider_cure(provider: str) -> str:
 
 
 def check_subject(settings: RelitSettings) -> Finding:
-    """Check that the subject in the settings exists and can be read. Without one the live picture passes through."""
+    """Check that the subject in the settings exists and can be read. Without one a placeholder is shown."""
     topic, store = "subject", SubjectStore(settings.storage.subjects, copied=True)  # as the camera does
     stored = ", ".join(store.names())
     if settings.subject is None:
         cure = f"choose one by `subject:` in config.yaml or --subject; stored are: {stored}"
         if not stored:
             cure = "make one: relit capture build FILM --out me.relit; or see `relit demo`"
-        return warning(topic, "none is chosen: the live picture passes through", cure)
+        return warning(topic, "none is chosen: a placeholder is shown", cure)
     try:
         name, subject = store.resolve(settings.subject)
     except RelitError as error:

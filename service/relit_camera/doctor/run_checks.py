@@ -42,10 +42,17 @@ def run_checks(
     if with_fix:
         fixed = apply_fixes(settings, host, access, with_folders=configuration.state is Severity.OK)
         settings, configuration = _check_configuration(config)  # the fix may have written the file
-    checks: tuple[Callable[[], Finding], ...] = (
+    python, packages, *others = (check() for check in checks_of(settings, host, access))
+    return Report(version=__version__, findings=(python, packages, configuration, *others), fix=fixed)
+
+
+def checks_of(
+    settings: RelitSettings, host: Host, access: AccessCheck = os.access
+) -> tuple[Callable[[], Finding], ...]:
+    """The checks of everything that the camera needs with these settings; none of them has run."""
+    return (
         check_python,
         check_packages,
-        lambda: configuration,
         lambda: check_cores(settings),
         lambda: check_folder("data folder", settings.storage.data_dir, "set storage.data_dir to a folder of yours"),
         lambda: check_folder("models folder", models_folder(), f"set {FOLDER_VARIABLE} to a folder of yours"),
@@ -61,7 +68,6 @@ def run_checks(
         check_running,
         lambda: check_service(host),
     )
-    return Report(version=__version__, findings=tuple(check() for check in checks), fix=fixed)
 
 
 def _check_configuration(config: Path | None) -> tuple[RelitSettings, Finding]:

@@ -24,7 +24,7 @@ FIX_CURE = "run: relit doctor --fix"
 
 # No mount namespaces (PrivateTmp, ProtectHome …): the user's manager would need user namespaces for them, in which the
 # groups that own the cameras are lost. No MemoryDenyWriteExecute: CUDA and OpenVINO make code while they run.
-# No limit of starts: without its webcam the camera exits at once, and must start when the webcam is back hours later.
+# No limit of starts: whatever ends the camera, it must start when that is mended hours later.
 UNIT_TEMPLATE = """\
 [Unit]
 Description=Relit Camera: a virtual webcam that shows you lit by any place you choose

@@ -22,7 +22,7 @@ _MIN_POINTS = 64
 
 
 def lamp_light_map(lamps: Sequence[Lamp]) -> LightMap:
-    """The light map of `lamps`: discs of uniform radiance, each with its intensity times its color.
+    """The light map of those of `lamps` that are not muted: discs of uniform radiance, intensity times color.
 
     A lamp's intensity is the irradiance Σ E·ω·max(0, n·l) on a surface that faces it. The disc consists of evenly
     spread points that are splatted by energy, so it moves smoothly however small it is; one smaller than a texel comes
@@ -30,6 +30,8 @@ def lamp_light_map(lamps: Sequence[Lamp]) -> LightMap:
     """
     light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
     for lamp in lamps:
+        if lamp.muted:
+            continue
         light_map += _disc(lamp)[..., None] * (_lamp_color(lamp) * np.float32(lamp.intensity))
     return light_map
 

@@ -28,16 +28,20 @@ from relit_camera.live.status.stage_timing import StageTimer
 from relit_camera.subject.relighting.relighter import Relighter
 from relit_camera.subject.subject import Subject
 
-__all__ = ["NO_SUBJECT", "Pipeline", "RenderTask", "RenderedFrame"]
+__all__ = ["Pipeline", "RenderTask", "RenderedFrame", "subject_troubles"]
 
 log = logging.getLogger(__name__)
 
-NO_SUBJECT = Degradation(
-    code=DegradationCode.NO_SUBJECT,
-    what="the live picture is shown as it is",
-    why="no subject is chosen",
-    cure="choose one in the panel or with --subject",
-)
+
+def subject_troubles(scene: Scene) -> list[Degradation]:
+    """What works less well than asked because nobody is chosen; nothing where somebody is."""
+    if scene.subject is not None:
+        return []
+    shown = "the live picture is shown as it is" if scene.unlit_allowed else "a placeholder is shown"
+    cure = "choose or capture one in the panel, or name one with --subject"
+    return [Degradation(code=DegradationCode.NO_SUBJECT, what=shown, why="no subject is chosen", cure=cure)]
+
+
 FALLBACK_MODE = Mode.REENACT
 """Shown where the mode asked for cannot go on with the live face; it must take any face."""
 
@@ -152,9 +156,7 @@ class Pipeline:
         scene = scene_now()
         self._forget_mismatch_of_other(scene.subject)
         if scene.subject is None:
-            self._troubles["subject"] = NO_SUBJECT
             return lambda: self._render_unrelit(frame, scene)
-        self._troubles.pop("subject", None)
         if motion is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
             motion = self._track(frame, quality)
         if self._mismatch is not None and self._mismatch.mismatch.is_over(motion):
@@ -175,7 +177,8 @@ class Pipeline:
 
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:
         live = fit_frame(frame, self._size)
-        return RenderedFrame(self._compositor.composite_live(live.image, live, scene), None, scene)
+        image = self._compositor.composite_live(live.image, live, scene)
+        return RenderedFrame(image, None, scene, unlit=True)  # the publisher shows it only where that is allowed
 
     def _opened_matte(self) -> Matting:
         self.on_opening()
@@ -209,11 +212,12 @@ class Pipeline:
         self.on_opening()
         with large_allocations_apart():
             relighter = active.relighter if active is not None and same_subject else self._open_relighter(subject)
+            face = find_source_face(subject, self._tracker)
             context = ModeContext(
                 subject=subject,
-                face=find_source_face(subject, self._tracker),
+                face=face,
                 relighter=relighter,
-                scene_relighting=SceneRelighting(subject, relighter, self._light, self.timer),
+                scene_relighting=SceneRelighting(subject, face, relighter, self._light, self.timer),
                 compositor=self._compositor,
                 size=self._size,
                 executor=self._executor,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from relit_camera.base.errors import NotFoundError
+from relit_camera.base.errors import ConflictError, NotFoundError, SubjectError
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage.atomic_files import make_folder
+from relit_camera.base.storage.atomic_files import make_folder, storage_error
 from relit_camera.base.storage.named_files import NamedFiles
 from relit_camera.subject.subject import Subject, SubjectMetadata
 from relit_camera.subject.subject_file import SUFFIX, read_metadata, read_neutral, read_subject
@@ -36,6 +38,48 @@ class SubjectStore(NamedFiles):
         self.require_free_name(name)
         make_folder(self.folder)
         return self.folder / f"{name}{SUFFIX}"
+
+    @contextmanager
+    def adding(self, name: str, called: str) -> Iterator[Path]:
+        """Give a path to write a subject's file to, which on success becomes the subject of that name.
+
+        Args:
+            name: of the new subject.
+            called: what the file is called in messages.
+
+        Raises:
+            ConflictError: there is one of that name.
+            InputError: the name is not allowed.
+            SubjectError: what was written is no subject, or too large.
+            StorageError: it cannot be written.
+        """
+        self._require_new(name)
+        with self.replacing(name, SUFFIX) as path:
+            yield path
+            try:
+                read_subject(path, self._copied)
+            except SubjectError as error:
+                raise SubjectError(error.what.replace(str(path), f"'{called}'"), error.cure) from error
+            self._require_new(name)
+
+    def rename(self, name: str, new_name: str) -> None:
+        """Give a stored subject another name.
+
+        Raises:
+            NotFoundError: there is none of the old name.
+            ConflictError: there is one of the new name.
+            InputError: the new name is not allowed.
+            StorageError: it cannot be renamed.
+        """
+        path = self.path(name)
+        if new_name == name:
+            return
+        target = self.new_path(new_name)
+        self._require_new(new_name)
+        try:
+            path.rename(target)
+        except OSError as error:
+            raise storage_error(target, error) from error
 
     def load(self, name: str) -> Subject:
         """Read a stored subject.
@@ -72,6 +116,10 @@ class SubjectStore(NamedFiles):
             NotFoundError, SubjectError: as `load`.
         """
         return read_neutral(self.path(name))
+
+    def _require_new(self, name: str) -> None:
+        if name in self.names():
+            raise ConflictError(f"there is a subject '{name}' already", "choose another name, or delete that one")
 
     def resolve(self, name_or_path: str) -> tuple[str, Subject]:
         """Read what a person named: a stored subject, else a file. Returns the name to show and the subject.

@@ -20,6 +20,9 @@ from relit_camera.capture.desk.desk_capture import (
 )
 from relit_camera.capture.desk.desk_recording import DeskRecording
 from relit_camera.capture.desk.patterns.pattern_sequence import Pattern, pattern_lights, standard_sequence
+from relit_camera.capture.desk.person import desk_face
+from relit_camera.capture.desk.person.desk_face import PUPIL_DISTANCE_CM, find_face
+from relit_camera.face.detection.face_detector import Box, Detection
 from relit_camera.lab.evaluate.desk_simulation import SimulatedPerson
 from tests.capture.desk.desk_person import SETUP, WEBCAM, LambertianField, face_landmarks, film, lambertian_person
 
@@ -138,6 +141,63 @@ def test_a_turned_screen_is_refused(person: SimulatedPerson, turned: str) -> Non
     shown = SETUP.model_copy(update={"sequence": [turn(pattern) for pattern in SETUP.patterns]})
     with pytest.raises(CaptureError, match=turned):
         patterns_of(film(person, shown, said=SETUP))
+
+
+def wall_alone(frame: DisplayImage) -> DisplayImage:
+    """The frame without the person."""
+    wall = np.median(frame[:20, :20].reshape(-1, 3), axis=0)
+    noise = np.random.default_rng(int(frame.sum())).normal(0, WEBCAM.noise, frame.shape)
+    return np.clip(wall + noise, 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(("begins", "ends"), [(0.25, 1.0), (0.5, 1.0), (0.75, 1.0), (0.45, 0.6)])
+def test_a_person_who_leaves_midway_is_told(recording: DeskRecording, begins: float, ends: float) -> None:
+    count = len(recording.frames)
+    away = range(round(begins * count), round(ends * count))
+    frames = [wall_alone(recording.frames[k]) if k in away else recording.frames[k] for k in range(count)]
+    with pytest.raises(CaptureError, match=r"you are not seen under \d+ of \d+ patterns.*stay before the webcam"):
+        measure_desk_samples(replace(recording, frames=frames))
+
+
+class FoundFaces:
+    """A detector that finds these faces in every picture."""
+
+    def __init__(self, *boxes: Box) -> None:
+        self.boxes = boxes
+
+    def detect_all(self, picture: DisplayImage) -> list[Detection]:
+        return [
+            Detection((x, y, w, h), np.array([[x + 0.3 * w, y + 0.4 * h], [x + 0.7 * w, y + 0.4 * h]], np.float32), 0.9)
+            for x, y, w, h in self.boxes
+        ]
+
+
+FACE: Box = (150, 90, 100, 120)
+
+
+@pytest.mark.parametrize(
+    ("boxes", "message"),
+    [
+        ([], "no face is seen under the white screen; sit before the webcam"),
+        ([FACE, (10, 90, 80, 100)], "two faces are seen; only you may be in the picture"),
+        ([(150, 90, 60, 70)], "only 70 pixels high"),
+    ],
+)
+def test_no_face_two_and_a_small_one_are_told(
+    recording: DeskRecording, monkeypatch: pytest.MonkeyPatch, boxes: list[Box], message: str
+) -> None:
+    monkeypatch.setattr(desk_face, "open_face_detector", lambda: FoundFaces(*boxes))
+    searched = replace(recording, setup=recording.setup.model_copy(update={"face": None, "pixels_per_cm": None}))
+    with pytest.raises(CaptureError, match=message):
+        measure_desk_samples(searched)
+
+
+def test_a_small_face_in_the_background_is_nobody(recording: DeskRecording, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(desk_face, "open_face_detector", lambda: FoundFaces((10, 10, 30, 40), FACE))
+    setup = recording.setup.model_copy(update={"face": None, "pixels_per_cm": None})
+    found = find_face(recording.frames[0], setup)
+    assert (found.circle.x, found.circle.y, found.circle.radius) == (200, 150, 60)
+    assert found.pixels_per_cm == pytest.approx(40 / PUPIL_DISTANCE_CM)
 
 
 def test_a_still_picture_shows_no_patterns(recording: DeskRecording) -> None:

@@ -11,7 +11,7 @@ import pytest
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import ConfigError, DeviceError
 from relit_camera.base.images.image_types import Frame
-from relit_camera.devices.on_demand.on_demand_source import RETRY_S, DemandMonitor, OnDemandController, OnDemandSource
+from relit_camera.devices.on_demand.on_demand_source import DemandMonitor, DemandWatch, OnDemandSource
 from relit_camera.devices.sinks.sink import NullSink, SinkInfo
 from relit_camera.devices.sources.source import SourceInfo, SourceState
 from relit_camera.devices.sources.webcam_source import WebcamSource
@@ -127,22 +127,24 @@ def test_indices_and_times_go_on_through_pauses(on_demand: OnDemand) -> None:
     assert (steps > 39).sum() == 2  # four reads of ten seconds without a frame
 
 
-def test_a_camera_that_went_away_meanwhile_is_looked_for_every_second(on_demand: OnDemand) -> None:
+def test_a_camera_that_went_away_meanwhile_is_looked_for_at_each_read(on_demand: OnDemand) -> None:
     on_demand.read(True)
     on_demand.read(False)
     on_demand.cameras.error = DeviceError("there is no webcam 'fake'", "plug it in")
-    calls = on_demand.cameras.calls
-    for _ in range(40):
-        assert on_demand.read(True, 0.2) is None
-    assert on_demand.cameras.calls - calls == pytest.approx(8.0 / RETRY_S, abs=1)
-    assert (on_demand.source.state, on_demand.source.reason) == (
-        SourceState.RECONNECTING,
-        "there is no webcam 'fake'",
-    )
+    for _ in range(3):
+        with pytest.raises(DeviceError, match="there is no webcam 'fake'; plug it in"):
+            on_demand.read(True)
+    assert on_demand.read(False) is None  # nobody looks for it any more
     on_demand.cameras.error = None
-    on_demand.clock.sleep(RETRY_S)
     assert on_demand.read(True) is not None
-    assert on_demand.source.reason == ""
+
+
+def test_a_source_that_is_open_already_is_closed_if_nobody_wants_it() -> None:
+    clock = VirtualClock()
+    cameras = Cameras(clock)
+    source = OnDemandSource(cameras(), cameras, lambda: False, clock, is_open=True)
+    assert source.read(0.1) is None
+    assert cameras.made[0].closed
 
 
 def test_closing_ends_it_for_good(on_demand: OnDemand) -> None:
@@ -196,19 +198,17 @@ class NamedSink(NullSink):
 
 
 def test_a_file_is_always_wanted_and_null_by_viewers_alone() -> None:
-    cameras = Cameras()
-    recording = OnDemandController(cameras(), cameras, NamedSink("file", "out.mp4")).source
-    assert recording.read(0.1) is not None
-    nowhere = OnDemandController(cameras(), cameras, NamedSink("null"))
-    assert nowhere.source.read(0.01) is None
+    assert DemandWatch(NamedSink("file", "out.mp4")).wanted()
+    nowhere = DemandWatch(NamedSink("null"))
+    assert not nowhere.wanted()
     nowhere.note_viewer()
-    assert nowhere.source.read(0.1) is not None
+    assert nowhere.wanted()
 
 
 def test_another_system_says_that_it_cannot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.platform", "darwin")
     with pytest.raises(ConfigError, match="only Linux"):
-        OnDemandController(Cameras()(), Cameras(), NamedSink("camera", "OBS"))
+        DemandWatch(NamedSink("camera", "OBS"))
 
 
 def test_the_camera_lives_on_while_its_webcam_is_released(tmp_path: Path) -> None:

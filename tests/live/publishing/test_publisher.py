@@ -62,20 +62,22 @@ class Publishing:
         self.sink = RecordingSink(self.clock, write_s)
         self.sink.error = error
         self.sink_errors: list[Exception | None] = []
+        self.unlit_allowed = False
         self.publisher = Publisher(
             self.sink,
             fps,
             PLACEHOLDER,
             stale_after_s=stale_after_s,
             on_sink_error=self.sink_errors.append,
+            unlit_allowed=lambda: self.unlit_allowed,
             clock=self.clock,
         )
 
-    def put(self, at: float, value: int, age_s: float = 0.0) -> None:
+    def put(self, at: float, value: int, age_s: float = 0.0, unlit: bool = False) -> None:
         """At `at` seconds a picture of frame `value` is ready, captured `age_s` before."""
         self.clock.at(
             at,
-            lambda: self.publisher.pictures.put(PublishedPicture(image(value), self.clock.now() - age_s, value)),
+            lambda: self.publisher.pictures.put(PublishedPicture(image(value), self.clock.now() - age_s, value, unlit)),
         )
 
     def show_placeholder(self, at: float, value: int, last_index: int) -> None:
@@ -170,6 +172,27 @@ def test_a_failing_sink_is_reported_once_and_tried_again() -> None:
     assert sink.times[0] == sink.attempts[3]
     assert camera.sink_errors == [gone, None]
     assert camera.publisher.counts.published == len(sink.values) > 10
+
+
+def test_a_sink_that_fails_for_another_reason_is_reported_again() -> None:
+    missing, denied = DeviceError("the module is not loaded", "load it"), DeviceError("no permission", "join video")
+    camera = Publishing(fps=20, error=missing)
+    camera.clock.at(2.5, lambda: setattr(camera.sink, "error", denied))
+    camera.clock.at(5.5, lambda: setattr(camera.sink, "error", None))
+    camera.run(8.0)
+    assert camera.sink_errors == [missing, denied, None]
+
+
+@pytest.mark.parametrize("error", [None, DeviceError("the module is not loaded")])
+def test_new_pictures_are_counted_without_repetitions_and_without_a_sink_too(error: Exception | None) -> None:
+    camera = Publishing(fps=30, error=error)
+    for number in range(80):
+        camera.put(0.1 * number, number)
+    camera.clock.at(7.0, lambda: rates.append(camera.publisher.new_fps))
+    rates: list[float] = []
+    camera.run(14.0)
+    assert rates == [pytest.approx(10.0, rel=0.1)]
+    assert camera.publisher.new_fps == 0.0
 
 
 def test_a_fault_in_the_sink_does_not_end_publishing() -> None:
@@ -304,3 +327,24 @@ def test_a_picture_of_the_users_own_is_fitted_whole(tmp_path: Path) -> None:
     assert (image[:, :68] == uint8_from_linear(BACKGROUND_COLOR)).all()
     with pytest.raises(ImageError, match=r"gone\.png"):
         placeholder((320, 180), "", tmp_path / "gone.png")
+
+
+def test_a_picture_as_filmed_is_not_shown_unless_that_is_allowed() -> None:
+    camera = Publishing(fps=10)
+    camera.put(0.05, 1)
+    camera.put(0.15, 2, unlit=True)
+    camera.clock.at(0.35, lambda: setattr(camera, "unlit_allowed", True))
+    camera.put(0.45, 3, unlit=True)
+    sink = camera.run(0.65)
+    assert sink.values == [7, 1, 1, 1, 1, 3, 3]
+    assert camera.publisher.unlit
+
+
+def test_a_picture_as_filmed_goes_when_the_permission_does_even_where_it_is_held() -> None:
+    camera = Publishing(fps=10)
+    camera.unlit_allowed = camera.publisher.hold = True
+    camera.put(0.05, 1, unlit=True)
+    camera.clock.at(0.25, lambda: setattr(camera, "unlit_allowed", False))
+    sink = camera.run(0.45)
+    assert sink.values == [7, 1, 1, 7, 7]
+    assert not camera.publisher.unlit

@@ -18,6 +18,7 @@ from relit_camera.devices.sinks.sink import NullSink
 from relit_camera.devices.sources.source import SourceInfo, SourceState
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.filmed_frames import FilmedFrames
 from relit_camera.live.frame_recorder import FrameRecorder
 from relit_camera.live.pipeline import RenderedFrame
 from relit_camera.live.publishing.placeholder_image import Placeholder
@@ -27,7 +28,7 @@ from relit_camera.live.status.camera_status import CameraState, DegradationCode
 from relit_camera.live.status.event_hub import Event, EventHub
 from relit_camera.live.status.status_board import StatusBoard
 from relit_camera.live.supervision.camera_loop import CameraLoop, Placeholders, publish_if_current
-from relit_camera.live.supervision.fallback_renderer import FallbackRenderer
+from relit_camera.live.supervision.fallback_renderer import FallbackPicture, FallbackRenderer
 from relit_camera.live.supervision.pipeline_supervisor import PipelineSupervisor, ShownPicture
 from tests.virtual_clock import VirtualClock
 
@@ -39,7 +40,11 @@ def image(value: int) -> DisplayImage:
     return np.full((SIZE[1], SIZE[0], 3), value, np.uint8)
 
 
-PICTURE, FALLBACK, WAITING, RELEASED, CAPTURING = image(1), image(2), image(3), image(4), image(5)
+PICTURE, FALLBACK, WAITING, RELEASED, CAPTURING, NOBODY = map(image, range(1, 7))
+
+
+def showing(picture: DisplayImage) -> Placeholder:
+    return Placeholder(lambda: picture)
 
 
 class FakeSource:
@@ -99,9 +104,10 @@ class FakeSupervisor:
 
 class FakeFallback:
     released = 0
+    unlit = False
 
-    def picture(self, frame: Frame, scene: Scene) -> DisplayImage:
-        return FALLBACK
+    def picture(self, frame: Frame, scene: Scene) -> FallbackPicture:
+        return FallbackPicture(FALLBACK, self.unlit)
 
     def release(self) -> None:
         self.released += 1
@@ -119,8 +125,10 @@ class LoopUnderTest:
     def __init__(self) -> None:
         self.clock = VirtualClock()
         self.source, self.fallback, self.supervisor = FakeSource(self.clock), FakeFallback(), FakeSupervisor(self)
-        self.scene = Scene(Look())
+        self.scene = Scene(Look(), unlit_allowed=True)
+        self.capturing = False
         self.recorder = FrameRecorder(self.clock)
+        self.filmed = FilmedFrames(SIZE, self.clock)
         events = EventHub()
         self.board = StatusBoard(events)
         self.publisher = Publisher(NullSink(SIZE), FPS, image(0), clock=self.clock)
@@ -129,10 +137,12 @@ class LoopUnderTest:
             cast(PipelineSupervisor, self.supervisor),
             cast(FallbackRenderer, self.fallback),
             self.publisher,
-            Placeholders(Placeholder(lambda: WAITING), Placeholder(lambda: RELEASED), Placeholder(lambda: CAPTURING)),
+            Placeholders(*map(showing, (WAITING, RELEASED, CAPTURING, NOBODY))),
             lambda: self.scene,
             self.board,
             self.recorder,
+            self.filmed,
+            lambda: self.capturing,
             clock=self.clock,
         )
         self._listening = events.listen()
@@ -186,6 +196,11 @@ def test_without_a_face_it_searches(camera: LoopUnderTest) -> None:
 def test_without_a_subject_nothing_unlit_is_shown_where_that_is_forbidden(camera: LoopUnderTest) -> None:
     camera.scene = replace(camera.scene, unlit_allowed=False)
     camera.run(1.0)
+    assert camera.publisher.placeholder is NOBODY
+    assert camera.publisher.pictures.newer(0, 0) is None
+    assert camera.board.state is CameraState.NO_SUBJECT
+    camera.capturing = True
+    camera.run(1.0)
     assert camera.publisher.placeholder is CAPTURING
     assert camera.publisher.pictures.newer(0, 0) is None
     assert camera.board.state is CameraState.CAPTURING
@@ -196,11 +211,31 @@ def test_without_a_subject_nothing_unlit_is_shown_where_that_is_forbidden(camera
 
 
 def test_a_late_unlit_picture_is_not_shown_once_that_is_forbidden(camera: LoopUnderTest) -> None:
-    rendered = RenderedFrame(PICTURE, None, camera.scene)
+    rendered = RenderedFrame(PICTURE, None, camera.scene, unlit=True)
     forbidden = replace(camera.scene, unlit_allowed=False)
     frame = Frame(image(0), 0, camera.clock.now(), 0.0)
     assert publish_if_current(camera.publisher, lambda: camera.scene, frame, rendered)
+    assert camera.newest().unlit
     assert not publish_if_current(camera.publisher, lambda: forbidden, frame, rendered)
+
+
+def test_an_unlit_fallback_is_marked(camera: LoopUnderTest) -> None:
+    camera.supervisor.fails = camera.fallback.unlit = True
+    camera.run(1.0)
+    assert camera.newest().unlit
+
+
+def test_frames_as_filmed_are_kept_while_somebody_asks(camera: LoopUnderTest) -> None:
+    camera.run(1.0)
+    camera.clock.every(1 / FPS, lambda: camera.loop.step(threading.Event()))
+    assert camera.filmed.newer(-1, 1.0) is not None
+    last, picture = camera.filmed.newer(0, 1.0) or (0, FALLBACK)
+    np.testing.assert_array_equal(picture, image(0))
+    camera.clock.sleep(4.0)
+    assert camera.filmed.newer(last, 0.0) is None
+    following = camera.filmed.newer(last, 1.0)
+    assert following is not None
+    assert following[0] > last
 
 
 def test_frames_are_recorded_while_they_are_shown(camera: LoopUnderTest) -> None:

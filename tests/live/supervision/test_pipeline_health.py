@@ -20,6 +20,7 @@ from relit_camera.live.supervision.pipeline_health import (
     ModelsOpening,
     PictureRendered,
     PipelineHealth,
+    ReplacementAsked,
     ReportFailure,
     ReportHang,
     ReportRecovery,
@@ -305,6 +306,16 @@ def test_a_worker_that_hangs_after_three_faults_is_replaced_once() -> None:
     assert script.arrive(23.3) == (StartWorker(1), SubmitFrame(), ShowFallback())  # and not retired at once
 
 
+def test_a_replacement_comes_with_the_next_frame_even_in_the_pause_after_a_failure() -> None:
+    script = working()
+    script.fail(10.0)
+    assert script.arrive(10.1) == (ShowFallback(),)
+    assert script(ReplacementAsked()) == (RetireWorker(0),)
+    assert script.arrive(10.2) == (StartWorker(1), SubmitFrame(), ShowFallback())
+    script.start(10.2, worker=1)
+    assert script.render(10.3, worker=1) == (ReportRecovery(),)
+
+
 # What holds whatever happens, in whatever order.
 
 QUICK = HealthLimits(
@@ -325,11 +336,14 @@ def check_transition(before: PipelineHealth, event: Event, limits: HealthLimits)
     if isinstance(event, FrameArrived):
         assert SubmitFrame in kinds or ShowFallback in kinds  # every frame leads to a picture
         assert (ShowFallback in kinds) or not after.in_trouble
+    elif isinstance(event, ReplacementAsked):
+        assert actions == (() if before.worker is None else (RetireWorker(before.worker),))
+        assert after.worker is None
     else:
         assert not {SubmitFrame, ShowFallback, StartWorker, RetireWorker} & set(kinds)  # only frames drive
     if isinstance(event, WorkerEnded):
         assert after.worker == before.worker
-    elif not isinstance(event, FrameArrived) and event.worker != before.worker:
+    elif not isinstance(event, FrameArrived | ReplacementAsked) and event.worker != before.worker:
         assert after == before  # late
     assert len(after.abandoned) <= limits.max_abandoned_workers
     assert after.worker not in after.abandoned
@@ -369,6 +383,7 @@ def possible_events(health: PipelineHealth, at: float) -> Iterator[Event]:
     workers = [number for number in (health.worker, min(health.abandoned, default=None)) if number is not None]
     yield FrameArrived(at, 0)
     yield FrameArrived(at, 1)
+    yield ReplacementAsked()
     for worker in workers:
         yield FrameStarted(worker, at)
         yield ModelsOpening(worker, at)
@@ -399,7 +414,7 @@ def test_every_order_of_up_to_nine_events() -> None:
     assert {len(health.abandoned) for health in reached} == {0, 1, 2}
 
 
-@given(st.lists(st.tuples(st.integers(0, 22), st.sampled_from([0.01, 0.5, 1.0, 2.5, 5.0, 30.0])), max_size=60))
+@given(st.lists(st.tuples(st.integers(0, 23), st.sampled_from([0.01, 0.5, 1.0, 2.5, 5.0, 30.0])), max_size=60))
 def test_any_long_order_of_events(choices: list[tuple[int, float]]) -> None:
     health, at = PipelineHealth(), 0.0
     for choice, pause in choices:

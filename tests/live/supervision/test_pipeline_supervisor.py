@@ -13,7 +13,7 @@ from relit_camera.base.config.look import Look
 from relit_camera.base.errors import PipelineHangError, TrackError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.live.pipeline import Pipeline, RenderedFrame
-from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS
+from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.supervision.pipeline_health import (
     Event,
@@ -72,6 +72,8 @@ class FakeWorker:
             self._begin(frame)
 
     def close(self) -> None:
+        if not self._busy and not self.closed:
+            self._post(WorkerEnded(self.number))
         self.closed = True
 
     def ended(self, timeout_s: float = 0.0) -> bool:
@@ -167,6 +169,11 @@ class Simulation:
     def longest_gap_s(self) -> float:
         """The longest time without a picture or fallback."""
         return float(np.diff([0.0, *(at for at, _, _ in self.shown), self.now()]).max())
+
+    def quality(self) -> RenderQuality:
+        """What the next picture may cost."""
+        assert self.supervisor.pipeline is not None
+        return self.supervisor.pipeline.quality
 
     def _publish(self, frame: Frame, rendered: RenderedFrame) -> bool:
         self.shown.append((self.now(), "picture", self.supervisor.health.worker or 0))
@@ -334,12 +341,12 @@ def test_late_pictures_get_cheaper_and_full_quality_comes_back_within_two_second
     simulation = Simulation()
     simulation.at(5.0, render_s=0.2)
     simulation.run(5.0)
-    assert simulation.supervisor.pipeline.quality == FULL_QUALITY
+    assert simulation.quality() == FULL_QUALITY
     simulation.run(8.0)
-    assert simulation.supervisor.pipeline.quality == QUALITY_LEVELS[-1]
+    assert simulation.quality() == QUALITY_LEVELS[-1]
     simulation.at(8.0, render_s=RENDER_S)
     simulation.run(10.0)
-    assert simulation.supervisor.pipeline.quality == FULL_QUALITY
+    assert simulation.quality() == FULL_QUALITY
     assert simulation.troubles == []
 
 
@@ -362,4 +369,39 @@ def test_a_new_worker_begins_with_the_quality_that_the_load_allows() -> None:
     simulation.at(5.5, render_s=0.2)
     simulation.run(17.0)
     assert len(simulation.workers) > 1
-    assert simulation.supervisor.pipeline.quality == QUALITY_LEVELS[-1]
+    assert simulation.quality() == QUALITY_LEVELS[-1]
+
+
+def test_a_replaced_pipeline_takes_the_next_frame_and_the_old_one_ends() -> None:
+    simulation = Simulation()
+    simulation.run(2.0)
+    simulation.supervisor.replace_pipeline()
+    simulation.run(4.0)
+    assert [worker.number for worker in simulation.workers] == [0, 1]
+    assert simulation.workers[0].closed
+    assert simulation.supervisor.health.abandoned == frozenset()
+    assert simulation.troubles == []
+    assert simulation.longest_gap_s() < 0.1
+    assert simulation.shown[-1][1:] == ("picture", 1)
+
+
+def test_what_replaces_it_is_made_by_what_was_given_once() -> None:
+    simulation = Simulation()
+    simulation.run(1.0)
+    other = cast(Pipeline, FakePipeline())
+    simulation.supervisor.replace_pipeline(lambda: other)
+    simulation.run(2.0)
+    assert simulation.supervisor.pipeline is other
+    simulation.supervisor.replace_pipeline()
+    simulation.run(3.0)
+    assert simulation.supervisor.pipeline is not other
+
+
+def test_a_replacement_is_tried_at_once_after_a_failure() -> None:
+    simulation = Simulation()
+    simulation.at(10.0, error=TrackError("models are missing"))
+    simulation.run(60.0)  # the pauses are sixteen seconds by now
+    simulation.error = None
+    simulation.supervisor.replace_pipeline()
+    simulation.run(60.2)
+    assert simulation.reported()[-1][1] == "recovered"

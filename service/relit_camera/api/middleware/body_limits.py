@@ -13,9 +13,20 @@ from relit_camera.api.problem_details import problem_response_from
 from relit_camera.base.errors import InputError, TooLargeError
 
 MAX_UPLOAD_BYTES = 64 << 20
-MAX_UPLOAD_FORM_BYTES = MAX_UPLOAD_BYTES + (1 << 16)
+MAX_FORM_FIELDS_BYTES = 1 << 16
+MAX_UPLOAD_FORM_BYTES = MAX_UPLOAD_BYTES + MAX_FORM_FIELDS_BYTES
 """A file and the form around it."""
 MAX_JSON_BYTES = 1 << 20
+MAX_SUBJECT_BYTES = 1 << 30
+"""As large as one that the camera shows."""
+MAX_FILM_BYTES = 4 << 30
+"""A film or a video that is sent to be relit."""
+STREAMED_FORMS = {
+    "/api/v1/subjects": MAX_SUBJECT_BYTES,
+    "/api/v1/captures/film": MAX_FILM_BYTES,
+    "/api/v1/replays": MAX_FILM_BYTES,
+}
+"""Path → bytes of the file, where a form's file is written to disk as it arrives (`api.streamed_forms`)."""
 STREAMING_PATHS = ("/api/v1/events", "/api/v1/preview.mjpg")
 """Paths whose answers do not end: a HEAD request would wait for ever."""
 
@@ -37,7 +48,8 @@ class BodyLimitMiddleware:
             return
         headers = Headers(scope=scope)
         is_form = headers.get("content-type", "").startswith("multipart/form-data")
-        limit = MAX_UPLOAD_FORM_BYTES if is_form else MAX_JSON_BYTES
+        file_limit = STREAMED_FORMS.get(scope["path"], MAX_UPLOAD_BYTES)
+        limit = file_limit + MAX_FORM_FIELDS_BYTES if is_form else MAX_JSON_BYTES
         announced = headers.get("content-length", "0")
         if announced.isdecimal() and int(announced) > limit:
             await problem_response_from(body_too_large(int(announced), limit))(scope, receive, send)

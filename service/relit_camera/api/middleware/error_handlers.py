@@ -12,6 +12,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import Response
 from starlette.routing import Match
 
+from relit_camera.api.middleware.json_bodies import JSON_TYPE, json_body_type, meant_field
 from relit_camera.api.middleware.same_origin import SECURITY_HEADERS
 from relit_camera.api.problem_details import FieldProblem, problem_response, problem_response_from
 from relit_camera.base.errors import RelitError
@@ -35,17 +36,29 @@ async def _relit_error(request: Request, error: RelitError) -> Response:
 async def _validation_error(request: Request, error: RequestValidationError) -> Response:
     details = error.errors()
     if any(detail["type"] == "json_invalid" for detail in details):
-        return problem_response(HTTPStatus.BAD_REQUEST, "the body is not valid JSON", OPENAPI_HINT)
-    fields = [_field_problem(detail) for detail in details]
-    first = fields[0]
+        return problem_response(HTTPStatus.BAD_REQUEST, "the body is not valid JSON", "send JSON")
+    body_type = json_body_type(request.scope.get("route"))
+    meant = [_meant(detail, body_type) for detail in details]
+    fields = [_field_problem(detail, name) for detail, name in zip(details, meant, strict=True)]
+    first = _field_problem(details[0], None)  # the cure has the offer
     more = f" (and {len(fields) - 1} more)" if len(fields) > 1 else ""
     what = f"{first.field}: {first.message}" if first.field else first.message
-    return problem_response(HTTPStatus.UNPROCESSABLE_ENTITY, what + more, OPENAPI_HINT, fields)
+    cure = next((f"did you mean {name}?" for name in meant if name), "correct it and send it again")
+    return problem_response(HTTPStatus.UNPROCESSABLE_ENTITY, what + more, cure, fields)
 
 
-def _field_problem(detail: Any) -> FieldProblem:
+def _meant(detail: Any, body_type: Any) -> str | None:
+    where, *path = detail["loc"]
+    unknown = detail["type"] == "extra_forbidden" and where == "body" and bool(path)
+    return meant_field(body_type, path) if unknown else None
+
+
+def _field_problem(detail: Any, meant: str | None) -> FieldProblem:
     where, *path = detail["loc"]
     name = ".".join(map(str, path)) or (str(where) if where not in ("body", "query", "path") else "")
+    if detail["type"] == "extra_forbidden":
+        offer = f"; did you mean {meant}?" if meant else ""
+        return FieldProblem(field=name, message=f"there is no such field{offer}")
     message = detail["msg"].removeprefix("Value error, ")
     value = detail.get("input")
     shown = f" (is {value!r:.60})" if isinstance(value, str | int | float | bool) else ""
@@ -63,7 +76,8 @@ async def _http_error(request: Request, error: HTTPException) -> Response:
         return problem_response(
             HTTPStatus.METHOD_NOT_ALLOWED, what, f"allowed are {allowed}", headers={"Allow": allowed}
         )
-    return problem_response(error.status_code, str(error.detail), OPENAPI_HINT, headers=headers)
+    cure = f"send it as {JSON_TYPE}" if error.status_code == HTTPStatus.UNSUPPORTED_MEDIA_TYPE else OPENAPI_HINT
+    return problem_response(error.status_code, str(error.detail), cure, headers=headers)
 
 
 def _allowed_methods(request: Request) -> Sequence[str]:

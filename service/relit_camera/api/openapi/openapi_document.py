@@ -11,12 +11,15 @@ from fastapi.routing import APIRoute
 from relit_camera.api.problem_details import MEDIA_TYPE, PROBLEM_TYPES
 
 TAGS = [
+    {"name": "scene", "description": "Everything that is shown, in one step."},
     {"name": "lighting", "description": "The light that falls on the face."},
     {"name": "environments", "description": "Stored light from all sides."},
     {"name": "background", "description": "What is seen behind the person."},
     {"name": "control", "description": "Mode, freezing, neutral pose."},
     {"name": "subjects", "description": "Who is shown."},
+    {"name": "replays", "description": "Recorded videos, relit."},
     {"name": "presets", "description": "Stored looks."},
+    {"name": "setup", "description": "Checks, devices, source, tracker, models, and how to sit."},
     {"name": "preview", "description": "The published picture."},
     {"name": "status", "description": "How the camera is doing."},
     {"name": "probes", "description": "For supervisors and Prometheus."},
@@ -46,7 +49,7 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
     for operations in document["paths"].values():
         for operation in operations.values():
             answers = operation["responses"]
-            for status in ("400", "413") if "requestBody" in operation else ():
+            for status in ("400", "413", "415") if "requestBody" in operation else ():
                 answers.setdefault(status, {"description": PROBLEM_TYPES[int(status)][1]})
             answers["default"] = {"description": OTHER_ERRORS}
             for status, answer in answers.items():

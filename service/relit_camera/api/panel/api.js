@@ -4,8 +4,16 @@ const BASE = "/api/v1/";
 const TOAST_MS = 8000;
 const SPACING_MS = 40;
 
-/** Asks the camera; answers the JSON body, or null for none. A refusal is shown as a toast and thrown. */
-export async function request(method, path, body) {
+/** What the camera refused: `what` is wrong, its `cure`, and the HTTP `status`, 0 where nothing answered. */
+export class Refused extends Error {
+  constructor(what, cure = "", status = 0) {
+    super(cure ? `${what}; ${cure}` : what);
+    Object.assign(this, { what, cure, status });
+  }
+}
+
+/** Asks the camera; answers the JSON body, or null for none. Throws `Refused`. */
+export async function call(method, path, body) {
   const form = body instanceof FormData;
   const options = { method };
   if (body !== undefined) {
@@ -15,18 +23,43 @@ export async function request(method, path, body) {
   let answer;
   try {
     answer = await fetch(BASE + path, options);
-  } catch (error) {
-    toast("The camera does not answer", "Is it still running?");
-    throw error;
+  } catch {
+    throw new Refused("the camera does not answer", "is it still running?");
   }
-  if (answer.status === 401) location.assign("/login"); // the camera began anew, or has another token
-  const text = await answer.text();
-  const json = text ? JSON.parse(text) : null;
-  if (!answer.ok) {
-    toast(json?.what ?? answer.statusText, json?.cure ?? "");
-    throw new Error(json?.detail ?? answer.statusText);
+  return understood(answer.status, await answer.text());
+}
+
+/** The JSON of an answer, or null for none. Throws `Refused` where it is an error. */
+export function understood(status, text) {
+  if (status === 401) location.assign("/login"); // the camera began anew, or has another token
+  let json = null;
+  try {
+    json = JSON.parse(text);
+  } catch {
+    // An answer without a body, or of a proxy.
+  }
+  if (status >= 400) {
+    const { what, cure } = forPeople(json);
+    throw new Refused(what, cure, status);
   }
   return json;
+}
+
+/** Like `call`; a refusal is also shown as a toast. */
+export async function request(method, path, body) {
+  try {
+    return await call(method, path, body);
+  } catch (error) {
+    toast(error.what, error.cure);
+    throw error;
+  }
+}
+
+/** What went wrong, without the advice that is meant for the authors of programs. */
+function forPeople(problem) {
+  if (!problem?.what || problem.type?.endsWith(":fault")) return { what: "The camera could not do that", cure: "Try again; the camera’s log says more" };
+  const forPrograms = /\/api\/|\/healthz|\/readyz/.test(problem.cure ?? "");
+  return { what: problem.what, cure: forPrograms ? "" : (problem.cure ?? "") };
 }
 
 /** Like `request`, for buttons: the toast has said what went wrong, nothing more is to be done. */
@@ -70,36 +103,36 @@ const merged = (before, change) => ({ ...before, ...change });
 
 /**
  * Sends changes one at a time. What is pushed meanwhile is joined into one, so that the latest wins and none queues up.
- * `settled()` is called when all is sent.
+ * The option `settled()` is called when all is sent; the method answers then.
  */
 export class Latest {
   #pending = null;
-  #busy = false;
+  #drained = null;
 
   constructor(send, { join = merged, settled = () => {} } = {}) {
     this.send = send;
     this.join = join;
-    this.settled = settled;
+    this.onSettled = settled;
   }
 
   push(change) {
     this.#pending = this.#pending ? this.join(this.#pending, change) : change;
-    if (!this.#busy) this.#drain();
+    this.#drained ??= this.#drain();
   }
 
-  get idle() {
-    return !this.#busy;
+  /** Answers when nothing is left to be sent. */
+  async settled() {
+    await this.#drained;
   }
 
   async #drain() {
-    this.#busy = true;
     while (this.#pending) {
       const change = this.#pending;
       this.#pending = null;
       await this.send(change).catch(() => null);
       await new Promise((done) => setTimeout(done, SPACING_MS));
     }
-    this.#busy = false;
-    this.settled();
+    this.#drained = null;
+    this.onSettled();
   }
 }

@@ -1,6 +1,10 @@
-// Small controls: sliders, groups of buttons, tiles, the dialog.
+// Small controls: sliders, groups of buttons, lists, tiles, the dialog.
+
+import { loadPicture } from "./pictures.js";
 
 const HELD_MS = 500;
+const NAME_PATTERN = "[A-Za-z0-9]([A-Za-z0-9 ._\\-]*[A-Za-z0-9_\\-])? *";
+const NAME_RULE = "Letters, digits, spaces, dots, dashes and underscores; a letter or digit first";
 
 /** Makes an element: `make("p", {className: "hint"}, "text", child)`. */
 export function make(tag, properties = {}, ...children) {
@@ -90,50 +94,104 @@ export function slider(spec, onInput) {
 
 /** Marks the button with this value as the chosen one. */
 export function choose(group, value) {
-  for (const button of group.querySelectorAll("button")) {
-    button.setAttribute("aria-pressed", String(button.value === value));
-  }
+  for (const button of group.querySelectorAll("button")) setAttribute(button, "aria-pressed", button.value === value);
 }
 
-/** A tile with a picture (or a symbol), a name, and, where it may be deleted, a button for that. */
-export function tile({ name, title = name, picture, symbol, chosen, onChoose, onDelete }) {
-  const face = picture
-    ? make("img", { src: picture, alt: "", width: 256, height: 128, loading: "lazy" })
-    : make("span", { className: "symbol", "aria-hidden": "true" }, symbol);
-  const button = make("button", { type: "button", "aria-pressed": String(chosen), title }, face, make("span", { className: "name" }, name));
+/**
+ * Keeps the children of `parent` in step with `items`, each in its own element: no element is replaced or moved without
+ * need, so that a click that has begun on it also ends on it.
+ * key(item) names an item; create(item) answers {element, update(item)}.
+ */
+export function keyed(parent, items, key, create) {
+  const kept = (parent.kept ??= new Map());
+  const wanted = new Set(items.map(key));
+  for (const [name, { element }] of kept) {
+    if (wanted.has(name)) continue;
+    element.remove();
+    kept.delete(name);
+  }
+  items.forEach((item, index) => {
+    const name = key(item);
+    if (!kept.has(name)) kept.set(name, create(item));
+    const { element, update } = kept.get(name);
+    if (parent.children[index] !== element) parent.insertBefore(element, parent.children[index] ?? null);
+    update?.(item);
+  });
+}
+
+/** Sets an attribute only where it differs, so that nothing is drawn or read aloud again. */
+export function setAttribute(element, name, value) {
+  if (element.getAttribute(name) !== String(value)) element.setAttribute(name, String(value));
+}
+
+/** Sets the text only where it differs. */
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+/** Fills a select with [value, text] pairs, unless it has them already. */
+export function setOptions(select, pairs, chosen) {
+  const stands = JSON.stringify(pairs);
+  if (select.dataset.pairs !== stands) {
+    select.dataset.pairs = stands;
+    select.replaceChildren(...pairs.map(([value, text]) => make("option", { value }, text)));
+  }
+  if (select.value !== chosen) select.value = chosen;
+}
+
+/**
+ * A tile with a picture (or a symbol), a name, and, where it may be deleted, a button for that.
+ * Answers {element, image, update({chosen})}.
+ */
+export function tile({ name, title = name, picture, symbol, onChoose, onDelete }) {
+  const image = make("img", { alt: "" });
+  const face = picture ? make("span", { className: "face" }, image) : make("span", { className: "symbol", "aria-hidden": "true" }, symbol);
+  const button = make("button", { type: "button", "aria-pressed": "false", title }, face, make("span", { className: "name" }, name));
   button.onclick = onChoose;
+  if (picture) loadPicture(image, picture);
   const element = make("div", { className: "tile" }, button);
   if (onDelete) {
     const remove = make("button", { type: "button", className: "close", "aria-label": `Delete ${name}` }, "×");
     remove.onclick = onDelete;
     element.append(remove);
   }
-  return element;
+  return {
+    element,
+    image,
+    update: ({ chosen }) => setAttribute(button, "aria-pressed", chosen),
+  };
 }
 
-/** Asks for a word, or, with `text` null, for consent. Answers the word (or true), or null when cancelled. */
-export function ask(title, action, text = null) {
+/**
+ * Asks for a name, or, with `text` null, for consent. Answers the name (or true), or null when cancelled.
+ * `words` is a sentence below the title that says what it means.
+ */
+export function ask(title, action, text = null, words = "") {
   const dialog = document.getElementById("ask");
   const input = document.getElementById("ask-text");
   const ok = document.getElementById("ask-ok");
+  const explained = document.getElementById("ask-words");
   document.getElementById("ask-title").textContent = title;
   ok.textContent = action;
+  explained.textContent = words;
+  explained.hidden = !words;
   input.hidden = text === null;
+  input.required = text !== null;
+  input.pattern = text === null ? ".*" : NAME_PATTERN;
+  input.title = NAME_RULE;
   input.value = text ?? "";
   return new Promise((answer) => {
     let given = null;
-    const accept = () => {
+    // A form, so that Enter submits: a key that closed the dialog itself would then press what has the focus behind it.
+    document.getElementById("ask-form").onsubmit = (event) => {
+      event.preventDefault();
       given = text === null ? true : input.value.trim() || null;
       dialog.close();
-    };
-    ok.onclick = accept;
-    input.onkeydown = (event) => {
-      if (event.key === "Enter") accept();
     };
     document.getElementById("ask-cancel").onclick = () => dialog.close();
     dialog.onclose = () => answer(given);
     dialog.showModal();
-    (text === null ? ok : input).focus();
+    (text === null ? document.getElementById("ask-cancel") : input).focus();
     input.select();
   });
 }

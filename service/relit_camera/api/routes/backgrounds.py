@@ -8,11 +8,11 @@ from typing import Annotated
 from fastapi import APIRouter, Body, Form, Request, UploadFile
 from starlette.responses import Response
 
+from relit_camera.api.bodies.schemas import BackgroundPicture
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, encode_thumbnail, jpeg_response, thumbnail_url_path
 from relit_camera.api.middleware.body_limits import read_upload
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.schemas import BackgroundPicture
 from relit_camera.base.config.look import Background, ImageBackground, StoredName
 from relit_camera.base.errors import ConflictError
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from http import HTTPStatus
 from pathlib import PurePath
 from typing import Annotated
@@ -9,15 +10,16 @@ from typing import Annotated
 from fastapi import APIRouter, Form, Request, UploadFile
 from starlette.responses import Response
 
+from relit_camera.api.bodies.schemas import EnvironmentDetails, EnvironmentItem
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response, thumbnail_url_path
 from relit_camera.api.middleware.body_limits import read_upload
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.schemas import EnvironmentDetails, EnvironmentItem
 from relit_camera.base.config.look import ImageBackground, StoredName
-from relit_camera.base.errors import ConflictError
+from relit_camera.base.errors import ConflictError, NotFoundError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.environments.environment_store import RESERVED_NAMES
 from relit_camera.light.environments.environment_thumbnail import thumbnail_image
 
@@ -79,6 +81,20 @@ def get_environment_thumbnail(api: ApiContextDep, request: Request, name: Stored
     return jpeg_response(request, jpeg)
 
 
+@router.get("/{name}/on-me.jpg", response_class=Response, responses=JPEG_RESPONSE | error_responses(404, 422, 503))
+async def get_environment_on_subject(api: ApiContextDep, request: Request, name: StoredName) -> Response:
+    """A small picture of the person who is shown, lit by an environment and before it; 404 while nobody is."""
+    subject = api.camera.scene_controller.scene.subject
+    if subject is None:
+        raise NotFoundError("nobody is shown", "choose a subject first")
+
+    def load() -> Environment:
+        with api.exclusive_image_work():
+            return _environment(api, name)
+
+    return jpeg_response(request, await asyncio.wrap_future(api.subject_in_places.jpeg(subject, name, load)))
+
+
 def _item(api: ApiContext, name: str) -> EnvironmentItem:
     return EnvironmentItem(
         name=name,
@@ -91,8 +107,7 @@ def _item(api: ApiContext, name: str) -> EnvironmentItem:
 
 def _details(api: ApiContext, name: str) -> EnvironmentDetails:
     with api.exclusive_image_work():
-        scene_controller = api.camera.scene_controller
-        environment = scene_controller.temporary_environments().get(name) or scene_controller.environments.load(name)
+        environment = _environment(api, name)
     height, width = environment.panorama.radiance.shape[:2]
     return EnvironmentDetails(
         **dict(_item(api, name)),
@@ -101,6 +116,11 @@ def _details(api: ApiContext, name: str) -> EnvironmentDetails:
         clipped_fraction=environment.panorama.clipped_fraction,
         notes=list(environment.notes),
     )
+
+
+def _environment(api: ApiContext, name: str) -> Environment:
+    scene_controller = api.camera.scene_controller
+    return scene_controller.temporary_environments().get(name) or scene_controller.environments.load(name)
 
 
 def _is_current(api: ApiContext, name: str) -> bool:

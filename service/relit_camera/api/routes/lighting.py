@@ -17,14 +17,14 @@ def get_lighting(api: ApiContextDep) -> Lighting:
     return api.camera.scene_controller.scene.look.lighting
 
 
-@router.put("", responses=error_responses(404, 422))
+@router.put("", responses=error_responses(404, 409, 422))
 def set_lighting(api: ApiContextDep, lighting: Lighting) -> Lighting:
     """Replace the lighting. Fields left out take their defaults; the answer is the lighting as it now stands."""
     scene = api.camera.scene_controller.update_look(lambda look: look.model_copy(update={"lighting": lighting}))
     return scene.look.lighting
 
 
-@router.patch("", responses=error_responses(404, 422))
+@router.patch("", responses=error_responses(404, 409, 422))
 def change_lighting(api: ApiContextDep, changes: Lighting) -> Lighting:
     """Change only the fields that are given. `lamps` is replaced as a whole; null is a value, not a removal."""
     given = {name: getattr(changes, name) for name in changes.model_fields_set}

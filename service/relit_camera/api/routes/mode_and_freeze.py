@@ -7,9 +7,9 @@ from http import HTTPStatus
 from fastapi import APIRouter
 from starlette.responses import Response
 
+from relit_camera.api.bodies.schemas import FreezeBody, ModeBody
 from relit_camera.api.dependencies import ApiContextDep
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.schemas import FreezeBody, ModeBody
 
 router = APIRouter(tags=["control"])
 
@@ -20,7 +20,7 @@ def get_mode(api: ApiContextDep) -> ModeBody:
     return ModeBody(mode=api.camera.scene_controller.scene.look.mode)
 
 
-@router.put("/mode", responses=error_responses(422))
+@router.put("/mode", responses=error_responses(409, 422))
 def set_mode(api: ApiContextDep, body: ModeBody) -> ModeBody:
     """Change how the relit face reaches the picture."""
     scene = api.camera.scene_controller.update_look(lambda look: look.model_copy(update={"mode": body.mode}))

@@ -15,9 +15,9 @@ from prometheus_client.core import (
 )
 from starlette.responses import Response
 
+from relit_camera.api.bodies.schemas import Health, Readiness
 from relit_camera.api.dependencies import ApiContextDep
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.schemas import Health, Readiness
 from relit_camera.base.errors import NotReadyError
 from relit_camera.live.status.camera_status import CameraState, CameraStatus, Percentiles
 
@@ -74,6 +74,11 @@ class _StatusCollector:
         for stage, seconds in status.stage_processor_s.items():
             used.add_metric([stage], seconds)
         yield used
+
+        if status.readers.count is not None:
+            yield GaugeMetricFamily(
+                "relit_readers", "Programs that take pictures from the virtual camera", status.readers.count
+            )
 
         tracker = GaugeMetricFamily(
             "relit_tracker_state", "1 for the tracker's present state", labels=["name", "state"]

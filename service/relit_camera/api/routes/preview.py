@@ -1,4 +1,4 @@
-"""Routes of the published picture: a snapshot, and a preview as motion JPEG."""
+"""Routes of the published picture: a snapshot, and a preview as motion JPEG, as published or as filmed."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ STREAM_RESPONSE: dict[int | str, dict[str, Any]] = {
 Width = Annotated[int | None, Query(ge=64, le=8192, description="Scaled down to this width; as published if not given")]
 Mirror = Annotated[bool, Query(description="Left and right exchanged, as in a mirror")]
 Fps = Annotated[float, Query(ge=0.1, le=60, allow_inf_nan=False, description="At most so many pictures a second")]
+Before = Annotated[bool, Query(description="The frames as filmed instead: to compare, in this answer only")]
 
 
 @router.get("/snapshot.jpg", response_class=Response, responses=JPEG_RESPONSE | error_responses(422, 503))
@@ -43,10 +44,10 @@ def get_snapshot(api: ApiContextDep) -> Response:
 
 @router.get("/preview.mjpg", response_class=StreamingResponse, responses=STREAM_RESPONSE | error_responses(422, 503))
 async def get_preview(
-    api: ApiContextDep, width: Width = None, mirror: Mirror = False, fps: Fps = 30.0
+    api: ApiContextDep, width: Width = None, mirror: Mirror = False, fps: Fps = 30.0, before: Before = False
 ) -> StreamingResponse:
-    """The published pictures as motion JPEG, for an `<img>`."""
-    variant = PreviewVariant(width, mirror, fps)
+    """The published pictures as motion JPEG, for an `<img>`; or, to compare, the frames as filmed."""
+    variant = PreviewVariant(width, mirror, fps, before)
     api.preview.check_capacity(variant)
     return StreamingResponse(
         motion_jpeg(api, variant), media_type=f"multipart/x-mixed-replace; boundary={MULTIPART_BOUNDARY}"

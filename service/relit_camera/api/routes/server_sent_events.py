@@ -12,8 +12,8 @@ from pydantic_core import to_json
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.responses import StreamingResponse
 
+from relit_camera.api.bodies.schemas import SceneBody
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
-from relit_camera.api.schemas import SceneBody
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.event_hub import Event
 
@@ -74,6 +74,8 @@ def scene_body(scene: Scene) -> SceneBody:
         rung=scene.subject.metadata.rung if scene.subject else None,
         unlit_allowed=scene.unlit_allowed,
         frozen=scene.frozen,
+        can_undo=scene.can_undo,
+        can_redo=scene.can_redo,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from relit_camera.app.needed_models import missing_models
+from relit_camera.app.setup.needed_models import missing_models
 
 FOLDER = Path(__file__).parent / "data"
 SUBJECT = FOLDER / "adam.relit"

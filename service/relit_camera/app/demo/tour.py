@@ -101,7 +101,7 @@ class DemoRunner:
 
         if look == shown.look and self._scene_controller.scene is shown:
             return shown  # every page hears of each change
-        return self._scene_controller.update_look(unless_changed)
+        return self._scene_controller.update_look(unless_changed, recorded=False)
 
 
 class _TakenOverError(Exception):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -14,6 +14,10 @@ LinearRgb = tuple[ColorChannel, ColorChannel, ColorChannel]
 StoredName = Annotated[str, Field(pattern=NAME_PATTERN), AfterValidator(require_portable_name)]
 """A stored thing's name: letters, digits, space, dot, dash, underscore; no dot or space last, and no device of Windows,
 so that it is safe as a file name everywhere."""
+
+
+SubjectName = Annotated[str, Field(min_length=1, max_length=120, pattern=r"^[^/\\\x00-\x1f]+$")]
+"""A subject's name, which may be that of any file put into the folder by hand."""
 
 
 class SettingsModel(BaseModel):
@@ -34,6 +38,15 @@ class Mode(StrEnum):
 class Lamp(SettingsModel):
     """A round lamp at infinity."""
 
+    model_config = ConfigDict(
+        json_schema_extra={
+            "not": {
+                "required": ["kelvin", "color"],
+                "properties": {"kelvin": {"type": "number"}, "color": {"type": "array"}},
+            }
+        }
+    )
+
     azimuth_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
     """0 is from the camera, 90 from the picture's right."""
     elevation_deg: Annotated[float, Field(ge=-90, le=90)] = 30.0
@@ -45,6 +58,10 @@ class Lamp(SettingsModel):
     """Linear RGB, multiplied by `intensity` as it is."""
     intensity: Annotated[float, Field(ge=0, le=1000)] = 1.0
     """Irradiance at the head, perpendicular to the lamp."""
+    muted: bool = False
+    """Gives no light, and keeps its settings."""
+    name: Annotated[str, Field(max_length=40, pattern=r"^[^\x00-\x1f\x7f]*$")] = ""
+    """What a person calls it."""
 
     @model_validator(mode="after")
     def _kelvin_or_color(self) -> Lamp:
@@ -70,20 +87,33 @@ class Lighting(SettingsModel):
     face_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
     background_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
     blend: Annotated[float, Field(ge=0, le=1)] = 1.0
-    """0 the live picture (in reenact, where that stays private, the source image as captured), 1 fully relit."""
+    """0 the live picture (in reenact, where that stays private, the source image as captured), 1 fully relit. In ratio
+    below 0.05 only where the picture as filmed may be published."""
     split: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Before and after, in mode ratio: this share of the picture, from its left, is as filmed, room and all."""
+    """Before and after, in mode ratio: this share of the picture, from its left, is as filmed, room and all. Above 0
+    only where the picture as filmed may be published."""
     transition_s: Annotated[float, Field(ge=0, le=60)] = 0.4
     """Seconds over which a change is eased."""
 
 
-class NoBackground(SettingsModel):
+def _with_kind_required(schema: dict[str, Any]) -> None:
+    """Say in a JSON schema that `kind` must be given: it tells the kinds of a background apart."""
+    schema["required"] = ["kind", *schema.get("required", [])]
+
+
+class KindOfBackground(SettingsModel):
+    """Base of the kinds of backgrounds."""
+
+    model_config = ConfigDict(json_schema_extra=_with_kind_required)
+
+
+class NoBackground(KindOfBackground):
     """Reenact: a dark neutral. Ratio: the live room."""
 
     kind: Literal["none"] = "none"
 
 
-class BlurBackground(SettingsModel):
+class BlurBackground(KindOfBackground):
     """The live room, blurred."""
 
     kind: Literal["blur"] = "blur"
@@ -91,7 +121,7 @@ class BlurBackground(SettingsModel):
     """1 blurs with a sigma of a tenth of the picture's height."""
 
 
-class ColorBackground(SettingsModel):
+class ColorBackground(KindOfBackground):
     """One colour."""
 
     kind: Literal["color"] = "color"
@@ -99,7 +129,7 @@ class ColorBackground(SettingsModel):
     """SRGB, as in a web page."""
 
 
-class ImageBackground(SettingsModel):
+class ImageBackground(KindOfBackground):
     """A picture, cropped to fill."""
 
     kind: Literal["image"] = "image"
@@ -107,7 +137,7 @@ class ImageBackground(SettingsModel):
     """A stored background picture or a stored environment's name."""
 
 
-class EnvironmentBackground(SettingsModel):
+class EnvironmentBackground(KindOfBackground):
     """The environment that lights the face, seen behind it and turned with it."""
 
     kind: Literal["environment"] = "environment"
@@ -123,8 +153,50 @@ Background = Annotated[
 
 
 class Look(SettingsModel):
-    """Everything that a preset keeps."""
+    """What is changed while the camera runs, but for the subject."""
 
     lighting: Lighting = Lighting()
     background: Background = NoBackground()
     mode: Mode = Mode.REENACT
+
+    @property
+    def shows_filmed(self) -> bool:
+        """Whether a part of the picture would be as it was filmed, or all of it but for a trace."""
+        light = self.lighting
+        return light.split > 0 or (self.mode is Mode.RATIO and light.blend < LEAST_RELIT_BLEND)
+
+    def relit(self) -> Look:
+        """The same look where it shows nothing as filmed; else with all of the picture relit."""
+        if not self.shows_filmed:
+            return self
+        faint = self.mode is Mode.RATIO and self.lighting.blend < LEAST_RELIT_BLEND
+        changes = {"split": 0.0, "blend": 1.0 if faint else self.lighting.blend}
+        return self.model_copy(update={"lighting": self.lighting.model_copy(update=changes)})
+
+
+LEAST_RELIT_BLEND = 0.05
+"""Below this `blend` the picture of mode ratio is as filmed for the eye: it differs by a few codes."""
+
+
+class Preset(Look):
+    """A look that is kept, with who is shown in it."""
+
+    subject: SubjectName | None = None
+    """A stored subject's name; null leaves whoever is shown."""
+
+    @property
+    def look(self) -> Look:
+        """The look alone."""
+        return Look(lighting=self.lighting, background=self.background, mode=self.mode)
+
+
+def merge_edits(look: Look, before: Look, after: Look) -> Look:
+    """The present look with every field that differs between `before` and `after`; in the lighting field by field."""
+    lighting = look.lighting.model_copy(update=_changed_fields(before.lighting, after.lighting))
+    parts = _changed_fields(before, after)
+    return look.model_copy(update=parts | {"lighting": lighting})
+
+
+def _changed_fields(before: SettingsModel, after: SettingsModel) -> dict[str, Any]:
+    values = {name: getattr(after, name) for name in type(after).model_fields}
+    return {name: value for name, value in values.items() if value != getattr(before, name)}

@@ -56,7 +56,10 @@ class OutputSettings(SettingsModel):
     """Picture shown while there is nothing else to show; a built-in one if not given."""
     fallback: Fallback = Fallback.PLACEHOLDER
     """While pictures cannot be made the source image is shown, relit; and where that cannot be either, this:
-    `placeholder`, or `live`, the webcam's picture as it is, room and all."""
+    `placeholder`, or `live`, the webcam's picture as it is, room and all, if `unlit_allowed` is true too."""
+    unlit_allowed: bool = False
+    """Whether the picture as filmed may be published: without a subject, without a face in mode ratio, before and after
+    (`split`). Else a placeholder or the subject's relit picture at rest is. The panel can allow it for one run."""
 
     @field_validator("sink", mode="before")
     @classmethod
@@ -146,8 +149,8 @@ class StorageSettings(SettingsModel):
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """All of them."""
-        return self.environments, self.subjects, self.backgrounds, self.presets
+        """All in which files are written."""
+        return self.environments, self.subjects, self.backgrounds, self.presets, self.film_capture, self.replays
 
     @property
     def environments(self) -> Path:
@@ -168,6 +171,16 @@ class StorageSettings(SettingsModel):
     def presets(self) -> Path:
         """Folder of stored presets."""
         return self.data_dir / "presets"
+
+    @property
+    def film_capture(self) -> Path:
+        """Folder of the film that a subject is made of, and of what is made of it."""
+        return self.data_dir / "captures" / "film"
+
+    @property
+    def replays(self) -> Path:
+        """Folder of relit videos."""
+        return self.data_dir / "replays"
 
 
 class RelitSettings(BaseSettings):

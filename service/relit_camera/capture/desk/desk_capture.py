@@ -38,6 +38,7 @@ from relit_camera.capture.desk.recording_checks import (
     motion_warnings,
     require_exposure,
     require_patterns,
+    require_person,
     scale_warnings,
     white_drift_warnings,
 )
@@ -51,6 +52,7 @@ from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.subject_builder import subject_from_field
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.light.directions import texel_solid_angles
+from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.reflectance_field import texel_vectors
 from relit_camera.subject.subject import Subject
 
@@ -58,6 +60,8 @@ METHOD = "model"
 SIZE_PX = 256
 RESIDUAL_KERNEL = Kernel(float(np.radians(30)), 0.1)
 """Of what the appearance model does not explain; so few lights cannot choose one by cross-validation."""
+ACCURACY = CompressionTarget(texel_db=38.0, light_db=41.0)
+"""Of the compression, against the fitted field, which is further from the truth than that."""
 MIN_FACE_IN_MATTE = 0.5
 """Least share of the face that must belong to the matte."""
 Progress = Callable[[str, int, int | None], None]
@@ -108,6 +112,7 @@ def build_desk_subject(
         source,
         str(recording.setup.camera_gamma),
         rung="desk",
+        accuracy=ACCURACY,
         progress=lambda done, total: progress("Building the field", done, total),
     )
     return subject, found.warnings
@@ -207,6 +212,8 @@ def identify_patterns(
     # Most plateaus light half of the screen, so the median is one of these.
     typical = sorted(plateaus, key=lambda each: float(each.cells.mean()))[len(plateaus) // 2]
     require_exposure(require_frame(recording, (typical.start + typical.stop) // 2), on_face)
+    middles = [require_frame(recording, (each.start + each.stop) // 2) for each in plateaus]
+    require_person(middles, np.array([each.cells.mean() for each in plateaus]), _exposed(white), face)
     patches = place_patches(recording.setup, face.from_axis_cm(recording.size))
     patterns = match_patterns(plateaus, lights, face_cells(cells.shape[1:], recording.size, face), patches).patterns
     known = [index for index, pattern in enumerate(patterns) if pattern >= 0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +26,13 @@ NOTED_COLOR_DRIFT = 0.03
 """Change of its color: automatic white balance, or night light that sets in."""
 NOTED_NONLINEARITY = 0.15
 """Difference of the sum of all patches from white: local dimming, HDR, a screen or webcam with a curve of its own."""
+LIT = 0.2
+"""Mean light of a frame, from the darkest to the brightest one, above which a face is looked for in it."""
+MIN_LIKENESS = 0.3
+"""Correlation of a face's details with those under white, below which it is not there. Faces lit from one side have 0.8
+and more, by one lamp of forty 0.4 and more; a wall has less than 0.2."""
+_DETAIL_BLURS, _DETAIL_SIDE = (0.02, 0.12), 160
+"""Standard deviations of the two blurs between which details lie, in sides of the face; and that side in pixels."""
 MAX_MOTION_CM, NOTED_MOTION_CM = 4.0, 0.8
 _FOCAL_WIDTHS = 0.45, 2.2
 """Focal length of a webcam in widths of its picture, from very wide to narrow."""
@@ -47,6 +55,42 @@ def require_exposure(picture: DisplayImage, face: NDArray[np.bool_]) -> None:
         raise CaptureError(what, "lower the webcam's exposure or gain, or the screen's brightness")
 
 
+def require_person(frames: Sequence[DisplayImage], levels: Float32Array, white: DisplayImage, face: DeskFace) -> None:
+    """Check that the person whose face is in one frame is in all others.
+
+    Args:
+        frames: one under each pattern, in order of time; in dark ones nobody is looked for.
+        levels: (frames,) mean light of each.
+        white: the frame in which the face was found, as bright as may be.
+        face: where it is.
+
+    Raises:
+        CaptureError: it is not.
+    """
+    radius = face.circle.radius
+    wanted = _details(white, face, radius)
+    lit = levels > levels.min() + LIT * np.ptp(levels)
+    away = []
+    for frame in (frame for frame, is_lit in zip(frames, lit, strict=True) if is_lit):
+        around = _details(frame, face, radius + MAX_MOTION_CM * face.pixels_per_cm)
+        away.append(float(cv2.matchTemplate(around, wanted, cv2.TM_CCOEFF_NORMED).max()) < MIN_LIKENESS)
+    if any(away):
+        what = f"you are not seen under {sum(away)} of {len(away)} patterns that light you"
+        raise CaptureError(what, "film again, stay before the webcam until it is done, and nothing before your face")
+
+
+def _details(picture: DisplayImage, face: DeskFace, reach_px: float) -> Float32Array:
+    """Details of a frame within reach of the middle of the face."""
+    x, y, half = round(face.circle.x), round(face.circle.y), max(round(reach_px), 1)
+    region = picture[max(y - half, 0) : y + half, max(x - half, 0) : x + half]
+    scale = _DETAIL_SIDE / (2 * face.circle.radius)
+    small = cv2.resize(region, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    # In logarithms, so that what lies in shadow counts as much.
+    gray = np.log(small.mean(axis=2, dtype=np.float32) + 16)
+    fine, coarse = (cv2.GaussianBlur(gray, (0, 0), sigma * _DETAIL_SIDE) for sigma in _DETAIL_BLURS)
+    return np.asarray(fine - coarse, np.float32)
+
+
 def require_patterns(found: NDArray[np.intp], lights: Float64Array, frames: int) -> None:
     """Check that the patterns that were found (count,) suffice.
 
@@ -67,7 +111,9 @@ def require_patterns(found: NDArray[np.intp], lights: Float64Array, frames: int)
         what = f"frames are missing: only {seen} of the first {last} patterns were seen in {frames} frames"
     else:
         what = f"the recording ends early: {seen} of {count} patterns were seen in {frames} frames"
-    raise CaptureError(what, "film again, and leave the page open and the webcam free until it is done")
+    raise CaptureError(
+        what, "film again: stay before the webcam, leave the page open and the webcam free until it is done"
+    )
 
 
 def white_drift_warnings(whites: Sequence[Float32Array]) -> list[str]:

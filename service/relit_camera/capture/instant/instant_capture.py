@@ -27,6 +27,7 @@ from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
 from relit_camera.capture.instant.median_picture import MedianPicture, median_picture
 from relit_camera.capture.instant.room_light import fit_room_light
 from relit_camera.capture.instant.room_shadows import with_room_shadows
+from relit_camera.capture.instant.skin.bare_skin import below_nose, find_bare_skin
 from relit_camera.capture.instant.skin.eye_whites import eye_white_ratio
 from relit_camera.capture.instant.skin.skin_albedo import estimate_albedo
 from relit_camera.capture.instant.skin.skin_prior import estimate_skin
@@ -157,11 +158,13 @@ def _reflectance(
     coarse = np.asarray(cv2.resize(linear, (width, height), interpolation=cv2.INTER_AREA), np.float32)
     eyes = eye_white_ratio(linear, picture.landmarks, landmark_scheme(SCHEME))
     skin_albedo = estimate_skin(coarse[shape.skin], picture.frame_luminance, eyes)
+    below = below_nose(np.asarray(picture.landmarks / 2, np.float32), shape.skin.shape)
+    skin = find_bare_skin(response, coarse, shape.skin, below, skin_albedo)
     clipped = cv2.resize(picture.image.max(axis=2), (width, height), interpolation=cv2.INTER_AREA)
-    unclipped = shape.skin & (clipped < TUNABLES.clipped_code)
-    enough = unclipped.sum() > TUNABLES.least_unclipped * shape.skin.sum()
-    room = fit_room_light(response, coarse, unclipped if enough else shape.skin, skin_albedo)
-    response = with_room_shadows(response, coarse, shape.skin, shape.certainty, room, skin_albedo)
+    unclipped = skin & (clipped < TUNABLES.clipped_code)
+    enough = unclipped.sum() > TUNABLES.least_unclipped * skin.sum()
+    room = fit_room_light(response, coarse, unclipped if enough else skin, skin_albedo)
+    response = with_room_shadows(response, coarse, skin, shape.certainty, room, skin_albedo)
     lit = response.spread(np.concatenate([response.diffuse @ room, response.glossy @ room], axis=1))
     lit = lit.reshape(*picture.matte.shape, 6)
     gloss = np.where(_doubled(shape.face), 1.0, TUNABLES.body_gloss).astype(np.float32)

@@ -189,10 +189,9 @@ def build(
     from relit_camera.capture.film.ball.sphere_projection import BallOutline
     from relit_camera.capture.film.face_circle import FaceCircle
     from relit_camera.capture.film.pipeline.capture_options import CaptureOptions
-    from relit_camera.capture.film.pipeline.checkpoint import Checkpoint, CheckpointFolder, input_fingerprint
-    from relit_camera.capture.film.pipeline.film_capture import build_samples
+    from relit_camera.capture.film.pipeline.checkpoint import CheckpointFolder, input_fingerprint
+    from relit_camera.capture.film.pipeline.film_subject import build_film_subject
     from relit_camera.capture.reflectance.method_registry import open_method
-    from relit_camera.capture.subject_builder import build_subject
     from relit_camera.cli.progress import progress_bar, stage_reporter
     from relit_camera.subject.subject_file import write_subject
 
@@ -220,28 +219,14 @@ def build(
     ):
         if fresh:
             checkpoint_folder.remove()
-        checkpoint = checkpoint_folder.read()
         with progress_bar() as progress:
-            report_stage = stage_reporter(progress)
-            if checkpoint is None:
-                film = build_samples(video, options, report_stage)
-                checkpoint = Checkpoint(film.samples, film.findings.report())
-                checkpoint_folder.write(checkpoint)
-            report_stage("Building the field", 0, None)
-            subject = build_subject(
-                checkpoint.samples,
-                method,
-                video.name,
-                options.gamma,
-                rung="film",
-                progress=partial(report_stage, "Building the field"),
-            )
+            subject, told = build_film_subject(video, options, checkpoint_folder, stage_reporter(progress), method)
         write_subject(subject_file, subject)
         if report_file:
-            report_file.write_text(json.dumps(checkpoint.report, indent=1), encoding="utf-8")
-    for warning in checkpoint.report["warnings"]:
+            report_file.write_text(json.dumps(told, indent=1), encoding="utf-8")
+    for warning in told["warnings"]:
         typer.echo(f"warning: {warning}", err=True)
-    meta, flashes = subject.metadata, checkpoint.report["light"]["frames"]
+    meta, flashes = subject.metadata, told["light"]["frames"]
     typer.echo(
         f"{out}: {meta.width}x{meta.height}, {meta.lights} lights of {flashes} flashes' frames, "
         f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better"

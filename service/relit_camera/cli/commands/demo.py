@@ -37,6 +37,7 @@ def demo(
     from relit_camera.cli.model_offer import offer_models
     from relit_camera.devices.sinks.sink import NullSink, Sink
     from relit_camera.devices.sinks.sink_factory import open_sink
+    from relit_camera.doctor.camera_checks import check_camera
     from relit_camera.live.status.camera_status import CameraState
 
     def camera_or_nothing(output: OutputSettings) -> Sink:
@@ -53,6 +54,7 @@ def demo(
     settings = load_command_settings(
         context,
         source={"source": str(demo_files.CLIP)},
+        output={"unlit_allowed": True},  # the clip as filmed is part of the tour
         subject=str(demo_files.SUBJECT),
         tracker={"name": tracker},
         matte=demo_files.matte_of_clip(),
@@ -84,7 +86,7 @@ def demo(
         finally:
             demo_runner.stop()
 
-    run_camera(settings, side_task=demo_tour, seconds=seconds, sink_for=camera_or_nothing)
+    run_camera(settings, side_task=demo_tour, seconds=seconds, sink_for=camera_or_nothing, checks=check_camera)
 
 
 def opens_in_browser(url: str) -> bool:

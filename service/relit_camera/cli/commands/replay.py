@@ -43,7 +43,7 @@ def replay(
     import sys
     from contextlib import ExitStack
 
-    from relit_camera.app.video_replay import replay as run_replay
+    from relit_camera.app.replay.video_replay import replay as run_replay
     from relit_camera.app.wiring import make_pipeline, make_tracker
     from relit_camera.base.concurrency.threads import limit_threads
     from relit_camera.base.config.look import Look
@@ -72,6 +72,7 @@ def replay(
     )
     info = probe_video(video)
     scene_controller = SceneController(settings.storage)
+    scene_controller.set_unlit_allowed(True)  # the result is a file of the person's own
     if instant:
         scene_controller.show_subject("instant", _instant_subject(video, settings))
     else:

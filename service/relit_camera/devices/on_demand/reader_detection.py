@@ -18,7 +18,7 @@ from pathlib import Path
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import UnsupportedByDriverError
 from relit_camera.devices.device_users import PROC, find_device_users
-from relit_camera.devices.v4l2 import query_has_readers
+from relit_camera.devices.v4l2 import count_readers
 
 log = logging.getLogger(__name__)
 
@@ -31,8 +31,8 @@ ReaderQuery = Callable[[str], bool]
 """Called with a device node; returns whether anybody reads pictures from it."""
 
 
-def driver_reports_readers(node: str) -> bool:
-    """Ask the driver whether anybody reads pictures from `node`.
+def driver_reader_count(node: str) -> int:
+    """Ask the driver how many programs read pictures from `node`.
 
     It subscribes anew each time: the first event of a subscription is the present state, so a lost event cannot mislead
     for long.
@@ -45,9 +45,14 @@ def driver_reports_readers(node: str) -> bool:
         raise UnsupportedByDriverError("only Linux has v4l2loopback")
     device = os.open(node, os.O_RDONLY | os.O_NONBLOCK)
     try:
-        return query_has_readers(device)
+        return count_readers(device)
     finally:
         os.close(device)
+
+
+def driver_reports_readers(node: str) -> bool:
+    """Ask the driver whether anybody reads pictures from `node`; raises what `driver_reader_count` does."""
+    return driver_reader_count(node) > 0
 
 
 def is_open_elsewhere(node: str, proc: Path = PROC) -> bool:

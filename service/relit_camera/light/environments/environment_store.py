@@ -12,6 +12,7 @@ from relit_camera.base.errors import InputError, PanoramaError
 from relit_camera.base.images.image_files import encode_display, write_linear
 from relit_camera.base.storage.named_files import FileVersion, NamedFiles, file_version
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.environments.builtin.builtin_thumbnails import builtin_thumbnail
 from relit_camera.light.environments.environment_panorama import (
     PANORAMA_SUFFIXES,
     Environment,
@@ -76,7 +77,7 @@ class EnvironmentStore(NamedFiles):
             NotFoundError, PanoramaError: as `load`.
         """
         if name in BUILTIN_NAMES:
-            return _builtin_thumbnail(name)
+            return builtin_thumbnail(name)
         path = self.path(name)
         return _thumbnail(path, file_version(path))
 
@@ -139,8 +140,3 @@ def _read_cached(path: Path, version: FileVersion) -> Environment:
 @lru_cache(maxsize=256)
 def _thumbnail(path: Path, version: FileVersion) -> bytes:
     return encode_display(thumbnail_image(_read_cached(path, version).panorama))
-
-
-@lru_cache(maxsize=len(BUILTIN_NAMES))
-def _builtin_thumbnail(name: str) -> bytes:
-    return encode_display(thumbnail_image(builtin_environment(name).panorama))

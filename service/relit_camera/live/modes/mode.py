@@ -27,11 +27,13 @@ class RenderedFrame:
         image: uint8 sRGB of the output's size.
         motion: what the face did; None while there is no tracker or no subject.
         scene: that it was made for.
+        unlit: whether it is as filmed, or a part of it.
     """
 
     image: DisplayImage
     motion: FaceMotion | None
     scene: Scene
+    unlit: bool = False
 
 
 RenderTask = Callable[[], RenderedFrame]

@@ -2,24 +2,37 @@
 
 from __future__ import annotations
 
-from relit_camera.base.images.image_types import DisplayImage, Frame
+from dataclasses import replace
+from functools import partial
+
+from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.compositing.background_renderer import crossfade
 from relit_camera.live.modes.frame_fitting import fit_frame, fit_motion
 from relit_camera.live.modes.identity_check import IdentityCheck
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
+from relit_camera.live.modes.reenact_mode import blend_with_source
+from relit_camera.live.reenactment.rest_layer import RestLayer
 from relit_camera.live.reenactment.warp import PositionGrid
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
 
 
 class RatioMode:
-    """See `RenderMode`."""
+    """See `RenderMode`.
+
+    Where no face is followed, or not yet, the live picture would be shown as it is. Unless the scene allows that, the
+    subject's relit picture at rest takes its place, as mode reenact shows it while it searches; between them it is
+    eased.
+    """
 
     def __init__(self, context: ModeContext, relighting: RatioRelighting) -> None:
         self._context = context
         self._relighting = relighting
         self._identity = IdentityCheck(context.face)
+        self._at_rest = RestLayer(context.subject, context.size)
 
     def begin(
         self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
@@ -28,27 +41,51 @@ class RatioMode:
 
         Both at the same time; the task multiplies and composes.
         """
-        timer = self._context.timer
         live = fit_frame(frame, self._context.size)
         motion = fit_motion(motion, frame.size, self._context.size)
-        plan = self._plan(motion, live, scene, quality)
-        if isinstance(plan, FaceMismatch):
-            return plan
+        if scene.unlit_allowed:
+            plan = self._plan(motion, live, scene, quality)
+            return plan if isinstance(plan, FaceMismatch) else partial(self._render, plan, live, motion, scene)
+        followed = None if motion.presence <= 0 else self._plan(motion, live, scene, quality)
+        if isinstance(followed, FaceMismatch):
+            return followed
+        if followed is not None and followed.presence >= 1:
+            return partial(self._render, followed, live, motion, scene)
+        at_rest = self._context.scene_relighting.relight(
+            scene, Rotation.identity(), frame.time_s, quality.relight_every
+        )
+        return partial(self._render_eased, followed, at_rest, live, motion, scene)
 
-        def render() -> RenderedFrame:
-            with timer.stage("move"):
-                blend = scene.look.lighting.blend
-                picture = live.image if plan is None else self._relighting.apply(plan, blend)
-            with timer.stage("compose"):
-                image = self._context.compositor.composite_live(picture, live, scene)
-                return RenderedFrame(split_view(image, live.image, scene.look.lighting.split), motion, scene)
+    def _render(self, plan: RatioPlan | None, live: Frame, motion: FaceMotion, scene: Scene) -> RenderedFrame:
+        """The relit live picture; as far as no face is followed, and where `split` says so, the live one."""
+        lighting = scene.look.lighting
+        image = split_view(self._relit_live(plan, live, scene), live.image, lighting.split)
+        unlit = plan is None or plan.presence < 1 or scene.look.shows_filmed
+        return RenderedFrame(image, motion, scene, unlit)
 
-        return render
+    def _render_eased(
+        self, plan: RatioPlan | None, at_rest: LinearImage, live: Frame, motion: FaceMotion, scene: Scene
+    ) -> RenderedFrame:
+        """The relit live picture as far as a face is followed; for the rest the subject at rest, relit."""
+        context = self._context
+        with context.timer.stage("move"):
+            layer = self._at_rest.render(blend_with_source(context.subject, at_rest, scene.look.lighting.blend))
+        with context.timer.stage("compose"):
+            image = context.compositor.composite_source(layer, scene, live.time_s)
+        if plan is not None:
+            image = crossfade(image, self._relit_live(replace(plan, presence=1.0), live, scene), plan.presence)
+        return RenderedFrame(image, motion, scene, scene.look.shows_filmed)
+
+    def _relit_live(self, plan: RatioPlan | None, live: Frame, scene: Scene) -> DisplayImage:
+        with self._context.timer.stage("move"):
+            picture = live.image if plan is None else self._relighting.apply(plan, scene.look.lighting.blend)
+        with self._context.timer.stage("compose"):
+            return self._context.compositor.composite_live(picture, live, scene)
 
     def _plan(
         self, motion: FaceMotion, frame: Frame, scene: Scene, quality: RenderQuality
     ) -> RatioPlan | FaceMismatch | None:
-        """What must be known to relight the frame; None without a face: then it is shown as it is."""
+        """What must be known to relight the frame; None without a face."""
         context, relighting, pose = self._context, self._relighting, motion.pose
         if pose is None:
             return None

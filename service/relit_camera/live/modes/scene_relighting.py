@@ -1,17 +1,25 @@
-"""Relighting the subject as the scene says: the scene's light, turned with the head, on the subject."""
+"""Relighting the subject as the scene says: the scene's light, turned with the head, on the head.
+
+The body below it does not turn with the head: it is lit as it stands in the room, and the neck in between by a mixture.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import LinearImage
+from relit_camera.base.easing import smoothstep
+from relit_camera.base.images.image_types import LinearImage, Mask
 from relit_camera.base.rotations import Rotation
+from relit_camera.face.head_pose import project
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.turn_extrapolation import TurnExtrapolation
+from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.scene.light_transition import LightTransition
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.stage_timing import StageTimer
@@ -21,19 +29,58 @@ from relit_camera.subject.subject import Subject
 RATIO_MORE_FRAMES, RATIO_MAX_STEP = 1, np.radians(4.0)
 """The ratio of two pictures changes less than one of them, and is seen under the texture of the live picture: while the
 head turns it is computed once in so many more frames, and for a larger turn."""
+NECK_TOP, NECK_END = np.array([0.0, -10.0, 0.0]), np.array([0.0, -14.5, 0.0])
+"""Head axes, cm: a neck turns with the head at its top, below the chin, and not at all at its end, at the collar."""
+
+
+@dataclass(frozen=True, eq=False)
+class _SeenLight:
+    """A light on the subject.
+
+    Attributes:
+        in_head_frame: (32, 64, 3) float32 as the turned head sees it, with the gain.
+        in_room: the same as the body sees it, without.
+        gain: factor of the light's brightness.
+    """
+
+    in_head_frame: LightMap
+    in_room: LightMap
+    gain: np.float32 = field(default_factory=lambda: np.float32(1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Body:
+    """The lower part of the source image under the light of the room; `light` is the map itself, to know it by."""
+
+    light: LightMap
+    picture: LinearImage
 
 
 class SceneRelighting:
     """Relights one subject frame by frame. Not thread-safe."""
 
-    def __init__(self, subject: Subject, relighter: Relighter, light: LightTransition, timer: StageTimer) -> None:
-        """`light` goes on from subject to subject, so that a change of light stays smooth."""
+    def __init__(
+        self, subject: Subject, face: SourceFace, relighter: Relighter, light: LightTransition, timer: StageTimer
+    ) -> None:
+        """Prepare for one subject.
+
+        Args:
+            subject: the person.
+            face: the face in the source image.
+            relighter: of that subject.
+            light: goes on from subject to subject, so that a change of light stays smooth.
+            timer: counts the stages `light` and `relight`.
+        """
         self._relit = TurnExtrapolation()
         self._compared = TurnExtrapolation(RATIO_MAX_STEP)
         self._gain = np.float32(subject.metadata.display_gain)
         self._relighter = relighter
         self._light = light
         self._timer = timer
+        body = body_fraction(face) * (subject.matte > 0)
+        self._first_row = int(np.argmax(body.any(axis=1)))
+        self._body = cv2.merge([body[self._first_row :]] * 3) if body.any() else None
+        self._bodies: list[_Body] = []
 
     def relight(self, scene: Scene, rotation: Rotation, time_s: float, every: int) -> LinearImage:
         """The subject under the scene's light: float32 linear, the subject's size, in display exposure.
@@ -50,7 +97,7 @@ class SceneRelighting:
             light = self._light.update(scene, time_s)
         with self._timer.stage("relight"):
             return self._relit.picture(
-                rotation, light, None, every, lambda: self._relighter.relight(self._seen(light, rotation)[None])[0]
+                rotation, light, None, every, lambda: self._head_and_body(self._scene_light(light, rotation))[0]
             )
 
     def compare(
@@ -80,10 +127,43 @@ class SceneRelighting:
             light = self._light.update(scene, time_s)
 
         def relit() -> NDArray[np.float32]:
-            return combine(*self._relighter.relight(np.stack([self._seen(light, rotation), room_in_head_frame])))
+            return combine(
+                *self._head_and_body(self._scene_light(light, rotation), _SeenLight(room_in_head_frame, room))
+            )
 
         with self._timer.stage("relight"):
             return self._compared.picture(rotation, light, room, every + RATIO_MORE_FRAMES, relit)
 
-    def _seen(self, light: LightMap, rotation: Rotation) -> LightMap:
-        return rotate_light_map(light, rotation) * self._gain
+    def _scene_light(self, light: LightMap, rotation: Rotation) -> _SeenLight:
+        return _SeenLight(rotate_light_map(light, rotation) * self._gain, light, self._gain)
+
+    def _head_and_body(self, *lights: _SeenLight) -> list[LinearImage]:
+        """The subject under each light: the head as it sees the light, the body as it stands in the room.
+
+        The body is relit only where its light has changed, in the same product as the head.
+        """
+        heads = [light.in_head_frame for light in lights]
+        if self._body is None:
+            return list(self._relighter.relight(np.stack(heads)))
+        new = [light for light in lights if not any(body.light is light.in_room for body in self._bodies)]
+        pictures = self._relighter.relight(np.stack([*heads, *(light.in_room * light.gain for light in new)]))
+        made = [
+            _Body(light.in_room, picture[self._first_row :].copy())
+            for light, picture in zip(new, pictures[len(lights) :], strict=True)
+        ]
+        known = [*made, *self._bodies]
+        self._bodies = [next(body for body in known if body.light is light.in_room) for light in lights]
+        for body, picture in zip(self._bodies, pictures, strict=False):
+            lower = picture[self._first_row :]
+            toward = cv2.subtract(body.picture, lower)
+            cv2.add(lower, cv2.multiply(toward, self._body, dst=toward), dst=lower)
+        return list(pictures[: len(lights)])
+
+
+def body_fraction(face: SourceFace) -> Mask:
+    """How little the pixels of the source image turn with the head: 0 on head and chin, 1 from the collar down."""
+    top, end = project(np.stack([NECK_TOP, NECK_END]), face.pose, face.size).astype(np.float64)
+    down = (end - top) / max(float((end - top) @ (end - top)), 1e-9)
+    width, height = face.size
+    across, along = (np.arange(width) + 0.5 - top[0]) * down[0], (np.arange(height) + 0.5 - top[1]) * down[1]
+    return np.asarray(smoothstep(np.add.outer(along, across)), np.float32)

@@ -33,15 +33,19 @@ class PublishedPicture:
         image: uint8 sRGB RGB (height, width, 3), of the sink's size; never modified again.
         captured_at: monotonic seconds at which the frame it was rendered from arrived; latency is measured from here.
         frame_index: that frame's index.
+        unlit: whether it is as filmed, or a part of it.
     """
 
     image: DisplayImage
     captured_at: float
     frame_index: int
+    unlit: bool = False
 
 
 class Publisher:
     """Writes to the sink at a steady rate: the newest picture, else the last again, else the placeholder.
+
+    No picture as filmed passes unless that is allowed: whatever made it, and however long it is held.
 
     It waits for the pipeline no longer than `LATE_FRAME_GRACE`. After a failed write the sink is left alone for
     `RETRY_S`. The caller owns the sink and closes it after `stop`.
@@ -63,6 +67,7 @@ class Publisher:
         *,
         stale_after_s: float | None = None,
         on_sink_error: Callable[[Exception | None], None] | None = None,
+        unlit_allowed: Callable[[], bool] = lambda: False,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         """Set up; `start` begins.
@@ -73,8 +78,9 @@ class Publisher:
             placeholder: shown until the first picture comes.
             stale_after_s: show the placeholder again when no picture came for this long; None repeats the last picture
                 forever.
-            on_sink_error: called in the publisher's thread with the error when the sink begins to fail, and with None
-                when it works again.
+            on_sink_error: called in the publisher's thread with the error when the sink begins to fail or fails for
+                another reason, and with None when it works again.
+            unlit_allowed: asked at each tick whether pictures as filmed may be shown; the placeholder is else.
             clock: to measure and wait by.
         """
         self.pictures: NewestSlot[PublishedPicture] = NewestSlot(clock)
@@ -86,13 +92,15 @@ class Publisher:
         self._fps = fps
         self._clock = clock
         self._stale_after_s = stale_after_s
+        self._unlit_allowed = unlit_allowed
         self._on_sink_error = on_sink_error or (lambda error: None)
         self._newest = self.pictures.reader()
         self._last: PublishedPicture | None = None
-        self._failing = False
+        self._failing = ""
+        """Why the last write failed; empty where it did not."""
         self._retry_at = self._held_at = 0.0
         self._published = self._repeated = self._overtaken = 0
-        self._rate = RateMeter(clock=clock)
+        self._rate, self._new_rate = RateMeter(clock=clock), RateMeter(clock=clock)
         self._latency = DurationWindow()
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self.run, name="publisher", daemon=True)
@@ -145,6 +153,17 @@ class Publisher:
         return self._rate.rate()
 
     @property
+    def new_fps(self) -> float:
+        """New pictures a second, without repetitions, whether the sink takes them or not."""
+        return self._new_rate.rate()
+
+    @property
+    def unlit(self) -> bool:
+        """Whether the picture that is shown is as filmed, or a part of it."""
+        last = self._last
+        return last is not None and last.unlit
+
+    @property
     def latency_ms(self) -> Percentiles:
         """From a frame's arrival to the end of writing its picture."""
         return self._latency.percentiles()
@@ -168,8 +187,12 @@ class Publisher:
         if picture is not None and self._last is None and picture.frame_index <= self.superseded_index:
             self._overtaken += 1
             picture = None
+        if picture is not None and picture.unlit and not self._unlit_allowed():
+            self._overtaken += 1
+            picture = None
         if picture is not None:
             self._last = picture
+            self._new_rate.tick(now)
         image = self._image(now)
         self._show(image)
         if not self._write(image, now):
@@ -184,6 +207,8 @@ class Publisher:
 
     def _image(self, now: float) -> DisplayImage:
         last = self._last
+        if last is not None and last.unlit and not self._unlit_allowed():
+            last = self._last = None  # not even one that is held
         if self.hold:
             self._held_at = now
         fresh_at = max(self._newest.put_at, self._held_at)
@@ -204,13 +229,13 @@ class Publisher:
             self._sink.write(image)
         except Exception as error:  # whatever a sink raises, publishing goes on
             self._retry_at = self._clock.now() + RETRY_S
-            if not self._failing:
-                self._failing = True
+            if self._failing != repr(error):
+                self._failing = repr(error)
                 log.warning("publishing fails, trying again every %.0f s: %s", RETRY_S, error)
                 self._on_sink_error(error)
             return False
         if self._failing:
-            self._failing = False
+            self._failing = ""
             log.info("publishing works again")
             self._on_sink_error(None)
         return True

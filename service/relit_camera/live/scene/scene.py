@@ -19,10 +19,12 @@ class Scene:
         environment: the environment that lights the face; None for lamps only.
         background_image: the picture of an `image` background, uint8 sRGB RGB (height, width, 3); None for other kinds.
         subject_name: name of the subject, for status and panel.
-        subject: the person shown; None shows the live picture without relighting.
+        subject: the person shown; None shows the live picture without relighting where that is allowed.
         frozen: whether the published picture is held.
-        unlit_allowed: whether the live picture may be shown as it is while there is no subject; else a placeholder is.
+        unlit_allowed: whether the picture as filmed may be published: where there is no subject, no face, before and
+            after. Else the subject's relit picture at rest is, or a placeholder.
         revision: number of changes so far.
+        can_undo, can_redo: whether there is a change to undo, or to do again.
     """
 
     look: Look
@@ -31,5 +33,7 @@ class Scene:
     subject_name: str | None = None
     subject: Subject | None = None
     frozen: bool = False
-    unlit_allowed: bool = True
+    unlit_allowed: bool = False
     revision: int = 0
+    can_undo: bool = False
+    can_redo: bool = False

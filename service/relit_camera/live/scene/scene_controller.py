@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.config.look import (
+    LEAST_RELIT_BLEND,
     Background,
     ColorBackground,
     EnvironmentBackground,
@@ -19,7 +21,13 @@ from relit_camera.base.config.look import (
     Mode,
 )
 from relit_camera.base.config.settings import StorageSettings
-from relit_camera.base.errors import InputError, NotFoundError
+from relit_camera.base.errors import (
+    ConflictError,
+    InputError,
+    NotFoundError,
+    PreconditionFailedError,
+    UnlitNotAllowedError,
+)
 from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.light.environments.background_light import panorama_from_background
@@ -30,11 +38,25 @@ from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map import resample_to_light_map
 from relit_camera.live.scene.background_store import BackgroundStore
 from relit_camera.live.scene.scene import Scene
+from relit_camera.live.scene.scene_history import SceneHistory, ScenePoint
 from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_store import SubjectStore
 
 BACKGROUND_ENVIRONMENT = "background"
 """The reserved environment name that means the light of the virtual background."""
+
+
+@dataclass(frozen=True)
+class ChosenSubject:
+    """Who shall be shown.
+
+    Attributes:
+        name: of a stored subject, or of one whose file a person named; None for nobody.
+        subject: the person, where that is loaded already.
+    """
+
+    name: str | None
+    subject: Subject | None = None
 
 
 class SceneController:
@@ -47,53 +69,112 @@ class SceneController:
         environments, subjects, backgrounds: the stores.
     """
 
-    def __init__(self, storage: StorageSettings) -> None:
+    def __init__(self, storage: StorageSettings, clock: Clock = SYSTEM_CLOCK) -> None:
+        """Set up; nothing is read. `clock` tells which changes are one step to undo."""
         self.environments = EnvironmentStore(storage.environments)
         self.subjects = SubjectStore(storage.subjects, copied=True)
         self.backgrounds = BackgroundStore(storage.backgrounds)
         self._change = threading.Lock()
+        self._history = SceneHistory(clock)
         self._temporary_environments: dict[str, Environment] = {}
+        self._subject_files: dict[str, Path] = {}
         self.scene = Scene(Look())
+        self._first = _point(self.scene)
+
+    def change(
+        self,
+        look: Callable[[Look], Look] | None = None,
+        subject: ChosenSubject | None = None,
+        frozen: bool | None = None,
+        unlit_allowed: bool | None = None,
+        if_revision: Collection[int] | None = None,
+        recorded: bool = True,
+    ) -> Scene:
+        """Change the scene, all of it in one step or nothing. What is None stays.
+
+        Where `unlit_allowed` becomes false, nothing of the look stays that shows the picture as filmed.
+
+        Args:
+            look: makes the next look of the present one. Other changes wait until it is shown.
+            subject: who is shown.
+            frozen: whether the published picture is held.
+            unlit_allowed: whether the picture as filmed may be published.
+            if_revision: revisions for which the change is meant; any if not given.
+            recorded: whether the change can be undone.
+
+        Raises:
+            PreconditionFailedError: the scene has another revision than those of `if_revision`.
+            UnlitNotAllowedError: the look shows the picture as filmed, which is not allowed.
+            NotFoundError: an environment, background or subject of that name is not stored.
+            InputError: `background` as environment while the background cannot light.
+            SubjectError: the subject's file is damaged.
+        """
+        with self._change:
+            now = self.scene
+            if if_revision is not None and now.revision not in if_revision:
+                raise PreconditionFailedError(
+                    f"the scene has changed: its revision is {now.revision}", "read it again, then change it"
+                )
+            allowed = now.unlit_allowed if unlit_allowed is None else unlit_allowed
+            before = now.look if allowed else now.look.relit()
+            wanted = before if look is None else look(before)
+            if not allowed and wanted.shows_filmed:
+                raise UnlitNotAllowedError(
+                    "part of the picture would be published as it is filmed, and nobody has allowed that",
+                    "allow it with the same change (unlit_allowed), or leave split at 0 and blend at "
+                    f"{LEAST_RELIT_BLEND} or more",
+                )
+            changes = {} if wanted is now.look else self._with_look(wanted)
+            if subject is not None:
+                changes |= {"subject_name": subject.name, "subject": self._loaded(subject)}
+            if frozen is not None:
+                changes["frozen"] = frozen
+            return self._show(self._next(unlit_allowed=allowed, **changes), recorded)
 
     def set_look(self, look: Look) -> Scene:
         """Show another lighting, background or mode.
 
         Raises:
-            NotFoundError: an environment or background of that name is not stored.
-            InputError: `background` as environment while the background cannot light.
+            RelitError: as `change`.
         """
-        return self.update_look(lambda _: look)
+        return self.change(lambda _: look)
 
-    def update_look(self, change: Callable[[Look], Look]) -> Scene:
+    def update_look(self, change: Callable[[Look], Look], recorded: bool = True) -> Scene:
         """Show what `change` makes of the present look. Other changes wait until it is replaced.
 
         Raises:
-            NotFoundError, InputError: as `set_look`.
+            RelitError: as `change`.
         """
-        with self._change:
-            look = change(self.scene.look)
-            # A slider sends dozens of changes a second, so what did not change is not read again.
-            image = self.scene.background_image if look.background == self.scene.look.background else None
-            if image is None:
-                image = self._background_image(look.background)
-            environment = self._unchanged_environment(look) or self._environment(look, image)
-            return self._replace(look=look, environment=environment, background_image=image)
+        return self.change(change, recorded=recorded)
 
     def choose_stored_subject(self, name: str | None, mode: Mode | None = None) -> Scene:
-        """Show a subject of the store, or none. For names from the API: never a file elsewhere.
+        """Show a stored subject, one whose file the command line named, or none. For names from the API.
 
-        Whoever asks for none may be shown the live picture unlit (`Scene.unlit_allowed`). With `mode` the mode changes
-        in the same step.
+        With `mode` the mode changes in the same step; then all of the picture is relit, unless it may be as filmed.
 
         Raises:
             NotFoundError: no stored subject has that name.
             SubjectError: its file is damaged.
         """
+
+        def in_mode(look: Look) -> Look:
+            changed = look if mode is None else look.model_copy(update={"mode": mode})
+            return changed if self.scene.unlit_allowed else changed.relit()
+
+        return self.change(in_mode, ChosenSubject(name))
+
+    def rename_stored_subject(self, name: str, new_name: str) -> Scene:
+        """Give a stored subject another name; where it is shown, it stays so under that name.
+
+        Raises:
+            NotFoundError: no stored subject has that name.
+            ConflictError: there is one of the new name.
+            InputError: the new name is not allowed.
+            StorageError: it cannot be renamed.
+        """
         with self._change:
-            subject = None if name is None else self.subjects.load(name)
-            unlit_allowed = self.scene.unlit_allowed or name is None
-            look = self.scene.look if mode is None else self.scene.look.model_copy(update={"mode": mode})
-            return self._replace(subject=subject, subject_name=name, unlit_allowed=unlit_allowed, look=look)
+            self.subjects.rename(name, new_name)
+            return self._show(self._next(subject_name=new_name)) if self.scene.subject_name == name else self.scene
 
     def load_configured_subject(self, name_or_path: str | None) -> Scene:
         """Show the subject that the command line or the configuration names: a stored one, else a file; or none.
@@ -102,24 +183,126 @@ class SceneController:
             NotFoundError: neither a stored name nor a file.
             SubjectError: the file is damaged.
         """
+        return self.change(subject=self.resolve_subject(name_or_path))
+
+    def resolve_subject(self, name_or_path: str | None) -> ChosenSubject:
+        """The subject that a person named outside the API: a stored one, else a file; or none.
+
+        A file's subject can then be chosen by the name that it is given here, as long as this program runs.
+
+        Raises:
+            NotFoundError: neither a stored name nor a file.
+            SubjectError: the file is damaged.
+        """
         if name_or_path is None:
-            return self.choose_stored_subject(None)
-        return self.show_subject(*self.subjects.resolve(name_or_path))
+            return ChosenSubject(None)
+        name, subject = self.subjects.resolve(name_or_path)
+        if name_or_path not in self.subjects.names():
+            if name in self.subjects.names():
+                name += "-file"
+            self._subject_files[name] = Path(name_or_path)
+        return ChosenSubject(name, subject)
 
     def show_subject(self, name: str, subject: Subject) -> Scene:
         """Show a subject that is not stored, under `name`."""
-        with self._change:
-            return self._replace(subject=subject, subject_name=name)
+        return self.change(subject=ChosenSubject(name, subject))
+
+    def subject_files(self) -> list[str]:
+        """Names of the subjects that are not stored, and can be chosen because a person named their files."""
+        return list(self._subject_files)
+
+    def subject_path(self, name: str) -> Path:
+        """The file of a subject that can be chosen.
+
+        Raises:
+            NotFoundError: there is none of that name.
+        """
+        stored = self.subjects.names()
+        return (
+            self._subject_files[name]
+            if name in self._subject_files and name not in stored
+            else self.subjects.path(name)
+        )
 
     def set_frozen(self, frozen: bool) -> Scene:
         """Hold the published picture, or continue."""
-        with self._change:
-            return self._replace(frozen=frozen)
+        return self.change(frozen=frozen)
 
     def set_unlit_allowed(self, allowed: bool) -> Scene:
-        """Say whether the live picture may be shown as it is while there is no subject."""
+        """Say whether the picture as filmed may be published."""
+        return self.change(unlit_allowed=allowed)
+
+    def mark_start(self) -> None:
+        """Make the present scene the one that `reset` brings back, and forget the steps before it."""
         with self._change:
-            return self._replace(unlit_allowed=allowed)
+            self._first = _point(self.scene)
+            self._history.clear()
+            self.scene = replace(self.scene, can_undo=False, can_redo=False)
+
+    def undo(self) -> Scene:
+        """Take the last step back. What may be published as filmed is never more after it.
+
+        Raises:
+            ConflictError: there is nothing to undo.
+            RelitError: what was shown then is not stored any more; the step is dropped.
+        """
+        with self._change:
+            restored = self._history.undo(_point(self.scene), self._restored)
+            if restored is None:
+                raise ConflictError("there is nothing to undo", "change something first")
+            return self._show(restored)
+
+    def redo(self) -> Scene:
+        """Do the step again that was undone last. What may be published as filmed is never more after it.
+
+        Raises:
+            ConflictError: there is nothing to do again.
+            RelitError: what was shown then is not stored any more; the step is dropped.
+        """
+        with self._change:
+            restored = self._history.redo(_point(self.scene), self._restored)
+            if restored is None:
+                raise ConflictError("there is nothing to do again", "undo something first")
+            return self._show(restored)
+
+    def reset(self) -> Scene:
+        """Show what the settings say, as at the first start; it can be undone.
+
+        Where they name no subject, whoever is shown stays. What may be published as filmed is never more after it.
+
+        Raises:
+            RelitError: what the settings name is not stored any more.
+        """
+        with self._change:
+            name = self._first.subject_name or self.scene.subject_name
+            first = self._restored(replace(self._first, subject_name=name))
+            self._history.note(_point(self.scene), _point(first), own_step=True)
+            return self._show(replace(first, frozen=False))
+
+    def _restored(self, point: ScenePoint) -> Scene:
+        """The next scene, with what `point` says of it; what may be published as filmed is never more."""
+        now = self.scene
+        allowed = now.unlit_allowed and point.unlit_allowed
+        changes = self._with_look(point.look if allowed else point.look.relit())
+        if point.subject_name != now.subject_name:
+            subject = self._loaded(ChosenSubject(point.subject_name))
+            changes |= {"subject_name": point.subject_name, "subject": subject}
+        return self._next(unlit_allowed=allowed, **changes)
+
+    def _loaded(self, chosen: ChosenSubject) -> Subject | None:
+        if chosen.name is None or chosen.subject is not None:
+            return chosen.subject
+        return self.subjects.load_file(self.subject_path(chosen.name))[1]
+
+    def _with_look(self, look: Look) -> dict[str, object]:
+        """The fields of a scene with that look."""
+        before = self.scene
+        # A slider sends dozens of changes a second, so what did not change is not read again.
+        image = before.background_image if look.background == before.look.background else None
+        if image is None:
+            image = self._background_image(look.background)
+        environment = self._unchanged_environment(look) or self._environment(look, image)
+        return {"look": look, "environment": environment, "background_image": image}
 
     def register_temporary_environment(self, name_or_path: str) -> str:
         """Make the environment of a file available under a name, for this run only; a stored one keeps its own name.
@@ -149,8 +332,13 @@ class SceneController:
         """The names that an `image` background may use: stored pictures and environments."""
         return sorted({*self.backgrounds.names(), *self.environments.names()})
 
-    def _replace(self, **changes: object) -> Scene:
-        self.scene = replace(self.scene, **changes, revision=self.scene.revision + 1)  # type: ignore[arg-type]
+    def _next(self, **changes: object) -> Scene:
+        return replace(self.scene, **changes, revision=self.scene.revision + 1)  # type: ignore[arg-type]
+
+    def _show(self, scene: Scene, recorded: bool = False) -> Scene:
+        if recorded:
+            self._history.note(_point(self.scene), _point(scene))
+        self.scene = replace(scene, can_undo=self._history.can_undo, can_redo=self._history.can_redo)
         return self.scene
 
     def _unchanged_environment(self, look: Look) -> Environment | None:
@@ -197,3 +385,7 @@ class SceneController:
             return uint8_from_linear(seen * np.float32(np.pi * auto_exposure_scale(environment.light_map)))
         known = ", ".join(self.background_names()) or "none"
         raise NotFoundError(f"no background picture '{background.image}'", f"there are: {known}")
+
+
+def _point(scene: Scene) -> ScenePoint:
+    return ScenePoint(scene.look, scene.subject_name, scene.unlit_allowed)

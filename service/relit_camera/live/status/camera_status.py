@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from relit_camera.devices.on_demand.reader_list import Readers
+from relit_camera.live.status.setup_status import SpeedAdvice
+
 
 class CameraState(StrEnum):
     """What is being published."""
@@ -22,7 +25,9 @@ class CameraState(StrEnum):
     RELEASED = "released"
     """On demand, and nobody reads the camera: the webcam is released, the placeholder is shown."""
     CAPTURING = "capturing"
-    """A first subject is being captured and the live picture may not be shown unlit: the placeholder says so."""
+    """A first subject is being captured, and nothing may be shown unlit: the placeholder says so."""
+    NO_SUBJECT = "no-subject"
+    """Nobody is chosen, and nothing may be shown unlit: the placeholder says so."""
     FROZEN = "frozen"
     STOPPING = "stopping"
 
@@ -36,10 +41,12 @@ class DegradationCode(StrEnum):
     """The pipeline fails or hangs: the fallback is shown."""
     SINK_FAILED = "sink-failed"
     """The sink takes no pictures; it is tried again."""
+    MODELS_MISSING = "models-missing"
+    """Models that the tracker needs are not stored: no face is tracked until they are."""
     CONFIGURATION_FAILED = "configuration-failed"
     """The configuration file was edited and cannot be used, or counts only from the next start."""
     NO_SUBJECT = "no-subject"
-    """No subject is chosen: the live picture is shown as it is."""
+    """No subject is chosen: a placeholder is shown, or the picture as filmed where that is allowed."""
     FACE_MISMATCH = "face-mismatch"
     """Mode ratio: the live face is not the subject's, so mode reenact takes over."""
     PROVIDER_FALLBACK = "provider-fallback"
@@ -68,11 +75,14 @@ class TrackerStatus:
 
 @dataclass(frozen=True)
 class Rates:
-    """Frames a second: what the source gives, the pipeline makes, and the sink gets."""
+    """Frames a second: what the source gives, the pipeline makes, the sink gets, and how many of those are new."""
 
     camera: float
     pipeline: float
     published: float
+    """With pictures that are sent again for want of a new one."""
+    new: float = 0.0
+    """Without them."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +132,14 @@ class CameraStatus:
     providers: dict[str, str] = field(default_factory=dict)
     """Name of each open model → the execution provider that is proven to run it, such as `cpu`; and `relighter NAME`,
     the relighter at work → `numpy` or such a provider."""
+    unlit: bool = False
+    """Whether the published picture is as filmed, or a part of it: without a subject or a face, or by `split`."""
     quality_level: int = 0
     """0 is full quality; at each further level a picture costs less, because the computer is busy."""
     degraded: list[Degradation] = field(default_factory=list)
+    readers: Readers = field(default_factory=Readers)
+    """Programs that take pictures from the virtual camera."""
+    advice: SpeedAdvice | None = None
+    """What to do where the computer has not kept up for some seconds."""
     version: str = ""
     uptime_s: float = 0.0

@@ -19,7 +19,7 @@ class Event:
 
     Attributes:
         kind: `state`, `tracking`, `neutral-pose`, `degraded`, `recovered`; `collection` from the API; `caption` from
-            the demonstration's tour.
+            the demonstration's tour; `models` and `framing` from the set-up.
         data: JSON-ready details.
         at: seconds since the epoch.
     """

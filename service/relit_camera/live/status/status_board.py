@@ -19,6 +19,7 @@ PARTS = {
     DegradationCode.SOURCE_FAILED: "source",
     DegradationCode.PICTURE_FAILED: "picture",
     DegradationCode.SINK_FAILED: "sink",
+    DegradationCode.MODELS_MISSING: "tracker",
     DegradationCode.CONFIGURATION_FAILED: "configuration",
 }
 """The part of the camera that each code is about, as events and messages name it."""

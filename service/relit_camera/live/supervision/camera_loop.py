@@ -11,6 +11,7 @@ from relit_camera.base.errors import DeviceError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.devices.sources.source import Source, SourceState
 from relit_camera.face.face_state import FaceStatus
+from relit_camera.live.filmed_frames import FilmedFrames
 from relit_camera.live.frame_recorder import FrameRecorder
 from relit_camera.live.pipeline import RenderedFrame
 from relit_camera.live.publishing.placeholder_image import Placeholder
@@ -20,6 +21,7 @@ from relit_camera.live.status.camera_status import CameraState, DegradationCode
 from relit_camera.live.status.stage_timing import RateMeter
 from relit_camera.live.status.status_board import StatusBoard
 from relit_camera.live.supervision.fallback_renderer import FallbackRenderer
+from relit_camera.live.supervision.framing_monitor import FramingMonitor
 from relit_camera.live.supervision.pipeline_supervisor import PipelineSupervisor, ShownPicture
 
 
@@ -43,12 +45,14 @@ class Placeholders:
     Attributes:
         waiting: the source is looked for.
         released: nobody reads the camera, so the webcam is off.
-        capturing: there is no subject yet, and the live picture may not be shown unlit.
+        capturing: a first subject is captured, and nothing may be shown unlit.
+        no_subject: nobody is chosen, and nothing may be shown unlit.
     """
 
     waiting: Placeholder
     released: Placeholder
     capturing: Placeholder
+    no_subject: Placeholder
 
 
 DEFAULT_TIMINGS = LoopTimings()
@@ -73,12 +77,16 @@ class CameraLoop:
         scene: Callable[[], Scene],
         board: StatusBoard,
         recorder: FrameRecorder,
+        filmed: FilmedFrames,
+        is_capturing: Callable[[], bool] = lambda: False,
         timings: LoopTimings = DEFAULT_TIMINGS,
         clock: Clock = SYSTEM_CLOCK,
+        framing: FramingMonitor | None = None,
     ) -> None:
         self._source, self._supervisor, self._fallback = source, supervisor, fallback
         self._publisher, self._placeholders, self._scene, self._board = publisher, placeholders, scene, board
-        self._recorder, self._timings, self._clock = recorder, timings, clock
+        self._recorder, self._filmed, self._framing = recorder, filmed, framing
+        self._is_capturing, self._timings, self._clock = is_capturing, timings, clock
         self._last_index = -1
         self.skipped = 0
         self.camera_rate, self.pipeline_rate = RateMeter(clock=clock), RateMeter(clock=clock)
@@ -98,19 +106,24 @@ class CameraLoop:
             return
         self._count(frame)
         self._recorder.offer(frame)
+        self._filmed.offer(frame)
+        if self._framing is not None:
+            self._framing.offer(frame)
         scene = self._scene()
         if scene.frozen:
             return
         if scene.subject is None and not scene.unlit_allowed:
-            self._show(self._placeholders.capturing, CameraState.CAPTURING)
+            if self._is_capturing():
+                self._show(self._placeholders.capturing, CameraState.CAPTURING)
+            else:
+                self._show(self._placeholders.no_subject, CameraState.NO_SUBJECT)
             return
         if self._supervisor.submit_frame(frame):
             self._fallback.release()
         else:
-            self._publisher.pictures.put(
-                PublishedPicture(self._fallback.picture(frame, scene), frame.captured_at, frame.index)
-            )
-            if self._board.is_degraded(DegradationCode.PICTURE_FAILED):
+            picture = self._fallback.picture(frame, scene)
+            self._publisher.pictures.put(PublishedPicture(picture.image, frame.captured_at, frame.index, picture.unlit))
+            if self._failing():
                 self._board.set_state(CameraState.FALLBACK)
 
     def _read(self, stopping: threading.Event) -> Frame | None:
@@ -138,6 +151,10 @@ class CameraLoop:
                 self._clock.wait(stopping, self._timings.read_timeout_s)  # its `read` returns at once
         return None
 
+    def _failing(self) -> bool:
+        codes = DegradationCode.PICTURE_FAILED, DegradationCode.MODELS_MISSING
+        return any(map(self._board.is_degraded, codes))
+
     def _show(self, placeholder: Placeholder, state: CameraState) -> None:
         self._publisher.show_placeholder(placeholder.image, self._last_index)
         self._board.set_state(state)
@@ -154,8 +171,7 @@ class CameraLoop:
         face = motion.status if motion else FaceStatus.LOST
         self._board.set_face(face)
         # A picture of a frame before the one that failed is no recovery: fallbacks follow.
-        failed = self._board.is_degraded(DegradationCode.PICTURE_FAILED)
-        if not failed and shown.frame.index > self._publisher.superseded_index:
+        if not self._failing() and shown.frame.index > self._publisher.superseded_index:
             tracked = motion is None or face is not FaceStatus.LOST
             self._board.set_state(CameraState.LIVE if tracked else CameraState.SEARCHING)
 
@@ -169,7 +185,7 @@ def publish_if_current(publisher: Publisher, scene: Callable[[], Scene], frame: 
     now, then = scene(), rendered.scene
     if now.frozen or now.subject is not then.subject or now.look.mode is not then.look.mode:
         return False
-    if now.subject is None and not now.unlit_allowed:
+    if rendered.unlit and not now.unlit_allowed:
         return False
-    publisher.pictures.put(PublishedPicture(rendered.image, frame.captured_at, frame.index))
+    publisher.pictures.put(PublishedPicture(rendered.image, frame.captured_at, frame.index, rendered.unlit))
     return True

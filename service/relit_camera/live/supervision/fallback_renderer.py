@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,8 +16,7 @@ from relit_camera.live.compositing.background_renderer import BackgroundRenderer
 from relit_camera.live.compositing.compositor import composite_source_image
 from relit_camera.live.publishing.placeholder_image import Placeholder
 from relit_camera.live.reenactment.reenactor import WarpedLayer
-from relit_camera.live.reenactment.source_image import Cutout
-from relit_camera.live.reenactment.warp import Warp, source_from_output, visible_box
+from relit_camera.live.reenactment.rest_layer import RestLayer
 from relit_camera.live.scene.light_transition import LightTransition
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
@@ -25,11 +25,24 @@ from relit_camera.subject.subject import Subject
 log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True)
+class FallbackPicture:
+    """A picture in place of a live one.
+
+    Attributes:
+        image: uint8 sRGB RGB (height, width, 3), of the output's size.
+        unlit: whether it is as filmed.
+    """
+
+    image: DisplayImage
+    unlit: bool = False
+
+
 class FallbackRenderer:
     """Renders without tracker and reenactor: the subject's source image at rest, relit as the scene says.
 
-    Where there is no subject, or where that fails too, it gives the live picture or the placeholder, as configured. Not
-    thread-safe.
+    Where there is no subject, or where that fails too, it gives the placeholder, or where both settings and scene allow
+    it the live picture. Not thread-safe.
     """
 
     def __init__(self, size: tuple[int, int], fallback: Fallback, placeholder: Placeholder) -> None:
@@ -52,16 +65,18 @@ class FallbackRenderer:
             self._source = None
             return_freed_memory()
 
-    def picture(self, frame: Frame, scene: Scene) -> DisplayImage:
-        """A picture in place of this live frame: uint8 sRGB RGB (height, width, 3). Never raises."""
+    def picture(self, frame: Frame, scene: Scene) -> FallbackPicture:
+        """A picture in place of this live frame. Never raises. As filmed only where the scene allows that too."""
         subject = scene.subject
         if subject is not None and subject is not self._failed_subject:
             try:
-                return self._relit(subject, scene, frame.time_s)
+                return FallbackPicture(self._relit(subject, scene, frame.time_s))
             except Exception:  # this is what is shown when all else fails
                 log.exception("the source image cannot be relit either")
                 self._failed_subject = subject
-        return crop_to_fill(frame.image, self._size) if self._fallback is Fallback.LIVE else self._placeholder.image
+        if self._fallback is Fallback.LIVE and scene.unlit_allowed:
+            return FallbackPicture(crop_to_fill(frame.image, self._size), unlit=True)
+        return FallbackPicture(self._placeholder.image)
 
     def _relit(self, subject: Subject, scene: Scene, now: float) -> DisplayImage:
         if self._source is None or self._source.subject is not subject:
@@ -78,15 +93,11 @@ class _RelitSource:
         self.subject = subject
         self._relighter = BasisRelighter(subject)
         subject.drop_pages()
-        self._person = Cutout(subject)
-        placed = source_from_output(subject.size, size)
-        self._box = visible_box(placed, subject.size, size)
-        self._grid = Warp(placed, ()).grid(self._box)
+        self._at_rest = RestLayer(subject, size)
         self._last: tuple[LightMap, WarpedLayer] | None = None
 
     def render(self, light: LightMap) -> WarpedLayer:
         """The person under `light`; the previous layer again if the light has not changed."""
         if self._last is None or not np.array_equal(self._last[0], light):
-            image = self._person.warped(self._relighter.relight(light[None])[0], self._grid)
-            self._last = light, WarpedLayer(image, self._box[:2])
+            self._last = light, self._at_rest.render(self._relighter.relight(light[None])[0])
         return self._last[1]

@@ -99,7 +99,21 @@ class WorkerEnded:
     worker: int
 
 
-Event = FrameArrived | FrameStarted | ModelsOpening | FrameFinished | PictureRendered | FrameFailed | WorkerEnded
+@dataclass(frozen=True)
+class ReplacementAsked:
+    """Another pipeline shall take the place of the one at work: somebody chose another tracker, say."""
+
+
+Event = (
+    ReplacementAsked
+    | FrameArrived
+    | FrameStarted
+    | ModelsOpening
+    | FrameFinished
+    | PictureRendered
+    | FrameFailed
+    | WorkerEnded
+)
 
 
 # Actions, to be taken in the order given.
@@ -198,6 +212,9 @@ def next_health(health: PipelineHealth, event: Event, limits: HealthLimits) -> T
     """The health after an event, and the actions to take. What a retired worker does late changes nothing."""
     if isinstance(event, FrameArrived):
         return _after_arrival(health, event, limits)
+    if isinstance(event, ReplacementAsked):
+        health = replace(health, retry_at=0.0)  # what failed may work now
+        return (health, ()) if health.worker is None else _retired(health)
     if isinstance(event, WorkerEnded):
         return replace(health, abandoned=health.abandoned - {event.worker}), ()
     if event.worker != health.worker:

@@ -20,6 +20,7 @@ from relit_camera.live.supervision.pipeline_health import (
     HealthLimits,
     PictureRendered,
     PipelineHealth,
+    ReplacementAsked,
     ReportFailure,
     ReportHang,
     ReportRecovery,
@@ -103,14 +104,14 @@ class PipelineSupervisor:
     a worker's thread hands them on by `publish` at once, because waiting would cost latency.
 
     Attributes:
-        pipeline: the one at work, or that was last. Any thread may read this.
+        pipeline: the one at work, or that was last; None before the first. Any thread may read this.
         load: how late pictures are, and so what the next one may cost. Any thread may read this.
         dropped: frames that no worker took. Any thread may read this.
     """
 
     def __init__(
         self,
-        first: Pipeline,
+        first: Pipeline | None,
         make_pipeline: Callable[[], Pipeline],
         scene: Callable[[], Scene],
         publish: Callable[[Frame, RenderedFrame], bool],
@@ -123,7 +124,7 @@ class PipelineSupervisor:
         """Set up; the first frame starts a worker.
 
         Args:
-            first: the pipeline to begin with.
+            first: the pipeline to begin with; None where one cannot be made yet.
             make_pipeline: makes another; called in a worker's thread.
             scene: gives the present scene.
             publish: takes a frame and its picture, in a worker's thread. Returns whether the picture is shown.
@@ -135,7 +136,7 @@ class PipelineSupervisor:
         """
         self.pipeline = first
         self.dropped = 0
-        self._next_pipeline: Callable[[], Pipeline] = lambda: first
+        self._next_pipeline: Callable[[], Pipeline] = make_pipeline if first is None else lambda: first
         self._make_pipeline, self._scene, self._publish, self._on_trouble = make_pipeline, scene, publish, on_trouble
         self._limits, self._clock, self._start_worker = limits, clock, start_worker
         self._quality_limits = quality_limits
@@ -145,6 +146,7 @@ class PipelineSupervisor:
         self._worker: Worker | None = None
         self._retired: dict[int, Worker] = {}  # replaced, never modified: `close` reads it in another thread
         self._closed = False
+        self._replacement: Callable[[], Pipeline] | None = None  # put by any thread, taken by the one of the frames
         self._dropped_by_retired = 0
 
     @property
@@ -169,12 +171,25 @@ class PipelineSupervisor:
 
     def submit_frame(self, frame: Frame) -> bool:
         """Hand a frame to the pipeline. Returns whether its picture can be expected; if not, show the fallback."""
+        replacement, self._replacement = self._replacement, None
+        if replacement is not None:
+            self._next_pipeline = replacement
+            self._apply(ReplacementAsked())
         actions = self._apply(FrameArrived(self._clock.now(), self._scene().revision), frame)
         if self._worker is not None:
             self.pipeline = self._worker.pipeline or self.pipeline
-        self.pipeline.quality = self.load.quality
+        if self.pipeline is not None:
+            self.pipeline.quality = self.load.quality
         self.dropped = self._dropped_by_retired + (self._worker.dropped if self._worker else 0)
         return ShowFallback() not in actions
+
+    def replace_pipeline(self, first: Callable[[], Pipeline] | None = None) -> None:
+        """Put another pipeline in the place of the one at work, with the next frame. Any thread may call this.
+
+        Args:
+            first: makes it, in a worker's thread; what makes all of them if not given.
+        """
+        self._replacement = first or self._make_pipeline
 
     def close(self) -> None:
         """Let all workers end; see `ended`. May be called from another thread."""

@@ -3,10 +3,15 @@
 The correction needs the head's shape, and the shape needs corrected pictures. Two rounds with the points of a generic
 head and the normals of the pictures, then two with integrated depth that stays near the generic one: unbounded, an
 error of depth feeds itself and the head collapses.
+
+The correction is smooth, so it is found at half the pictures' resolution.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 
 from relit_camera.base.array_types import Float32Array
@@ -32,18 +37,31 @@ def undo_near_field(pictures: Float32Array, patches: Patches, head: GenericHead,
         matte: (height, width) alpha of the person.
     """
     unit = pictures / patches.strengths()[:, None, None, None]
-    corrected = unit
+    size = (matte.shape[1] // 2, matte.shape[0] // 2)
+    small = np.stack([cv2.resize(each, size, interpolation=cv2.INTER_AREA) for each in unit])
+    half_matte, points, face = (
+        cv2.resize(each, size, interpolation=cv2.INTER_AREA)
+        for each in (matte, head.points_cm, head.face.astype(np.float32))
+    )
+    half_head = replace(
+        head, points_cm=points, pixels_per_cm=head.pixels_per_cm * size[0] / matte.shape[1], face=face > 0.5
+    )
+    factors = _factors(small, patches, half_head, np.asarray(half_matte, np.float32))
+    larger = (cv2.resize(each, matte.shape[::-1], interpolation=cv2.INTER_LINEAR) for each in factors)
+    return np.asarray(unit * np.stack(list(larger))[..., None], np.float32)
+
+
+def _factors(unit: Float32Array, patches: Patches, head: GenericHead, matte: Mask) -> Float32Array:
+    """Factors (patches, height, width) by which pictures (patches, height, width, 3) of unit patches are corrected."""
+    factors = np.ones(unit.shape[:3], np.float32)
     for round_index in range(ROUNDS_ON_GENERIC_HEAD + ROUNDS_ON_OWN_DEPTH):
-        shape = photometric_stereo(corrected, patches.directions, matte)
+        shape = photometric_stereo(unit * factors[..., None], patches.directions, matte)
         normals = complete_normals(shape.normals, shape.confidence, matte)
         points = head.points_cm
         if round_index >= ROUNDS_ON_GENERIC_HEAD:
             points = bounded_points(integrate_normals(normals, matte > 0.5, shape.confidence), head)
-        corrected = np.empty_like(unit)
-        for patch in range(len(unit)):
-            factor = patches.distant_light_factor(points, normals, patch)
-            corrected[patch] = unit[patch] * factor[..., None]
-    return corrected
+        factors = np.stack([patches.distant_light_factor(points, normals, patch) for patch in range(len(unit))])
+    return factors
 
 
 def bounded_points(depth_px: Float32Array, head: GenericHead) -> Float32Array:

@@ -50,6 +50,15 @@ from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.face.detection.face_detector import FaceDetector
 from relit_camera.face.detection.installed_detector import open_face_detector
 
+FLASHES = "Looking for flashes"
+BALL = "Looking for the mirror ball"
+FACE = "Following the face"
+LIGHT = "Looking at the light"
+PICTURES = "Cutting out the flash's light"
+PERSON = "Finding the person"
+STAGES = (FLASHES, BALL, FACE, LIGHT, PICTURES, PERSON)
+"""Names of the stages that are told as progress, in their order."""
+
 _BALL_REACH = 1.15
 """Radii about a ball within which the person cannot be."""
 
@@ -85,13 +94,13 @@ def build_samples(
 
     # Flashes: which frames the lamp lit.
     brightness = measure_brightness(
-        video, options.gamma, threads=options.threads, progress=_reporter(progress, "Looking for flashes")
+        video, options.gamma, threads=options.threads, progress=_reporter(progress, FLASHES)
     )
     flashes = detect_flashes(brightness)
     total = len(flashes.frames)
 
     # Mirror balls, whose outlines correct the focal length.
-    progress("Looking for the mirror ball", 0, None)
+    progress(BALL, 0, None)
     sample = _sample_frames(video, flashes, options.gamma, options.threads)
     focal = known_focal_length(video, brightness.size, options.focal_px)
     balls = find_balls(sample, focal, options.balls, given_balls)
@@ -103,7 +112,7 @@ def build_samples(
         flashes,
         face.circle,
         threads=options.threads,
-        progress=_reporter(progress, "Following the face", total),
+        progress=_reporter(progress, FACE, total),
     )
     usable = UsableFrames.from_flashes(flashes, motion.lost)
 
@@ -112,7 +121,7 @@ def build_samples(
     with LinearVideoReader(
         video, options.gamma, only=frozenset(usable.all.tolist()), threads=options.threads
     ) as reader:
-        film = _reporting(reader, _reporter(progress, "Looking at the light", total))
+        film = _reporting(reader, _reporter(progress, LIGHT, total))
         observed = measure_film(film, usable, flashes, balls, sample, detector)
     gains = observed.gains
     require_uniform_gains(gains.spread)
@@ -143,11 +152,11 @@ def build_samples(
         usable.dark,
         subtract=subtract,
         threads=options.threads,
-        progress=_reporter(progress, "Cutting out the flash's light", total),
+        progress=_reporter(progress, PICTURES, total),
     )
 
     # Matte: the person, without the balls.
-    progress("Finding the person", 0, None)
+    progress(PERSON, 0, None)
     discs = [crop.disc(ball.x, ball.y, _BALL_REACH * ball.radius) for ball in (each.outline for each in balls)]
     matte = estimate_flash_matte(olat.pictures, olat.room, np.logical_or.reduce(discs))
     require_face_in_matte(matte, crop.disc(*motion.circle))

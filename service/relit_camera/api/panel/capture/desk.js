@@ -1,0 +1,190 @@
+// The desk capture: asks for sizes, then shows the patterns that the camera asks for, full screen.
+
+import { call, sentence } from "../api.js";
+import { FramingHelp } from "../first/framing.js";
+import { showProblem } from "../first/problem.js";
+import { on, openEvents } from "../stage/events.js";
+import { Steps } from "./steps.js";
+
+const CARD_CM = 8.56; // ISO/IEC 7810 ID-1: every bank card
+const CARD_HEIGHT_CM = 5.398;
+const POLL_MS = 80;
+const $ = (id) => document.getElementById(id);
+
+let running = false;
+let shown = -1;
+
+/** Centimeters a CSS pixel is wide, by the card. */
+function pixelCm() {
+  return CARD_CM / Number($("card-width").value);
+}
+
+function showSize() {
+  const width = Number($("card-width").value);
+  $("card").style.width = `${width}px`;
+  $("card").style.height = `${(width * CARD_HEIGHT_CM) / CARD_CM}px`;
+  const cm = [screen.width, screen.height].map((pixels) => pixels * pixelCm());
+  const inches = Math.hypot(...cm) / 2.54;
+  $("screen-size").textContent = `The screen is ${cm[0].toFixed(1)} × ${cm[1].toFixed(1)} cm, ${inches.toFixed(0)} inches.`;
+}
+
+function body() {
+  const height = screen.height * pixelCm();
+  const up = height / 2 + Number($("camera-edge").value);
+  return {
+    name: $("name").value,
+    screen_width_cm: screen.width * pixelCm(),
+    screen_height_cm: height,
+    distance_cm: Number($("distance").value),
+    camera_up_cm: $("camera").value === "top" ? up : -up,
+    one_by_one: $("slow").checked,
+  };
+}
+
+/** Makes the grid once; its cells are then only recolored. */
+function makeGrid({ columns, rows }) {
+  const grid = $("grid");
+  grid.style.gridTemplateColumns = `repeat(${columns}, 1fr)`;
+  grid.style.gridTemplateRows = `repeat(${rows}, 1fr)`;
+  grid.replaceChildren(...Array.from({ length: columns * rows }, () => document.createElement("div")));
+}
+
+function paint(status) {
+  const cells = $("grid").children;
+  status.patches.forEach((value, index) => {
+    const code = Math.round(255 * value);
+    cells[index].style.backgroundColor = `rgb(${code} ${code} ${code})`;
+  });
+  $("progress").textContent = status.stage === "filming" ? `${status.step + 1} of ${status.steps} · Escape stops` : "Escape stops";
+}
+
+/** Answers after the next frame was drawn. */
+function drawn() {
+  return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+}
+
+async function leaveFullScreen() {
+  $("patterns").hidden = true;
+  if (document.fullscreenElement) await document.exitFullscreen().catch(() => null);
+}
+
+function tell(status) {
+  if (status.stage === "building") return steps.show("building", true);
+  const done = status.stage === "done";
+  const stopped = status.stage === "canceled";
+  $("result-title").textContent = done ? "That is you, measured" : stopped ? "Stopped" : "That did not work";
+  $("result").textContent = stopped
+    ? "Nothing was stored, and the webcam is as it was."
+    : done
+      ? [`Stored as “${status.subject}”, and shown.`, status.what && sentence(status.what), status.cure && sentence(status.cure)].filter(Boolean).join(" ")
+      : "";
+  showProblem($("desk-problem"), done || stopped ? null : status);
+  $("result-view").hidden = !done;
+  if (done) $("result-picture").src = `/api/v1/preview.mjpg?mirror=true&width=640&fps=15&opened=${Date.now()}`;
+  $("desk-again").textContent = done ? "Once more" : "Try again";
+  $("desk-next").hidden = !done;
+  steps.show("result", true);
+}
+
+async function stop() {
+  if (!running) return;
+  running = false;
+  await leaveFullScreen();
+  await cancel();
+}
+
+async function cancel() {
+  try {
+    tell(await call("DELETE", "captures/desk"));
+  } catch (error) {
+    tell({ stage: "failed", ...told(error) });
+  }
+}
+
+function told(error) {
+  return { what: error.what ?? error.message, cure: error.cure ?? "" };
+}
+
+async function run() {
+  let status = await call("POST", "captures/desk", body());
+  makeGrid(status);
+  $("patterns").hidden = false;
+  running = true;
+  shown = -1;
+  let key = "";
+  while (running) {
+    const now = `${status.stage} ${status.step}`;
+    if (status.stage !== "exposing" && status.stage !== "filming") break;
+    if (now !== key) {
+      key = now;
+      paint(status);
+      await drawn();
+    }
+    shown = document.hidden ? -1 : status.step;
+    await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+    if (running) status = await call("PUT", "captures/desk/shown", { step: shown });
+  }
+  if (!running) return;
+  running = false;
+  await leaveFullScreen();
+  await follow(status);
+}
+
+/** Shows how far the computing is, until it ends. */
+async function follow(first) {
+  let status = first;
+  tell(status);
+  while (status.stage === "building") {
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    status = await call("GET", "captures/desk");
+  }
+  tell(status);
+}
+
+async function begin() {
+  $("start").disabled = true;
+  framing.stop();
+  try {
+    await document.documentElement.requestFullscreen().catch(() => null); // without it the patterns fill the window
+    await run();
+  } catch (error) {
+    running = false;
+    await leaveFullScreen();
+    await call("DELETE", "captures/desk").catch(() => null);
+    tell({ stage: "failed", ...told(error) });
+  }
+  $("start").disabled = false;
+}
+
+const framing = new FramingHelp(on);
+$("framing-help").append(framing.view, framing.advice, framing.marks);
+
+const steps = new Steps(["warning", "size", "place", "framing", "building", "result"], ["warning", "size", "place", "framing"], (name) => {
+  if (name !== "result") $("result-picture").removeAttribute("src");
+  $("start").disabled = !$("understood").checked;
+  if (name === "framing") framing.start();
+  else framing.close();
+});
+
+$("understood").onchange = () => {
+  $("accept").disabled = !$("understood").checked;
+};
+$("accept").onclick = () => steps.next();
+$("size-next").onclick = () => steps.next();
+$("place-next").onclick = () => {
+  const wrong = ["distance", "camera-edge", "name"].find((id) => !$(id).reportValidity());
+  if (!wrong) steps.next();
+};
+$("start").onclick = begin;
+$("desk-again").onclick = () => steps.show("framing", true);
+$("desk-cancel").onclick = cancel;
+$("card-width").oninput = showSize;
+document.addEventListener("fullscreenchange", () => { if (!document.fullscreenElement) stop(); });
+document.addEventListener("keydown", (event) => { if (event.key === "Escape") stop(); });
+document.addEventListener("visibilitychange", () => { if (document.hidden) stop(); });
+addEventListener("pagehide", () => { if (running) fetch("/api/v1/captures/desk", { method: "DELETE", keepalive: true }); });
+showSize();
+steps.show("warning");
+openEvents();
+const status = await call("GET", "captures/desk").catch(() => null);
+if (status?.stage === "building") follow(status);

@@ -1,0 +1,194 @@
+// Who will be seen: three doors for a first visit, and a quiet fourth.
+
+import { call, sentence } from "../api.js";
+import { upload } from "../capture/upload.js";
+import { on } from "../stage/events.js";
+import { onScene, scene } from "../stage/scene.js";
+import { make, storedName } from "../widgets.js";
+import { DRAWINGS } from "./drawings.js";
+import { problemPlace, showProblem } from "./problem.js";
+
+const MOST_NAMES = 9;
+const CAPTURING = {
+  filming: "Measuring your face: look at the camera and hold still…",
+  building: "Making you of what was filmed: some seconds…",
+};
+
+const section = document.getElementById("doors");
+section.setAttribute("aria-labelledby", "doors-title");
+section.innerHTML = `
+  <header>
+    <h2 id="doors-title" tabindex="-1">Who will be seen?</h2>
+    <p id="doors-now"></p>
+  </header>
+  <ul class="doors">
+    ${door("face", "My face now", "Look into the webcam for three seconds. You are lit in less than half a minute.")}
+    ${door("demo", "The demo person", "At once, and moved by your face. Rendered: they do not exist.")}
+    ${door("file", "Open a file", "Somebody captured before: a file that ends in .relit.")}
+  </ul>
+  <input type="file" id="door-file-input" accept=".relit" hidden>
+  <p id="doors-state" class="hint" role="status"></p>
+  <p class="buttons">
+    <button type="button" class="quiet" id="door-unlit">Show my webcam unlit…</button>
+    <button type="button" class="quiet" id="doors-close" hidden>Close</button>
+  </p>`;
+const problem = problemPlace("doors-problem");
+section.querySelector(".doors").after(problem);
+const byId = (id) => document.getElementById(id);
+
+function door(id, title, words) {
+  return `<li><button type="button" class="door" id="door-${id}" aria-labelledby="door-${id}-title" aria-describedby="door-${id}-words">
+    ${DRAWINGS[id]}<strong id="door-${id}-title">${title}</strong><span id="door-${id}-words">${words}</span></button></li>`;
+}
+
+let opened = false;
+let opener = "";
+
+/** Shows the doors, whoever is seen now, and moves the keyboard there. */
+export function openDoors() {
+  opener = document.activeElement?.id ?? "";
+  opened = true;
+  draw();
+  byId("doors-title").focus();
+}
+
+/** Begins the capture of one's own face, with help to sit well. */
+export async function captureFace() {
+  showProblem(problem, null);
+  const from = document.activeElement?.id;
+  const { openFaceDialog } = await import("./face.js");
+  if (await openFaceDialog()) leave();
+  if (document.activeElement === document.body) focusAgain(from);
+}
+
+function draw() {
+  const now = scene();
+  const nobody = now !== null && now.subject === null && !now.unlit_allowed;
+  const shown = now !== null && (nobody || opened);
+  if (section.hidden === !shown) return;
+  const inside = section.contains(document.activeElement);
+  section.hidden = !shown;
+  if (!shown && inside) focusAgain(opener);
+}
+
+function drawNow(now) {
+  byId("doors-close").hidden = now.subject === null && !now.unlit_allowed;
+  if (now.subject !== null) byId("doors-now").textContent = `Others see “${now.subject}” now.`;
+  else if (now.unlit_allowed) byId("doors-now").textContent = "Others see your webcam’s picture, unlit.";
+  else byId("doors-now").textContent = "So far others see a placeholder. Your pictures stay on this computer.";
+}
+
+/** The doors have done their work. */
+function leave() {
+  opened = false;
+  draw();
+}
+
+/** Moves the keyboard to where it came from; or, where that is gone, to the page's content. */
+function focusAgain(id) {
+  const from = document.getElementById(id);
+  if (from?.checkVisibility()) return from.focus();
+  const main = document.querySelector("main");
+  main.tabIndex = -1;
+  main.focus({ preventScroll: true });
+}
+
+/** Does what a door is for; what goes wrong is shown beneath the doors. */
+async function pass(work, words) {
+  if (section.ariaBusy === "true") return;
+  section.ariaBusy = "true";
+  showProblem(problem, null);
+  byId("doors-state").textContent = words;
+  try {
+    await work();
+    leave();
+  } catch (error) {
+    showProblem(problem, error);
+  }
+  byId("doors-state").textContent = "";
+  section.ariaBusy = "false";
+}
+
+async function showDemo() {
+  const { name } = await call("POST", "subjects/demo");
+  await call("PATCH", "scene", { subject: name, mode: "reenact", unlit_allowed: false });
+}
+
+/** Stores the file under its own name, or where that is taken, with a number. */
+async function openFile(file) {
+  const base = storedName(file.name).slice(0, 60);
+  for (let number = 1; ; number++) {
+    const form = new FormData();
+    const name = number === 1 ? base : `${base} ${number}`;
+    form.append("name", name);
+    form.append("file", file);
+    const shown = (share) => {
+      byId("doors-state").textContent = `Reading ${file.name}: ${Math.round(100 * share)} %`;
+    };
+    try {
+      await upload("subjects", form, shown);
+    } catch (error) {
+      if (error.status === 409 && number < MOST_NAMES) continue;
+      throw error;
+    }
+    return call("PATCH", "scene", { subject: name, unlit_allowed: false });
+  }
+}
+
+/** Asks, with the picture that others would see, whether it may be published; only a yes changes anything. */
+export function askUnlit() {
+  const picture = make("img", { alt: "What others would see, live", width: 640, height: 360, src: `/api/v1/preview.mjpg?before=true&width=640&fps=15&opened=${Date.now()}` });
+  const no = make("button", { type: "button", className: "firm", id: "unlit-no", autofocus: true }, "Keep me hidden");
+  const yes = make("button", { type: "button", id: "unlit-yes" }, "Show me unlit");
+  const wrong = problemPlace("unlit-problem");
+  const dialog = make(
+    "dialog",
+    { id: "unlit-dialog", className: "flow", "aria-labelledby": "unlit-title", "aria-describedby": "unlit-words" },
+    make("h2", { id: "unlit-title" }, "Show yourself unlit?"),
+    make("div", { className: "mirror" }, picture),
+    make("p", { id: "unlit-words" }, "Others will see this picture of your webcam as it is: your face, your room, everything in it. The panel says UNLIT for as long. After a restart you are hidden again."),
+    wrong,
+    make("p", { className: "actions" }, yes, no),
+  );
+  no.onclick = () => dialog.close();
+  yes.onclick = async () => {
+    try {
+      await call("PATCH", "scene", { subject: null, unlit_allowed: true });
+      leave();
+      dialog.close();
+    } catch (error) {
+      showProblem(wrong, error);
+    }
+  };
+  dialog.onclose = () => {
+    picture.removeAttribute("src"); // else it streams on
+    dialog.remove();
+  };
+  document.body.append(dialog);
+  dialog.showModal();
+}
+
+byId("door-face").onclick = captureFace;
+byId("door-demo").onclick = () => pass(showDemo, "Fetching the demo person…");
+byId("door-file").onclick = () => byId("door-file-input").click();
+byId("door-file-input").onchange = ({ target }) => {
+  const [file] = target.files;
+  target.value = "";
+  if (file) pass(() => openFile(file), `Reading ${file.name}…`);
+};
+byId("door-unlit").onclick = askUnlit;
+byId("doors-close").onclick = leave;
+section.addEventListener("keydown", (event) => {
+  if (event.key === "Escape" && !byId("doors-close").hidden) leave();
+});
+
+onScene((now) => {
+  drawNow(now);
+  draw();
+});
+// A capture that somebody else began, such as `relit run --instant`.
+on("capture", ({ stage, what, cure }) => {
+  if (document.getElementById("face-dialog")) return;
+  byId("doors-state").textContent = CAPTURING[stage] ?? "";
+  showProblem(problem, stage === "failed" || (what && CAPTURING[stage]) ? { what, cure } : null);
+});

@@ -1,0 +1,79 @@
+// The ladder: how the present subject was captured, what may be trusted, and the next rung.
+
+import { call } from "../api.js";
+import { onScene } from "../stage/scene.js";
+import { make } from "../widgets.js";
+import { captureFace, openDoors } from "./doors.js";
+
+const DEMO_NAME = "demo person";
+const RUNGS = {
+  instant: {
+    line: "captured in the light of a room",
+    trust: "Right in soft places: a room, a sky, a sunset. Lamps from the side and behind are softened.",
+    next: ["Better: by this screen’s light, a minute", "/desk"],
+  },
+  desk: {
+    line: "captured by the light of a screen",
+    trust: "Light from the front is measured, from behind it is a guess.",
+    next: ["Best: film yourself with a lamp, an evening", "/film"],
+  },
+  film: { line: "captured with a lamp and a mirror ball", trust: "Right in any light, a single hard lamp too." },
+  pictures: { line: "captured under one light at a time", trust: "Right where there was light, modelled elsewhere." },
+};
+const OLD = { line: "captured by an older version, which did not note how", trust: "" };
+const DEMO = {
+  line: "rendered, they do not exist",
+  trust: "Right in any light. From ICT-FaceKit (MIT) and a head scan by Lee Perry-Smith (CC-BY 3.0).",
+};
+
+const ladder = document.getElementById("ladder");
+const line = make("p", { id: "ladder-line", role: "status" });
+const trust = make("p", { id: "ladder-trust", className: "hint" });
+const next = make("div", { className: "buttons" });
+ladder.append(line, trust, next);
+
+let known = "";
+
+function show(now) {
+  const key = `${now.subject}|${now.rung}`;
+  if (key === known) return;
+  known = key;
+  const rung = now.subject === DEMO_NAME ? DEMO : (RUNGS[now.rung] ?? OLD);
+  line.textContent = now.subject === null ? "" : `“${now.subject}”: ${rung.line}.`;
+  trust.textContent = now.subject === null ? "" : rung.trust;
+  if (now.subject !== null && now.rung !== "instant") tellMeasured(now.subject, rung.trust);
+  const focused = ladder.contains(document.activeElement) ? document.activeElement.id : null;
+  next.replaceChildren(nextRung(now, rung), people());
+  if (focused) document.getElementById(focused)?.focus();
+}
+
+/** The way to the next rung: a page, or the capture of one's own face. */
+function nextRung(now, rung) {
+  if (now.subject !== null && rung !== DEMO && rung !== OLD) {
+    return rung.next ? make("a", { id: "ladder-next", className: "button", href: rung.next[1] }, rung.next[0]) : "";
+  }
+  const button = make("button", { type: "button", id: "ladder-next" }, "My face now");
+  button.onclick = captureFace;
+  return button;
+}
+
+function people() {
+  const button = make("button", { type: "button", id: "ladder-people", className: "quiet" }, "Another person…");
+  button.onclick = openDoors;
+  return button;
+}
+
+/** Adds what the subject's file says of how much was measured. */
+async function tellMeasured(name, words) {
+  const stored = await call("GET", "subjects").catch(() => []);
+  if (!stored.some((item) => item.name === name)) return; // one of the command line, without details
+  const details = await call("GET", `subjects/${encodeURIComponent(name)}`).catch(() => null);
+  if (!details || !known.startsWith(`${name}|`)) return;
+  const { measured_fraction: measured, expected_db: expected } = details.metadata;
+  const told = [words];
+  if (measured) told.push(`Measured from ${Math.round(100 * measured)} % of all directions.`);
+  if (expected) told.push(`Expected quality ${Math.round(expected)} dB.`);
+  trust.textContent = told.join(" ");
+}
+
+onScene(show);

@@ -1,0 +1,1 @@
+"""Routes of work that goes on after the answer: captures and replays."""

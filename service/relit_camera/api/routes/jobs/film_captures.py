@@ -1,0 +1,79 @@
+"""Routes of the capture from a film: the film is sent, a worker process makes a subject of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from http import HTTPStatus
+from pathlib import Path
+
+from fastapi import APIRouter, Request
+from starlette.responses import Response
+
+from relit_camera.api.bodies.job_schemas import FilmCaptureForm, FilmOptionFields
+from relit_camera.api.dependencies import ApiContext, ApiContextDep
+from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response
+from relit_camera.api.middleware.body_limits import MAX_FILM_BYTES
+from relit_camera.api.problem_details import error_responses
+from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
+from relit_camera.base.errors import ConflictError
+from relit_camera.live.status.film_status import FilmCaptureStatus
+
+router = APIRouter(prefix="/captures/film", tags=["subjects"])
+
+
+@router.get("")
+def get_film_capture(api: ApiContextDep) -> FilmCaptureStatus:
+    """How far the last capture from a film is; the event `film-capture` tells each change."""
+    return api.camera.film_capture.status()
+
+
+@router.post(
+    "",
+    status_code=HTTPStatus.ACCEPTED,
+    responses=error_responses(409, 413, 415, 422, 507),
+    openapi_extra=form_description(FilmCaptureForm, "The film: .mp4, .mov, .m4v, .mkv, .webm or .avi."),
+)
+async def start_film_capture(api: ApiContextDep, request: Request) -> FilmCaptureStatus:
+    """Capture a subject from a film of up to 4 GiB, and of half of the free space; the other fields come before `file`.
+
+    The subject is stored, and shown unless somebody has chosen another one meanwhile.
+    """
+
+    @contextmanager
+    def open_file(fields: Mapping[str, str], file_name: str) -> Iterator[Path]:
+        form = read_fields(FilmCaptureForm, fields)
+        _require_no_replay(api)
+        with api.camera.film_capture.receive(form.name, file_name, form.options()) as path:
+            yield path
+
+    await receive_form(request, open_file, MAX_FILM_BYTES)
+    return api.camera.film_capture.status()
+
+
+@router.post("/resume", status_code=HTTPStatus.ACCEPTED, responses=error_responses(409, 422))
+def resume_film_capture(api: ApiContextDep, options: FilmOptionFields | None = None) -> FilmCaptureStatus:
+    """Go on with the film that is there, after it was canceled, the camera ended or it failed.
+
+    With options in the body the film is read anew with these.
+    """
+    _require_no_replay(api)
+    return api.camera.film_capture.resume(None if options is None else options.options())
+
+
+@router.delete("", responses=error_responses(422))
+def cancel_film_capture(api: ApiContextDep, forget: bool = False) -> FilmCaptureStatus:
+    """End the capture that runs; nothing is stored then. `?forget=true` deletes the film and what was made of it."""
+    return api.camera.film_capture.cancel(forget)
+
+
+@router.get("/pictures/{name}.jpg", response_class=Response, responses=JPEG_RESPONSE | error_responses(404, 422))
+def get_film_picture(api: ApiContextDep, request: Request, name: str) -> Response:
+    """One of the report's pictures."""
+    return jpeg_response(request, api.camera.film_capture.picture(name))
+
+
+def _require_no_replay(api: ApiContext) -> None:
+    """Raise ConflictError while a video is relit: both take all of the processor that the camera leaves."""
+    if any(each.stage.is_running for each in api.camera.replays.all()):
+        raise ConflictError("a video is being relit", "wait for its end, or delete it")

@@ -1,0 +1,1 @@
+"""How well a person sits before the webcam: distance, position, light, sharpness, exposure."""

@@ -1,0 +1,232 @@
+"""The first scene of a run: what the settings say, then what the last run showed or a preset, then the command line.
+
+While the camera runs its look and subject are written to a file, at most once a second.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
+from relit_camera.base.config.look import Look, SettingsModel, SubjectName, merge_edits
+from relit_camera.base.config.preset_store import PresetStore
+from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml
+from relit_camera.base.config.settings import RelitSettings, StorageSettings
+from relit_camera.base.errors import RelitError
+from relit_camera.base.storage.atomic_files import make_folder, write_atomic
+from relit_camera.live.scene.scene_controller import ChosenSubject, SceneController
+
+log = logging.getLogger(__name__)
+
+WRITE_INTERVAL_S = 1.0
+STOP_TIMEOUT_S = 2.0
+
+
+@dataclass(frozen=True)
+class GivenOptions:
+    """Which options of the command line are about the first scene: they win over what was kept.
+
+    Attributes:
+        subject: whether the settings' subject is the command line's.
+        mode: whether the settings' mode is.
+    """
+
+    subject: bool = False
+    mode: bool = False
+
+
+class KeptScene(SettingsModel):
+    """The file that keeps a run's look and subject, and what the configuration said meanwhile.
+
+    What the configuration says by the next start in another way is an edit, and wins.
+    """
+
+    look: Look
+    subject: SubjectName | None = None
+    """A stored subject, or null for nobody; left out where the one shown is not stored."""
+    configured_look: Look = Look()
+    configured_subject: str | None = None
+
+
+def kept_scene_path(storage: StorageSettings) -> Path:
+    """The file of the data folder in which the last run's look and subject are kept."""
+    return storage.data_dir / "last-scene.yaml"
+
+
+def read_kept_scene(path: Path) -> KeptScene | None:
+    """What the last run kept; None where there is no such file, or a damaged one, which the log names."""
+    try:
+        if path.stat().st_size > MAX_YAML_BYTES:
+            raise ValueError(f"it is larger than {MAX_YAML_BYTES >> 20} MiB")
+        return KeptScene.model_validate(parse_yaml(path.read_text(encoding="utf-8")))
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        log.warning("the last run's look is not shown, since %s cannot be read: %s", path.name, error)
+        return None
+
+
+def show_first_scene(
+    scene_controller: SceneController,
+    settings: RelitSettings,
+    environment: str | None = None,
+    instant: bool = False,
+    given: GivenOptions | None = None,
+) -> None:
+    """Show what a run begins with.
+
+    Args:
+        scene_controller: holds the scene. What `reset` brings back is what the settings say.
+        settings: of this run.
+        environment: a stored environment's name or a panorama file, instead of the one in the settings.
+        instant: show nobody: a subject is captured first.
+        given: the options of the command line, where the last run's look or the preset at start is to be shown; None
+            shows what the settings say.
+
+    Raises:
+        RelitError: something that the settings or the command line name cannot be used.
+    """
+    unlit_allowed = settings.output.unlit_allowed and not instant
+    scene_controller.set_unlit_allowed(unlit_allowed)
+    look = settings.look
+    if environment is not None:
+        environment = scene_controller.register_temporary_environment(environment)
+        look = _in_environment(look, environment)
+    if look.shows_filmed and not unlit_allowed:
+        log.warning("all of the picture is relit: split and blend count where output.unlit_allowed is true (--unlit)")
+        look = look.relit()
+    scene_controller.set_look(look)
+    scene_controller.load_configured_subject(None if instant else settings.subject)
+    scene_controller.mark_start()
+    if given is not None:
+        _show_kept(scene_controller, settings, environment, instant, given)
+
+
+def _show_kept(
+    scene_controller: SceneController,
+    settings: RelitSettings,
+    environment: str | None,
+    instant: bool,
+    given: GivenOptions,
+) -> None:
+    look, subject = scene_controller.scene.look, None
+    kept = read_kept_scene(kept_scene_path(settings.storage))
+    if kept is not None:
+        look = merge_edits(kept.look, before=kept.configured_look, after=settings.look)
+        if "subject" in kept.model_fields_set and settings.subject == kept.configured_subject:
+            subject = ChosenSubject(kept.subject)
+    presets = PresetStore(settings.storage.presets)
+    try:
+        at_start = presets.at_start()
+        if at_start is not None:
+            preset = presets.load(at_start)
+            look = preset.look
+            subject = subject if preset.subject is None else ChosenSubject(preset.subject)
+    except RelitError as error:
+        log.warning("the preset at start is not shown: %s", error)
+    if given.mode:
+        look = look.model_copy(update={"mode": settings.look.mode})
+    if environment is not None:
+        look = _in_environment(look, environment)
+    if instant or given.subject:
+        subject = None
+    elif subject is not None:
+        _show_or_say(scene_controller, None, subject)
+    if not _show_or_say(scene_controller, look, None):
+        places = {"background": settings.look.background}
+        _show_or_say(
+            scene_controller,
+            _in_environment(look.model_copy(update=places), scene_controller.scene.look.lighting.environment),
+            None,
+        )
+
+
+def _show_or_say(scene_controller: SceneController, look: Look | None, subject: ChosenSubject | None) -> bool:
+    """Show it, all of it relit unless it may be as filmed. Returns whether it could be; the log says why not."""
+    if look is not None and not scene_controller.scene.unlit_allowed:
+        look = look.relit()
+    try:
+        scene_controller.change(None if look is None else lambda _: look, subject, recorded=False)
+    except RelitError as error:
+        log.warning("what was kept is not all shown: %s", error)
+        return False
+    return True
+
+
+def _in_environment(look: Look, environment: str | None) -> Look:
+    return look.model_copy(update={"lighting": look.lighting.model_copy(update={"environment": environment})})
+
+
+class SceneKeeper:
+    """Writes the look and the subject to a file whenever they have changed; `check` is to be called regularly."""
+
+    def __init__(self, scene_controller: SceneController, settings: RelitSettings, given: GivenOptions) -> None:
+        """Set up; nothing is written before something changes.
+
+        Args:
+            scene_controller: holds the scene.
+            settings: of this run.
+            given: options of the command line: what the configuration itself says there is not known.
+        """
+        self._scene_controller, self._path = scene_controller, kept_scene_path(settings.storage)
+        before = read_kept_scene(self._path) or KeptScene(look=Look())
+        look = settings.look
+        if given.mode:
+            look = look.model_copy(update={"mode": before.configured_look.mode})
+        self._configured_look = look
+        self._configured_subject = before.configured_subject if given.subject else settings.subject
+        self._written = self._present()
+        self._failed = False
+
+    def check(self) -> None:
+        """Write what is shown, if that is not what the file has. A failure is logged, and tried again later."""
+        present = self._present()
+        if present == self._written:
+            return
+        try:
+            make_folder(self._path.parent)
+            write_atomic(self._path, yaml.safe_dump(present, sort_keys=False, allow_unicode=True))
+        except RelitError as error:
+            if not self._failed:
+                log.warning("the look is not kept for the next start: %s", error)
+            self._failed = True
+            return
+        self._written, self._failed = present, False
+
+    def _present(self) -> dict[str, object]:
+        scene = self._scene_controller.scene
+        kept = KeptScene(
+            look=scene.look,
+            subject=scene.subject_name,
+            configured_look=self._configured_look,
+            configured_subject=self._configured_subject,
+        )
+        stored = scene.subject_name is None or scene.subject_name in self._scene_controller.subjects.names()
+        return kept.model_dump(mode="json", exclude=None if stored else {"subject"})
+
+
+@contextmanager
+def keep_scene(keeper: SceneKeeper, clock: Clock = SYSTEM_CLOCK) -> Iterator[None]:
+    """Within the block: let `keeper` check once a second, in a thread, and once more at the end."""
+    stopping = threading.Event()
+
+    def run() -> None:
+        while not clock.wait(stopping, WRITE_INTERVAL_S):
+            keeper.check()
+
+    thread = threading.Thread(target=run, name="scene-keeper", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stopping.set()
+        thread.join(STOP_TIMEOUT_S)
+        if not thread.is_alive():
+            keeper.check()

@@ -1,0 +1,120 @@
+"""The steps of the scene that can be undone and done again."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from relit_camera.base.concurrency.clock import Clock
+from relit_camera.base.config.look import Look
+
+T = TypeVar("T")
+
+MAX_STEPS = 200
+"""Older steps are forgotten. A step is a look and a name: some kilobytes."""
+SAME_STEP_S = 1.0
+"""Changes of the same fields that follow each other within this are one step: a slider sends dozens a second."""
+
+
+@dataclass(frozen=True)
+class ScenePoint:
+    """What of a scene can be brought back.
+
+    Attributes:
+        look: lighting, background and mode.
+        subject_name: who is shown; None for nobody.
+        unlit_allowed: whether the picture as filmed may be published.
+    """
+
+    look: Look
+    subject_name: str | None
+    unlit_allowed: bool
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A change: what was before it, which fields it changed, and when it was last added to."""
+
+    before: ScenePoint
+    fields: frozenset[str]
+    at: float
+
+
+class SceneHistory:
+    """What was shown before each change, and what was undone. Not thread-safe."""
+
+    def __init__(self, clock: Clock) -> None:
+        """`clock` tells which changes belong to one step."""
+        self._clock = clock
+        self._past: deque[_Step] = deque(maxlen=MAX_STEPS)
+        self._undone: list[ScenePoint] = []
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a step to undo."""
+        return bool(self._past)
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is an undone step to do again."""
+        return bool(self._undone)
+
+    def clear(self) -> None:
+        """Forget all steps."""
+        self._past.clear()
+        self._undone.clear()
+
+    def note(self, before: ScenePoint, after: ScenePoint, own_step: bool = False) -> None:
+        """Take in a change; one that changes nothing is no step. What was undone cannot be done again after it.
+
+        With `own_step` it is a step of its own, whatever was changed before it.
+        """
+        fields = changed_fields(before, after)
+        if not fields:
+            return
+        now = self._clock.now()
+        last = self._past[-1] if self._past else None
+        self._undone.clear()
+        if last is not None and not own_step and fields <= last.fields and now - last.at < SAME_STEP_S:
+            self._past[-1] = _Step(last.before, last.fields, now)
+        else:
+            self._past.append(_Step(before, fields, now))
+
+    def undo(self, now: ScenePoint, restore: Callable[[ScenePoint], T]) -> T | None:
+        """What `restore` makes of the scene before the last step; None if there is none.
+
+        A step that cannot be restored is dropped: the error is passed on.
+        """
+        if not self._past:
+            return None
+        restored = restore(self._past.pop().before)
+        self._undone.append(now)
+        return restored
+
+    def redo(self, now: ScenePoint, restore: Callable[[ScenePoint], T]) -> T | None:
+        """What `restore` makes of the scene after the last undone step; None if there is none, errors as in `undo`."""
+        if not self._undone:
+            return None
+        restored = restore(self._undone.pop())
+        # No later change belongs to this step, whatever its fields are.
+        self._past.append(_Step(now, frozenset(), self._clock.now()))
+        return restored
+
+
+def changed_fields(before: ScenePoint, after: ScenePoint) -> frozenset[str]:
+    """The names of what differs: the lighting field by field."""
+    old, new = _values(before), _values(after)
+    return frozenset(name for name, value in new.items() if value != old[name])
+
+
+def _values(point: ScenePoint) -> dict[str, object]:
+    look = point.look
+    return {
+        **{f"lighting.{name}": getattr(look.lighting, name) for name in type(look.lighting).model_fields},
+        "background": look.background,
+        "mode": look.mode,
+        "subject": point.subject_name,
+        "unlit_allowed": point.unlit_allowed,
+    }

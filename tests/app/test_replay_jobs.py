@@ -1,0 +1,184 @@
+"""Videos that are sent to the running camera and relit: what is kept, told, and every way it can end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from relit_camera.app.demo import demo_files
+from relit_camera.app.replay.replay_jobs import ReplayJobs, ReplayLimits, ReplayWriter
+from relit_camera.app.replay.replay_worker import write_replay
+from relit_camera.base.config.look import Lighting, Look
+from relit_camera.base.config.settings import RelitSettings, StorageSettings, TrackerSettings
+from relit_camera.base.errors import ConflictError, InputError, NotFoundError
+from relit_camera.base.video.video_readers import VideoReader, probe_video
+from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.live.status.event_hub import EventHub
+from relit_camera.live.status.replay_status import ReplayStage, ReplayStatus
+from relit_camera.subject.subject_file import write_subject
+from tests.app.replay_writers import VIDEO, refuse_video, write_half_and_wait, write_quickly
+from tests.app.subject_builders import captured
+from tests.small_camera import wait_until
+
+
+class Room:
+    """A scene with a subject of a file, a listener, and the jobs under test; its folder outlives it."""
+
+    def __init__(self, folder: Path, write: ReplayWriter, settings: RelitSettings | None = None) -> None:
+        storage = StorageSettings(data_dir=folder)
+        self.folder = storage.replays
+        self.scenes = SceneController(storage)
+        self.scenes.set_look(Look(lighting=Lighting(yaw_deg=40, split=0.5)))
+        self.scenes.show_subject("file", captured("film"))
+        events = EventHub()
+        self._listening = events.listen()
+        self.events = self._listening.__enter__()
+        settings = (settings or RelitSettings()).model_copy(update={"storage": storage})
+        limits = ReplayLimits(timeout_s=120.0, event_interval_s=0.0)
+        self.jobs = ReplayJobs(self.folder, settings, self.scenes, events, write, limits)
+
+    def send(self, name: str = "talk", data: bytes = VIDEO, meanwhile: Callable[[], object] = lambda: None) -> None:
+        """Send a video; `meanwhile` is called before its end."""
+        with self.jobs.receive(name, "my talk.mov") as path:
+            path.write_bytes(data)
+            meanwhile()
+
+    def end(self, name: str = "talk") -> ReplayStatus:
+        wait_until(lambda: not self.jobs.status(name).stage.is_running, 120)
+        return self.jobs.status(name)
+
+    def files(self) -> set[str]:
+        return {path.name for path in self.folder.iterdir()}
+
+
+Opener = Callable[[ReplayWriter], Room]
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Iterator[Opener]:
+    rooms: list[Room] = []
+
+    def make(write: ReplayWriter) -> Room:
+        rooms.append(Room(tmp_path, write))
+        return rooms[-1]
+
+    yield make
+    for each in rooms:
+        each.jobs.close()
+
+
+def test_a_video_is_relit_as_the_scene_says_whole_and_kept(room: Opener) -> None:
+    there = room(write_quickly)
+    there.send()
+    done = there.end()
+    path = "/api/v1/replays/talk/video"
+    what = "no face was found in 2 of 30 frames; slow: a network is missing"
+    assert done == ReplayStatus("talk", ReplayStage.DONE, 1.0, 30, path, what)
+    assert there.jobs.video("talk").read_text() == "16 pixels at 40, split 0"
+    assert there.files() == {"talk.mp4"}
+    told = []
+    while not there.events.empty():
+        told.append(there.events.get().data)
+    assert [each["stage"] for each in told] == ["receiving", "working", "working", "done"]
+    assert (told[2]["progress"], told[2]["frames"]) == (0.5, 15)
+    again = room(write_quickly)
+    assert again.jobs.all() == [ReplayStatus("talk", ReplayStage.DONE, 1.0, video=path)]
+    with pytest.raises(ConflictError, match="there is a replay 'talk'"):
+        again.send()
+
+
+def test_a_stored_subject_is_read_by_the_worker(room: Opener) -> None:
+    there = room(write_quickly)
+    write_subject(there.scenes.subjects.new_path("ada"), captured("film"))
+    there.scenes.choose_stored_subject("ada")
+    there.send()
+    there.end()
+    assert there.jobs.video("talk").read_text().startswith("ada at")
+
+
+def test_one_at_a_time_and_removed_while_it_runs(room: Opener) -> None:
+    there = room(write_half_and_wait)
+    there.send()
+    wait_until(lambda: there.jobs.status("talk").progress == 0.5)
+    with pytest.raises(ConflictError, match="relit already"):
+        there.send("other")
+    with pytest.raises(NotFoundError):
+        there.jobs.video("talk")
+    there.jobs.remove("talk")
+    assert there.files() == set()
+    assert there.jobs.all() == []
+    with pytest.raises(NotFoundError):
+        there.jobs.status("talk")
+
+
+def test_a_camera_that_ends_leaves_nothing_of_it(room: Opener) -> None:
+    there = room(write_half_and_wait)
+    there.send()
+    wait_until(lambda: there.jobs.status("talk").progress == 0.5)
+    there.jobs.close()
+    assert there.end().stage is ReplayStage.CANCELED
+    assert there.files() == set()
+    (there.folder / ".sent").mkdir()
+    (there.folder / ".sent" / "video.mp4").write_bytes(VIDEO)  # of one that was killed
+    assert room(write_quickly).files() == set()
+
+
+def test_what_is_refused_is_told_until_it_is_removed_or_another_is_sent(room: Opener) -> None:
+    there = room(refuse_video)
+    there.send()
+    failed = there.end()
+    assert (failed.stage, failed.what, failed.cure) == (
+        ReplayStage.FAILED,
+        "no face was found in it",
+        "look toward the camera",
+    )
+    assert there.jobs.all() == [failed]
+    assert there.files() == set()
+    there.send()
+    there.end()
+    there.jobs.remove("talk")
+    assert there.jobs.all() == []
+
+
+def test_an_upload_that_breaks_off_or_is_removed_is_not_begun(room: Opener) -> None:
+    there = room(write_quickly)
+
+    def break_off() -> None:
+        raise OSError("the browser is gone")
+
+    with pytest.raises(OSError, match="gone"):
+        there.send(meanwhile=break_off)
+    with pytest.raises(ConflictError, match="canceled"):
+        there.send(meanwhile=lambda: there.jobs.remove("talk"))
+    assert there.files() == set()
+    assert there.jobs.all() == []
+
+
+def test_nobody_to_relight_names_and_suffixes_are_told_first(room: Opener) -> None:
+    there = room(write_quickly)
+    with pytest.raises(InputError, match="cannot name a replay"):
+        there.send("../x")
+    with pytest.raises(InputError, match="no film by its name"), there.jobs.receive("talk", "talk.txt"):
+        pass
+    there.scenes.choose_stored_subject(None)
+    with pytest.raises(ConflictError, match="nobody is shown"):
+        there.send()
+    assert not there.folder.exists()
+
+
+def test_a_real_video_is_relit(tmp_path: Path) -> None:
+    """The demonstration's clip, with its recorded track: no network is needed."""
+    settings = RelitSettings(tracker=TrackerSettings(name=f"recorded:{demo_files.TRACK}"))
+    there = Room(tmp_path, write_replay, settings)
+    there.scenes.set_look(Look(lighting=Lighting(environment="party")))
+    there.scenes.load_configured_subject(str(demo_files.SUBJECT))
+    there.send(data=demo_files.CLIP.read_bytes())
+    done = there.end()
+    assert done.stage is ReplayStage.DONE, done
+    before, after = probe_video(demo_files.CLIP), probe_video(there.jobs.video("talk"))
+    assert (after.width, after.height, done.frames) == (before.width, before.height, before.frames)
+    with VideoReader(demo_files.CLIP) as live, VideoReader(there.jobs.video("talk")) as relit:
+        first, second = next(iter(live)).image, next(iter(relit)).image
+    assert abs(first.astype(float) - second).mean() > 5

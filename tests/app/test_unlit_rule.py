@@ -1,0 +1,187 @@
+"""The picture as filmed is never published without a confirmed choice: tried in each way in which it could be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from relit_camera.base.config.look import Lighting, Look, Mode
+from relit_camera.base.config.settings import Fallback
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.face.face_state import LOST, FaceState
+from relit_camera.live.status.camera_status import DegradationCode
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from tests.api.api_client import decoded_picture
+from tests.app.test_camera_service import IMPATIENT, LongFaceTracker
+from tests.small_camera import (
+    FPS,
+    SIZE,
+    Camera,
+    SteadyTracker,
+    memory_source,
+    running_camera,
+    wait_until,
+)
+
+FILMED: DisplayImage = np.random.default_rng(3).integers(60, 200, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
+RATIO = Look(mode=Mode.RATIO, lighting=Lighting(exposure_ev=-2, transition_s=0))
+ONE_S = int(FPS)
+
+
+def share_as_filmed(picture: DisplayImage) -> float:
+    """The share of a picture's pixels that are those of the frame, but for what rounding does."""
+    return float((np.abs(picture.astype(int) - FILMED) <= 2).all(axis=2).mean())
+
+
+def check_nothing_as_filmed(camera: Camera) -> None:
+    """Every picture so far, and of the next second."""
+    camera.sink.wait_for(1)
+    count = camera.sink.count
+    wait_until(lambda: camera.sink.count >= count + ONE_S)
+    assert max(map(share_as_filmed, list(camera.sink.new))) < 0.02
+    assert not camera.status()["unlit"]
+
+
+class Tracker(SteadyTracker):
+    """Sees the steady face where `sees` says so of a frame's index, `tilted` by so many degrees."""
+
+    def __init__(self, sees: Callable[[int], bool] = lambda index: True, tilted_deg: float = 0.0) -> None:
+        super().__init__()
+        self._sees, self._tilted = sees, tilted_deg
+
+    def track(self, frame: Frame) -> FaceState:
+        state = super().track(frame)
+        if not self._sees(frame.index):
+            return LOST
+        if self._tilted:
+            assert state.pose is not None
+            turn = rotation_from_angles(0, self._tilted)
+            return replace(state, pose=replace(state.pose, rotation=turn * state.pose.rotation))
+        return state
+
+
+def test_the_pattern_is_told_from_others() -> None:
+    assert share_as_filmed(FILMED) == 1
+    assert share_as_filmed(255 - FILMED) < 0.02
+
+
+@pytest.mark.parametrize("mode", list(Mode))
+def test_no_subject(tmp_path: Path, mode: Mode) -> None:
+    with running_camera(tmp_path, memory_source(FILMED), look=RATIO.model_copy(update={"mode": mode})) as camera:
+        camera.put("subject", name=None)
+        wait_until(lambda: camera.status()["state"] == "no-subject")
+        check_nothing_as_filmed(camera)
+        assert DegradationCode.NO_SUBJECT in camera.degraded()
+
+
+def test_it_is_published_once_that_is_confirmed_and_no_longer_when_it_is_withdrawn(tmp_path: Path) -> None:
+    with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
+        camera.http.patch("scene", json={"subject": None, "unlit_allowed": True}).raise_for_status()
+        wait_until(lambda: bool(camera.status()["unlit"]))
+        wait_until(lambda: share_as_filmed(camera.sink.new[-1]) == 1)
+        camera.put("freeze", frozen=True)
+        camera.http.patch("scene", json={"unlit_allowed": False}).raise_for_status()
+        wait_until(lambda: not camera.status()["unlit"])
+        wait_until(lambda: share_as_filmed(camera.sink.new[-1]) < 0.02)
+
+
+@pytest.mark.parametrize(
+    "sees",
+    [lambda index: False, lambda index: index < 25, lambda index: index % 20 < 10],
+    ids=["never there", "lost", "coming and going"],
+)
+def test_a_face_that_is_lost(tmp_path: Path, sees: Callable[[int], bool]) -> None:
+    with running_camera(tmp_path, memory_source(FILMED), Tracker(sees), look=RATIO) as camera:
+        camera.sink.wait_for(2 * ONE_S)
+        check_nothing_as_filmed(camera)
+
+
+def test_a_head_that_is_bowed_at_the_start(tmp_path: Path) -> None:
+    with running_camera(tmp_path, memory_source(FILMED), Tracker(tilted_deg=30), look=RATIO) as camera:
+        check_nothing_as_filmed(camera)
+
+
+def test_a_stranger(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
+    filmed = noise.repeat(4, axis=0).repeat(4, axis=1)
+    with running_camera(tmp_path, memory_source(filmed), LongFaceTracker(), look=RATIO) as camera:
+        wait_until(lambda: DegradationCode.FACE_MISMATCH in camera.degraded())
+        camera.sink.wait_for(len(camera.sink.new) + 3)
+        assert not camera.status()["unlit"]
+        for picture in list(camera.sink.new):
+            assert (np.abs(picture.astype(int) - filmed) <= 2).all(axis=2).mean() < 0.5
+
+
+@pytest.mark.parametrize("change", [{"split": 0.5}, {"split": 1.0}, {"blend": 0.0}])
+def test_as_filmed(tmp_path: Path, change: dict[str, float]) -> None:
+    with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
+        camera.sink.wait_for(ONE_S)
+        assert camera.http.patch("lighting", json=change).status_code == 409
+        check_nothing_as_filmed(camera)
+        camera.http.patch("scene", json={"lighting": change, "unlit_allowed": True}).raise_for_status()
+        wait_until(lambda: bool(camera.status()["unlit"]))
+        wait_until(lambda: share_as_filmed(camera.sink.new[-1]) > 0.4)
+
+
+class BrokenTracker(SteadyTracker):
+    """Fails from the start."""
+
+    def track(self, frame: Frame) -> FaceState:
+        raise ZeroDivisionError("a bug")
+
+
+@pytest.mark.parametrize("allowed", [False, True])
+def test_the_fallback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, allowed: bool) -> None:
+    """Neither tracking nor relighting works, and the settings want the live picture then."""
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("another bug")
+
+    monkeypatch.setattr(BasisRelighter, "relight", fail)
+    with running_camera(
+        tmp_path,
+        memory_source(FILMED),
+        BrokenTracker(),
+        look=RATIO,
+        fallback=Fallback.LIVE,
+        timings=IMPATIENT,
+        unlit_allowed=allowed,
+    ) as camera:
+        wait_until(lambda: camera.status()["state"] == "standing-in")
+        if allowed:
+            wait_until(lambda: bool(camera.status()["unlit"]))
+            wait_until(lambda: share_as_filmed(camera.sink.new[-1]) == 1)
+        else:
+            check_nothing_as_filmed(camera)
+
+
+def test_before_is_for_the_preview_alone_and_taken_from_nobody(tmp_path: Path) -> None:
+    with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
+        camera.sink.wait_for(ONE_S)
+        with camera.http.stream("GET", "preview.mjpg", params={"before": "true"}) as body:
+            picture = first_picture(body)
+        assert likeness(picture) > 0.75
+        check_nothing_as_filmed(camera)
+
+
+def first_picture(body: httpx.Response) -> DisplayImage:
+    data = b""
+    for part in body.iter_bytes():
+        data += part
+        head = data.find(b"\r\n\r\n")
+        if head >= 0:
+            length = int(data[:head].split(b"Content-Length: ")[1])
+            if len(data) >= head + 4 + length:
+                return decoded_picture(data[head + 4 : head + 4 + length])
+    raise AssertionError("the preview ended")
+
+
+def likeness(picture: DisplayImage) -> float:
+    """The correlation with the frame in grey: a JPEG file of coloured noise is not exact."""
+    return float(np.corrcoef(picture.mean(axis=2).ravel(), FILMED.mean(axis=2).ravel())[0, 1])

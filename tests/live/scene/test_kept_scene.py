@@ -1,0 +1,255 @@
+"""What a run begins with: settings, the last run's look, a preset at start, the command line; and what it keeps."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from relit_camera.base.config.look import ColorBackground, Lighting, Look, Mode, Preset
+from relit_camera.base.config.preset_store import PresetStore
+from relit_camera.base.config.settings import OutputSettings, RelitSettings, StorageSettings
+from relit_camera.base.errors import StorageError
+from relit_camera.live.scene.kept_scene import (
+    WRITE_INTERVAL_S,
+    GivenOptions,
+    SceneKeeper,
+    keep_scene,
+    kept_scene_path,
+    read_kept_scene,
+    show_first_scene,
+)
+from relit_camera.live.scene.scene import Scene
+from relit_camera.live.scene.scene_controller import SceneController
+from relit_camera.subject.subject_file import write_subject
+from tests.api.api_client import hdr
+from tests.small_camera import small_subject
+
+NOTHING_GIVEN = GivenOptions()
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A data folder with the subjects ada and bea."""
+    for name in ("ada", "bea"):
+        write_subject(SceneController(StorageSettings(data_dir=tmp_path)).subjects.new_path(name), small_subject())
+    return tmp_path
+
+
+def settings(folder: Path, **values: object) -> RelitSettings:
+    return RelitSettings.model_validate({"storage": {"data_dir": folder}, **values})
+
+
+def run(
+    wanted: RelitSettings,
+    change: Callable[[SceneController], object] = lambda controller: None,
+    given: GivenOptions | None = NOTHING_GIVEN,
+    **options: object,
+) -> Scene:
+    """One run in which something is changed. Returns the scene that it began with."""
+    controller = SceneController(wanted.storage)
+    show_first_scene(controller, wanted, given=given, **options)  # type: ignore[arg-type]
+    first = controller.scene
+    if given is not None:
+        keeper = SceneKeeper(controller, wanted, given)
+        change(controller)
+        keeper.check()
+    return first
+
+
+def sunset_ratio(controller: SceneController) -> None:
+    look = Look(lighting=Lighting(environment="sunset", yaw_deg=30), background=ColorBackground(), mode=Mode.RATIO)
+    controller.set_look(look)
+    controller.choose_stored_subject("ada")
+
+
+def test_look_and_subject_are_those_of_the_last_run(folder: Path) -> None:
+    first = run(settings(folder), sunset_ratio)
+    assert (first.subject_name, first.look) == (None, Look())
+    again = run(settings(folder))
+    assert (again.subject_name, again.look.lighting.environment, again.look.mode) == ("ada", "sunset", Mode.RATIO)
+    assert again.environment is not None
+    assert again.environment.name == "sunset"
+    assert (again.can_undo, again.can_redo) == (False, False)
+    assert run(settings(folder), lambda controller: controller.choose_stored_subject(None)).subject_name == "ada"
+    assert run(settings(folder)).subject_name is None
+
+
+def test_reset_shows_what_the_settings_say(folder: Path) -> None:
+    run(settings(folder), sunset_ratio)
+    controller = SceneController(StorageSettings(data_dir=folder))
+    show_first_scene(controller, settings(folder, subject="bea"), given=NOTHING_GIVEN)
+    assert controller.reset().look == Look()
+    assert controller.scene.subject_name == "bea"
+
+
+def test_nothing_is_kept_where_that_is_not_asked_for(folder: Path) -> None:
+    run(settings(folder), sunset_ratio)
+    assert run(settings(folder), given=None).look == Look()
+
+
+def test_what_was_edited_in_the_configuration_since_wins(folder: Path) -> None:
+    before = settings(folder, subject="bea", look={"lighting": {"saturation": 0.5}})
+    run(before, sunset_ratio)
+    edited = settings(folder, subject="bea", look={"lighting": {"saturation": 0.5, "yaw_deg": -10}})
+    again = run(edited)
+    assert (again.look.lighting.yaw_deg, again.look.lighting.environment, again.subject_name) == (-10, "sunset", "ada")
+    other = settings(folder, look={"lighting": {"saturation": 0.5, "yaw_deg": -10}})
+    assert run(other).subject_name is None
+
+
+def test_a_preset_at_start_wins_over_the_last_run(folder: Path) -> None:
+    run(settings(folder), sunset_ratio)
+    presets = PresetStore(settings(folder).storage.presets)
+    presets.save("calm", Preset(lighting=Lighting(environment="overcast")))
+    presets.save("bea", Preset(subject="bea"))
+    presets.set_at_start("calm")
+    first = run(settings(folder))
+    assert (first.look.lighting.environment, first.subject_name) == ("overcast", "ada")
+    presets.set_at_start("bea")
+    assert run(settings(folder)).subject_name == "bea"
+
+
+def test_the_command_line_wins_over_both(folder: Path) -> None:
+    run(settings(folder), sunset_ratio)
+    PresetStore(settings(folder).storage.presets).save("bea", Preset(subject="bea", mode=Mode.RATIO))
+    PresetStore(settings(folder).storage.presets).set_at_start("bea")
+    wanted = settings(folder, subject="ada", look={"mode": "reenact"})
+    first = run(wanted, given=GivenOptions(subject=True, mode=True), environment="party")
+    assert (first.subject_name, first.look.mode, first.look.lighting.environment) == ("ada", Mode.REENACT, "party")
+    assert run(settings(folder), instant=True).subject_name is None
+
+
+def test_what_the_command_line_said_is_kept_as_what_was_shown(folder: Path) -> None:
+    wanted = settings(folder, subject="ada", look={"mode": "ratio"})
+    run(wanted, lambda controller: controller.set_frozen(True), GivenOptions(subject=True, mode=True))
+    run(wanted, lambda controller: controller.set_look(Look(mode=Mode.RATIO, lighting=Lighting(yaw_deg=9))),
+        GivenOptions(subject=True, mode=True))  # fmt: skip
+    again = run(settings(folder))
+    assert (again.subject_name, again.look.mode, again.look.lighting.yaw_deg) == ("ada", Mode.RATIO, 9)
+
+
+def test_a_subject_that_is_not_stored_is_left_to_the_settings(folder: Path, tmp_path: Path) -> None:
+    file = tmp_path / "elsewhere" / "me.relit"
+    file.parent.mkdir()
+    write_subject(file, small_subject())
+    run(settings(folder, subject=str(file)), lambda controller: controller.set_look(Look(mode=Mode.RATIO)))
+    again = run(settings(folder, subject=str(file)))
+    assert (again.subject_name, again.look.mode) == ("me", Mode.RATIO)
+    assert run(settings(folder)).subject_name is None
+
+
+def test_what_is_gone_is_left_out_and_said(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
+    def change(controller: SceneController) -> None:
+        sunset_ratio(controller)
+        controller.environments.add_upload("room", hdr(), ".hdr")
+        controller.update_look(
+            lambda look: look.model_copy(update={"lighting": look.lighting.model_copy(update={"environment": "room"})})
+        )
+
+    run(settings(folder), change)
+    controller = SceneController(StorageSettings(data_dir=folder))
+    controller.environments.remove("room")
+    controller.subjects.remove("ada")
+    first = run(settings(folder))
+    assert (first.subject_name, first.look.lighting.environment, first.look.lighting.yaw_deg) == (None, "studio", 30)
+    assert "room" in caplog.text
+    assert "ada" in caplog.text
+
+
+@pytest.mark.parametrize("text", ["", "look: [", "look: {mode: disco}", "\x00", "[" * 100_000, "#" * (2 << 20)])
+def test_a_damaged_file_is_said_and_left_out(folder: Path, text: str, caplog: pytest.LogCaptureFixture) -> None:
+    kept_scene_path(StorageSettings(data_dir=folder)).write_text(text)
+    assert run(settings(folder), sunset_ratio).look == Look()
+    assert "last-scene.yaml" in caplog.text
+    assert run(settings(folder)).subject_name == "ada"
+
+
+# Nothing as filmed unasked
+
+
+def test_permission_for_the_picture_as_filmed_is_not_kept(folder: Path) -> None:
+    def change(controller: SceneController) -> None:
+        controller.change(
+            lambda look: look.model_copy(
+                update={"mode": Mode.RATIO, "lighting": look.lighting.model_copy(update={"split": 0.5})}
+            ),
+            unlit_allowed=True,
+        )
+
+    run(settings(folder), change)
+    again = run(settings(folder))
+    assert (again.unlit_allowed, again.look.lighting.split, again.look.mode) == (False, 0, Mode.RATIO)
+
+
+def test_settings_that_show_it_count_where_they_allow_it_too(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
+    look = {"mode": "ratio", "lighting": {"split": 0.5}}
+    assert run(settings(folder, look=look)).look.lighting.split == 0
+    assert "output.unlit_allowed" in caplog.text
+    allowed = settings(folder, look=look, output=OutputSettings(unlit_allowed=True))
+    first = run(allowed, given=None)
+    assert (first.look.lighting.split, first.unlit_allowed) == (0.5, True)
+    assert not run(allowed, given=None, instant=True).unlit_allowed
+
+
+# Writing
+
+
+def test_it_is_written_once_a_second_at_most_and_at_the_end(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = SceneController(StorageSettings(data_dir=folder))
+    show_first_scene(controller, settings(folder))
+    keeper, checked, go_on = SceneKeeper(controller, settings(folder), NOTHING_GIVEN), threading.Event(), []
+
+    class StepClock:
+        """Lets a second pass when the test says so."""
+
+        def wait(self, event: threading.Event, timeout_s: float) -> bool:
+            go_on.append(timeout_s)
+            checked.set()
+            return event.wait(30)
+
+    path = kept_scene_path(StorageSettings(data_dir=folder))
+    with keep_scene(keeper, StepClock()):  # type: ignore[arg-type]
+        assert checked.wait(30)
+        controller.set_look(Look(mode=Mode.RATIO))
+        assert not path.exists()
+    assert go_on == [WRITE_INTERVAL_S]
+    kept = read_kept_scene(path)
+    assert kept is not None
+    assert kept.look.mode is Mode.RATIO
+
+
+def test_an_unchanged_scene_is_not_written_again(folder: Path) -> None:
+    controller = SceneController(StorageSettings(data_dir=folder))
+    show_first_scene(controller, settings(folder))
+    keeper = SceneKeeper(controller, settings(folder), NOTHING_GIVEN)
+    path = kept_scene_path(StorageSettings(data_dir=folder))
+    keeper.check()
+    assert not path.exists()
+    controller.set_look(Look(mode=Mode.RATIO))
+    keeper.check()
+    written = path.stat().st_mtime_ns
+    controller.set_frozen(True)
+    keeper.check()
+    assert path.stat().st_mtime_ns == written
+
+
+def test_a_disk_that_takes_nothing_is_said_once(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(path: Path, text: str) -> None:
+        raise StorageError("the disk is full", "make room")
+
+    controller = SceneController(StorageSettings(data_dir=folder))
+    show_first_scene(controller, settings(folder))
+    keeper = SceneKeeper(controller, settings(folder), NOTHING_GIVEN)
+    controller.set_look(Look(mode=Mode.RATIO))
+    with monkeypatch.context() as broken:
+        broken.setattr("relit_camera.live.scene.kept_scene.write_atomic", fail)
+        keeper.check()
+        keeper.check()
+    assert caplog.text.count("the disk is full") == 1
+    keeper.check()
+    assert kept_scene_path(StorageSettings(data_dir=folder)).exists()
