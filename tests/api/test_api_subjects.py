@@ -130,19 +130,19 @@ def test_what_is_too_large_to_be_shown_is_told_and_seen(client: Client, camera: 
 
 
 def test_the_demo_person_is_stored_once(client: Client, camera: FakeCamera) -> None:
-    item = client.post("/api/v1/subjects/demo").json()
+    item = client.post("/api/v1/demo-subject").json()
     assert item["name"] == "demo person"
     stored = camera.scene_controller.subjects.path("demo person")
     assert stored.read_bytes() == camera.demo_subject.read_bytes()
     before = stored.stat().st_mtime_ns
-    assert client.post("/api/v1/subjects/demo").json() == item
+    assert client.post("/api/v1/demo-subject").json() == item
     assert stored.stat().st_mtime_ns == before
     assert client.put("/api/v1/subject", {"name": "demo person"}).json() == {"name": "demo person"}
 
 
 def test_a_subject_of_that_name_is_no_demo_person(client: Client, stored: Path) -> None:
     (stored / "ada.relit").rename(stored / "demo person.relit")
-    check_problem(client.post("/api/v1/subjects/demo"), 409)
+    check_problem(client.post("/api/v1/demo-subject"), 409)
 
 
 def test_a_subject_s_file_is_sent_and_stored(client: Client, camera: FakeCamera, stored: Path) -> None:

@@ -171,7 +171,7 @@ def test_one_at_a_time_and_canceled(studio: Callable[[SubjectBuilder], Studio]) 
         camera.capture.start("me")
     wait_until(lambda: camera.capture.status().stage is CaptureStage.BUILDING)
     folder = camera.scenes.subjects.folder
-    wait_until(lambda: any(path.stat().st_size for path in folder.iterdir()))
+    wait_until(lambda: any(path.stat().st_size for path in folder.glob("*")))  # the folder comes with the file
     camera.capture.cancel()
     wait_until(camera.ended)
     assert camera.capture.status().stage is CaptureStage.CANCELED

@@ -30,6 +30,7 @@ class Room:
         storage = StorageSettings(data_dir=folder)
         self.folder = storage.replays
         self.scenes = SceneController(storage)
+        self.scenes.set_unlit_allowed(True)
         self.scenes.set_look(Look(lighting=Lighting(yaw_deg=40, split=0.5)))
         self.scenes.show_subject("file", captured("film"))
         events = EventHub()

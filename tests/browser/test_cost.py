@@ -23,35 +23,47 @@ NoteRow = Callable[[str, tuple[str, ...]], None]
 def test_the_first_picture_comes_after_few_requests(
     demo: ProcessCamera, open_page: OpenPage, browser: Browser, note_row: NoteRow
 ) -> None:
-    """Counted from an empty cache until the page shows the preview's first picture, which is counted too."""
+    """Counted from an empty cache until the page shows the preview's first picture, which is counted too.
+
+    By the browser's own clock: what the page asks for once the picture is there is none of it.
+    """
     page = open_page("about:blank")
-    seen: dict[str, float] = {}
+    page.add_init_script(
+        "document.addEventListener('load', (event) => {"
+        " if (event.target.id === 'preview') window.firstPictureAt ??= performance.timeOrigin + performance.now();"
+        "}, true)"
+    )
+    received: dict[str, float] = {}
+    asked_at: dict[str, float] = {}
     urls: dict[str, str] = {}
 
     def note_request(event: dict[str, Any]) -> None:
         urls[event["requestId"]] = event["request"]["url"]
-        seen[event["requestId"]] = 0
+        asked_at[event["requestId"]] = event["wallTime"]
 
     def note_bytes(event: dict[str, Any]) -> None:
-        seen[event["requestId"]] = seen.get(event["requestId"], 0) + event["encodedDataLength"]
+        received[event["requestId"]] = received.get(event["requestId"], 0) + event["encodedDataLength"]
 
     session = page.context.new_cdp_session(page)
     session.on("Network.requestWillBeSent", note_request)
     session.on("Network.responseReceived", lambda event: note_bytes({**event, **event["response"]}))
     session.on("Network.dataReceived", note_bytes)
     session.send("Network.enable")
-    began = time.monotonic()
+    began = time.time()
     page.goto(demo.url, wait_until="commit")
-    page.locator("#preview").evaluate(
-        "image => new Promise(done => {"
-        " const look = () => image.naturalWidth > 0 ? done() : requestAnimationFrame(look); look(); })"
+    shown_at = page.evaluate(
+        "() => new Promise((done, fail) => {"
+        " setTimeout(() => fail(new Error('no picture came')), 20000);"
+        " const look = () => window.firstPictureAt ? done(window.firstPictureAt / 1000) : setTimeout(look, 10);"
+        " look(); })"
     )
-    took_s = time.monotonic() - began
+    took_s = shown_at - began
+    seen = {key: received.get(key, 0) for key, at in asked_at.items() if at <= shown_at}
     requests, total = len(seen), round(sum(seen.values()))
     note_row("what the panel costs", ("requests before the first picture", str(requests), str(MOST_REQUESTS)))
     note_row("what the panel costs", ("kB before the first picture", f"{total / 1000:.0f}", f"{MOST_BYTES / 1000:.0f}"))
     note_row("what the panel costs", ("seconds until the first picture", f"{took_s:.1f}", ""))
-    assert requests <= MOST_REQUESTS, sorted(urls.values())
+    assert requests <= MOST_REQUESTS, sorted(urls[key] for key in seen)
     assert total <= MOST_BYTES, {urls[key]: size for key, size in seen.items()}
 
 

@@ -70,6 +70,7 @@ def play(case: Case, folder: Path) -> Played:
         use_models()
     settings = RelitSettings(storage=StorageSettings(data_dir=folder / "data"), tracker={"name": tracker}, subject=None)
     scene_controller = SceneController(settings.storage)
+    scene_controller.set_unlit_allowed(True)  # as a replay to a file
     scene_controller.load_configured_subject(str(subject_file(lights, case.gamma)))
     named = case.environment if case.environment in scene_controller.environments.names() else None
     environment = scene_controller.register_temporary_environment(named or str(find(case.environment, folder, "")))

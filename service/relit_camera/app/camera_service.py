@@ -23,7 +23,7 @@ from relit_camera.app.demo import demo_files
 from relit_camera.app.replay.replay_jobs import ReplayJobs
 from relit_camera.app.replay.replay_worker import write_replay
 from relit_camera.app.setup.camera_setup import CameraSetup
-from relit_camera.app.setup.check_runner import Checks
+from relit_camera.app.setup.check_runner import Checks, no_checks
 from relit_camera.app.setup.pipeline_choice import PipelineChoice
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK
 from relit_camera.base.config.settings import RelitSettings
@@ -110,7 +110,7 @@ class CameraService:
         new_tracker: Callable[[], Tracker] | None = None,
         on_viewer: Callable[[], None] = lambda: None,
         timings: CameraTimings = DEFAULT_TIMINGS,
-        checks: Checks = lambda settings: (),
+        checks: Checks = no_checks,
     ) -> None:
         """Set up; `start` begins.
 
@@ -176,7 +176,17 @@ class CameraService:
             timings.pipeline,
         )
         self._pipelines.replace_pipeline = self._supervisor.replace_pipeline
-        self.setup = CameraSetup(settings, source, sink, self._board, self._pipelines, checks, on_viewer)
+        self.setup = CameraSetup(
+            settings,
+            source,
+            sink,
+            self._board,
+            self._pipelines,
+            checks,
+            on_viewer,
+            # Whoever allowed one camera's picture as filmed has not seen the other's.
+            before_new_source=lambda: scene_controller.set_unlit_allowed(False),
+        )
         self._loop = CameraLoop(
             source,
             self._supervisor,

@@ -23,7 +23,7 @@ from relit_camera.app.camera_service import CameraService
 from relit_camera.app.captures.desk.controls_note import restore_noted_controls
 from relit_camera.app.captures.live_capture import require_instant_name
 from relit_camera.app.config_reload import apply_edited_settings
-from relit_camera.app.setup.check_runner import Checks
+from relit_camera.app.setup.check_runner import Checks, no_checks
 from relit_camera.app.setup.needed_models import missing_models
 from relit_camera.app.setup.startup_checks import check_before_devices
 from relit_camera.app.systemd import notify_systemd
@@ -66,7 +66,7 @@ def run_camera(
     reload: tuple[Path, Callable[[Path], RelitSettings]] | None = None,
     instant: bool = False,
     strict: bool = False,
-    checks: Checks = lambda settings: (),
+    checks: Checks = no_checks,
     given: GivenOptions | None = None,
 ) -> None:
     """Run the camera until SIGTERM or SIGINT, then end within 3 s.

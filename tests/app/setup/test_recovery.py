@@ -10,10 +10,11 @@ import pytest
 
 from relit_camera.app.camera_service import CameraService
 from relit_camera.app.setup import camera_setup
-from relit_camera.base.config.look import Lighting, Look
+from relit_camera.base.config.look import Lighting, Look, Mode
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings, StorageSettings
 from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.devices.device_discovery import list_webcams
 from relit_camera.devices.sinks.reopening_sink import ReopeningSink
 from relit_camera.devices.sinks.virtual_camera_sink import VirtualCameraSink
 from relit_camera.devices.sources.changeable_source import ChangeableSource
@@ -84,7 +85,12 @@ class BareMachine:
         return SteadyTracker()
 
     def told(self) -> dict[DegradationCode, str]:
-        return {found.code: f"{found.why}; {found.cure}" for found in self.camera.status().degraded}
+        """What works less well than asked, but for what a busy machine does."""
+        return {
+            found.code: f"{found.why}; {found.cure}"
+            for found in self.camera.status().degraded
+            if found.code is not DegradationCode.REDUCED_QUALITY
+        }
 
     def shown(self) -> DisplayImage:
         found = self.camera.picture(0, 5.0)
@@ -161,3 +167,25 @@ def test_smaller_pictures_are_published_in_the_size_of_the_virtual_camera(tmp_pa
         output = machine.outputs[-1].last
         assert output is not None
         assert output.shape == before.shape
+
+
+def test_whoever_allowed_one_webcam_s_picture_as_filmed_has_not_allowed_another_s(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine = BareMachine(tmp_path)
+    monkeypatch.setattr(camera_setup, "list_webcams", lambda tree: list_webcams(machine.tree))
+    machine.tree.add_webcam(0, "Cam", by_id="one")
+    machine.tree.add_webcam(2, "Other", usb="1-3:1.0", by_id="two")
+    machine.tree.add_loopback(10, "Relit Camera")
+    scene_controller = machine.camera.scene_controller
+    with machine.running():
+        wait_until(lambda: str(machine.camera.status().state) == "live")
+        as_filmed = Look(mode=Mode.RATIO, lighting=Lighting(split=1, transition_s=0))
+        scene_controller.change(lambda _: as_filmed, unlit_allowed=True)
+        wait_until(lambda: machine.camera.status().unlit)
+        machine.camera.setup.change_source(width=SIZE[0] // 2, height=SIZE[1] // 2)
+        assert scene_controller.scene.unlit_allowed  # the same webcam
+        machine.camera.setup.change_source(device="two")
+        assert not scene_controller.scene.unlit_allowed
+        assert scene_controller.scene.look.lighting.split == 0
+        wait_until(lambda: not machine.camera.status().unlit)

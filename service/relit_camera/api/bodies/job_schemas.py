@@ -8,11 +8,10 @@ from pydantic import Field
 
 from relit_camera.api.bodies.schemas import ApiModel
 from relit_camera.base.config.look import StoredName
-from relit_camera.base.errors import InputError
 from relit_camera.live.status.film_status import Circle, FilmOptions
 
-CircleText = Annotated[str, Field(pattern=r"^\d{1,5}(\.\d{1,3})?(,\d{1,5}(\.\d{1,3})?){2}$", max_length=40)]
-"""x, y and radius in pixels of the upright film, as in `120,80.5,30`."""
+CircleText = Annotated[str, Field(pattern=r"^(\d{1,5}(\.\d{1,3})?,){2}[1-9]\d{0,4}(\.\d{1,3})?$", max_length=40)]
+"""x, y and radius in pixels of the upright film, as in `120,80.5,30`; a radius of at least one pixel."""
 
 
 class FilmOptionFields(ApiModel):
@@ -36,12 +35,8 @@ class FilmOptionFields(ApiModel):
     """The same of the face, brow to chin."""
 
     def options(self) -> FilmOptions:
-        """These options with the circles as numbers.
-
-        Raises:
-            InputError: a radius is zero.
-        """
-        circles = {name: _circle(getattr(self, name), name) for name in ("ball", "second_ball", "face")}
+        """These options with the circles as numbers."""
+        circles = {name: _circle(getattr(self, name)) for name in ("ball", "second_ball", "face")}
         fields = {name: getattr(self, name) for name in FilmOptionFields.model_fields}
         return FilmOptions(**{**fields, **circles})
 
@@ -66,10 +61,8 @@ class NewName(ApiModel):
     name: StoredName
 
 
-def _circle(text: str | None, field: str) -> Circle | None:
+def _circle(text: str | None) -> Circle | None:
     if text is None:
         return None
     x, y, radius = map(float, text.split(","))
-    if radius == 0:
-        raise InputError(f"{field}: a radius of 0 pixels", "give X,Y,RADIUS")
     return x, y, radius

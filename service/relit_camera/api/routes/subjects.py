@@ -52,7 +52,7 @@ def list_subjects(api: ApiContextDep) -> list[SubjectItem]:
     ]
 
 
-@router.post("/subjects/demo", responses=error_responses(409, 507))
+@router.post("/demo-subject", responses=error_responses(409, 507))
 def store_demo_subject(api: ApiContextDep) -> SubjectItem:
     """Store the person who is shipped with the program, under the name `demo person`, unless that is done already."""
     store, bundled = api.camera.scene_controller.subjects, api.camera.demo_subject

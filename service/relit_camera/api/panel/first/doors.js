@@ -110,7 +110,7 @@ async function pass(work, words) {
 }
 
 async function showDemo() {
-  const { name } = await call("POST", "subjects/demo");
+  const { name } = await call("POST", "demo-subject");
   await call("PATCH", "scene", { subject: name, mode: "reenact", unlit_allowed: false });
 }
 
