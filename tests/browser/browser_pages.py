@@ -15,9 +15,9 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, sync_playwright
 
 FAILURES = Path(__file__).resolve().parents[2] / "test-failures" / "browser"
-EXECUTABLE_VARIABLE = "RELIT_CHROMIUM"
+EXECUTABLE_VARIABLE = "CHROMIUM"
 """Names the browser's program where it is none of `PROGRAMS`."""
-NEEDED_VARIABLE = "RELIT_BROWSER_NEEDED"
+NEEDED_VARIABLE = "BROWSER_NEEDED"
 """Set, as in CI, where a missing browser fails the tests instead of skipping them."""
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 TIMEOUT_MS = 15_000

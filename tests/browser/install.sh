@@ -14,7 +14,7 @@ if chromium=$(command -v chromium); then
     exit 0
 fi
 [ "$(id -u)" = 0 ] || unavailable "it needs root (sudo apt install chromium does it)"
-command -v apt-get >/dev/null || unavailable "there is no apt here; install Chromium, or name one with RELIT_CHROMIUM"
+command -v apt-get >/dev/null || unavailable "there is no apt here; install Chromium, or name one with CHROMIUM"
 export DEBIAN_FRONTEND=noninteractive
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT

