@@ -57,21 +57,22 @@ image-steps: setup ## the image's build without Docker: a wheel, installed by it
 tool-install: setup ## the wheel as users install it, used from an empty home; make tool-install WITH=pipx
 	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
-pytest: setup ## the tests alone, in two processes, and the share of lines they execute; make pytest PROCESSES=4
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --cov --cov-report=
-	$(BIN)/python scripts/coverage_summary.py
+pytest: setup ## the tests alone, in two processes; make pytest PROCESSES=4
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser
 	# By themselves: browser and emulated machine take both cores, and tests that hold in real time would not.
-	$(BIN)/python -m pytest tests/browser
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup tests/browser
 	$(BIN)/python -m pytest tests/vm
 
-coverage: pytest ## the same, and which lines: build/coverage/index.html
+coverage: setup ## the first of these with the share of lines that they execute: build/coverage/index.html
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --cov --cov-report=
+	$(BIN)/python scripts/coverage_summary.py
 	$(BIN)/coverage html --quiet --directory build/coverage
 
 browser: ## Debian's Chromium, in which the panel is tested (root on Debian)
 	sh tests/browser/install.sh
 
 test-browser: setup ## the panel in a real browser
-	$(BIN)/python -m pytest tests/browser
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup tests/browser
 
 vm: ## build the virtual machine in which the camera is tried on a real kernel (root on Debian 12, two minutes)
 	sh tests/vm/build.sh

@@ -1,6 +1,6 @@
 """Print the share of lines that the last test run executed, a line for each folder of `service`, two levels deep.
 
-Read from `.coverage`, as `make pytest` leaves it.
+Read from `.coverage`, as `make coverage` leaves it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def main() -> int:
         try:
             coverage.json_report(outfile=str(report))
         except NoDataError as error:
-            print(f"coverage: {error}; run make pytest first", file=sys.stderr)
+            print(f"coverage: {error}; run make coverage first", file=sys.stderr)
             return 1
         files = json.loads(report.read_text())["files"]
     statements, executed = Counter[str](), Counter[str]()
