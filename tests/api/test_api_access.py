@@ -119,6 +119,12 @@ def test_it_is_not_taken_from_an_address(guarded: Client) -> None:
     assert guarded.post(f"/login?token={TOKEN}").status_code == 401
 
 
+@pytest.mark.parametrize("path", ["/desk", "/film"])
+def test_the_captures_pages_lead_to_the_login_page(guarded: Client, path: str) -> None:
+    answer = guarded.get(path)
+    assert (answer.status_code, answer.headers["location"]) == (303, "/login")
+
+
 def test_a_browser_is_led_to_the_login_page(guarded: Client) -> None:
     answer = guarded.get("/")
     assert (answer.status_code, answer.headers["location"]) == (303, "/login")

@@ -11,6 +11,7 @@ from playwright.sync_api import Locator, expect
 
 from relit_camera.base.images.color import LUMINANCE, rgb_from_kelvin
 from relit_camera.live.status.setup_status import SpeedAdvice
+from tests.api.api_client import hdr
 from tests.browser.browser_pages import OpenPage
 from tests.browser.cameras import START_S, FakeServer
 from tests.browser.panel import Panel, open_panel
@@ -65,6 +66,47 @@ def test_the_empty_picture_turns_the_place(fake: FakeServer, open_page: OpenPage
     drag(panel, (box["x"] + 0.5 * box["width"], box["y"] + 0.9 * box["height"]), box["width"] / 4, 0)
     expect(panel.page.locator("#turn")).to_have_attribute("aria-valuetext", "turned 45 degrees to the right")
     fake.wait_for("lighting", yaw_deg=-45)
+
+
+@pytest.mark.parametrize("leave", ["Escape", "a click elsewhere"])
+def test_a_lamp_s_name_is_kept_however_its_card_is_left(fake: FakeServer, open_page: OpenPage, leave: str) -> None:
+    fake.patch("lighting", lamps=[LAMP])
+    panel = open_panel(open_page, fake.url)
+    panel.lamp(0).click()
+    name = panel.page.get_by_role("dialog", name="Lamp 1").get_by_role("textbox", name="Name")
+    name.click()
+    name.press_sequentially("Desk lamp")
+    if leave == "Escape":
+        name.press("Escape")
+    else:
+        panel.page.mouse.click(*panel.middle(panel.page.locator("h1")))
+    wait_until(lambda: lamps(fake)[0].get("name") == "Desk lamp")
+
+
+def test_the_keyboard_stays_near_what_is_removed(fake: FakeServer, open_page: OpenPage) -> None:
+    for name in ("dawn", "dusk"):
+        fake.http.put(f"presets/{name}").raise_for_status()
+    panel = open_panel(open_page, fake.url)
+    page, focused = panel.page, panel.page.locator(":focus")
+    page.locator("#lamp-add").click()
+    wait_until(lambda: len(lamps(fake)) == 1)
+    panel.lamp(0).focus()
+    page.keyboard.press("Control+z")
+    expect(page.locator("#lamp-add")).to_be_focused()
+    for left in ("dusk", "Presets"):
+        page.locator("#presets .close").first.press("Enter")
+        page.get_by_role("menuitem", name="Delete").press("Enter")
+        page.locator("#ask-ok").click()
+        expect(focused).to_have_text(left)
+
+
+def test_a_place_of_the_command_line_is_not_asked_for_as_a_picture(fake: FakeServer, open_page: OpenPage) -> None:
+    path = fake.data / "mine.hdr"
+    path.write_bytes(hdr())
+    fake.patch("lighting", environment=fake.camera.scene_controller.register_temporary_environment(str(path)))
+    panel = open_panel(open_page, fake.url)
+    panel.page.locator("#background-kind").get_by_role("button", name="Picture").click()
+    wait_until(lambda: fake.get("background")["kind"] == "image")
 
 
 def test_a_double_click_adds_a_lamp_there_and_its_card_changes_it(fake: FakeServer, open_page: OpenPage) -> None:

@@ -16,11 +16,14 @@ from playwright.sync_api import Page, expect
 from relit_camera.app.captures.desk.controls_note import ControlsNote
 from relit_camera.app.captures.desk.desk_filming import DeskFilming, FilmingTimings
 from relit_camera.app.demo import demo_files
+from relit_camera.base.errors import ConflictError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.capture.desk.desk_session import SessionTimings
 from relit_camera.live.frame_recorder import FrameRecorder
+from relit_camera.live.status.capture_status import CaptureStage, CaptureStatus
 from relit_camera.live.status.film_status import DroppedFrames, FilmReport, FilmStage, FilmStep
+from relit_camera.live.status.setup_status import ModelPullStatus, ModelStage
 from relit_camera.subject.subject_file import write_subject
 from tests.app.desk_builders import check_and_build
 from tests.app.subject_builders import captured
@@ -142,6 +145,20 @@ def test_a_file_that_is_none_is_told_at_the_door(nobody: FakeServer, open_page: 
     assert nobody.get("subjects") == []
 
 
+def test_a_capture_that_runs_already_is_told_and_joined(nobody: FakeServer, open_page: OpenPage) -> None:
+    capture = nobody.camera.instant_capture
+    capture.current = CaptureStatus(CaptureStage.FILMING, "me")
+    capture.error = ConflictError("a capture runs already", "wait for its end, or cancel it")
+    nobody.camera.setup.pull = ModelPullStatus(ModelStage.DONE)
+    page = open_panel(open_page, nobody.url).page
+    expect(page.locator("#doors-state")).to_contain_text("hold still")
+    page.locator("#door-face").click()
+    page.locator("#face-start").click()
+    expect(page.locator("#face-dialog")).to_have_attribute("data-step", "filming")
+    capture.current = CaptureStatus(CaptureStage.DONE, "me")
+    expect(page.locator("#face-dialog")).to_have_attribute("data-step", "done")
+
+
 class Desk:
     """A stand-in webcam before the browser's screen: its picture is as bright as the page."""
 
@@ -225,6 +242,8 @@ def test_escape_ends_the_desk_s_patterns(nobody: FakeServer, open_page: OpenPage
         for button in ("#accept", "#size-next", "#place-next", "#start"):
             page.locator(button).click()
         expect(page.locator("#patterns")).to_be_visible()
+        # Also where less motion is asked for, as here: edges of light are never sudden.
+        expect(page.locator("#grid div").first).to_have_css("transition-duration", "0.12s")
         desk.look_at(page)
         page.keyboard.press("Escape")
         expect(page.locator("#patterns")).to_be_hidden()

@@ -89,6 +89,9 @@ def test_the_models_are_got_from_the_page(fake: FakeServer, open_page: OpenPage)
     panel.page.locator("#models-get").click()
     expect(panel.page.locator("#models-progress")).to_be_visible()
     assert setup.pull.stage is ModelStage.PULLING
+    panel.page.route("**/api/v1/models", lambda route: route.abort())
+    expect(panel.page.locator("#models-problem")).to_contain_text("does not answer")
+    panel.page.unroute("**/api/v1/models")
     setup.pull = ModelPullStatus(ModelStage.FAILED, ("face_landmarks",), what="the line is down", cure="try again")
     expect(panel.page.locator("#models-problem")).to_contain_text("The line is down")
     panel.page.locator("#models-get").click()
@@ -98,11 +101,26 @@ def test_the_models_are_got_from_the_page(fake: FakeServer, open_page: OpenPage)
     expect(panel.page.locator("#checklist")).to_be_hidden()
 
 
+def test_who_is_unlit_can_hide_before_the_controls_are_there(fake: FakeServer, open_page: OpenPage) -> None:
+    """The controls come only after a while, at the second try."""
+    fake.show_raw_picture()
+    page = open_page("about:blank")
+    page.route("**/panel/library/places.js", lambda route: route.abort())
+    page.goto(fake.url, wait_until="domcontentloaded")
+    expect(page.locator(".toast")).to_contain_text("The controls could not be loaded")
+    page.locator("#unlit-stop").click()
+    fake.wait_for("scene", unlit_allowed=False)
+    page.unroute("**/panel/library/places.js")
+    expect(Panel(page).place("party")).to_be_attached()
+
+
 def test_a_camera_that_ends_is_told_and_the_page_finds_the_next(fake: FakeServer, open_page: OpenPage) -> None:
     panel = open_panel(open_page, fake.url)
     panel.wait_for_picture()
     fake.stop_server()
     expect(panel.page.locator("#state-text")).to_have_text("Not connected")
+    expect(panel.page.locator("#veil")).to_contain_text("Start it again: relit run")
+    expect(panel.rate).to_be_empty()
     fake.start_server()
     expect(panel.page.locator("#state-text")).to_have_text("Live")
     panel.place("party").click()

@@ -54,7 +54,7 @@ class TokenAuthMiddleware:
             return await self._login(request)
         if path in PUBLIC_PATHS or self._knows_token(request.headers) or self._has_session(request):
             return None
-        if path in ("/", "/desk"):
+        if path in ("/", "/desk", "/film"):
             return RedirectResponse(LOGIN_PATH, HTTPStatus.SEE_OTHER)
         return problem_response(
             HTTPStatus.UNAUTHORIZED,

@@ -7,7 +7,11 @@ import { firstPicture, openPreview, showBefore } from "./stage/preview.js";
 import { change, onScene, scene, step } from "./stage/scene.js";
 import { setAttribute } from "./widgets.js";
 
+const RETRY_MS = 3000;
 const byId = (id) => document.getElementById(id);
+
+// Before all else, and without the controls: nobody is to be shown unlit for longer than they want
+byId("unlit-stop").onclick = () => change({ unlit_allowed: false });
 
 // Undo, redo, reset
 
@@ -70,4 +74,15 @@ on("open", () => {
   lost = false;
 });
 openEvents();
-firstPicture().then(() => import("./controls.js"));
+
+/** Loads the controls, and again until they are there. */
+async function loadControls() {
+  try {
+    await import("./controls.js");
+  } catch {
+    toast("The controls could not be loaded", "They are tried again; if they do not come, load the page again");
+    setTimeout(loadControls, RETRY_MS);
+  }
+}
+
+firstPicture().then(loadControls);

@@ -105,8 +105,10 @@ export function choose(group, value) {
 export function keyed(parent, items, key, create) {
   const kept = (parent.kept ??= new Map());
   const wanted = new Set(items.map(key));
+  let lost = -1;
   for (const [name, { element }] of kept) {
     if (wanted.has(name)) continue;
+    if (element.contains(document.activeElement)) lost = [...parent.children].indexOf(element);
     element.remove();
     kept.delete(name);
   }
@@ -117,6 +119,15 @@ export function keyed(parent, items, key, create) {
     if (parent.children[index] !== element) parent.insertBefore(element, parent.children[index] ?? null);
     update?.(item);
   });
+  if (lost >= 0) focusNear(parent, lost);
+}
+
+/** Moves the keyboard from what was removed to its neighbour; where none is left, to the section's heading. */
+function focusNear(parent, index) {
+  const neighbour = parent.children[Math.min(index, parent.children.length - 1)];
+  const heading = parent.closest("section")?.querySelector("h2");
+  if (heading) heading.tabIndex = -1;
+  (neighbour?.querySelector("button") ?? neighbour ?? heading)?.focus();
 }
 
 /** Sets an attribute only where it differs, so that nothing is drawn or read aloud again. */

@@ -17,6 +17,7 @@ const STATES = {
   lost: "Not connected",
 };
 const VEILED = ["waiting", "lost", "starting", "capturing"];
+const LOST_TEXT = "The camera does not answer. Start it again: relit run. This page finds it by itself.";
 const UNLIT_TEXT = "Others see your webcam’s picture as it is.";
 
 const byId = (id) => document.getElementById(id);
@@ -86,6 +87,10 @@ function showStatus(status) {
 on("status", showStatus);
 on("lost", ({ refused }) => {
   showState("lost");
+  setText(byId("veil"), LOST_TEXT);
+  showReaders();
+  showUnlit(false); // what was true of the pictures of a camera that is no longer there
+  for (const figure of ["figure-fps", "figure-latency", "figure-tracker"]) setText(byId(figure), "");
   if (refused) attempt("GET", "mode"); // which finds out whether the token is needed again
 });
 on("caption", ({ text }) => {

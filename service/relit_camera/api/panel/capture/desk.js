@@ -1,6 +1,6 @@
 // The desk capture: asks for sizes, then shows the patterns that the camera asks for, full screen.
 
-import { call, sentence } from "../api.js";
+import { Refused, call, sentence } from "../api.js";
 import { FramingHelp } from "../first/framing.js";
 import { showProblem } from "../first/problem.js";
 import { on, openEvents } from "../stage/events.js";
@@ -11,8 +11,11 @@ const CARD_HEIGHT_CM = 5.398;
 const POLL_MS = 80;
 const $ = (id) => document.getElementById(id);
 
-let running = false;
-let shown = -1;
+const RESIZED = { what: "the window’s size changed while the patterns were shown", cure: "leave it as it is until they end" };
+const GONE = { what: "the camera ended meanwhile", cure: "begin again" };
+
+let wanted = false; // patterns were asked for, and nobody has stopped them
+let running = false; // the camera films them
 
 /** Centimeters a CSS pixel is wide, by the card. */
 function pixelCm() {
@@ -86,18 +89,22 @@ function tell(status) {
   steps.show("result", true);
 }
 
-async function stop() {
-  if (!running) return;
+/** Stops the patterns, also while they only begin; `problem` is why, null where a person did it. */
+async function stop(problem = null) {
+  if (!wanted) return;
+  wanted = false;
+  const begun = running;
   running = false;
   await leaveFullScreen();
-  await cancel();
+  if (begun) await cancel(problem); // else what has just been asked for ends it once it is answered
 }
 
-async function cancel() {
+async function cancel(problem = null) {
   try {
-    tell(await call("DELETE", "captures/desk"));
+    const status = await call("DELETE", "captures/desk");
+    tell(problem ? { stage: "failed", ...problem } : status);
   } catch (error) {
-    tell({ stage: "failed", ...told(error) });
+    tell({ stage: "failed", ...(problem ?? told(error)) });
   }
 }
 
@@ -107,10 +114,11 @@ function told(error) {
 
 async function run() {
   let status = await call("POST", "captures/desk", body());
+  if (!wanted) return cancel();
   makeGrid(status);
   $("patterns").hidden = false;
   running = true;
-  shown = -1;
+  const size = [innerWidth, innerHeight];
   let key = "";
   while (running) {
     const now = `${status.stage} ${status.step}`;
@@ -120,39 +128,50 @@ async function run() {
       paint(status);
       await drawn();
     }
-    shown = document.hidden ? -1 : status.step;
+    const shown = document.hidden ? -1 : status.step;
     await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+    // What is lit is no longer what was measured. Where full screen has ended, its event stops the patterns.
+    if (document.fullscreenElement && (innerWidth !== size[0] || innerHeight !== size[1])) await stop(RESIZED);
     if (running) status = await call("PUT", "captures/desk/shown", { step: shown });
   }
   if (!running) return;
-  running = false;
+  wanted = running = false;
   await leaveFullScreen();
   await follow(status);
 }
 
-/** Shows how far the computing is, until it ends. */
+/** Shows how far the computing is, until it ends; a missed answer does not end it. */
 async function follow(first) {
   let status = first;
   tell(status);
   while (status.stage === "building") {
     await new Promise((resolve) => setTimeout(resolve, 500));
-    status = await call("GET", "captures/desk");
+    try {
+      status = await call("GET", "captures/desk");
+    } catch (error) {
+      if (error.status) throw error;
+    }
   }
-  tell(status);
+  tell(status.stage === "idle" ? { stage: "failed", ...GONE } : status);
 }
 
 async function begin() {
   $("start").disabled = true;
-  framing.stop();
+  framing.close();
+  wanted = true;
   try {
-    await document.documentElement.requestFullscreen().catch(() => null); // without it the patterns fill the window
-    await run();
+    await document.documentElement.requestFullscreen?.().catch(() => null);
+    if (wanted && !document.fullscreenElement) {
+      throw new Refused("the browser did not give the whole screen", "allow this page full screen, or try another browser");
+    }
+    if (wanted) await run();
+    else tell({ stage: "canceled" });
   } catch (error) {
-    running = false;
-    await leaveFullScreen();
-    await call("DELETE", "captures/desk").catch(() => null);
-    tell({ stage: "failed", ...told(error) });
+    if (running) await stop(told(error));
+    else tell({ stage: "failed", ...told(error) });
   }
+  wanted = false;
+  await leaveFullScreen(); // also where it came only after the stop
   $("start").disabled = false;
 }
 
@@ -177,14 +196,14 @@ $("place-next").onclick = () => {
 };
 $("start").onclick = begin;
 $("desk-again").onclick = () => steps.show("framing", true);
-$("desk-cancel").onclick = cancel;
+$("desk-cancel").onclick = () => cancel();
 $("card-width").oninput = showSize;
 document.addEventListener("fullscreenchange", () => { if (!document.fullscreenElement) stop(); });
 document.addEventListener("keydown", (event) => { if (event.key === "Escape") stop(); });
 document.addEventListener("visibilitychange", () => { if (document.hidden) stop(); });
-addEventListener("pagehide", () => { if (running) fetch("/api/v1/captures/desk", { method: "DELETE", keepalive: true }); });
+addEventListener("pagehide", () => { if (wanted) fetch("/api/v1/captures/desk", { method: "DELETE", keepalive: true }); });
 showSize();
 steps.show("warning");
 openEvents();
 const status = await call("GET", "captures/desk").catch(() => null);
-if (status?.stage === "building") follow(status);
+if (status?.stage === "building") follow(status).catch((error) => tell({ stage: "failed", ...told(error) }));

@@ -39,6 +39,7 @@ const FIELDS = {
 const $ = (id) => document.getElementById(id);
 
 let sending = null;
+let last = null; // what the camera has told last
 
 const steps = new Steps(["warning", "prepare", "film", "upload", "work", "report"], ["warning", "prepare", "film", "upload"]);
 
@@ -112,9 +113,23 @@ function numbers(said) {
 
 // The work
 
+/** Shows what the camera tells while it works, and to who waits for it; else only leads there, from the first step. */
+function hear(status) {
+  const news = steps.current === "work" && status.stage !== last?.stage;
+  if (RUNNING.includes(status.stage) || news) return show(status);
+  offer(status);
+}
+
+function offer(status) {
+  last = status;
+  $("film-last").hidden = status.stage === "idle" || RUNNING.includes(status.stage);
+  $("film-last-open").textContent = status.stage === "done" ? "The report of your last film" : "Back to your last film";
+}
+
 /** Shows how far the capture is: its work, or its report. */
 function show(status) {
   if (sending) return; // this page knows better how far it is
+  offer(status);
   if (status.stage === "idle") return;
   if (status.stage === "done") return showReport(status);
   const running = RUNNING.includes(status.stage);
@@ -214,6 +229,7 @@ $("understood").onchange = () => {
   $("accept").disabled = !$("understood").checked;
 };
 $("accept").onclick = () => steps.show("prepare");
+$("film-last-open").onclick = () => show(last);
 $("have-film").onclick = () => steps.show("upload");
 $("prepare-next").onclick = () => steps.show("film");
 $("film-next").onclick = () => steps.show("upload");
@@ -240,15 +256,17 @@ $("film-other").onclick = openUpload;
 $("film-use").onclick = use;
 $("film-again").onclick = () => steps.show("film");
 
+// A field that is wrong is shown, also where it is folded away.
+document.addEventListener("invalid", ({ target }) => target.closest("details")?.setAttribute("open", ""), true);
 addEventListener("beforeunload", (event) => {
   if (sending) event.preventDefault(); // the browser asks whether the upload shall end
 });
 
 steps.show("warning");
-on("film-capture", show);
+on("film-capture", hear);
 // At the start, and where events were missed.
 on("open", async () => {
   const status = await call("GET", "captures/film").catch(() => null);
-  if (status && (status.stage !== "canceled" || steps.current === "work")) show(status);
+  if (status) hear(status);
 });
 openEvents();

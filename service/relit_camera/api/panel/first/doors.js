@@ -1,6 +1,6 @@
 // Who will be seen: three doors for a first visit, and a quiet fourth.
 
-import { call, sentence } from "../api.js";
+import { call, toast } from "../api.js";
 import { upload } from "../capture/upload.js";
 import { on } from "../stage/events.js";
 import { onScene, scene } from "../stage/scene.js";
@@ -41,6 +41,7 @@ function door(id, title, words) {
     ${DRAWINGS[id]}<strong id="door-${id}-title">${title}</strong><span id="door-${id}-words">${words}</span></button></li>`;
 }
 
+let capturing = false;
 let opened = false;
 let opener = "";
 
@@ -56,8 +57,9 @@ export function openDoors() {
 export async function captureFace() {
   showProblem(problem, null);
   const from = document.activeElement?.id;
-  const { openFaceDialog } = await import("./face.js");
-  if (await openFaceDialog()) leave();
+  const face = await import("./face.js").catch(() => null);
+  if (!face) return toast("This part of the panel could not be loaded", "Try again; if it does not help, load the page again");
+  if (await face.openFaceDialog()) leave();
   if (document.activeElement === document.body) focusAgain(from);
 }
 
@@ -186,9 +188,19 @@ onScene((now) => {
   drawNow(now);
   draw();
 });
-// A capture that somebody else began, such as `relit run --instant`.
-on("capture", ({ stage, what, cure }) => {
+// A capture that somebody else began, such as `relit run --instant`; perhaps before this page was opened.
+function hear({ stage, what, cure }) {
+  capturing = stage in CAPTURING;
   if (document.getElementById("face-dialog")) return;
   byId("doors-state").textContent = CAPTURING[stage] ?? "";
-  showProblem(problem, stage === "failed" || (what && CAPTURING[stage]) ? { what, cure } : null);
-});
+  showProblem(problem, stage === "failed" || (what && capturing) ? { what, cure } : null);
+}
+
+async function look() {
+  const status = await call("GET", "captures/instant").catch(() => null);
+  if (status && (capturing || status.stage in CAPTURING)) hear(status);
+}
+
+on("capture", hear);
+on("open", look);
+look();

@@ -23,6 +23,19 @@ export async function openFaceDialog() {
   return dialog.run();
 }
 
+/** Begins a capture, or joins the one that runs; takes over one that only waits to try again. */
+async function begin() {
+  try {
+    return await call("POST", "captures/instant", {});
+  } catch (error) {
+    if (error.status !== 409) throw error;
+  }
+  const status = await call("GET", "captures/instant");
+  if (status.stage === "filming" || status.stage === "building") return status;
+  await call("DELETE", "captures/instant");
+  return call("POST", "captures/instant", {});
+}
+
 // One for the page: there is no way to take back what was given to `on`.
 const framing = new FramingHelp(on);
 
@@ -101,7 +114,7 @@ class FaceDialog {
   async #capture() {
     this.#show("filming");
     try {
-      let status = await call("POST", "captures/instant", {});
+      let status = await begin();
       while (status.stage === "filming" || status.stage === "building") {
         if (status.stage !== this.#step) this.#show(status.stage);
         await new Promise((resolve) => setTimeout(resolve, POLL_MS));

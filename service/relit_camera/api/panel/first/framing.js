@@ -14,8 +14,10 @@ const FACES = {
 
 /** The picture and its marks. `on(kind, callback)` hears server-sent events. */
 export class FramingHelp {
+  #running = false;
   #renewal = 0;
   #heard = 0;
+  #query = "";
 
   constructor(on) {
     this.picture = make("img", { id: "face-picture", alt: "Your webcam’s picture, which only you see here", width: 640, height: 360 });
@@ -29,42 +31,65 @@ export class FramingHelp {
       this.marks.append(mark);
     }
     on("framing", (framing) => this.#show(framing));
+    document.addEventListener("visibilitychange", () => this.#look());
   }
 
   get running() {
-    return this.#renewal !== 0;
+    return this.#running;
   }
 
-  /** Shows the webcam's picture and judges it, until `stop`. */
+  /** Shows the webcam's picture and judges it, until `stop`, while the page is looked at. */
   start() {
     this.stop();
     this.showFilmed();
     this.advice.textContent = "Looking for your face…";
+    this.#running = true;
+    this.#look();
+  }
+
+  stop() {
+    if (!this.#running) return;
+    this.#running = false;
+    this.#pause();
+  }
+
+  /** The picture as filmed, which nobody else sees. */
+  showFilmed() {
+    this.#open("before=true&mirror=true&width=640&fps=15");
+  }
+
+  /** The picture as others see it. */
+  showRelit() {
+    this.#open("mirror=true&width=640&fps=15");
+  }
+
+  close() {
+    this.stop();
+    this.#open("");
+  }
+
+  /** Shows the preview with this query, "" for none; nothing while the page is hidden, so that the webcam can rest. */
+  #open(query) {
+    this.#query = query;
+    if (query && !document.hidden) this.picture.src = `/api/v1/preview.mjpg?${query}&opened=${Date.now()}`;
+    else this.picture.removeAttribute("src");
+  }
+
+  /** Goes on while the page is looked at. */
+  #look() {
+    this.#open(this.#query);
+    if (!this.#running) return;
+    if (document.hidden) return this.#pause();
+    clearInterval(this.#renewal);
     this.#heard = performance.now();
     this.#renewal = setInterval(() => this.#renew(), RENEW_MS);
     this.#renew();
   }
 
-  stop() {
-    if (this.running) call("PUT", "framing", { wanted: false }).catch(() => null);
+  #pause() {
+    call("PUT", "framing", { wanted: false }).catch(() => null);
     clearInterval(this.#renewal);
-    this.#renewal = 0;
     this.box.hidden = true;
-  }
-
-  /** The picture as filmed, which nobody else sees. */
-  showFilmed() {
-    this.picture.src = `/api/v1/preview.mjpg?before=true&mirror=true&width=640&fps=15&opened=${Date.now()}`;
-  }
-
-  /** The picture as others see it. */
-  showRelit() {
-    this.picture.src = `/api/v1/preview.mjpg?mirror=true&width=640&fps=15&opened=${Date.now()}`;
-  }
-
-  close() {
-    this.stop();
-    this.picture.removeAttribute("src");
   }
 
   async #renew() {
@@ -87,14 +112,25 @@ export class FramingHelp {
       mark.title = advice;
       mark.lastElementChild.textContent = `: ${SAID[kind]}`;
     }
-    const [left, top, width, height] = framing.box ?? [0, 0, 0, 0];
-    this.box.hidden = !framing.box;
-    const share = (part) => `${(100 * part).toFixed(1)}%`;
-    // The picture is mirrored, as a mirror is.
-    Object.assign(this.box.style, { left: share(1 - left - width), top: share(top), width: share(width), height: share(height) });
+    this.box.hidden = !framing.box || !this.picture.naturalWidth;
+    if (!this.box.hidden) this.#place(framing.box);
     const good = framing.face === "one" && !framing.advice;
     this.view.dataset.state = good ? "good" : "bad";
     this.#say(good ? "That is good. Hold still." : framing.advice || FACES[framing.face] || "");
+  }
+
+  /** Puts the box round the face. The picture is mirrored, as a mirror is, and has bars beside it or above and below it. */
+  #place([left, top, width, height]) {
+    const { clientWidth, clientHeight, naturalWidth, naturalHeight } = this.picture;
+    const scale = Math.min(clientWidth / naturalWidth, clientHeight / naturalHeight);
+    const [wide, high] = [(scale * naturalWidth) / clientWidth, (scale * naturalHeight) / clientHeight]; // shares of the place
+    const share = (part) => `${(100 * part).toFixed(1)}%`;
+    Object.assign(this.box.style, {
+      left: share((1 - wide) / 2 + wide * (1 - left - width)),
+      top: share((1 - high) / 2 + high * top),
+      width: share(wide * width),
+      height: share(high * height),
+    });
   }
 
   #say(words) {

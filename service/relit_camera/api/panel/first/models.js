@@ -38,6 +38,9 @@ export class ModelPull {
       this.#show(await call(method, "models"));
     } catch (error) {
       showProblem(this.problem, error);
+      if (this.bar.hidden) return;
+      this.stop();
+      this.#timer = setTimeout(() => this.look(), POLL_MS); // what is being got may go on all the same
     }
   }
 

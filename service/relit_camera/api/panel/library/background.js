@@ -119,7 +119,8 @@ function controlsOf(kind) {
 
 function show(now) {
   const { environment } = now.lighting;
-  if (environment !== null && environment !== "background") place = environment;
+  // Not one from the command line: it lights, but there is no picture of it to be put behind the person.
+  if (stored("environments").some(({ name, temporary }) => name === environment && !temporary)) place = environment;
   choose(kinds, now.background.kind);
   setAttribute(keep, "aria-pressed", keepsBackground());
   document.getElementById("background-upload").hidden = now.background.kind !== "image";

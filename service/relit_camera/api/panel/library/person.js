@@ -40,7 +40,6 @@ document.getElementById("mode").onclick = (event) => {
   if (mode) change({ mode });
 };
 document.getElementById("neutral").onclick = () => attempt("POST", "neutral-pose");
-document.getElementById("unlit-stop").onclick = () => change({ unlit_allowed: false });
 on("status", (status) => {
   if (unlit === Boolean(status.unlit)) return;
   unlit = Boolean(status.unlit);

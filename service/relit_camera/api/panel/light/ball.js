@@ -49,7 +49,9 @@ function drawLamp(dot, lamp, index) {
 
 function draw(now) {
   const { lamps, environment, yaw_deg: yaw } = now.lighting;
+  const held = dots.indexOf(document.activeElement) >= lamps.length;
   while (dots.length > lamps.length) dots.pop().remove();
+  if (held) (dots.at(-1) ?? document.getElementById("lamp-add")).focus();
   while (dots.length < lamps.length) dots.push(addDot(dots.length));
   lamps.forEach((lamp, index) => drawLamp(dots[index], lamp, index));
   turn.hidden = environment === null;

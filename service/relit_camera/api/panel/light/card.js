@@ -41,6 +41,7 @@ function put(part) {
 /** Opens the card of a lamp; when it closes, the focus goes back to `from`, or the lamp's dot. */
 export function openCard(index, from = null) {
   if (!scene()?.lighting.lamps[index]) return;
+  if (document.activeElement === name) putName();
   open = index;
   opener = from;
   card.hidden = false;
@@ -50,7 +51,11 @@ export function openCard(index, from = null) {
 
 function closeCard() {
   if (open < 0) return;
-  const back = opener ?? document.querySelector(`#ball [data-lamp="${open}"]`);
+  if (document.activeElement === name) putName(); // its `change` would come too late
+  const there = scene().lighting.lamps[open] !== undefined;
+  const dot = document.querySelector(`#ball [data-lamp="${open}"]`);
+  const add = card.contains(document.activeElement) ? document.getElementById("lamp-add") : null;
+  const back = there ? (opener ?? dot) : add;
   open = -1;
   card.hidden = true;
   back?.focus();
@@ -95,12 +100,15 @@ function place(dot) {
   card.style.setProperty("--top", `${clamp(top, MARGIN, lowest)}px`);
 }
 
-name.onchange = () => put({ name: name.value.trim() });
+function putName() {
+  const lamp = scene().lighting.lamps[open];
+  const typed = name.value.trim();
+  if (lamp && typed !== (lamp.name ?? "")) put({ name: typed });
+}
+
+name.onchange = putName;
 name.onkeydown = (event) => {
-  if (event.key === "Enter") {
-    name.onchange();
-    closeCard();
-  }
+  if (event.key === "Enter") closeCard();
 };
 kinds.onclick = (event) => {
   const kind = event.target.closest("button")?.value;
