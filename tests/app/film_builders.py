@@ -35,7 +35,7 @@ def refuse_film(film: Path, name: str, options: FilmOptions, folder: Path, path:
     if options.light_distance_cm == 80:
         return build_film(film, name, options, folder, path, tell)
     tell("Looking for flashes", 1, 2)
-    raise CaptureError("no flash found", "let a light blink")
+    raise CaptureError(f"no flash found in {film} and {folder}/kept", "let a light blink")
 
 
 def keep_and_wait(film: Path, name: str, options: FilmOptions, folder: Path, path: Path, tell: Progress) -> FilmReport:

@@ -32,4 +32,4 @@ def write_half_and_wait(work: ReplayWork, out: Path, tell: Progress) -> ReplayOu
 
 def refuse_video(work: ReplayWork, out: Path, tell: Progress) -> ReplayOutcome:
     """Find no face."""
-    raise VideoError("no face was found in it", "look toward the camera")
+    raise VideoError(f"no face was found in {work.video}, which gave {out.parent}/half.mp4", "look toward the camera")

@@ -23,6 +23,7 @@ from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.live.supervision.camera_loop import LoopTimings
 from relit_camera.live.supervision.pipeline_health import HealthLimits
 from tests.small_camera import FPS, SIZE, SteadyTracker, difference, memory_source, running_camera, wait_until
+from tests.virtual_clock import VirtualClock
 
 pytestmark = pytest.mark.real_time
 
@@ -109,6 +110,20 @@ def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(tmp_path: Path) 
         camera.put("freeze", frozen=False)
         wait_until(lambda: difference(camera.sink.new[-1], held) > 5)
         assert camera.status()["state"] == "live"
+
+
+def test_while_the_picture_is_frozen_the_computer_is_not_said_to_be_slow(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = VirtualClock()
+    monkeypatch.setattr("relit_camera.app.camera_service.SYSTEM_CLOCK", clock)  # tells for how long it is slow
+    with running_camera(tmp_path) as camera:
+        camera.sink.wait_for(3)
+        camera.put("freeze", frozen=True)
+        wait_until(lambda: (status := camera.camera_service.status()).fps.new == 0 < status.fps.camera)
+        for _ in range(3):
+            clock.sleep(4)
+            assert camera.camera_service.status().advice is None
 
 
 class FailingTracker(SteadyTracker):

@@ -129,7 +129,11 @@ def test_a_film_that_is_refused_is_kept_for_other_options(studio: Opener) -> Non
     there = studio(refuse_film)
     there.send()
     failed = there.end()
-    assert (failed.stage, failed.what, failed.cure) == (FilmStage.FAILED, "no flash found", "let a light blink")
+    assert (failed.stage, failed.what, failed.cure) == (
+        FilmStage.FAILED,
+        "no flash found in 'evening.MP4' and kept",
+        "let a light blink",
+    )
     assert failed.can_resume
     assert [step.state for step in failed.stages][:2] == ["running", "waiting"]
     assert there.scenes.subjects.names() == []

@@ -13,7 +13,7 @@ import pytest
 from relit_camera.app.captures.live_capture import LiveCapture, LiveCaptureTimings, SubjectBuilder
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.config.settings import StorageSettings
-from relit_camera.base.errors import ConflictError, InputError
+from relit_camera.base.errors import ConflictError, InputError, NotFoundError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.live.frame_recorder import FrameRecorder
 from relit_camera.live.scene.scene_controller import SceneController
@@ -112,6 +112,48 @@ def test_a_subject_that_somebody_chose_meanwhile_stays(studio: Callable[[Subject
     assert camera.scenes.subjects.names() == ["me"]
 
 
+def test_a_mode_that_somebody_chose_meanwhile_stays(studio: Callable[[SubjectBuilder], Studio]) -> None:
+    camera = studio(build)
+    camera.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.RATIO}))
+    camera.on = False
+    camera.capture.start("me")
+    camera.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.REENACT}))
+    camera.on = True
+    wait_until(camera.ended)
+    assert camera.scenes.scene.subject_name == "me"
+    assert camera.scenes.scene.look.mode is Mode.REENACT
+
+
+def test_a_better_subject_that_was_stored_meanwhile_stays(studio: Callable[[SubjectBuilder], Studio]) -> None:
+    camera = studio(build)
+    camera.on = False
+    camera.capture.start("me")
+    folder = camera.scenes.subjects.folder
+    folder.mkdir(parents=True)
+    write_subject(folder / "me.relit", captured("film"))
+    camera.on = True
+    wait_until(camera.ended)
+    status = camera.capture.status()
+    assert (status.stage, status.what) == (CaptureStage.FAILED, "subject 'me' was captured in a better way")
+    assert camera.scenes.subjects.metadata("me").rung == "film"
+
+
+def test_a_subject_that_is_stored_but_cannot_be_shown_is_done(
+    studio: Callable[[SubjectBuilder], Studio], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse_to_show(*_: object) -> None:
+        raise NotFoundError("no background picture 'beach'", "there are: none")
+
+    camera = studio(build)
+    monkeypatch.setattr(camera.scenes, "choose_stored_subject", refuse_to_show)
+    camera.capture.start("me")
+    wait_until(camera.ended)
+    status = camera.capture.status()
+    assert status.stage is CaptureStage.DONE
+    assert "subject 'me' is stored, but cannot be shown: no background picture 'beach'" in status.what
+    assert camera.scenes.subjects.names() == ["me"]
+
+
 def test_a_failure_is_told_with_its_cure_and_stores_nothing(studio: Callable[[SubjectBuilder], Studio]) -> None:
     camera = studio(refuse)
     camera.capture.start("me")
@@ -125,6 +167,20 @@ def test_a_failure_is_told_with_its_cure_and_stores_nothing(studio: Callable[[Su
     assert camera.scenes.subjects.names() == []
     assert list(camera.scenes.subjects.folder.iterdir()) == []
     assert camera.scenes.scene.subject is None
+
+
+@pytest.mark.parametrize("other", [".film.unfinished-abcdefgh.relit", ".me.unfinished-abcdefgh.relit"])
+def test_a_failure_leaves_what_another_capture_has_finished(
+    studio: Callable[[SubjectBuilder], Studio], other: str
+) -> None:
+    camera = studio(refuse)
+    camera.scenes.subjects.folder.mkdir(parents=True)
+    finished = camera.scenes.subjects.folder / other
+    write_subject(finished, captured("film"))  # by its worker, before the other capture stores it
+    camera.capture.start("me")
+    wait_until(camera.ended)
+    assert camera.capture.status().stage is CaptureStage.FAILED
+    assert list(finished.parent.iterdir()) == [finished]
 
 
 def test_a_camera_without_frames_is_a_failure(studio: Callable[[SubjectBuilder], Studio]) -> None:

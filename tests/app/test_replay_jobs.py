@@ -132,7 +132,7 @@ def test_what_is_refused_is_told_until_it_is_removed_or_another_is_sent(room: Op
     failed = there.end()
     assert (failed.stage, failed.what, failed.cure) == (
         ReplayStage.FAILED,
-        "no face was found in it",
+        "no face was found in 'my talk.mov', which gave half.mp4",
         "look toward the camera",
     )
     assert there.jobs.all() == [failed]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from relit_camera.base.config.settings import SourceSettings
 from relit_camera.base.errors import ConflictError, DeviceError, RelitError, VideoError
 from relit_camera.base.images.image_types import Frame
+from relit_camera.devices.device_discovery import FIRST_WEBCAM
 from relit_camera.devices.sources.changeable_source import TRIAL_S, ChangeableSource
 from relit_camera.devices.sources.source import SourceInfo, SourceState
 from tests.virtual_clock import VirtualClock
@@ -24,6 +27,7 @@ class Webcam:
 
     def __init__(self, machine: Machine, settings: SourceSettings) -> None:
         self._machine, self.settings = machine, settings
+        self._id = machine.first if settings.source == FIRST_WEBCAM else settings.source
         self.state, self.index, self.closed = SourceState.IDLE, -1, False
 
     def read(self, timeout_s: float) -> Frame | None:
@@ -34,7 +38,7 @@ class Webcam:
             clock.wait(threading.Event(), timeout_s)
             return None
         others = [each for each in self._machine.made if each is not self and each.is_open]
-        assert not [each for each in others if each.settings.source == name], "a device is opened once only"
+        assert not [each for each in others if each.describe().id == self._id], "a device is opened once only"
         clock.wait(threading.Event(), 1 / 30)
         self.state = SourceState.RUNNING
         self.index += 1
@@ -45,7 +49,7 @@ class Webcam:
         return self.state is SourceState.RUNNING and not self.closed
 
     def describe(self) -> SourceInfo:
-        return SourceInfo("webcam", self.settings.source, (self.settings.width, self.settings.height), 30.0)
+        return SourceInfo("webcam", self._id, (self.settings.width, self.settings.height), 30.0)
 
     def close(self) -> None:
         self.closed = True
@@ -57,16 +61,21 @@ class Machine:
     def __init__(self, *plugged: str) -> None:
         self.clock = VirtualClock()
         self.plugged, self.busy, self.silent = set(plugged), set[str](), set[str]()
+        self.first = plugged[0] if plugged else ""
         self.made: list[Webcam] = []
+        self.new_sources = 0
 
     def make(self, settings: SourceSettings) -> Webcam:
-        if settings.source not in self.plugged:
+        if settings.source not in {*self.plugged, FIRST_WEBCAM}:
             raise DeviceError(f"there is no webcam '{settings.source}'", "plug it in")
         self.made.append(Webcam(self, settings))
         return self.made[-1]
 
-    def source(self, wanted: object = None) -> ChangeableSource:
-        return ChangeableSource(SourceSettings(source="one"), self.make, wanted, self.clock)  # type: ignore[arg-type]
+    def source(self, wanted: Callable[[], bool] | None = None, name: str = "one") -> ChangeableSource:
+        return ChangeableSource(settings(name), self.make, wanted, self.clock, self.count_new_source)
+
+    def count_new_source(self) -> None:
+        self.new_sources += 1
 
 
 def settings(name: str = "one", **changes: object) -> SourceSettings:
@@ -173,6 +182,18 @@ def test_a_size_that_the_webcam_does_not_give_brings_the_old_one_back() -> None:
     assert source.describe().size == (1280, 720)
 
 
+def test_an_error_that_nobody_expected_brings_the_old_one_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    machine = Machine("one")
+    source = machine.source()
+    read(source, 3)
+    with monkeypatch.context() as patched:
+        patched.setattr(Webcam, "read", Mock(side_effect=OSError("a driver's fault")))
+        with pytest.raises(OSError, match="a driver's fault"):
+            source.change(settings(width=640, height=360))
+    assert machine.made[1].closed
+    assert [frame.index for frame in read(source, 2)] == [3, 4]
+
+
 def test_one_that_does_not_exist_is_told_and_the_old_one_goes_on() -> None:
     machine = Machine("one")
     source = machine.source()
@@ -204,6 +225,56 @@ def test_on_demand_the_new_one_is_closed_when_nobody_looks() -> None:
     wanted[0] = True
     assert read(source, 1)[0].index == 4
     assert machine.made[-1].settings.source == "two"
+
+
+def test_before_frames_of_another_webcam_come_it_is_told() -> None:
+    machine = Machine("one", "two")
+    source = machine.source()
+    read(source, 3)
+    source.change(settings(width=640, height=360))
+    read(source, 3)
+    assert machine.new_sources == 0
+    source.change(settings("two"))
+    assert machine.new_sources == 0
+    read(source, 1)
+    assert machine.new_sources == 1
+    read(source, 3)
+    assert machine.new_sources == 1
+
+
+def test_the_first_webcam_may_be_another_one_after_a_change_of_the_rate() -> None:
+    machine = Machine("one", "two")
+    source = machine.source(name=FIRST_WEBCAM)
+    read(source, 3)
+    machine.first = "two"
+    source.change(settings(FIRST_WEBCAM, fps=15.0))
+    read(source, 3)
+    assert machine.new_sources == 1
+
+
+def test_the_first_webcam_may_be_another_one_when_it_is_opened_on_demand() -> None:
+    machine, wanted = Machine("one", "two"), [True]
+    source = machine.source(lambda: wanted[0], FIRST_WEBCAM)
+    read(source, 3)
+    for first, expected in (("one", 0), ("two", 1), ("two", 1)):
+        wanted[0] = False
+        read(source, 1)
+        wanted[0], machine.first = True, first
+        read(source, 3)
+        assert machine.new_sources == expected
+
+
+def test_a_frame_of_another_webcam_is_not_given_while_that_cannot_be_told() -> None:
+    def fail() -> None:
+        raise RelitError("what is allowed cannot be changed", "wait")
+
+    machine = Machine("one", "two")
+    source = ChangeableSource(settings(), machine.make, clock=machine.clock, before_new_source=fail)
+    read(source, 1)
+    source.change(settings("two"))
+    for _ in range(2):
+        with pytest.raises(RelitError, match="what is allowed cannot be changed"):
+            source.read(0.1)
 
 
 def test_closing_ends_it_for_good() -> None:

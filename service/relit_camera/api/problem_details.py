@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import re
-import tempfile
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
-from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
@@ -25,6 +22,7 @@ from relit_camera.base.errors import (
     TooLargeError,
     UnlitNotAllowedError,
 )
+from relit_camera.base.storage.folder_redaction import redact_folders
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -93,9 +91,6 @@ PROBLEM_TYPES = {
 UNLIT_NOT_ALLOWED = ("unlit-not-allowed", "Nobody has allowed the picture as filmed")
 """The same of a 409 that goes away once a person has confirmed it."""
 
-# Folders of a path would reveal the person's machine: only the last part is shown. Paths of the API itself stay.
-_FOLDER_PATTERN = re.compile(r"(?<![\w.:/\\])(?!/api/|/panel/)(?:[A-Za-z]:)?[/\\](?:[^\s/\\:'\",;]+[/\\])+")
-
 
 def status_for_error(error: RelitError) -> int:
     """The HTTP status of an error: that of its nearest listed ancestor, else 500."""
@@ -134,13 +129,6 @@ def problem_response_from(error: RelitError) -> Response:
     """The error answer for a `RelitError`, without the folders of this machine."""
     kind = UNLIT_NOT_ALLOWED if isinstance(error, UnlitNotAllowedError) else None
     return problem_response(status_for_error(error), redact_folders(error.what), redact_folders(error.cure), kind=kind)
-
-
-def redact_folders(text: str) -> str:
-    """`text` with every absolute path cut down to its last part."""
-    for folder in (Path.home(), Path(tempfile.gettempdir())):
-        text = text.replace(f"{folder}/", "/…/").replace(f"{folder}\\", "/…/")  # the home folder's name may hold spaces
-    return _FOLDER_PATTERN.sub("", text)
 
 
 def error_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:

@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from hashlib import sha256
 
 import numpy as np
 
@@ -37,7 +38,8 @@ class SubjectInPlaces:
         self._waiting = 0
         # From here on: only in that thread.
         self._subject: Subject | None = None
-        self._made: dict[str, tuple[Environment, bytes]] = {}
+        self._made: dict[str, tuple[bytes, bytes]] = {}
+        """The digest of the light, and the JPEG file, by the environment's name: the environment itself is large."""
         self._renderer: _SubjectRenderer | None = None
 
     def jpeg(self, subject: Subject, name: str, load: Callable[[], Environment]) -> Future[bytes]:
@@ -55,11 +57,11 @@ class SubjectInPlaces:
             if subject is not self._subject:
                 self._subject, self._renderer = subject, None
                 self._made.clear()
-            found = self._made.pop(name, None)
-            if found is None or found[0] is not environment:
+            found, light = self._made.pop(name, None), sha256(environment.light_map.tobytes()).digest()
+            if found is None or found[0] != light:
                 if self._renderer is None:
                     self._renderer = _SubjectRenderer(subject)
-                found = environment, encode_display(self._renderer.picture(environment))
+                found = light, encode_display(self._renderer.picture(environment))
             self._made[name] = found
             if len(self._made) > MOST_KEPT:
                 del self._made[next(iter(self._made))]

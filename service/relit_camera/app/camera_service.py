@@ -184,8 +184,6 @@ class CameraService:
             self._pipelines,
             checks,
             on_viewer,
-            # Whoever allowed one camera's picture as filmed has not seen the other's.
-            before_new_source=lambda: scene_controller.set_unlit_allowed(False),
         )
         self._loop = CameraLoop(
             source,
@@ -286,7 +284,8 @@ class CameraService:
             for session in sessions
             if session.why
         ]
-        load, board_state = self._supervisor.load, self._board.state
+        load = self._supervisor.load
+        state = CameraState.FROZEN if scene.frozen else self._board.state
         reduced = [_reduced_quality(load.latency_s or 0.0)] if load.level else []
         fps = Rates(
             self._loop.camera_rate.rate(),
@@ -295,7 +294,7 @@ class CameraService:
             self._publisher.new_fps,
         )
         return CameraStatus(
-            state=CameraState.FROZEN if scene.frozen else board_state,
+            state=state,
             source=f"{source.kind} {source.id}".strip(),
             sink=f"{sink.kind} {sink.id}".strip(),
             subject=scene.subject_name,
@@ -318,7 +317,7 @@ class CameraService:
                 *reduced,
             ],
             readers=self._readers.readers(),
-            advice=self._advice(fps, board_state),
+            advice=self._advice(fps, state),
             version=__version__,
             uptime_s=self._clock.now() - self._started_at,
         )

@@ -122,6 +122,8 @@ def run_camera(
             settings.source,
             lambda asked: source_for(asked, published_label(settings.output)),
             demand.wanted if demand else None,
+            # Whoever allowed one camera's picture as filmed has not seen the other's.
+            before_new_source=lambda: scene_controller.set_unlit_allowed(False),
         )
         cleanup.callback(source.close)
         missing = source.opening_error or sink.opening_error

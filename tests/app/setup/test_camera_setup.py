@@ -56,15 +56,12 @@ class Parts:
         self.pipelines = PipelineChoice(self.settings, SteadyTracker())
         self.replaced: list[Callable[[], Any] | None] = []
         self.pipelines.replace_pipeline = self.replaced.append
-        self.woken = self.new_sources = 0
+        self.woken = 0
         self.setup = self.of(self.source)
 
     def of(self, source: Any) -> CameraSetup:
         def wake() -> None:
             self.woken += 1
-
-        def count_new_source() -> None:
-            self.new_sources += 1
 
         return CameraSetup(
             self.settings,
@@ -75,7 +72,6 @@ class Parts:
             lambda values: (),
             wake,
             self.tree,
-            before_new_source=count_new_source,
             clock=self.machine.clock,
         )
 
@@ -107,7 +103,6 @@ def test_another_webcam_is_chosen(parts: Parts) -> None:
     assert (status.device, status.state, status.width) == ("two", "running", 1280)
     assert parts.woken == 1
     assert parts.replaced == []  # the pipeline stays
-    assert parts.new_sources == 1  # what was allowed of the first camera's picture is no longer
     assert parts.setup.source() == status
 
 
@@ -138,7 +133,6 @@ def test_a_smaller_size_makes_smaller_pictures_of_the_output_s_shape(parts: Part
     parts.setup.change_source(width=640, height=360)
     assert parts.pipelines.size == (640, 360)
     assert parts.replaced == [None]
-    assert parts.new_sources == 0
     parts.setup.change_source(fps=15.0)
     assert parts.source.settings.fps == 15.0
     assert parts.replaced == [None]

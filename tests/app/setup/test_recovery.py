@@ -63,7 +63,9 @@ class BareMachine:
         scene_controller = SceneController(self.settings.storage)
         scene_controller.set_look(Look(lighting=Lighting(transition_s=0)))
         scene_controller.show_subject("small", small_subject())
-        self.source = ChangeableSource(self.settings.source, self._webcam)
+        self.source = ChangeableSource(
+            self.settings.source, self._webcam, before_new_source=lambda: scene_controller.set_unlit_allowed(False)
+        )
         self.sink = ReopeningSink(self._virtual_camera, SIZE)
         tracker = SteadyTracker() if has_models else None
         self.camera = CameraService(self.settings, scene_controller, self.source, self.sink, tracker, self._tracker)
@@ -186,6 +188,6 @@ def test_whoever_allowed_one_webcam_s_picture_as_filmed_has_not_allowed_another_
         machine.camera.setup.change_source(width=SIZE[0] // 2, height=SIZE[1] // 2)
         assert scene_controller.scene.unlit_allowed  # the same webcam
         machine.camera.setup.change_source(device="two")
-        assert not scene_controller.scene.unlit_allowed
+        wait_until(lambda: not scene_controller.scene.unlit_allowed)
         assert scene_controller.scene.look.lighting.split == 0
         wait_until(lambda: not machine.camera.status().unlit)

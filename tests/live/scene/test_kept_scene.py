@@ -236,6 +236,36 @@ def test_an_unchanged_scene_is_not_written_again(folder: Path) -> None:
     assert path.stat().st_mtime_ns == written
 
 
+def test_the_longest_name_that_a_subject_s_file_can_have_is_kept(folder: Path) -> None:
+    name = "a" * 200
+    subjects = SceneController(StorageSettings(data_dir=folder)).subjects.folder
+    (subjects / "ada.relit").rename(subjects / f"{name}.relit")
+    assert run(settings(folder, subject=name)).subject_name == name
+    run(settings(folder), lambda controller: controller.choose_stored_subject(name))
+    assert run(settings(folder)).subject_name == name
+
+
+def test_a_folder_that_cannot_be_read_ends_nothing_and_is_said_once(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail() -> list[str]:
+        raise StorageError("cannot read the subjects: Permission denied", "check its permissions")
+
+    controller = SceneController(StorageSettings(data_dir=folder))
+    show_first_scene(controller, settings(folder, subject="ada"))
+    with monkeypatch.context() as broken:
+        broken.setattr(controller.subjects, "names", fail)
+        keeper = SceneKeeper(controller, settings(folder), NOTHING_GIVEN)
+        keeper.check()
+        keeper.check()
+    assert caplog.text.count("Permission denied") == 1
+    controller.set_look(Look(mode=Mode.RATIO))
+    keeper.check()
+    kept = read_kept_scene(kept_scene_path(StorageSettings(data_dir=folder)))
+    assert kept is not None
+    assert (kept.look.mode, kept.subject) == (Mode.RATIO, "ada")
+
+
 def test_a_disk_that_takes_nothing_is_said_once(
     folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -215,6 +215,45 @@ def test_the_configuration_names_a_stored_subject_or_a_file(
     assert scene_controller.load_configured_subject(None).subject is None
 
 
+@pytest.mark.usefixtures("stored_subject")
+def test_a_subject_that_is_renamed_is_found_by_undo_redo_and_reset(scene_controller: SceneController) -> None:
+    scene_controller.choose_stored_subject("stored")
+    scene_controller.mark_start()
+    scene_controller.choose_stored_subject(None)
+    scene_controller.rename_stored_subject("stored", "lovelace")
+    assert scene_controller.undo().subject_name == "lovelace"
+    scene_controller.rename_stored_subject("lovelace", "stored")
+    assert scene_controller.redo().subject_name is None
+    assert scene_controller.reset().subject_name == "stored"
+    assert scene_controller.scene.subject is not None
+    scene_controller.rename_stored_subject("stored", "countess")
+    assert scene_controller.undo().subject_name is None
+    assert scene_controller.redo().subject_name == "countess"
+
+
+@pytest.mark.usefixtures("stored_subject")
+def test_a_step_that_cannot_be_restored_is_not_offered_again(scene_controller: SceneController) -> None:
+    scene_controller.choose_stored_subject("stored")
+    scene_controller.mark_start()
+    scene_controller.choose_stored_subject(None)
+    scene_controller.subjects.remove("stored")
+    with pytest.raises(NotFoundError, match="no subject 'stored'"):
+        scene_controller.undo()
+    assert (scene_controller.scene.can_undo, scene_controller.scene.can_redo) == (False, False)
+
+
+@pytest.mark.usefixtures("stored_subject")
+def test_a_step_that_cannot_be_done_again_is_not_offered_again(scene_controller: SceneController) -> None:
+    scene_controller.choose_stored_subject("stored")
+    assert scene_controller.undo().can_redo
+    before = scene_controller.scene
+    scene_controller.subjects.remove("stored")
+    with pytest.raises(NotFoundError, match="no subject 'stored'"):
+        scene_controller.redo()
+    assert (scene_controller.scene.can_undo, scene_controller.scene.can_redo) == (False, False)
+    assert scene_controller.scene.revision > before.revision  # so that whoever listens hears of it
+
+
 def test_changes_from_many_threads_are_all_made(scene_controller: SceneController) -> None:
     scene_controller.set_look(Look(lighting=Lighting(exposure_ev=0)))
 

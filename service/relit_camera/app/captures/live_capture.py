@@ -16,12 +16,13 @@ from relit_camera.app.captures.subject_maker import SubjectMaker, require_replac
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import ConflictError, DeviceError, RelitError
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.storage.folder_redaction import redact_folders
 from relit_camera.live.frame_recorder import FrameRecorder
+from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.capture_status import CaptureStage, CaptureStatus
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.subject.rungs import Rung
-from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_store import SubjectStore
 
 log = logging.getLogger(__name__)
@@ -111,7 +112,7 @@ class LiveCapture:
     def start(self, name: str, until_done: bool = False) -> CaptureStatus:
         """Begin to capture a subject, which replaces a stored instant one of that name.
 
-        It is shown, in mode ratio, once it is stored, unless somebody has chosen another one meanwhile.
+        It is shown, in mode ratio, once it is stored, unless somebody has chosen another one or mode meanwhile.
 
         Args:
             name: under which it is stored.
@@ -141,17 +142,18 @@ class LiveCapture:
             thread.join(2.0)
         return self._status
 
-    def _run(self, name: str, until_done: bool, canceled: threading.Event, before: Subject | None) -> None:
-        """Capture; `before` is who was shown when somebody asked for it."""
+    def _run(self, name: str, until_done: bool, canceled: threading.Event, before: Scene) -> None:
+        """Capture; `before` is what was shown when somebody asked for it."""
         pause_s = self._timings.retry_s
         while True:
             try:
                 status = self._attempt(name, canceled, before)
             except RelitError as error:
-                status = CaptureStatus(CaptureStage.FAILED, name, error.what, error.cure)
+                what, cure = redact_folders(error.what), redact_folders(error.cure)
+                status = CaptureStatus(CaptureStage.FAILED, name, what, cure)
             except Exception as error:  # else nobody would hear that it has ended
                 log.exception("the instant capture failed")
-                what = f"it failed in a way that nobody expected ({type(error).__name__}: {error})"
+                what = redact_folders(f"it failed in a way that nobody expected ({type(error).__name__}: {error})")
                 status = CaptureStatus(CaptureStage.FAILED, name, what, "please report it")
             if status.stage is not CaptureStage.DONE and canceled.is_set():
                 status = CaptureStatus(CaptureStage.CANCELED, name)
@@ -160,11 +162,11 @@ class LiveCapture:
             if not again or self._clock.wait(canceled, pause_s):
                 return
             pause_s = min(2 * pause_s, self._timings.most_retry_s)
-            if self._maker.shown() is not before:
+            if self._maker.shown().subject is not before.subject:
                 return  # somebody has chosen another one
             self._set(CaptureStatus(CaptureStage.FILMING, name, status.what, status.cure))
 
-    def _attempt(self, name: str, canceled: threading.Event, before: Subject | None) -> CaptureStatus:
+    def _attempt(self, name: str, canceled: threading.Event, before: Scene) -> CaptureStatus:
         """Capture once.
 
         Raises:
@@ -175,8 +177,10 @@ class LiveCapture:
             return CaptureStatus(CaptureStage.CANCELED, name)
         self._set(CaptureStatus(CaptureStage.BUILDING, name))
         limit_s = self._timings.building_timeout_s
-        notes = self._maker.make(name, before, self._build, frames, timeout_s=limit_s, canceled=canceled)
-        return CaptureStatus(CaptureStage.DONE, name, "; ".join(notes))
+        notes, not_shown = self._maker.make(
+            name, REPLACED, before, self._build, frames, timeout_s=limit_s, canceled=canceled
+        )
+        return CaptureStatus(CaptureStage.DONE, name, "; ".join(filter(None, [*notes, not_shown])))
 
     def _film(self, canceled: threading.Event) -> list[DisplayImage]:
         """Frames of the camera.

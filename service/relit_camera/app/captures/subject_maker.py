@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable, Collection
 from typing import TypeVar
 
 from relit_camera.base.concurrency.worker_process import Progress, run_in_worker_process
 from relit_camera.base.config.look import Mode
-from relit_camera.base.errors import ConflictError, StorageError, WorkerError
+from relit_camera.base.errors import ConflictError, RelitError, StorageError, WorkerError
 from relit_camera.base.storage.atomic_files import remove_unfinished_files
+from relit_camera.base.storage.folder_redaction import redact_folders
+from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.subject.rungs import Rung
-from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import SUFFIX
 from relit_camera.subject.subject_store import SubjectStore
+
+log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
@@ -46,28 +50,31 @@ class SubjectMaker:
         """
         self._scene_controller, self._events = scene_controller, events
 
-    def shown(self) -> Subject | None:
-        """Who is shown now: to be noted when a capture begins."""
-        return self._scene_controller.scene.subject
+    def shown(self) -> Scene:
+        """What is shown now: to be noted when a capture begins."""
+        return self._scene_controller.scene
 
     def make(
         self,
         name: str,
-        before: Subject | None,
+        replaced: Collection[Rung],
+        before: Scene,
         build: Callable[..., T],
         *arguments: object,
         timeout_s: float,
         canceled: threading.Event,
         progress: Progress | None = None,
         most_bytes: int | None = None,
-    ) -> T:
-        """Store what `build` makes, and show it in mode ratio unless somebody has chosen another one meanwhile.
+    ) -> tuple[T, str]:
+        """Store what `build` makes, and show it unless somebody has chosen another one meanwhile.
 
-        Nothing is stored, and nothing unfinished is left, unless this returns.
+        It is shown in mode ratio, unless somebody has chosen another mode meanwhile. Nothing is stored, and nothing
+        unfinished is left, unless this returns.
 
         Args:
             name: under which the subject is stored; one of that name is replaced.
-            before: who was shown when the capture began.
+            replaced: how a subject of that name may have been captured, else it stays.
+            before: what was shown when the capture began.
             build: a function of a module, called in a worker process with the arguments and the path to write to.
             arguments: come before the path.
             timeout_s: after which the worker is ended.
@@ -76,26 +83,32 @@ class SubjectMaker:
             most_bytes: memory that the worker may take.
 
         Returns:
-            What `build` returns.
+            What `build` returns, and why the subject is stored but cannot be shown: empty where that is not so.
 
         Raises:
+            ConflictError: a subject of that name was stored meanwhile that was captured in a better way.
             RelitError: of `build`, or of the worker: it was canceled, took too long or too much memory, or died.
             StorageError: the file cannot be written.
         """
         subjects = self._scene_controller.subjects
         limits = {"timeout_s": timeout_s, "canceled": canceled, "progress": progress, "most_bytes": most_bytes}
-        try:
-            with subjects.replacing(name, SUFFIX) as path:
-                try:
-                    result: T = run_in_worker_process(build, *arguments, path, **limits)  # type: ignore[arg-type]
-                except StorageError as error:  # names the temporary file
-                    raise StorageError(error.what.replace(path.name, f"{name}{SUFFIX}"), error.cure) from error
-                if canceled.is_set():
-                    raise WorkerError("the work was canceled", "start it again")
-        except BaseException:
-            remove_unfinished_files(subjects.folder)  # of a worker that was killed
-            raise
+        with subjects.replacing(name, SUFFIX) as path:
+            try:
+                result: T = run_in_worker_process(build, *arguments, path, **limits)  # type: ignore[arg-type]
+            except StorageError as error:  # names the temporary file
+                raise StorageError(error.what.replace(path.name, f"{name}{SUFFIX}"), error.cure) from error
+            finally:
+                remove_unfinished_files(subjects.folder, path)  # of a worker that was killed
+            if canceled.is_set():
+                raise WorkerError("the work was canceled", "start it again")
+            require_replaceable(subjects, name, replaced, "rename or delete that one, then start again")
         self._events.publish("collection", name="subjects")
-        if self.shown() is before:
-            self._scene_controller.choose_stored_subject(name, Mode.RATIO)
-        return result
+        now = self.shown()
+        if now.subject is before.subject:
+            mode = Mode.RATIO if now.look.mode is before.look.mode else None
+            try:
+                self._scene_controller.choose_stored_subject(name, mode)
+            except RelitError as error:
+                log.warning("subject '%s' cannot be shown: %s", name, error)
+                return result, redact_folders(f"subject '{name}' is stored, but cannot be shown: {error}")
+        return result, ""

@@ -18,6 +18,7 @@ from relit_camera.base.concurrency.worker_process import Progress, run_in_worker
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import ConflictError, RelitError, WorkerError
 from relit_camera.base.storage.atomic_files import atomic_path, make_folder, remove_unfinished_files
+from relit_camera.base.storage.folder_redaction import redact_folders
 from relit_camera.base.storage.named_files import NamedFiles
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.event_hub import EventHub
@@ -124,7 +125,7 @@ class ReplayJobs:
             with self._lock:
                 self._last = before
             raise
-        self._begin(name, sent / f"video{suffix}", canceled)
+        self._begin(name, sent / f"video{suffix}", file_name, canceled)
 
     def video(self, name: str) -> Path:
         """The file of a relit video; see `ReplayControl.video`."""
@@ -153,7 +154,7 @@ class ReplayJobs:
         if self._last is not None and self._last.stage.is_running:
             raise ConflictError("a video is being relit already", "wait for its end, or delete it")
 
-    def _begin(self, name: str, video: Path, canceled: threading.Event) -> None:
+    def _begin(self, name: str, video: Path, file_name: str, canceled: threading.Event) -> None:
         scene = self._scene_controller.scene
         stored = scene.subject_name in self._scene_controller.subjects.names()
         subject = scene.subject_name if stored else scene.subject
@@ -167,10 +168,11 @@ class ReplayJobs:
             look = scene.look.model_copy(update={"lighting": lighting})
             work = ReplayWork(self._settings, replace(scene, subject=None, look=look, frozen=False), subject, video)
             self._set(ReplayStatus(name, ReplayStage.WORKING))
-            self._thread = threading.Thread(target=self._run, args=(name, work, canceled), name="replay", daemon=True)
+            arguments = name, work, file_name, canceled
+            self._thread = threading.Thread(target=self._run, args=arguments, name="replay", daemon=True)
             self._thread.start()
 
-    def _run(self, name: str, work: ReplayWork, canceled: threading.Event) -> None:
+    def _run(self, name: str, work: ReplayWork, file_name: str, canceled: threading.Event) -> None:
         def tell(stage: str, done: int, total: int | None) -> None:
             share = min(done / total, 1.0) if total else 0.0
             self._set(ReplayStatus(name, ReplayStage.WORKING, round(share, 4), done), seldom=True)
@@ -195,10 +197,11 @@ class ReplayJobs:
                 ended = ReplayStatus(name, ReplayStage.CANCELED)
             else:
                 log.warning("replay: %s", error)
-                ended = ReplayStatus(name, ReplayStage.FAILED, what=error.what, cure=error.cure)
+                what = redact_folders(error.what.replace(str(work.video), f"'{file_name}'"))
+                ended = ReplayStatus(name, ReplayStage.FAILED, what=what, cure=redact_folders(error.cure))
         except Exception as error:  # else nobody would hear that it has ended
             log.exception("the replay failed")
-            what = f"it failed in a way that nobody expected ({type(error).__name__}: {error})"
+            what = redact_folders(f"it failed in a way that nobody expected ({type(error).__name__}: {error})")
             ended = ReplayStatus(name, ReplayStage.FAILED, what=what, cure="please report it")
         self._remove_sent()
         if ended.stage is not ReplayStage.DONE:

@@ -62,7 +62,6 @@ class CameraSetup:
         wake: Callable[[], None] = lambda: None,
         tree: DeviceFolders = SYSTEM_FOLDERS,
         pull: Pull = pull_public_models,
-        before_new_source: Callable[[], object] = lambda: None,
         clock: Clock = SYSTEM_CLOCK,
     ) -> None:
         """Set up.
@@ -77,12 +76,10 @@ class CameraSetup:
             wake: called when somebody wants frames: on demand, the webcam opens then.
             tree: where devices are looked for.
             pull: pulls the public models.
-            before_new_source: called before frames of another source come.
             clock: to wait by.
         """
         self._settings, self._source, self._sink, self._board = settings, source, sink, board
         self._pipelines, self._wake, self._tree, self._clock = pipelines, wake, tree, clock
-        self._before_new_source = before_new_source
         self._first_source = settings.source.source
         self._checks = CheckRunner(checks)
         self._models = ModelJob(board.events, self.missing_models, self._models_came, pull)
@@ -155,8 +152,6 @@ class CameraSetup:
             if not isinstance(self._source, ChangeableSource):
                 raise ConflictError("this source cannot be changed while it runs", "start the camera with another one")
             self._wake()
-            if settings.source != self._settings.source.source:
-                self._before_new_source()
             try:
                 self._source.change(settings)
             except DeviceError as error:

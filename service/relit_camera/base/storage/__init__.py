@@ -1,4 +1,7 @@
-"""Files on disk: written whole or not at all (`atomic_files`), and stored by name in a folder (`named_files`)."""
+"""Files on disk: written whole or not at all (`atomic_files`), and stored by name in a folder (`named_files`).
+
+Texts that others may read name no folder of this machine (`folder_redaction`).
+"""
 
 from __future__ import annotations
 

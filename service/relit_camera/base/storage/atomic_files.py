@@ -50,7 +50,7 @@ def atomic_path(target: Path) -> Iterator[Path]:
     try:
         if target.is_dir():
             raise StorageError(f"cannot write {target}: it is a folder", "name a file in it")
-        temporary = target.with_name(f".{target.stem[:40]}{_UNFINISHED_MARK}{secrets.token_hex(4)}{target.suffix}")
+        temporary = target.with_name(f"{_unfinished_start(target)}{secrets.token_hex(4)}{target.suffix}")
         # Created with the mode it shall have in the end (not by `tempfile`, which creates private files): the kernel
         # applies the umask and the folder's access list, and nothing has to read or set the umask of all threads.
         handle = os.open(temporary, _CREATE_NEW, 0o666)
@@ -71,15 +71,17 @@ def atomic_path(target: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def remove_unfinished_files(folder: Path) -> list[Path]:
+def remove_unfinished_files(folder: Path, target: Path | None = None) -> list[Path]:
     """Delete the temporary files of `atomic_path` that killed programs left in a folder; returns those deleted.
 
-    Files that any process of this machine is still writing are left alone, and so are all other files. A folder that
-    does not exist or may not be written to is no error.
+    With `target` only those that were to become that file. Files that any process of this machine is still writing are
+    left alone, and so are all other files. A folder that does not exist or may not be written to is no error.
     """
     removed = []
     with suppress(OSError):
-        for path in [path for path in folder.iterdir() if _UNFINISHED_PATTERN.match(path.name)]:
+        start = "" if target is None else _unfinished_start(target)
+        found = [path for path in folder.iterdir() if _UNFINISHED_PATTERN.match(path.name)]
+        for path in [path for path in found if path.name.startswith(start)]:
             with suppress(OSError):
                 if _is_abandoned(path):
                     path.unlink()
@@ -157,6 +159,11 @@ def _is_abandoned(path: Path) -> bool:
     finally:
         os.close(handle)
     return True
+
+
+def _unfinished_start(target: Path) -> str:
+    """What the names of the temporary files begin with that become `target`."""
+    return f".{target.stem[:40]}{_UNFINISHED_MARK}"
 
 
 def _sync_folder(folder: Path) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.config.settings import SourceSettings
-from relit_camera.base.errors import ConflictError, DeviceError, RelitError
+from relit_camera.base.errors import ConflictError, DeviceError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.devices.device_discovery import FIRST_WEBCAM
 from relit_camera.devices.on_demand.on_demand_source import OnDemandSource
@@ -38,6 +38,7 @@ class ChangeableSource:
         make: MakeSource,
         wanted: Callable[[], bool] | None = None,
         clock: Clock = SYSTEM_CLOCK,
+        before_new_source: Callable[[], object] = lambda: None,
     ) -> None:
         """Make the source that the settings name; nothing is opened before the first `read`.
 
@@ -46,6 +47,8 @@ class ChangeableSource:
             make: makes a source from settings.
             wanted: whether a source should be open now (on demand); None for always.
             clock: to measure and wait by.
+            before_new_source: called in `read`, before the first frame of another device than the last frame's is
+                returned, for whatever reason it is another: `webcam` means the first one that is there.
 
         Raises:
             RelitError: the settings are wrong; a device that is missing is no such error.
@@ -53,6 +56,8 @@ class ChangeableSource:
         self.settings = settings
         self.opening_error: DeviceError | None = None
         self._make, self._wanted, self._clock = make, wanted, clock
+        self._before_new_source = before_new_source
+        self._last_read: tuple[str, str] | None = None  # kind and id of the source that gave the last frame
         self._numbering = FrameNumbering(clock)
         self._lock = threading.Lock()  # held while the source is exchanged, never while it is read
         self._changing = threading.Lock()
@@ -79,7 +84,12 @@ class ChangeableSource:
         with self._lock:
             if frame is None or source is not self._current:
                 return None  # of a source that was replaced meanwhile
-            return self._numbering.renumber(frame)
+            renumbered = self._numbering.renumber(frame)
+        info = source.describe()
+        if self._last_read not in (None, (info.kind, info.id)):
+            self._before_new_source()
+        self._last_read = info.kind, info.id
+        return renumbered
 
     @property
     def state(self) -> SourceState:
@@ -135,10 +145,10 @@ class ChangeableSource:
                 present = None
             try:
                 frame = self._first_frame(other)
-            except RelitError:
-                other.close()
+            except BaseException:
                 with self._lock:
                     self._paused = False  # one that was closed is made anew, from the settings as they were
+                other.close()
                 raise
             with self._lock:
                 self._numbering.begin_source(frame.index + 1, frame.time_s)

@@ -8,14 +8,14 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
-from relit_camera.base.config.look import Look, SettingsModel, SubjectName, merge_edits
+from relit_camera.base.config.look import Look, SettingsModel, merge_edits
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml
 from relit_camera.base.config.settings import RelitSettings, StorageSettings
@@ -49,7 +49,7 @@ class KeptScene(SettingsModel):
     """
 
     look: Look
-    subject: SubjectName | None = None
+    subject: str | None = None
     """A stored subject, or null for nobody; left out where the one shown is not stored."""
     configured_look: Look = Look()
     configured_subject: str | None = None
@@ -182,18 +182,20 @@ class SceneKeeper:
             look = look.model_copy(update={"mode": before.configured_look.mode})
         self._configured_look = look
         self._configured_subject = before.configured_subject if given.subject else settings.subject
-        self._written = self._present()
+        self._written: dict[str, object] | None = None
+        with suppress(RelitError, ValueError):  # `check` says why
+            self._written = self._present()
         self._failed = False
 
     def check(self) -> None:
         """Write what is shown, if that is not what the file has. A failure is logged, and tried again later."""
-        present = self._present()
-        if present == self._written:
-            return
         try:
+            present = self._present()
+            if present == self._written:
+                return
             make_folder(self._path.parent)
             write_atomic(self._path, yaml.safe_dump(present, sort_keys=False, allow_unicode=True))
-        except RelitError as error:
+        except (RelitError, ValueError) as error:  # also a name that is no text, of a file that a person put there
             if not self._failed:
                 log.warning("the look is not kept for the next start: %s", error)
             self._failed = True
@@ -201,6 +203,12 @@ class SceneKeeper:
         self._written, self._failed = present, False
 
     def _present(self) -> dict[str, object]:
+        """What the file is to have.
+
+        Raises:
+            StorageError: the folder of subjects cannot be read.
+            ValueError: the subject's name is no text that a file can keep.
+        """
         scene = self._scene_controller.scene
         kept = KeptScene(
             look=scene.look,

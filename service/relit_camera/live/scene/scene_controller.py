@@ -26,6 +26,7 @@ from relit_camera.base.errors import (
     InputError,
     NotFoundError,
     PreconditionFailedError,
+    RelitError,
     UnlitNotAllowedError,
 )
 from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, uint8_from_linear
@@ -38,7 +39,7 @@ from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map import resample_to_light_map
 from relit_camera.live.scene.background_store import BackgroundStore
 from relit_camera.live.scene.scene import Scene
-from relit_camera.live.scene.scene_history import SceneHistory, ScenePoint
+from relit_camera.live.scene.scene_history import SceneHistory, ScenePoint, TakeStep
 from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_store import SubjectStore
 
@@ -174,6 +175,8 @@ class SceneController:
         """
         with self._change:
             self.subjects.rename(name, new_name)
+            self._history.rename_subject(name, new_name)
+            self._first = self._first.with_renamed(name, new_name)
             return self._show(self._next(subject_name=new_name)) if self.scene.subject_name == name else self.scene
 
     def load_configured_subject(self, name_or_path: str | None) -> Scene:
@@ -247,10 +250,7 @@ class SceneController:
             RelitError: what was shown then is not stored any more; the step is dropped.
         """
         with self._change:
-            restored = self._history.undo(_point(self.scene), self._restored)
-            if restored is None:
-                raise ConflictError("there is nothing to undo", "change something first")
-            return self._show(restored)
+            return self._step(self._history.undo, ConflictError("there is nothing to undo", "change something first"))
 
     def redo(self) -> Scene:
         """Do the step again that was undone last. What may be published as filmed is never more after it.
@@ -260,10 +260,7 @@ class SceneController:
             RelitError: what was shown then is not stored any more; the step is dropped.
         """
         with self._change:
-            restored = self._history.redo(_point(self.scene), self._restored)
-            if restored is None:
-                raise ConflictError("there is nothing to do again", "undo something first")
-            return self._show(restored)
+            return self._step(self._history.redo, ConflictError("there is nothing to do again", "undo something first"))
 
     def reset(self) -> Scene:
         """Show what the settings say, as at the first start; it can be undone.
@@ -278,6 +275,17 @@ class SceneController:
             first = self._restored(replace(self._first, subject_name=name))
             self._history.note(_point(self.scene), _point(first), own_step=True)
             return self._show(replace(first, frozen=False))
+
+    def _step(self, take: TakeStep[Scene], nothing: ConflictError) -> Scene:
+        """Show the scene that a step of the history leads to; raises `nothing` where there is no step."""
+        try:
+            restored = take(_point(self.scene), self._restored)
+        except RelitError:
+            self._show(self._next())  # the same, but the step was dropped: there may be none left
+            raise
+        if restored is None:
+            raise nothing
+        return self._show(restored)
 
     def _restored(self, point: ScenePoint) -> Scene:
         """The next scene, with what `point` says of it; what may be published as filmed is never more."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from relit_camera.base.concurrency.clock import Clock
@@ -31,6 +31,14 @@ class ScenePoint:
     look: Look
     subject_name: str | None
     unlit_allowed: bool
+
+    def with_renamed(self, name: str, new_name: str) -> ScenePoint:
+        """The same, where subject `name` is called `new_name` now."""
+        return replace(self, subject_name=new_name) if self.subject_name == name else self
+
+
+TakeStep = Callable[[ScenePoint, Callable[[ScenePoint], T]], T | None]
+"""`SceneHistory.undo` or `SceneHistory.redo`."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +109,13 @@ class SceneHistory:
         # No later change belongs to this step, whatever its fields are.
         self._past.append(_Step(now, frozenset(), self._clock.now()))
         return restored
+
+    def rename_subject(self, name: str, new_name: str) -> None:
+        """Note that a stored subject has another name now."""
+        self._past = deque(
+            (replace(step, before=step.before.with_renamed(name, new_name)) for step in self._past), maxlen=MAX_STEPS
+        )
+        self._undone = [point.with_renamed(name, new_name) for point in self._undone]
 
 
 def changed_fields(before: ScenePoint, after: ScenePoint) -> frozenset[str]:

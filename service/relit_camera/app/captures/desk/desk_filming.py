@@ -22,16 +22,17 @@ from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import CaptureError, ConflictError, DeviceError, InputError, RelitError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.images.image_types import Frame
+from relit_camera.base.storage.folder_redaction import redact_folders
 from relit_camera.capture.desk.desk_recording import CameraPlace, DeskSetup, Screen
 from relit_camera.capture.desk.desk_session import DeskSession, SessionTimings
 from relit_camera.capture.desk.patterns.pattern_sequence import Pattern, pattern_light, standard_sequence
 from relit_camera.devices.webcam_controls import ControlDevice, find_exposure, hold_controls
 from relit_camera.live.frame_recorder import FrameRecorder
+from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.desk_status import DeskCaptureStatus, DeskPlace, DeskStage
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.subject.rungs import Rung
-from relit_camera.subject.subject import Subject
 
 log = logging.getLogger(__name__)
 
@@ -157,8 +158,8 @@ class DeskFilming:
             thread.join(3.0)
         return self.status()
 
-    def _run(self, name: str, setup: DeskSetup, canceled: threading.Event, before: Subject | None) -> None:
-        """Capture; `before` is who was shown when somebody asked for it."""
+    def _run(self, name: str, setup: DeskSetup, canceled: threading.Event, before: Scene) -> None:
+        """Capture; `before` is what was shown when somebody asked for it."""
         try:
             with self._controls() as device:
                 self._white_balance(setup)
@@ -169,17 +170,21 @@ class DeskFilming:
             setup = setup.model_copy(update={"locked": held.names})
             self._change(stage=DeskStage.BUILDING, patches=())
             limit_s, text = self._timings.building_timeout_s, setup.model_dump_json()
-            notes = self._maker.make(name, before, self._build, frames, text, timeout_s=limit_s, canceled=canceled)
-            self._change(stage=DeskStage.DONE, what="; ".join(notes))
+            notes, not_shown = self._maker.make(
+                name, REPLACED, before, self._build, frames, text, timeout_s=limit_s, canceled=canceled
+            )
+            self._change(stage=DeskStage.DONE, what="; ".join(filter(None, [*notes, not_shown])))
         except RelitError as error:
             if canceled.is_set():
                 self._change(stage=DeskStage.CANCELED, patches=())
             else:
                 log.warning("desk capture: %s", error)
-                self._change(stage=DeskStage.FAILED, patches=(), what=error.what, cure=error.cure)
+                what, cure = redact_folders(error.what), redact_folders(error.cure)
+                self._change(stage=DeskStage.FAILED, patches=(), what=what, cure=cure)
         except Exception as error:  # else the page would wait for ever
             log.exception("desk capture")
-            self._change(stage=DeskStage.FAILED, patches=(), what=f"the capture failed: {error}", cure="start again")
+            what = redact_folders(f"the capture failed: {error}")
+            self._change(stage=DeskStage.FAILED, patches=(), what=what, cure="start again")
 
     def _white_balance(self, setup: DeskSetup) -> None:
         """Wait until the page shows white, and the webcam has adapted to it."""

@@ -18,11 +18,12 @@ from relit_camera.app.captures.subject_maker import SubjectMaker, require_replac
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.concurrency.worker_process import Progress
 from relit_camera.base.errors import ConflictError, RelitError, StorageError
+from relit_camera.base.storage.folder_redaction import redact_folders
+from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.live.status.film_status import FilmCaptureStatus, FilmOptions, FilmReport, FilmStage
 from relit_camera.subject.rungs import Rung
-from relit_camera.subject.subject import Subject
 
 log = logging.getLogger(__name__)
 
@@ -170,10 +171,8 @@ class FilmProcessing:
             self._thread = threading.Thread(target=self._run, args=arguments, name="film-capture", daemon=True)
             self._thread.start()
 
-    def _run(
-        self, record: FilmRecord, canceled: threading.Event, progress: FilmProgress, before: Subject | None
-    ) -> None:
-        """Work; `before` is who was shown when somebody asked for it."""
+    def _run(self, record: FilmRecord, canceled: threading.Event, progress: FilmProgress, before: Scene) -> None:
+        """Work; `before` is what was shown when somebody asked for it."""
 
         def tell(stage: str, done: int, total: int | None) -> None:
             new_step = progress.note(stage, done, total)
@@ -185,8 +184,9 @@ class FilmProcessing:
         try:
             if film is None:
                 raise StorageError("the film is not there any more", "send it again")
-            report = self._maker.make(
+            report, not_shown = self._maker.make(
                 record.subject,
+                REPLACED,
                 before,
                 self._build,
                 film,
@@ -200,20 +200,21 @@ class FilmProcessing:
             )
             progress.finish()
             pictures = tuple(PICTURE_PATH.format(name) for name in report.pictures)
-            self._settle(record, progress, RecordedState.DONE, report=replace(report, pictures=pictures))
+            report = replace(report, pictures=pictures)
+            self._settle(record, progress, RecordedState.DONE, report=report, what=not_shown)
             self._files.keep_result()
         except RelitError as error:
             if not canceled.is_set():
                 log.warning("film capture: %s", error)
-                what = error.what.replace(str(film), f"'{record.file_name}'")
-                self._settle(record, progress, RecordedState.FAILED, what=what, cure=error.cure)
+                what = redact_folders(error.what.replace(str(film), f"'{record.file_name}'"))
+                self._settle(record, progress, RecordedState.FAILED, what=what, cure=redact_folders(error.cure))
             elif self._closing.is_set():
                 self._settle(record, progress, RecordedState.BEGUN)
             else:
                 self._settle(record, progress, RecordedState.CANCELED)
         except Exception as error:  # else nobody would hear that it has ended
             log.exception("the film capture failed")
-            what = f"it failed in a way that nobody expected ({type(error).__name__}: {error})"
+            what = redact_folders(f"it failed in a way that nobody expected ({type(error).__name__}: {error})")
             self._settle(record, progress, RecordedState.FAILED, what=what, cure="please report it")
 
     def _settle(self, record: FilmRecord, progress: FilmProgress, state: RecordedState, **changes: object) -> None:
