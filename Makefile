@@ -72,7 +72,7 @@ browser: ## Debian's Chromium, in which the panel is tested (root on Debian)
 	sh tests/browser/install.sh
 
 test-browser: setup ## the panel in a real browser
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup tests/browser
+	$(BIN)/python -m pytest tests/browser
 
 vm: ## build the virtual machine in which the camera is tried on a real kernel (root on Debian 12, two minutes)
 	sh tests/vm/build.sh

@@ -1,4 +1,4 @@
-"""State survives `kill -9`: ten times here, two hundred by hand (`python -m tests.crash`)."""
+"""State survives `kill -9`: six times here, two hundred by hand (`python -m tests.crash`)."""
 
 from __future__ import annotations
 

@@ -59,11 +59,10 @@ def fake(tmp_path: Path) -> Iterator[FakeServer]:
         yield server
 
 
-@pytest.fixture(scope="session")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ProcessCamera]:
-    """`relit demo` in a process of its own, with the bundled person, for tests that leave it as they find it."""
-    folder = tmp_path_factory.mktemp("demo")
-    with camera_process(folder, "demo", "--headless") as camera:
+@pytest.fixture
+def demo(tmp_path: Path) -> Iterator[ProcessCamera]:
+    """`relit demo` in a process of its own, with the bundled person, no longer than it is needed: it takes a core."""
+    with camera_process(tmp_path, "demo", "--headless") as camera:
         yield camera
 
 

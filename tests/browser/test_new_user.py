@@ -153,7 +153,10 @@ def test_a_capture_that_runs_already_is_told_and_joined(nobody: FakeServer, open
     page = open_panel(open_page, nobody.url).page
     expect(page.locator("#doors-state")).to_contain_text("hold still")
     page.locator("#door-face").click()
-    page.locator("#face-start").click()
+    with page.expect_response(
+        lambda answer: answer.request.method == "GET" and answer.url.endswith("captures/instant")
+    ):
+        page.locator("#face-start").click()
     expect(page.locator("#face-dialog")).to_have_attribute("data-step", "filming")
     capture.current = CaptureStatus(CaptureStage.DONE, "me")
     expect(page.locator("#face-dialog")).to_have_attribute("data-step", "done")
