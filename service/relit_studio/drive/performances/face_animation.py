@@ -28,8 +28,10 @@ VISEMES: dict[str, dict[str, float]] = {
     "ll": {"jawOpen": 0.14, "mouthUpperUp": 0.12, "mouthLowerDown": 0.08},
     "ff": {"jawOpen": 0.05, "mouthRollLower": 0.5, "mouthUpperUp": 0.16},
     "mm": {"mouthPress": 0.3, "mouthRollUpper": 0.22, "mouthRollLower": 0.22},
+    "teeth": {"jawOpen": 0.03, "mouthStretch": 0.2, "mouthSmile": 0.2, "mouthUpperUp": 0.4, "mouthLowerDown": 0.4},
+    "jaw": {"jawOpen": 0.6, "mouthUpperUp": 0.1, "mouthLowerDown": 0.15},
 }
-"""Mouth shapes as expression weights; a name without a side applies to both sides."""
+"""Mouth shapes as expression weights, bared teeth and a dropped jaw too; a name without a side applies to both."""
 _ONE_PIECE = frozenset(
     {"jawOpen", "jawLeft", "jawRight", "mouthFunnel", "mouthPucker", "mouthRollLower", "mouthRollUpper"}
 )
