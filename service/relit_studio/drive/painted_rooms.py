@@ -1,4 +1,4 @@
-"""Painted rooms for driving videos: one room, lit in four ways."""
+"""Painted rooms for driving videos: one room, lit in five ways."""
 
 from __future__ import annotations
 
@@ -36,6 +36,11 @@ def _ceiling() -> Canvas:
     return canvas
 
 
+def _lamp() -> Canvas:
+    """The day of `soft`, and a warm lamp at the picture's right, which a person may switch on."""
+    return blend_over(_soft(), panel_mask(62, 24, 26, 26, 4), color("#ffd3a1", 9.0))
+
+
 def _screen() -> Canvas:
     """Night: the screen alone, and its light on the walls near it."""
     bearing, _ = bearings()
@@ -50,6 +55,7 @@ _ROOMS: dict[str, Callable[[], Canvas]] = {
     "side-window": _side_window,
     "ceiling": _ceiling,
     "screen": _screen,
+    "lamp": _lamp,
 }
 ROOMS = tuple(_ROOMS)
 
