@@ -92,7 +92,10 @@ def test_the_table_of_threads_names_every_thread() -> None:
             if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("Thread", "ThreadPoolExecutor")):
                 named = [keyword.value for keyword in node.keywords if keyword.arg in ("name", "thread_name_prefix")]
                 named += node.args[1:2] if ast.unparse(node.func).endswith("Executor") else []
-                found |= {ast.unparse(value).split("'")[1] for value in named}
+                # Other names are arguments of what starts threads for others.
+                found |= {ast.unparse(value).split("'")[1] for value in named if "'" in ast.unparse(value)}
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("BackgroundJob", "checking_regularly"):
+                found.add(ast.literal_eval(node.args[0]))
     documented = {row[0].strip("`") for row in rows("architecture.md", "## Threads")}
     assert {re.sub(r"\{.*\}", "KIND", name) for name in found} == documented
 

@@ -16,6 +16,7 @@ from relit_camera.base.config.look import Look
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import ConflictError, NotFoundError, NotReadyError, RelitError
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.storage.upload import Upload
 from relit_camera.devices.webcam_formats import FrameSize
 from relit_camera.face.framing.framing import FaceCount, Framing, FramingItem, FramingState
 from relit_camera.live.scene.scene_controller import SceneController
@@ -195,21 +196,25 @@ class FakeFilmCapture:
         self.current = FilmCaptureStatus()
         self.film = folder / "film"
         self.options: FilmOptions | None = None
+        self.canceled = threading.Event()
+        self.written = 0
+        self.noted: list[tuple[str, ...]] = []
         self.pictures = {"studio": b"a JPEG file"}
 
     def status(self) -> FilmCaptureStatus:
         return self.current
 
     @contextmanager
-    def receive(self, name: str, file_name: str, options: FilmOptions) -> Iterator[Path]:
+    def receive(self, name: str, file_name: str, options: FilmOptions) -> Iterator[Upload]:
         if self.current.stage.is_running:
             raise ConflictError("a capture from a film runs already", "wait for its end, or cancel it")
         before, self.current = self.current, FilmCaptureStatus(FilmStage.RECEIVING, name, file_name)
         self.film.parent.mkdir(parents=True, exist_ok=True)
         try:
-            yield self.film
+            yield Upload(self.film, self.canceled)
         except BaseException:
             self.current = before
+            self.written = self.film.stat().st_size if self.film.exists() else 0
             self.film.unlink(missing_ok=True)
             raise
         self._read(options)
@@ -226,6 +231,12 @@ class FakeFilmCapture:
         elif self.current.stage.is_running:
             self.current = replace(self.current, stage=FilmStage.CANCELED, can_resume=True)
         return self.current
+
+    def subject_renamed(self, name: str, new_name: str) -> None:
+        self.noted.append((name, new_name))
+
+    def subject_removed(self, name: str) -> None:
+        self.noted.append((name,))
 
     def picture(self, name: str) -> bytes:
         if name not in self.pictures:
@@ -254,13 +265,13 @@ class FakeReplays:
         return self.found[name]
 
     @contextmanager
-    def receive(self, name: str, file_name: str) -> Iterator[Path]:
+    def receive(self, name: str, file_name: str) -> Iterator[Upload]:
         if any(each.stage.is_running for each in self.found.values()):
             raise ConflictError("a video is being relit already", "wait for its end, or delete it")
         if name in self.found:
             raise ConflictError(f"there is a replay '{name}' already", "choose another name")
         self.folder.mkdir(parents=True, exist_ok=True)
-        yield self.folder / f"{name}.mp4"
+        yield Upload(self.folder / f"{name}.mp4")
         self.found[name] = ReplayStatus(name, ReplayStage.WORKING)
 
     def video(self, name: str) -> Path:

@@ -80,11 +80,3 @@ def test_the_page_of_the_film_capture_warns_first(client: Client) -> None:
     for file in ("film.js", "film.css"):
         assert f"/panel/capture/{file}" in page.text
         assert client.get(f"/panel/capture/{file}").status_code == 200
-
-
-def test_one_kind_of_capture_at_a_time(client: Client, camera: FakeCamera) -> None:
-    client.post("/api/v1/captures/instant", json={})
-    check_problem(client.post("/api/v1/captures/desk", json=PLACE), 409)
-    client.delete("/api/v1/captures/instant")
-    assert client.post("/api/v1/captures/desk", json=PLACE).status_code == 202
-    check_problem(client.post("/api/v1/captures/instant", json={}), 409)

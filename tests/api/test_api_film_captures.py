@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -42,6 +43,27 @@ def test_a_film_is_sent_followed_canceled_and_resumed(client: Client, camera: Fa
     assert camera.film_capture.options == FilmOptions(focal_px=800)
     assert client.delete(f"{PATH}?forget=true").json()["stage"] == "idle"
     check_problem(client.post(f"{PATH}/resume"), 409)
+
+
+def test_an_upload_that_is_canceled_ends_at_the_next_piece(client: Client, camera: FakeCamera) -> None:
+    begin = (
+        b'--limit\r\nContent-Disposition: form-data; name="name"\r\n\r\nme\r\n'
+        b'--limit\r\nContent-Disposition: form-data; name="file"; filename="evening.mp4"\r\n\r\n'
+    )
+    sent: list[int] = []
+
+    async def body() -> AsyncIterator[bytes]:
+        yield begin
+        for index in range(30):
+            sent.append(index)
+            if index == 3:
+                camera.film_capture.canceled.set()
+            yield bytes(streamed_forms.CHUNK_BYTES)
+        yield b"\r\n--limit--\r\n"
+
+    answer = client.post(PATH, content=body(), headers={"content-type": "multipart/form-data; boundary=limit"})
+    check_problem(answer, 409)
+    assert camera.film_capture.written < 6 * streamed_forms.CHUNK_BYTES
 
 
 def test_the_report_is_given_whole(client: Client, camera: FakeCamera) -> None:

@@ -96,6 +96,13 @@ def test_a_store_without_a_folder_is_empty(tmp_path: Path) -> None:
         store.remove("x")
 
 
+def test_a_preset_keeps_no_subject_that_is_not_stored(client: Client, camera: FakeCamera) -> None:
+    camera.scene_controller.show_subject("guest", small_subject())
+    assert client.request("PUT", f"{PRESETS}/mine").json()["subject"] is None
+    assert client.post(f"{PRESETS}/mine/apply").status_code == 200
+    assert camera.scene_controller.scene.subject_name == "guest"
+
+
 def test_a_preset_shows_its_subject_again(client: Client, camera: FakeCamera) -> None:
     for name in ("ada", "bea"):
         write_subject(camera.scene_controller.subjects.new_path(name), small_subject())

@@ -71,6 +71,7 @@ def test_a_subject_is_listed_chosen_and_deleted(client: Client, camera: FakeCame
     assert client.put("/api/v1/subject", {"name": None}).json() == {"name": None}
     assert camera.scene_controller.scene.subject is None
     assert client.delete("/api/v1/subjects/ada").status_code == 204
+    assert camera.film_capture.noted == [("ada",)]
     assert not (stored / "ada.relit").exists()
     check_problem(client.delete("/api/v1/subjects/ada"), 404)
 
@@ -176,6 +177,7 @@ def test_a_subject_is_renamed_also_while_it_is_shown(client: Client, camera: Fak
     client.put("/api/v1/subject", {"name": "ada"})
     revision = camera.scene_controller.scene.revision
     answer = client.patch("/api/v1/subjects/ada", {"name": "bea"})
+    assert camera.film_capture.noted == [("ada", "bea")]
     assert answer.status_code == 200, answer.text
     assert (answer.json()["name"], answer.json()["is_current"]) == ("bea", True)
     assert client.get("/api/v1/subject").json() == {"name": "bea"}

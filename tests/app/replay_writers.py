@@ -18,7 +18,7 @@ def write_quickly(work: ReplayWork, out: Path, tell: Progress) -> ReplayOutcome:
     tell("Relighting", 15, 30)
     lighting = work.scene.look.lighting
     who = work.subject if isinstance(work.subject, str) else f"{work.subject.metadata.width} pixels"
-    out.write_text(f"{who} at {lighting.yaw_deg:g}, split {lighting.split:g}")
+    out.write_text(f"{who} at {lighting.yaw_deg:g}, split {lighting.split:g} by {work.settings.tracker.name}")
     return ReplayOutcome(30, 28, ("slow: a network is missing",))
 
 

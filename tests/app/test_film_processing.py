@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import stat
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from relit_camera.app.captures.film.film_worker import DRAWING
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import ConflictError, InputError, NotFoundError, StorageError
-from relit_camera.capture.film.pipeline.film_subject import ALL_STAGES
+from relit_camera.capture.film.pipeline.film_capture import STAGES
+from relit_camera.capture.film.pipeline.film_subject import BUILDING
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.live.status.film_status import FilmCaptureStatus, FilmOptions, FilmStage
@@ -49,8 +51,8 @@ class Studio:
         meanwhile: Callable[[], object] = lambda: None,
     ) -> None:
         """Send a film; `meanwhile` is called before its end."""
-        with self.capture.receive(name, file, options or FilmOptions()) as path:
-            path.write_bytes(data)
+        with self.capture.receive(name, file, options or FilmOptions()) as upload:
+            upload.path.write_bytes(data)
             meanwhile()
 
     def end(self) -> FilmCaptureStatus:
@@ -78,6 +80,8 @@ def studio(tmp_path: Path) -> Iterator[Opener]:
     studios: list[Studio] = []
 
     def make(build: FilmBuilder) -> Studio:
+        for each in studios:  # another one is a restart
+            each.capture.close()
         studios.append(Studio(tmp_path, build))
         return studios[-1]
 
@@ -187,10 +191,22 @@ def test_an_upload_that_breaks_off_leaves_everything_as_it_was(studio: Opener) -
 
 def test_an_upload_that_is_canceled_is_not_begun(studio: Opener) -> None:
     there = studio(build_film)
+    ended: list[FilmCaptureStatus] = []
+    cancel = threading.Thread(target=lambda: ended.append(there.capture.cancel(forget=True)))
+
+    def send_while_somebody_cancels() -> None:
+        with there.capture.receive("me", "evening.mp4", FilmOptions()) as upload:
+            upload.path.write_bytes(FILM)
+            cancel.start()
+            assert upload.canceled.wait(10)
+            upload.require_wanted()
+
     with pytest.raises(ConflictError, match="was canceled"):
-        there.send(meanwhile=there.capture.cancel)
-    assert there.capture.status().stage is FilmStage.IDLE
+        send_while_somebody_cancels()
+    cancel.join(10)
+    assert [each.stage for each in ended] == [FilmStage.IDLE]  # once the upload had ended
     assert there.files() == set()
+    assert there.told() == ["receiving", "idle"]
 
 
 def test_another_film_replaces_the_one_that_is_there(studio: Opener) -> None:
@@ -199,7 +215,10 @@ def test_another_film_replaces_the_one_that_is_there(studio: Opener) -> None:
     there.end()
     there.send(file="second.mp4")
     assert there.end().film == "second.mp4"
-    assert there.files() == {RECORD_NAME, "film.mp4"}
+    record = there.capture._files.read()
+    assert record is not None
+    assert there.files() == {RECORD_NAME, record.film}
+    assert record.film.endswith(".mp4")
 
 
 @pytest.mark.parametrize("build", [refuse_film, build_film])
@@ -262,7 +281,7 @@ def test_a_film_that_is_gone_cannot_be_resumed(studio: Opener) -> None:
     there = studio(refuse_film)
     there.send()
     there.end()
-    (there.folder / "film.mp4").unlink()
+    next(there.folder.glob("film-*.mp4")).unlink()
     assert not studio(refuse_film).capture.status().can_resume
 
 
@@ -278,10 +297,104 @@ def test_a_record_that_cannot_be_written_is_told_and_nothing_begins(
     with pytest.raises(StorageError):
         there.send()
     assert there.capture.status() == FilmCaptureStatus()
+    assert there.files() == set()
+
+
+def test_a_film_whose_record_cannot_be_written_leaves_the_one_before(
+    studio: Opener, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there = studio(refuse_film)
+    there.send(file="first.mov")
+    before, files = there.end(), there.files()
+
+    def full(*_: object) -> None:
+        raise StorageError("cannot write capture.json: no space", "free some space")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("relit_camera.app.captures.film.film_folder.write_atomic", full)
+        with pytest.raises(StorageError):
+            there.send("you", b"another film", "second.mp4")
+    assert (there.capture.status(), there.files()) == (before, files)
+    there.capture.resume(FilmOptions(light_distance_cm=80))
+    done = there.end()
+    assert (done.stage, done.subject, done.film) == (FilmStage.DONE, "me", "first.mov")
+
+
+def test_work_that_cannot_begin_is_told_and_can_be_resumed(studio: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+    there = studio(build_film)
+
+    def refuse(thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(threading.Thread, "start", refuse)
+        with pytest.raises(RuntimeError):
+            there.send()
+    assert (there.capture.status().stage, there.capture.status().can_resume) == (FilmStage.INTERRUPTED, True)
+    assert there.told()[-1] == "interrupted"
+    there.capture.resume()
+    assert there.end().stage is FilmStage.DONE
+
+
+def test_another_process_deletes_nothing_and_is_refused(studio: Opener, tmp_path: Path) -> None:
+    there = studio(build_film)
+    with there.capture.receive("me", "evening.mp4", FilmOptions()) as upload:
+        upload.path.write_bytes(FILM)
+        other = Studio(tmp_path, build_film)
+        assert upload.path.exists()
+        with pytest.raises(ConflictError, match="another Relit Camera") as refused:
+            other.send("you")
+        assert "data folder of its own" in refused.value.cure
+        with pytest.raises(ConflictError, match="another Relit Camera"):
+            other.capture.cancel(forget=True)
+        assert other.capture.status() == FilmCaptureStatus()
+    assert there.end().stage is FilmStage.DONE
+    there.capture.close()
+    other.send("you")  # it has the folder from now on
+    assert other.end().stage is FilmStage.DONE
+    other.capture.close()
+
+
+def test_the_report_has_the_new_name_of_its_subject_and_goes_with_it(studio: Opener) -> None:
+    there = studio(build_film)
+    there.send()
+    there.end()
+    there.capture.subject_renamed("you", "she")
+    assert there.capture.status().subject == "me"
+    there.scenes.rename_stored_subject("me", "ada")
+    there.capture.subject_renamed("me", "ada")
+    assert there.capture.status().subject == "ada"
+    again = studio(build_film)
+    assert again.capture.status().subject == "ada"
+    again.capture.subject_removed("me")
+    assert again.capture.picture("studio") == b"a picture"
+    again.capture.subject_removed("ada")
+    assert (again.capture.status(), again.files()) == (FilmCaptureStatus(), set())
+
+
+def test_the_report_of_a_subject_that_was_deleted_by_other_means_goes_at_the_next_start(studio: Opener) -> None:
+    there = studio(build_film)
+    there.send()
+    there.end()
+    there.scenes.subjects.remove("me")
+    again = studio(build_film)
+    assert (again.capture.status(), again.files()) == (FilmCaptureStatus(), set())
+
+
+def test_a_mode_that_was_chosen_meanwhile_stays_though_it_is_the_same_again(studio: Opener) -> None:
+    there = studio(keep_and_wait)
+    there.send()
+    wait_until(lambda: there.capture.status().stage is FilmStage.BUILDING)
+    there.capture.cancel()
+    there.capture.resume()
+    there.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.RATIO}))
+    there.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.REENACT}))
+    assert there.end().stage is FilmStage.DONE
+    assert (there.scenes.scene.subject_name, there.scenes.scene.look.mode) == ("me", Mode.REENACT)
 
 
 def test_the_steps_are_those_that_the_work_tells() -> None:
-    assert tuple(SHARES) == (*ALL_STAGES, DRAWING)
+    assert tuple(SHARES) == (*STAGES, BUILDING, DRAWING)
     assert sum(SHARES.values()) == pytest.approx(1)
 
 

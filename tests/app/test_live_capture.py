@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,7 @@ TIMINGS = LiveCaptureTimings(frames=3, interval_s=0.0, filming_timeout_s=2.0, bu
 class Studio:
     """A scene controller, a camera that gives frames while `on`, and the capture under test."""
 
-    def __init__(self, folder: Path, build: SubjectBuilder) -> None:
+    def __init__(self, folder: Path, build: SubjectBuilder, timings: LiveCaptureTimings | None = None) -> None:
         self.scenes = SceneController(StorageSettings(data_dir=folder))
         self.scenes.set_look(Look())
         self.recorder = FrameRecorder()
@@ -38,7 +39,10 @@ class Studio:
         events = EventHub()
         self._listening = events.listen()
         self.events = self._listening.__enter__()
-        self.capture = LiveCapture(self.recorder, self.scenes, events, build, self._wake, TIMINGS)
+        self.webcam = threading.Lock()
+        self.capture = LiveCapture(
+            self.recorder, self.scenes, events, build, self._wake, timings or TIMINGS, webcam=self.webcam
+        )
         self._stop = threading.Event()
         self._camera = threading.Thread(target=self._run)
         self._camera.start()
@@ -249,3 +253,39 @@ def test_a_better_subject_is_not_replaced_but_an_instant_one_is(studio: Callable
     camera.capture.start("instant")
     wait_until(camera.ended)
     assert camera.capture.status().stage is CaptureStage.DONE
+
+
+def test_another_capture_that_needs_the_webcam_is_waited_for(studio: Callable[[SubjectBuilder], Studio]) -> None:
+    camera = studio(build)
+    assert camera.webcam.acquire(blocking=False)
+    with pytest.raises(ConflictError, match="another capture runs"):
+        camera.capture.start("me")
+    camera.webcam.release()
+    camera.capture.start("me")
+    assert not camera.webcam.acquire(blocking=False)
+    wait_until(camera.ended)
+    assert camera.webcam.acquire(blocking=False)
+
+
+def test_attempts_pause_while_another_capture_needs_the_webcam(studio: Callable[[SubjectBuilder], Studio]) -> None:
+    camera = studio(refuse)
+    camera.capture.start("me", until_done=True)
+    wait_until(lambda: camera.capture.status().stage is CaptureStage.FAILED and camera.webcam.acquire(blocking=False))
+    camera.stages()
+    time.sleep(0.3)  # some pauses
+    assert camera.stages() == []
+    camera.webcam.release()
+    wait_until(lambda: "filming" in camera.stages())
+
+
+def test_who_asks_during_a_pause_begins_at_once(tmp_path: Path) -> None:
+    camera = Studio(tmp_path, refuse, replace(TIMINGS, retry_s=600.0))
+    try:
+        camera.capture.start("me", until_done=True)
+        wait_until(lambda: camera.capture.status().stage is CaptureStage.FAILED)
+        assert camera.capture.start("you").stage is CaptureStage.FILMING
+        wait_until(camera.ended)
+        status = camera.capture.status()
+        assert (status.stage, status.subject) == (CaptureStage.FAILED, "you")
+    finally:
+        camera.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -38,17 +39,27 @@ class Room:
         self.events = self._listening.__enter__()
         settings = (settings or RelitSettings()).model_copy(update={"storage": storage})
         limits = ReplayLimits(timeout_s=120.0, event_interval_s=0.0)
-        self.jobs = ReplayJobs(self.folder, settings, self.scenes, events, write, limits)
+        self.settings = settings
+        self.jobs = ReplayJobs(self.folder, lambda: self.settings, self.scenes, events, write, limits)
 
     def send(self, name: str = "talk", data: bytes = VIDEO, meanwhile: Callable[[], object] = lambda: None) -> None:
         """Send a video; `meanwhile` is called before its end."""
-        with self.jobs.receive(name, "my talk.mov") as path:
-            path.write_bytes(data)
+        with self.jobs.receive(name, "my talk.mov") as upload:
+            upload.path.write_bytes(data)
             meanwhile()
 
     def end(self, name: str = "talk") -> ReplayStatus:
         wait_until(lambda: not self.jobs.status(name).stage.is_running, 120)
         return self.jobs.status(name)
+
+    def stages(self) -> list[str]:
+        """The stages that were told since the last call."""
+        told = []
+        while not self.events.empty():
+            event = self.events.get()
+            if event.kind == "replay":
+                told.append(str(event.data["stage"]))
+        return told
 
     def files(self) -> set[str]:
         return {path.name for path in self.folder.iterdir()}
@@ -62,6 +73,8 @@ def room(tmp_path: Path) -> Iterator[Opener]:
     rooms: list[Room] = []
 
     def make(write: ReplayWriter) -> Room:
+        for each in rooms:  # another one is a restart
+            each.jobs.close()
         rooms.append(Room(tmp_path, write))
         return rooms[-1]
 
@@ -77,7 +90,7 @@ def test_a_video_is_relit_as_the_scene_says_whole_and_kept(room: Opener) -> None
     path = "/api/v1/replays/talk/video"
     what = "no face was found in 2 of 30 frames; slow: a network is missing"
     assert done == ReplayStatus("talk", ReplayStage.DONE, 1.0, 30, path, what)
-    assert there.jobs.video("talk").read_text() == "16 pixels at 40, split 0"
+    assert there.jobs.video("talk").read_text() == "16 pixels at 40, split 0 by mesh"
     assert there.files() == {"talk.mp4"}
     told = []
     while not there.events.empty():
@@ -151,10 +164,59 @@ def test_an_upload_that_breaks_off_or_is_removed_is_not_begun(room: Opener) -> N
 
     with pytest.raises(OSError, match="gone"):
         there.send(meanwhile=break_off)
+    assert there.stages() == ["receiving", "canceled"]  # whoever shows it must hear of its end
+    remove = threading.Thread(target=there.jobs.remove, args=("talk",))
+
+    def send_while_somebody_removes() -> None:
+        with there.jobs.receive("talk", "my talk.mov") as upload:
+            upload.path.write_bytes(VIDEO)
+            remove.start()
+            assert upload.canceled.wait(10)
+            upload.require_wanted()
+
     with pytest.raises(ConflictError, match="canceled"):
-        there.send(meanwhile=lambda: there.jobs.remove("talk"))
+        send_while_somebody_removes()
+    remove.join(10)
     assert there.files() == set()
     assert there.jobs.all() == []
+
+
+def test_work_that_cannot_begin_leaves_nothing(room: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+    there = room(write_quickly)
+
+    def refuse(thread: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(threading.Thread, "start", refuse)
+        with pytest.raises(RuntimeError):
+            there.send()
+    assert (there.files(), there.jobs.all()) == (set(), [])
+    there.send()
+    assert there.end().stage is ReplayStage.DONE
+
+
+def test_another_process_deletes_nothing_and_is_refused(room: Opener, tmp_path: Path) -> None:
+    there = room(write_quickly)
+    with there.jobs.receive("talk", "my talk.mov") as upload:
+        upload.path.write_bytes(VIDEO)
+        other = Room(tmp_path, write_quickly)
+        assert upload.path.exists()
+        with pytest.raises(ConflictError, match="another Relit Camera"):
+            other.send("song")
+    assert there.end().stage is ReplayStage.DONE
+    there.jobs.close()
+    other.send("song")
+    assert other.end("song").stage is ReplayStage.DONE
+    other.jobs.close()
+
+
+def test_a_tracker_that_was_chosen_since_the_start_is_used(room: Opener) -> None:
+    there = room(write_quickly)
+    there.settings = there.settings.model_copy(update={"tracker": TrackerSettings(name="openseeface")})
+    there.send()
+    there.end()
+    assert there.jobs.video("talk").read_text().endswith("by openseeface")
 
 
 def test_nobody_to_relight_names_and_suffixes_are_told_first(room: Opener) -> None:

@@ -13,9 +13,10 @@ import pytest
 
 from relit_camera.app.demo import demo_files
 from relit_camera.base.video.video_readers import VideoReader, probe_video
+from relit_camera.capture.subject_builder import measured_fraction
 from relit_camera.cli.commands.demo import opens_in_browser
 from relit_camera.face.tracking.track_recording import read_track
-from relit_camera.subject.subject_file import read_subject
+from relit_camera.subject.subject_file import read_metadata, read_subject
 from tests.api.api_client import decoded_picture
 from tests.cli.relit_command import call, start
 from tests.small_camera import wait_until
@@ -81,6 +82,7 @@ def test_the_bundled_person_is_live_and_in_ratio(demo: tuple[list[str], httpx.Cl
     now = status(demo[1])
     assert now["state"] == "live"
     assert (now["subject"], now["mode"]) == ("adam", "ratio")
+    assert demo[1].get("scene").json()["rung"] == "pictures"
     assert now["degraded"] == []
     let_run(demo[1], 3)  # longer than a stranger is on trial
     assert status(demo[1])["mode"] == "ratio"
@@ -141,6 +143,20 @@ def test_credits_are_with_the_person() -> None:
     assert "Lee Perry-Smith" in text
     assert "CC-BY 3.0" in text
     assert "ICT-FaceKit" in text
+
+
+def test_the_panel_is_told_how_the_bundled_person_was_captured(tmp_path: Path) -> None:
+    noted = demo_files.noted_subject(tmp_path / "demo")
+    told = read_metadata(noted)
+    assert (told.rung, told.measured_fraction) == ("pictures", 1.0)
+    shipped = read_metadata(demo_files.SUBJECT)
+    assert told.model_copy(update={"rung": shipped.rung, "measured_fraction": shipped.measured_fraction}) == shipped
+    subject = read_subject(noted)
+    assert measured_fraction(subject.light_directions.astype(np.float64)) == pytest.approx(told.measured_fraction)
+    np.testing.assert_array_equal(subject.neutral, read_subject(demo_files.SUBJECT).neutral)
+    assert noted == demo_files.noted_subject(tmp_path / "demo")
+    (tmp_path / "file").touch()
+    assert demo_files.noted_subject(tmp_path / "file") == demo_files.SUBJECT
 
 
 def test_the_bundled_subject_is_as_any_other() -> None:

@@ -15,7 +15,7 @@ from relit_camera.app.wiring import make_follower, make_pipeline, mode_factories
 from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
 from relit_camera.base.config.settings import InferenceSettings, RelitSettings
 from relit_camera.base.errors import ModelError, SubjectError
-from relit_camera.base.images.image_types import Alpha, Frame
+from relit_camera.base.images.image_types import Alpha, Frame, LinearImage
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.motion.face_follower import FaceMotion
@@ -25,6 +25,8 @@ from relit_camera.light.environments.builtin.builtin_environments import builtin
 from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.pipeline import Pipeline, subject_troubles
+from relit_camera.live.reenactment.reenactor import WarpedLayer
+from relit_camera.live.reenactment.rest_layer import RestLayer
 from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import DegradationCode
@@ -205,6 +207,33 @@ def test_without_a_face_mode_ratio_shows_what_reenact_does_unless_the_live_pictu
     )
     assert not ratio.unlit
     assert difference(ratio.image, reenact.image) < 2
+
+
+@pytest.mark.parametrize("blend", [1.0, 0.5])
+def test_the_subject_at_rest_is_placed_once_while_nothing_changes(
+    blend: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    placed: list[LinearImage] = []
+    whole = RestLayer.render
+
+    def render(layer: RestLayer, relit: LinearImage) -> WarpedLayer:
+        placed.append(relit)
+        return whole(layer, relit)
+
+    monkeypatch.setattr(RestLayer, "render", render)
+    made = pipeline(Blind())
+    shown = [
+        scene(mode=Mode.RATIO, unlit_allowed=False, lighting={"blend": blend, "exposure_ev": ev}) for ev in (0, -2)
+    ]
+    for index in range(5):
+        made.process(frame(index), shown[0])
+    assert len(placed) == 1
+    pictures = [made.process(frame(index), shown[1]).image for index in range(5, 60)]
+    assert len(placed) > 2  # the light changes, step by step
+    assert difference(pictures[0], pictures[-1]) > 5
+    count = len(placed)
+    made.process(frame(60), shown[1])
+    assert len(placed) == count
 
 
 def test_a_face_that_comes_or_goes_is_eased_between_the_subject_at_rest_and_the_relit_picture() -> None:

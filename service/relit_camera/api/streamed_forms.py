@@ -24,6 +24,7 @@ from starlette.exceptions import HTTPException
 from relit_camera.api.middleware.body_limits import body_too_large
 from relit_camera.base.errors import InputError, StorageError
 from relit_camera.base.storage.atomic_files import storage_error
+from relit_camera.base.storage.upload import Upload
 
 if TYPE_CHECKING:
     from python_multipart.multipart import MultipartCallbacks
@@ -34,9 +35,9 @@ MAX_FIELD_BYTES = 4096
 MAX_FIELDS = 32
 
 Model = TypeVar("Model", bound=BaseModel)
-FileOpener = Callable[[Mapping[str, str], str], AbstractContextManager[Path]]
-"""Called with the fields before the file, and with the file's name; gives the path to write to for the length of a
-context, which ends with the error where the form ends early."""
+FileOpener = Callable[[Mapping[str, str], str], AbstractContextManager[Upload]]
+"""Called with the fields before the file, and with the file's name; gives what to write to for the length of a context,
+which ends with the error where the form ends early."""
 
 
 async def receive_form(request: Request, open_file: FileOpener, most_bytes: int) -> None:
@@ -53,6 +54,7 @@ async def receive_form(request: Request, open_file: FileOpener, most_bytes: int)
         HTTPException: 415, the body is no form; 400, it is not a whole one.
         RequestValidationError: the file is missing, or a field comes after it.
         TooLargeError: the file is too large.
+        ConflictError: it was canceled meanwhile.
         StorageError: there is too little room for it, or it cannot be written.
         InputError: the file is empty.
         RelitError: of `open_file`.
@@ -115,7 +117,7 @@ class _Form:
         self._field, self._text = "", bytearray()
         self._in_file = self._whole = False
         self._file: BinaryIO | None = None
-        self._path = Path()
+        self._upload: Upload | None = None
         self._written = 0
 
     def callbacks(self) -> MultipartCallbacks:
@@ -167,16 +169,17 @@ class _Form:
         self._open(Path(file_name.decode(errors="replace").replace("\\", "/")).name)
 
     def _open(self, file_name: str) -> None:
-        self._path = self._with_files.enter_context(self._open_file(self._fields, file_name))
-        free = disk_usage(self._path.parent).free
+        self._upload = self._with_files.enter_context(self._open_file(self._fields, file_name))
+        path = self._upload.path
+        free = disk_usage(path.parent).free
         if self._announced > free // 2:
             what = f"the file has {self._announced / 1e6:.0f} MB, the disk has {free / 1e6:.0f} MB left"
             raise StorageError(what, "half of it may be used: free some space")
         self._most_bytes = min(self._most_bytes, free // 2)
         try:
-            self._file = self._with_files.enter_context(self._path.open("wb"))
+            self._file = self._with_files.enter_context(path.open("wb"))
         except OSError as error:
-            raise storage_error(self._path, error) from error
+            raise storage_error(path, error) from error
         self._in_file = True
 
     def _data(self, data: bytes, start: int, end: int) -> None:
@@ -186,21 +189,24 @@ class _Form:
                 raise _field_error(self._field, f"is longer than {MAX_FIELD_BYTES} bytes", "too_long")
             return
         assert self._file is not None
+        assert self._upload is not None
+        self._upload.require_wanted()
         self._written += end - start
         if self._written > self._most_bytes:
             raise body_too_large(self._written, self._most_bytes)
         try:
             self._file.write(data[start:end])
         except OSError as error:
-            raise storage_error(self._path, error) from error
+            raise storage_error(self._upload.path, error) from error
 
     def _part_ends(self) -> None:
         if self._in_file:
             assert self._file is not None
+            assert self._upload is not None
             try:
                 self._file.flush()
             except OSError as error:
-                raise storage_error(self._path, error) from error
+                raise storage_error(self._upload.path, error) from error
             self._in_file = False
             return
         if self._field in self._fields:

@@ -54,7 +54,7 @@ from relit_camera.live.status.camera_status import (
 from relit_camera.live.status.capture_status import CaptureStage
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.live.status.setup_status import SpeedAdvice
-from relit_camera.live.status.speed_advice import SpeedState, next_speed, speed_advice
+from relit_camera.live.status.speed_advice import SpeedState, next_speed, reduced_quality, speed_advice
 from relit_camera.live.status.status_board import StatusBoard
 from relit_camera.live.supervision.camera_loop import CameraLoop, LoopTimings, Placeholders, publish_if_current
 from relit_camera.live.supervision.fallback_renderer import FallbackRenderer
@@ -145,7 +145,10 @@ class CameraService:
 
         recorder = FrameRecorder()
         self._filmed = FilmedFrames(size)
-        self.instant_capture = LiveCapture(recorder, scene_controller, self.events, write_instant_subject, on_viewer)
+        webcam = threading.Lock()
+        self.instant_capture = LiveCapture(
+            recorder, scene_controller, self.events, write_instant_subject, on_viewer, webcam=webcam
+        )
         self.desk_capture = DeskFilming(
             recorder,
             scene_controller,
@@ -155,10 +158,13 @@ class CameraService:
             ControlsNote(settings.storage.data_dir, lambda: find_webcam(source.describe().id).id),
             lambda: 1 / max(source.describe().fps, 1.0),
             on_viewer,
+            webcam=webcam,
         )
         storage = settings.storage
         self.film_capture = FilmProcessing(storage.film_capture, scene_controller, self.events, write_film_subject)
-        self.replays = ReplayJobs(storage.replays, settings, scene_controller, self.events, write_replay)
+        self.replays = ReplayJobs(
+            storage.replays, lambda: self.setup.settings, scene_controller, self.events, write_replay
+        )
         self._publisher = Publisher(
             sink,
             settings.output.fps,
@@ -286,7 +292,7 @@ class CameraService:
         ]
         load = self._supervisor.load
         state = CameraState.FROZEN if scene.frozen else self._board.state
-        reduced = [_reduced_quality(load.latency_s or 0.0)] if load.level else []
+        reduced = [reduced_quality(load.latency_s or 0.0, self._pipelines.size)] if load.level else []
         fps = Rates(
             self._loop.camera_rate.rate(),
             self._loop.pipeline_rate.rate(),
@@ -361,12 +367,3 @@ class CameraService:
 
     def _scene(self) -> Scene:
         return self.scene_controller.scene
-
-
-def _reduced_quality(latency_s: float) -> Degradation:
-    return Degradation(
-        code=DegradationCode.REDUCED_QUALITY,
-        what="pictures have less detail",
-        why=f"the computer is busy: they come {1e3 * latency_s:.0f} ms late",
-        cure="close other programs, or choose a smaller output, such as 640x360; full quality comes back by itself",
-    )

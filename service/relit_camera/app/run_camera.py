@@ -28,9 +28,10 @@ from relit_camera.app.setup.needed_models import missing_models
 from relit_camera.app.setup.startup_checks import check_before_devices
 from relit_camera.app.systemd import notify_systemd
 from relit_camera.app.wiring import make_tracker
+from relit_camera.base.concurrency.regular_checks import checking_regularly
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.concurrency.threads import freeze_gc, limit_threads
-from relit_camera.base.config.config_watcher import watch_config
+from relit_camera.base.config.config_watcher import ConfigWatcher
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
 from relit_camera.base.errors import ModelError, RelitError
 from relit_camera.base.storage.atomic_files import remove_unfinished_files
@@ -42,7 +43,7 @@ from relit_camera.devices.sources.changeable_source import ChangeableSource
 from relit_camera.devices.sources.source import Source
 from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.face.face_state import Tracker
-from relit_camera.live.scene.kept_scene import GivenOptions, SceneKeeper, keep_scene, show_first_scene
+from relit_camera.live.scene.kept_scene import GivenOptions, SceneKeeper, show_first_scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import DegradationCode
 
@@ -162,13 +163,15 @@ def run_camera(
         if side_task is not None:
             cleanup.enter_context(side_task(camera_service, server.address.url))
         if given is not None:
-            cleanup.enter_context(keep_scene(SceneKeeper(scene_controller, settings, given)))
+            keeper = SceneKeeper(scene_controller, settings, given)
+            cleanup.enter_context(checking_regularly("scene-keeper", keeper.check, at_end=True))
         if reload is not None:
             apply, report_degradation = (
                 partial(apply_edited_settings, scene_controller, settings),
                 partial(camera_service.report_degradation, DegradationCode.CONFIGURATION_FAILED),
             )
-            cleanup.enter_context(watch_config(*reload, settings, apply, report_degradation))
+            watcher = ConfigWatcher(*reload, settings, apply, report_degradation)
+            cleanup.enter_context(checking_regularly("config", watcher.check))
         cleanup.enter_context(notify_systemd(camera_service.status))
         ends_at = time.monotonic() + (math.inf if seconds is None else seconds)
         while not stop.is_set() and (left := ends_at - time.monotonic()) > 0:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.storage.upload import Upload
 from relit_camera.face.framing.framing import Framing
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import CameraStatus
@@ -139,11 +140,12 @@ class FilmCaptureControl(Protocol):
         """How far the last capture is."""
         ...
 
-    def receive(self, name: str, file_name: str, options: FilmOptions) -> AbstractContextManager[Path]:
-        """Give a path to write a film to, which replaces an older one; the capture begins when the context ends.
+    def receive(self, name: str, file_name: str, options: FilmOptions) -> AbstractContextManager[Upload]:
+        """Give where to write a film to, which replaces an older one; the capture begins when the context ends.
 
         Raises:
-            ConflictError: a capture from a film runs, or a better subject has that name.
+            ConflictError: a capture from a film runs, a better subject has that name, the upload was canceled, or
+                another process has the folder of films.
             InputError: a name is not allowed, or no film has such a file name.
             StorageError: the film cannot be written.
         """
@@ -153,12 +155,24 @@ class FilmCaptureControl(Protocol):
         """Go on with the film that is there; with other options than before the work begins anew.
 
         Raises:
-            ConflictError: there is no film, or its capture runs.
+            ConflictError: there is no film, its capture runs, or another process has the folder of films.
         """
         ...
 
     def cancel(self, forget: bool = False) -> FilmCaptureStatus:
-        """End the capture that runs, if one does; nothing is stored then. With `forget` the film is deleted."""
+        """End the capture that runs, if one does; nothing is stored then. With `forget` the film is deleted.
+
+        Raises:
+            ConflictError: another process has the folder of films, and `forget` was asked for.
+        """
+        ...
+
+    def subject_renamed(self, name: str, new_name: str) -> None:
+        """Let the report of a subject's film bear its new name."""
+        ...
+
+    def subject_removed(self, name: str) -> None:
+        """Delete the report of a subject's film, and its pictures."""
         ...
 
     def picture(self, name: str) -> bytes:
@@ -185,11 +199,12 @@ class ReplayControl(Protocol):
         """
         ...
 
-    def receive(self, name: str, file_name: str) -> AbstractContextManager[Path]:
-        """Give a path to write a video to; it is relit, as the present scene says, when the context ends.
+    def receive(self, name: str, file_name: str) -> AbstractContextManager[Upload]:
+        """Give where to write a video to; it is relit, as the present scene says, when the context ends.
 
         Raises:
-            ConflictError: one is being relit, there is one of that name, or nobody is shown who could be relit.
+            ConflictError: one is being relit, there is one of that name, nobody is shown who could be relit, the upload
+                was canceled, or another process has the folder of replays.
             InputError: a name is not allowed, or no video has such a file name.
             StorageError: the video cannot be written.
         """

@@ -18,7 +18,7 @@ from safetensors import SafetensorError, safe_open
 
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage.atomic_files import write_tensors
+from relit_camera.base.storage.atomic_files import write_atomic, write_tensors
 from relit_camera.subject.compression.local_basis import LocalBasis, global_basis
 from relit_camera.subject.compression.webp_packing import decode_basis, encode_basis
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
@@ -128,6 +128,23 @@ def read_metadata(path: Path) -> SubjectMetadata:
     """
     with _open_safetensors(path, MAX_BYTES) as file:
         return _metadata(path, file.metadata() or {})
+
+
+def copy_subject(source: Path, target: Path, **noted: object) -> None:
+    """Copy a subject file, with other values of these fields in its header; the tensors are copied as they are.
+
+    Raises:
+        SubjectError: `source` is no subject.
+        StorageError: `target` cannot be written.
+    """
+    metadata = SubjectMetadata.model_validate(read_metadata(source).model_dump() | noted)
+    with source.open("rb") as file:
+        layout = json.loads(file.read(int.from_bytes(file.read(8), "little")))
+        tensors = file.read()
+    layout["__metadata__"] = {HEADER_KEY: metadata.model_dump_json()}
+    header = json.dumps(layout, separators=(",", ":")).encode()
+    header += b" " * (-len(header) % 8)  # tensors begin at a multiple of 8
+    write_atomic(target, len(header).to_bytes(8, "little") + header + tensors)
 
 
 def read_neutral(path: Path) -> DisplayImage:

@@ -12,8 +12,8 @@ import pytest
 from relit_camera.app.setup import camera_setup
 from relit_camera.app.setup.camera_setup import CameraSetup
 from relit_camera.app.setup.pipeline_choice import PipelineChoice
-from relit_camera.base.config.settings import RelitSettings, SourceSettings
-from relit_camera.base.errors import ConflictError, ModelError, NotFoundError
+from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
+from relit_camera.base.errors import ConflictError, DeviceError, ModelError, NotFoundError
 from relit_camera.devices.device_users import DeviceUser
 from relit_camera.devices.sinks.sink import NullSink, SinkInfo
 from relit_camera.devices.sources.changeable_source import ChangeableSource
@@ -142,6 +142,33 @@ def test_a_smaller_size_makes_smaller_pictures_of_the_output_s_shape(parts: Part
     assert parts.pipelines.size == (1280, 720)
 
 
+def test_another_rate_leaves_the_size_of_the_pictures(parts: Parts) -> None:
+    parts.pipelines = PipelineChoice(
+        parts.settings.model_copy(update={"output": OutputSettings(width=1920, height=1080)}), SteadyTracker()
+    )
+    parts.pipelines.replace_pipeline = parts.replaced.append
+    setup = parts.of(parts.source)
+    parts.source.read(0.1)
+    setup.change_source(fps=15.0)
+    setup.change_source(device="two")
+    assert (parts.pipelines.size, parts.replaced) == ((1920, 1080), [])
+    setup.change_source(width=1280, height=720)
+    assert parts.pipelines.size == (1920, 1080)  # that is the size it has
+    setup.change_source(width=640)
+    assert parts.pipelines.size == (1280, 720)
+
+
+def test_a_device_that_fails_is_a_conflict(parts: Parts, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(settings: SourceSettings) -> None:
+        raise DeviceError("the webcam is used by another program", "close cheese")
+
+    parts.source.read(0.1)
+    monkeypatch.setattr(parts.source, "change", fail)
+    with pytest.raises(ConflictError, match="another program; close cheese"):
+        parts.setup.change_source(device="two")
+    assert parts.setup.settings.source.source == "one"
+
+
 def test_one_that_is_busy_changes_nothing(parts: Parts) -> None:
     parts.source.read(0.1)
     parts.machine.busy.add("two")
@@ -213,6 +240,36 @@ def test_models_that_come_from_anywhere_end_the_wait(parts: Parts, monkeypatch: 
     assert clock.now() - began == pytest.approx(20.0, abs=1.1)
     assert parts.board.degradations() == []
     assert parts.replaced == [None]
+
+
+@pytest.mark.parametrize("first", ["watch", "pull"])
+def test_models_that_are_pulled_while_they_are_waited_for_begin_the_pipeline_once(
+    parts: Parts, monkeypatch: pytest.MonkeyPatch, first: str
+) -> None:
+    missing = ["face_mesh"]
+    monkeypatch.setattr(camera_setup, "missing_models", lambda tracker, matte="": list(missing))
+    monkeypatch.setattr(threading.Thread, "start", lambda thread: None)
+    parts.setup.wait_for_models(ModelError("model face_mesh is not pulled", "run `relit models pull face_mesh`"))
+    parts.setup.pull_models()
+    missing.clear()
+    both = [parts.setup.watch_models, parts.setup._models_came]  # what the two threads do
+    for come in both if first == "watch" else both[::-1]:
+        come()
+    assert (parts.replaced, parts.board.degradations()) == ([None], [])
+
+
+def test_a_matte_that_is_pulled_after_the_tracker_is_used_too(parts: Parts, monkeypatch: pytest.MonkeyPatch) -> None:
+    missing = ["face_mesh", "selfie"]
+    monkeypatch.setattr(
+        camera_setup, "missing_models", lambda tracker, matte="": [x for x in missing if matte or x != "selfie"]
+    )
+    monkeypatch.setattr(threading.Thread, "start", lambda thread: None)
+    parts.setup.pull_models()
+    missing.remove("face_mesh")
+    parts.setup.watch_models()
+    missing.remove("selfie")
+    parts.setup._models_came()
+    assert parts.replaced == [None, None]
 
 
 def test_closing_ends_the_wait(parts: Parts, monkeypatch: pytest.MonkeyPatch) -> None:

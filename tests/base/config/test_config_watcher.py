@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from pathlib import Path
 
 import pytest
 
-from relit_camera.base.config import config_watcher
-from relit_camera.base.config.config_watcher import ConfigWatcher, watch_config
+from relit_camera.base.config.config_watcher import ConfigWatcher
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.config.settings_loader import load_settings
 from relit_camera.base.errors import ConfigError, RelitError
@@ -64,20 +62,3 @@ def test_a_file_that_is_being_written_is_waited_for(path: Path) -> None:
     assert seen == []
     watcher.check()
     assert seen == ["debug"]
-
-
-def test_a_thread_checks_the_file_until_the_block_ends(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(config_watcher, "POLL_INTERVAL_S", 0.01)
-    applied = threading.Event()
-
-    def apply(before: RelitSettings, after: RelitSettings) -> None:
-        applied.set()
-
-    def threads() -> list[str]:
-        return [thread.name for thread in threading.enumerate() if thread.name == "config"]
-
-    with watch_config(path, load_settings, load_settings(path), apply, lambda error: None):
-        path.write_text("log_level: debug", encoding="utf-8")
-        assert applied.wait(WAIT_S)
-        assert threads() == ["config"]
-    assert threads() == []

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,10 +13,9 @@ from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, StorageSettings
 from relit_camera.base.errors import StorageError
 from relit_camera.live.scene.kept_scene import (
-    WRITE_INTERVAL_S,
     GivenOptions,
+    KeptScene,
     SceneKeeper,
-    keep_scene,
     kept_scene_path,
     read_kept_scene,
     show_first_scene,
@@ -197,30 +196,6 @@ def test_settings_that_show_it_count_where_they_allow_it_too(folder: Path, caplo
 # Writing
 
 
-def test_it_is_written_once_a_second_at_most_and_at_the_end(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    controller = SceneController(StorageSettings(data_dir=folder))
-    show_first_scene(controller, settings(folder))
-    keeper, checked, go_on = SceneKeeper(controller, settings(folder), NOTHING_GIVEN), threading.Event(), []
-
-    class StepClock:
-        """Lets a second pass when the test says so."""
-
-        def wait(self, event: threading.Event, timeout_s: float) -> bool:
-            go_on.append(timeout_s)
-            checked.set()
-            return event.wait(30)
-
-    path = kept_scene_path(StorageSettings(data_dir=folder))
-    with keep_scene(keeper, StepClock()):  # type: ignore[arg-type]
-        assert checked.wait(30)
-        controller.set_look(Look(mode=Mode.RATIO))
-        assert not path.exists()
-    assert go_on == [WRITE_INTERVAL_S]
-    kept = read_kept_scene(path)
-    assert kept is not None
-    assert kept.look.mode is Mode.RATIO
-
-
 def test_an_unchanged_scene_is_not_written_again(folder: Path) -> None:
     controller = SceneController(StorageSettings(data_dir=folder))
     show_first_scene(controller, settings(folder))
@@ -234,6 +209,26 @@ def test_an_unchanged_scene_is_not_written_again(folder: Path) -> None:
     controller.set_frozen(True)
     keeper.check()
     assert path.stat().st_mtime_ns == written
+
+
+def test_an_unchanged_scene_costs_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = SceneController(StorageSettings(data_dir=folder))
+    show_first_scene(controller, settings(folder))
+    keeper, dumped = SceneKeeper(controller, settings(folder), NOTHING_GIVEN), []
+    whole = KeptScene.model_dump
+
+    def dump(kept: KeptScene, **options: Any) -> dict[str, object]:
+        dumped.append(kept)
+        return whole(kept, **options)
+
+    monkeypatch.setattr(KeptScene, "model_dump", dump)
+    for _ in range(5):
+        keeper.check()
+    assert dumped == []
+    controller.set_look(Look(mode=Mode.RATIO))
+    for _ in range(5):
+        keeper.check()
+    assert len(dumped) == 1
 
 
 def test_the_longest_name_that_a_subject_s_file_can_have_is_kept(folder: Path) -> None:

@@ -24,7 +24,8 @@ from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import InputError, NotFoundError, SubjectError
 from relit_camera.base.images.image_files import encode_display, write_linear
 from relit_camera.light.light_map import irradiance
-from relit_camera.live.scene.scene_controller import BACKGROUND_ENVIRONMENT, SceneController
+from relit_camera.live.scene.look_loader import BACKGROUND_ENVIRONMENT
+from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.subject.subject_file import write_subject
 from tests.small_camera import small_subject
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from relit_camera.live.status.speed_advice import DEFAULT_LIMITS, SpeedState, next_speed, speed_advice
+from relit_camera.live.status.speed_advice import DEFAULT_LIMITS, SpeedState, next_speed, reduced_quality, speed_advice
 
 
 def behind_after(*looks: tuple[float, float]) -> list[bool]:
@@ -63,3 +63,10 @@ def test_the_next_smaller_size_is_advised(size: tuple[int, int], advised: tuple[
     assert (advice.width, advice.height) == advised
     assert advice.what == "the computer makes 12 of 30 pictures a second"
     assert ("try" in advice.cure) == (advised != size)
+
+
+@pytest.mark.parametrize("size", [(1920, 1080), (640, 360), (480, 270)])
+def test_a_busy_computer_is_told_what_the_advice_says(size: tuple[int, int]) -> None:
+    cure = reduced_quality(0.2, size).cure
+    assert cure.startswith(speed_advice(size, 30, 10).cure)
+    assert f"{size[0]}x{size[1]}" not in cure

@@ -112,8 +112,10 @@ def test_without_frames_it_says_so(watched: Watched) -> None:
 def test_missing_models_are_told_with_their_cure_and_tried_again(watched: Watched) -> None:
     watched.error = ModelError("model x is not pulled", "run `relit models pull x`")
     watched.clock.at(0.1, watched.monitor.run)
+    began = watched.clock.now()
     with pytest.raises(NotReadyError, match="model x is not pulled; run `relit models pull x`"):
         watched.monitor.framing()
+    assert watched.clock.now() - began == pytest.approx(0.1, abs=0.05)  # at once, not when time is up
     watched.error = None
     watched.clock.at(0.1, watched.monitor.run)
     assert watched.monitor.framing().face is FaceCount.ONE
@@ -121,8 +123,9 @@ def test_missing_models_are_told_with_their_cure_and_tried_again(watched: Watche
 
 def test_a_fault_ends_it_and_the_next_question_begins_anew(watched: Watched) -> None:
     watched.fault = ZeroDivisionError("a bug")
-    watched.monitor.want(True)
-    watched.monitor.run()
+    watched.clock.at(0.1, watched.monitor.run)
+    with pytest.raises(NotReadyError, match="cannot be judged; please report it"):
+        watched.monitor.framing()
     watched.fault = None
     watched.monitor.want(True)
     assert watched.started == 2

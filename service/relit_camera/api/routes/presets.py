@@ -36,8 +36,10 @@ def get_preset(api: ApiContextDep, name: StoredName) -> Preset:
 def save_preset(api: ApiContextDep, response: Response, name: StoredName, preset: Preset | None = None) -> Preset:
     """Store a look under a name, in place of one of that name. Without a body: what is shown now."""
     if preset is None:
-        scene = api.camera.scene_controller.scene
-        preset = Preset(**dict(scene.look), subject=scene.subject_name)
+        controller = api.camera.scene_controller
+        scene = controller.scene
+        stored = scene.subject_name in controller.subjects.names()  # one of a file is gone at the next start
+        preset = Preset(**dict(scene.look), subject=scene.subject_name if stored else None)
     if api.presets.save(name, preset):
         response.status_code = HTTPStatus.CREATED
     api.publish_collection_changed("presets")

@@ -7,7 +7,6 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from http import HTTPStatus
-from pathlib import Path
 
 from fastapi import APIRouter, Request
 from starlette.responses import Response
@@ -21,7 +20,7 @@ from relit_camera.api.problem_details import error_responses
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
 from relit_camera.base.config.look import StoredName
 from relit_camera.base.errors import ConflictError
-from relit_camera.live.status.film_status import FilmStage
+from relit_camera.base.storage.upload import Upload
 from relit_camera.subject.subject_file import read_metadata, read_neutral
 
 router = APIRouter(tags=["subjects"])
@@ -76,10 +75,10 @@ async def add_subject(api: ApiContextDep, request: Request) -> SubjectItem:
     stored: list[str] = []
 
     @contextmanager
-    def open_file(fields: Mapping[str, str], file_name: str) -> Iterator[Path]:
+    def open_file(fields: Mapping[str, str], file_name: str) -> Iterator[Upload]:
         name = read_fields(NameForm, fields).name
         with api.camera.scene_controller.subjects.adding(name, file_name) as path:
-            yield path
+            yield Upload(path)
         stored.append(name)
 
     await receive_form(request, open_file, MAX_SUBJECT_BYTES)
@@ -91,6 +90,7 @@ async def add_subject(api: ApiContextDep, request: Request) -> SubjectItem:
 def rename_subject(api: ApiContextDep, name: StoredName, change: NewName) -> SubjectItem:
     """Give a stored subject another name, also while it is shown."""
     api.camera.scene_controller.rename_stored_subject(name, change.name)
+    api.camera.film_capture.subject_renamed(name, change.name)
     api.publish_collection_changed("subjects")
     return _item(api, change.name)
 
@@ -109,9 +109,7 @@ def delete_subject(api: ApiContextDep, name: StoredName) -> None:
     if name == api.camera.scene_controller.scene.subject_name:
         raise ConflictError(f"subject '{name}' is shown now", "choose another subject first")
     api.camera.scene_controller.subjects.remove(name)
-    film = api.camera.film_capture.status()
-    if (film.subject, film.stage) == (name, FilmStage.DONE):
-        api.camera.film_capture.cancel(forget=True)
+    api.camera.film_capture.subject_removed(name)
     api.publish_collection_changed("subjects")
 
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from relit_camera.app.background_job import BackgroundJob, describe_failure
 from relit_camera.app.captures.subject_maker import SubjectMaker, require_replaceable
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
-from relit_camera.base.errors import ConflictError, DeviceError, RelitError
+from relit_camera.base.errors import DeviceError
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.storage.folder_redaction import redact_folders
 from relit_camera.live.frame_recorder import FrameRecorder
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
@@ -85,6 +85,7 @@ class LiveCapture:
         wake: Callable[[], None] = lambda: None,
         timings: LiveCaptureTimings = LiveCaptureTimings(),
         clock: Clock = SYSTEM_CLOCK,
+        webcam: threading.Lock | None = None,
     ) -> None:
         """Set up; `start` begins.
 
@@ -96,14 +97,13 @@ class LiveCapture:
             wake: called while frames are waited for: on demand, the webcam opens while somebody wants it.
             timings: frames and limits.
             clock: of all waiting.
+            webcam: is held during an attempt, by one capture of those that need its frames.
         """
         self._recorder, self._scene_controller, self._events = recorder, scene_controller, events
         self._wake, self._build, self._timings, self._clock = wake, build, timings, clock
         self._maker = SubjectMaker(scene_controller, events)
-        self._lock = threading.Lock()
+        self._job = BackgroundJob("instant-capture", "a capture runs already", shared=webcam)
         self._status = CaptureStatus()
-        self._canceled = threading.Event()
-        self._thread: threading.Thread | None = None
 
     def status(self) -> CaptureStatus:
         """How far the last capture is."""
@@ -112,59 +112,70 @@ class LiveCapture:
     def start(self, name: str, until_done: bool = False) -> CaptureStatus:
         """Begin to capture a subject, which replaces a stored instant one of that name.
 
-        It is shown, in mode ratio, once it is stored, unless somebody has chosen another one or mode meanwhile.
+        It is shown, in mode ratio, once it is stored, unless somebody has chosen another one or mode meanwhile. It ends
+        a capture that pauses before its next attempt.
 
         Args:
             name: under which it is stored.
             until_done: try again after each failure that a person before the camera can mend.
 
         Raises:
-            ConflictError: a capture runs, or the name belongs to a subject that was captured in a better way.
+            ConflictError: a capture runs, also of another kind, or the name belongs to a subject that was captured in a
+                better way.
             InputError: the name is not allowed.
         """
         require_instant_name(self._scene_controller.subjects, name)
-        with self._lock:
-            if self._thread is not None and self._thread.is_alive():
-                raise ConflictError("a capture runs already", "wait for its end, or cancel it")
-            self._canceled = threading.Event()
+        with self._job.lock:
+            if self._pauses:
+                self._job.cancel()
+        with self._job.taken() as canceled:
             self._set(CaptureStatus(CaptureStage.FILMING, name))
-            arguments = name, until_done, self._canceled, self._maker.shown()
-            self._thread = threading.Thread(target=self._run, args=arguments, name="instant-capture", daemon=True)
-            self._thread.start()
+            shown = self._maker.shown()
+            self._job.begin(lambda: self._run(name, until_done, canceled, shown), self._set)
             return self._status
 
     def cancel(self) -> CaptureStatus:
         """End the capture that runs, if one does; nothing is stored then."""
-        with self._lock:
-            thread = self._thread
-            self._canceled.set()
-        if thread is not None:
-            thread.join(2.0)
+        self._job.cancel()
         return self._status
 
-    def _run(self, name: str, until_done: bool, canceled: threading.Event, before: Scene) -> None:
-        """Capture; `before` is what was shown when somebody asked for it."""
+    @property
+    def _pauses(self) -> bool:
+        """Whether a capture runs that waits for its next attempt."""
+        return self._job.is_running and not self._status.stage.is_running
+
+    def _run(self, name: str, until_done: bool, canceled: threading.Event, before: Scene) -> CaptureStatus:
+        """Capture; `before` is what was shown when somebody asked for it. Returns how it ended."""
         pause_s = self._timings.retry_s
         while True:
             try:
                 status = self._attempt(name, canceled, before)
-            except RelitError as error:
-                what, cure = redact_folders(error.what), redact_folders(error.cure)
+            except Exception as error:  # also a fault: else nobody would hear that it has ended
+                if canceled.is_set():
+                    return CaptureStatus(CaptureStage.CANCELED, name)
+                what, cure = describe_failure("instant capture", error)
                 status = CaptureStatus(CaptureStage.FAILED, name, what, cure)
-            except Exception as error:  # else nobody would hear that it has ended
-                log.exception("the instant capture failed")
-                what = redact_folders(f"it failed in a way that nobody expected ({type(error).__name__}: {error})")
-                status = CaptureStatus(CaptureStage.FAILED, name, what, "please report it")
-            if status.stage is not CaptureStage.DONE and canceled.is_set():
-                status = CaptureStatus(CaptureStage.CANCELED, name)
-            self._set(status)
-            again = until_done and status.stage is CaptureStage.FAILED
-            if not again or self._clock.wait(canceled, pause_s):
-                return
+            if not until_done or status.stage is not CaptureStage.FAILED:
+                return status
+            with self._job.lock:
+                self._job.leave_shared()
+                self._set(status)
+            begins = False
+            while not begins:
+                if self._clock.wait(canceled, pause_s):
+                    return CaptureStatus(CaptureStage.CANCELED, name)
+                if self._maker.shown().subject is not before.subject:
+                    return status  # somebody has chosen another one
+                begins = self._begin_again(canceled, status)
             pause_s = min(2 * pause_s, self._timings.most_retry_s)
-            if self._maker.shown().subject is not before.subject:
-                return  # somebody has chosen another one
-            self._set(CaptureStatus(CaptureStage.FILMING, name, status.what, status.cure))
+
+    def _begin_again(self, canceled: threading.Event, failed: CaptureStatus) -> bool:
+        """Begin the next attempt after one that failed, unless it was canceled or the webcam's frames are taken."""
+        with self._job.lock:
+            begins = not canceled.is_set() and self._job.take_shared()
+            if begins:
+                self._set(replace(failed, stage=CaptureStage.FILMING))
+        return begins
 
     def _attempt(self, name: str, canceled: threading.Event, before: Scene) -> CaptureStatus:
         """Capture once.
@@ -202,9 +213,9 @@ class LiveCapture:
         return [frame.image for frame in frames]
 
     def _set(self, status: CaptureStatus) -> None:
+        if status == self._status:
+            return
         self._status = status
-        if status.stage is CaptureStage.FAILED:
-            log.warning("instant capture: %s; %s", status.what, status.cure)
-        else:
+        if status.stage is not CaptureStage.FAILED:  # what failed is in the log already
             log.info("instant capture: %s %s", status.stage, status.what)
         self._events.publish("capture", **vars(status))

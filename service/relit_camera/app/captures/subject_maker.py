@@ -105,7 +105,7 @@ class SubjectMaker:
         self._events.publish("collection", name="subjects")
         now = self.shown()
         if now.subject is before.subject:
-            mode = Mode.RATIO if now.look.mode is before.look.mode else None
+            mode = Mode.RATIO if now.mode_revision == before.mode_revision else None
             try:
                 self._scene_controller.choose_stored_subject(name, mode)
             except RelitError as error:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 from relit_camera.app.setup.needed_models import missing_models
+from relit_camera.base.errors import StorageError
+from relit_camera.base.storage.atomic_files import make_folder
+from relit_camera.subject.subject_file import copy_subject, read_metadata
+
+log = logging.getLogger(__name__)
 
 FOLDER = Path(__file__).parent / "data"
 SUBJECT = FOLDER / "adam.relit"
@@ -14,6 +20,27 @@ TRACK = FOLDER / "track.json"
 MATTES = FOLDER / "mattes.npz"
 """Where the person is in each frame: used where no public matting network is installed."""
 CREDITS = FOLDER / "CREDITS.md"
+
+
+SUBJECT_NOTES: dict[str, object] = {"rung": "pictures", "measured_fraction": 1.0}
+"""How the person was captured: rendered under one light each. The file was made before subjects noted it."""
+
+
+def noted_subject(folder: Path) -> Path:
+    """The subject's file with `SUBJECT_NOTES` in its header: a copy in `folder`, in place of an earlier one.
+
+    Where none can be written it is the file itself, and the log says so.
+    """
+    if read_metadata(SUBJECT).rung is not None:
+        return SUBJECT
+    copy = folder / SUBJECT.name
+    try:
+        make_folder(folder)
+        copy_subject(SUBJECT, copy, **SUBJECT_NOTES)
+    except StorageError as error:
+        log.warning("the panel does not know how the bundled person was captured: %s", error)
+        return SUBJECT
+    return copy
 
 
 def tracker_of_clip() -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import shutil
 import threading
 from collections.abc import Callable, Iterator
@@ -11,20 +10,20 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from urllib.parse import quote
 
+from relit_camera.app.background_job import BackgroundJob, StatusEvents, describe_failure
 from relit_camera.app.captures.film.film_folder import film_suffix
 from relit_camera.app.replay.replay_worker import ReplayOutcome, ReplayWork
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.concurrency.worker_process import Progress, run_in_worker_process
 from relit_camera.base.config.settings import RelitSettings
-from relit_camera.base.errors import ConflictError, RelitError, WorkerError
+from relit_camera.base.errors import ConflictError, WorkerError
 from relit_camera.base.storage.atomic_files import atomic_path, make_folder, remove_unfinished_files
-from relit_camera.base.storage.folder_redaction import redact_folders
+from relit_camera.base.storage.folder_lock import FolderLock
 from relit_camera.base.storage.named_files import NamedFiles
+from relit_camera.base.storage.upload import Upload
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.live.status.replay_status import ReplayStage, ReplayStatus
-
-log = logging.getLogger(__name__)
 
 ReplayWriter = Callable[[ReplayWork, Path, Progress], ReplayOutcome]
 """Relights a video into a file. It must be a function of a module, since another process imports it."""
@@ -32,6 +31,7 @@ ReplayWriter = Callable[[ReplayWork, Path, Progress], ReplayOutcome]
 SUFFIX = ".mp4"
 SENT = ".sent"
 """The folder of the video that was sent, within that of the results; it is deleted when its work ends."""
+NOBODY, NOBODY_CURE = "nobody is shown who could be relit", "choose or capture a subject first"
 VIDEO_PATH = "/api/v1/replays/{}/video"
 
 
@@ -56,7 +56,7 @@ class ReplayJobs:
     def __init__(
         self,
         folder: Path,
-        settings: RelitSettings,
+        settings: Callable[[], RelitSettings],
         scene_controller: SceneController,
         events: EventHub,
         write: ReplayWriter,
@@ -67,22 +67,22 @@ class ReplayJobs:
 
         Args:
             folder: of the results.
-            settings: of the camera.
+            settings: gives those of the camera at present: its tracker may be changed while it runs.
             scene_controller: its scene says how the videos are relit.
             events: hears `replay` whenever the status of one changes.
             write: relights a video.
             limits: of the work.
             clock: by which events are limited.
         """
-        self._settings, self._scene_controller, self._events = settings, scene_controller, events
-        self._write, self._limits, self._clock = write, limits, clock
+        self._settings, self._scene_controller = settings, scene_controller
+        self._write, self._limits = write, limits
         self._results = NamedFiles(folder, "replay", [SUFFIX])
-        self._lock = threading.RLock()
-        self._canceled = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._folder_lock = FolderLock(folder)
+        self._told = StatusEvents(events, "replay", limits.event_interval_s, clock)
+        self._job = BackgroundJob("replay", "a video is being relit already", "wait for its end, or delete it")
         self._last: ReplayStatus | None = None
-        self._told_at = float("-inf")
-        self._remove_sent()
+        if folder.is_dir() and self._folder_lock.take():
+            self._remove_sent()
 
     def all(self) -> list[ReplayStatus]:
         """Those that are stored, and the last one; see `ReplayControl.all`."""
@@ -99,33 +99,29 @@ class ReplayJobs:
         return _done(name)
 
     @contextmanager
-    def receive(self, name: str, file_name: str) -> Iterator[Path]:
+    def receive(self, name: str, file_name: str) -> Iterator[Upload]:
         """Give a path to write a video to; see `ReplayControl.receive`."""
         suffix = film_suffix(file_name)
         self._results.require_free_name(name)
-        with self._lock:
-            self._require_idle()
+        with self._job.taken() as canceled:
             if name in self._results.names():
                 raise ConflictError(f"there is a replay '{name}' already", "choose another name, or delete that one")
             if self._scene_controller.scene.subject is None:
-                raise ConflictError("nobody is shown who could be relit", "choose or capture a subject first")
-            before, canceled = self._last, threading.Event()
-            self._canceled = canceled
-            self._set(ReplayStatus(name, ReplayStage.RECEIVING))
-        sent = self._results.folder / SENT
-        try:
-            make_folder(self._results.folder, private=True)
-            make_folder(sent, private=True)
-            with atomic_path(sent / f"video{suffix}") as path:
-                yield path
-            if canceled.is_set():
-                raise ConflictError("the replay was canceled", "send the video again")
-        except BaseException:
-            self._remove_sent()
-            with self._lock:
-                self._last = before
-            raise
-        self._begin(name, sent / f"video{suffix}", file_name, canceled)
+                raise ConflictError(NOBODY, NOBODY_CURE)
+            self._require_own_folder()
+            before, sent = self._last, self._results.folder / SENT
+            try:
+                self._set(ReplayStatus(name, ReplayStage.RECEIVING))
+                make_folder(sent, private=True)
+                with atomic_path(sent / f"video{suffix}") as path:
+                    upload = Upload(path, canceled, "the replay was canceled", "send the video again")
+                    yield upload
+                    upload.require_wanted()
+                self._begin(name, sent / f"video{suffix}", file_name, canceled)
+            except BaseException:
+                self._remove_sent()
+                self._give_up(name, before)
+                raise
 
     def video(self, name: str) -> Path:
         """The file of a relit video; see `ReplayControl.video`."""
@@ -135,8 +131,8 @@ class ReplayJobs:
         """End a replay that runs, or delete its video; see `ReplayControl.remove`."""
         last = self.status(name)
         if last.stage.is_running:
-            self.close()
-        with self._lock:
+            self._job.cancel()
+        with self._job.lock:
             if self._last is not None and self._last.name == name and not self._last.stage.is_running:
                 self._last = None
         if name in self._results.names():
@@ -144,35 +140,46 @@ class ReplayJobs:
 
     def close(self) -> None:
         """End the replay that runs, if one does."""
-        with self._lock:
-            thread = self._thread
-            self._canceled.set()
-        if thread is not None:
-            thread.join(3.0)
+        self._job.cancel()
+        if not self._job.is_running:  # else its thread still writes
+            self._folder_lock.release()
 
-    def _require_idle(self) -> None:
-        if self._last is not None and self._last.stage.is_running:
-            raise ConflictError("a video is being relit already", "wait for its end, or delete it")
+    def _require_own_folder(self) -> None:
+        """Create the folder where it is missing, and take it.
+
+        Raises:
+            ConflictError: another process has it.
+            StorageError: it cannot be created.
+        """
+        make_folder(self._results.folder, private=True)
+        if not self._folder_lock.take():
+            raise ConflictError(
+                "another Relit Camera has the folder of replays",
+                "use that one's panel, or start this one with a data folder of its own (storage.data_dir)",
+            )
+
+    def _give_up(self, name: str, before: ReplayStatus | None) -> None:
+        """Tell that an upload has ended, and be as before it."""
+        self._set(ReplayStatus(name, ReplayStage.CANCELED))
+        self._last = before
 
     def _begin(self, name: str, video: Path, file_name: str, canceled: threading.Event) -> None:
         scene = self._scene_controller.scene
         stored = scene.subject_name in self._scene_controller.subjects.names()
         subject = scene.subject_name if stored else scene.subject
-        with self._lock:
-            if subject is None:  # somebody has chosen nobody meanwhile
-                self._remove_sent()
-                what, cure = "nobody is shown who could be relit", "choose or capture a subject first"
-                self._set(ReplayStatus(name, ReplayStage.FAILED, what=what, cure=cure))
-                return
-            lighting = scene.look.lighting.model_copy(update={"split": 0.0})
-            look = scene.look.model_copy(update={"lighting": lighting})
-            work = ReplayWork(self._settings, replace(scene, subject=None, look=look, frozen=False), subject, video)
-            self._set(ReplayStatus(name, ReplayStage.WORKING))
-            arguments = name, work, file_name, canceled
-            self._thread = threading.Thread(target=self._run, args=arguments, name="replay", daemon=True)
-            self._thread.start()
+        if subject is None:  # somebody has chosen nobody meanwhile
+            self._remove_sent()
+            self._set(ReplayStatus(name, ReplayStage.FAILED, what=NOBODY, cure=NOBODY_CURE))
+            return
+        lighting = scene.look.lighting.model_copy(update={"split": 0.0})
+        look = scene.look.model_copy(update={"lighting": lighting})
+        work = ReplayWork(self._settings(), replace(scene, subject=None, look=look, frozen=False), subject, video)
+        self._set(ReplayStatus(name, ReplayStage.WORKING))
+        self._job.begin(lambda: self._run(name, work, file_name, canceled), self._set)
 
-    def _run(self, name: str, work: ReplayWork, file_name: str, canceled: threading.Event) -> None:
+    def _run(self, name: str, work: ReplayWork, file_name: str, canceled: threading.Event) -> ReplayStatus:
+        """Relight it; returns how it ended."""
+
         def tell(stage: str, done: int, total: int | None) -> None:
             share = min(done / total, 1.0) if total else 0.0
             self._set(ReplayStatus(name, ReplayStage.WORKING, round(share, 4), done), seldom=True)
@@ -192,21 +199,16 @@ class ReplayJobs:
                 if canceled.is_set():
                     raise WorkerError("the replay was canceled", "send the video again")
             ended = replace(_done(name), frames=outcome.frames, what="; ".join(_notes(outcome)))
-        except RelitError as error:
+        except Exception as error:  # also a fault: else nobody would hear that it has ended
             if canceled.is_set():
                 ended = ReplayStatus(name, ReplayStage.CANCELED)
             else:
-                log.warning("replay: %s", error)
-                what = redact_folders(error.what.replace(str(work.video), f"'{file_name}'"))
-                ended = ReplayStatus(name, ReplayStage.FAILED, what=what, cure=redact_folders(error.cure))
-        except Exception as error:  # else nobody would hear that it has ended
-            log.exception("the replay failed")
-            what = redact_folders(f"it failed in a way that nobody expected ({type(error).__name__}: {error})")
-            ended = ReplayStatus(name, ReplayStage.FAILED, what=what, cure="please report it")
+                what, cure = describe_failure("replay", error, {str(work.video): f"'{file_name}'"})
+                ended = ReplayStatus(name, ReplayStage.FAILED, what=what, cure=cure)
         self._remove_sent()
         if ended.stage is not ReplayStage.DONE:
             remove_unfinished_files(self._results.folder)  # of a worker that was killed
-        self._set(ended)
+        return ended
 
     def _remove_sent(self) -> None:
         with suppress(OSError):
@@ -215,10 +217,7 @@ class ReplayJobs:
     def _set(self, status: ReplayStatus, seldom: bool = False) -> None:
         """Set the status of the last one and tell it; `seldom`: only if nothing was told for a while."""
         self._last = status
-        now = self._clock.now()
-        if not seldom or now >= self._told_at + self._limits.event_interval_s:
-            self._told_at = now
-            self._events.publish("replay", **asdict(status))
+        self._told.publish(asdict(status), seldom)
 
 
 def _done(name: str) -> ReplayStatus:

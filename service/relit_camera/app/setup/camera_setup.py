@@ -87,7 +87,15 @@ class CameraSetup:
             board.events, lambda: open_face_detector(session_options(self._settings.inference))
         )
         self._changing = threading.Lock()
+        self._models_coming = threading.Lock()
+        self._missing_at_restart: list[str] | None = None
+        """The models that were missing when the pipeline began anew because some had come; None where it has not."""
         self._closing = threading.Event()
+
+    @property
+    def settings(self) -> RelitSettings:
+        """The settings of this run at present: source and tracker may have been changed."""
+        return self._settings
 
     # Checks and devices
 
@@ -155,9 +163,10 @@ class CameraSetup:
             try:
                 self._source.change(settings)
             except DeviceError as error:
-                raise NotFoundError(error.what, error.cure) from error
+                raise ConflictError(error.what, error.cure) from error
             self._settings = self._settings.model_copy(update={"source": settings})
-            self._pipelines.use_source_size(settings.width, settings.height)
+            if width is not None or height is not None:
+                self._pipelines.use_source_size(settings.width, settings.height)
             self._checks.forget()
             return self.source()
 
@@ -222,6 +231,7 @@ class CameraSetup:
         Raises:
             ConflictError: a pull is under way.
         """
+        self._missing_at_restart = None  # its end begins the pipeline anew at least once
         return self._models.start()
 
     def cancel_models(self) -> ModelPullStatus:
@@ -241,9 +251,15 @@ class CameraSetup:
         self._models_came()
 
     def _models_came(self) -> None:
-        self._checks.forget()
-        self._board.report(DegradationCode.MODELS_MISSING, None)
-        self._pipelines.restart()
+        """Begin the pipeline anew, unless that was done already with the models that are there now."""
+        with self._models_coming:
+            self._checks.forget()
+            missing = self.missing_models()
+            if missing == self._missing_at_restart:
+                return
+            self._missing_at_restart = missing
+            self._board.report(DegradationCode.MODELS_MISSING, None)
+            self._pipelines.restart()
 
     # Framing
 

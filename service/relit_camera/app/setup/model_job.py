@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from relit_camera.app.background_job import BackgroundJob, describe_failure
 from relit_camera.base.concurrency.worker_process import Progress, run_in_worker_process
-from relit_camera.base.errors import ConflictError, RelitError
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.live.status.setup_status import ModelPullStatus, ModelStage
-
-log = logging.getLogger(__name__)
 
 PULL_TIMEOUT_S = 1800.0
 """A line of 0.2 Mbit/s has got them by then."""
@@ -59,9 +56,7 @@ class ModelJob:
         """
         self._events, self._missing, self._on_done, self._pull = events, missing, on_done, pull
         self._status = ModelPullStatus()
-        self._lock = threading.Lock()
-        self._canceled = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._job = BackgroundJob("model-pull", "the models are being pulled already")
 
     def status(self) -> ModelPullStatus:
         """Which models are missing, and how far the last pull is."""
@@ -73,36 +68,28 @@ class ModelJob:
         Raises:
             ConflictError: a pull is under way.
         """
-        with self._lock:
-            if self._thread is not None and self._thread.is_alive():
-                raise ConflictError("the models are being pulled already", "wait for its end, or cancel it")
-            self._canceled = threading.Event()
+        with self._job.taken() as canceled:
             self._set(ModelPullStatus(ModelStage.PULLING))
-            self._thread = threading.Thread(target=self._run, args=(self._canceled,), name="model-pull", daemon=True)
-            self._thread.start()
+            self._job.begin(lambda: self._run(canceled), self._set)
         return self.status()
 
     def cancel(self) -> ModelPullStatus:
         """End the pull that is under way, if one is."""
-        with self._lock:
-            thread = self._thread
-            self._canceled.set()
-        if thread is not None:
-            thread.join(3.0)
+        self._job.cancel()
         return self.status()
 
-    def _run(self, canceled: threading.Event) -> None:
+    def _run(self, canceled: threading.Event) -> ModelPullStatus:
+        """Pull; returns how it ended."""
         try:
             run_in_worker_process(self._pull, timeout_s=PULL_TIMEOUT_S, canceled=canceled, progress=self._note_progress)
-            ended = ModelPullStatus(ModelStage.DONE, progress=1.0)
             self._on_done()
-        except RelitError as error:
-            ended = ModelPullStatus(ModelStage.FAILED, what=error.what, cure=error.cure)
-        except Exception as error:  # else nobody would hear that it has ended
-            log.exception("the pull of the models failed")
-            what = f"it failed in a way that nobody expected ({type(error).__name__}: {error})"
-            ended = ModelPullStatus(ModelStage.FAILED, what=what, cure="please report it")
-        self._set(ModelPullStatus(ModelStage.CANCELED) if canceled.is_set() else ended)
+        except Exception as error:  # also a fault: else nobody would hear that it has ended
+            if not canceled.is_set():
+                what, cure = describe_failure("models", error)
+                return ModelPullStatus(ModelStage.FAILED, what=what, cure=cure)
+        if canceled.is_set():
+            return ModelPullStatus(ModelStage.CANCELED)
+        return ModelPullStatus(ModelStage.DONE, progress=1.0)
 
     def _note_progress(self, doing: str, done: int, total: int | None) -> None:
         share = min(1.0, done / total) if total else 0.0
@@ -112,6 +99,4 @@ class ModelJob:
         if status == self._status:
             return  # a hundred steps a file are enough
         self._status = status
-        if status.stage is ModelStage.FAILED:
-            log.warning("models: %s; %s", status.what, status.cure)
         self._events.publish("models", **vars(self.status()))

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import logging
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import RelitError
 
 log = logging.getLogger(__name__)
-
-POLL_INTERVAL_S = 1.0
-STOP_TIMEOUT_S = 1.0
 
 SettingsLoader = Callable[[Path], RelitSettings]
 SettingsApplier = Callable[[RelitSettings, RelitSettings], RelitError | None]
@@ -69,31 +64,6 @@ class ConfigWatcher:
         if note is not None or self._was_reported:
             self._report(note)
         self._was_reported = note is not None
-
-
-@contextmanager
-def watch_config(
-    path: Path,
-    load: SettingsLoader,
-    settings: RelitSettings,
-    apply: SettingsApplier,
-    report: Callable[[Exception | None], None],
-) -> Iterator[None]:
-    """Within the block: let a `ConfigWatcher` of these arguments check the file once a second, in a thread."""
-    watcher = ConfigWatcher(path, load, settings, apply, report)
-    stopping = threading.Event()
-
-    def run() -> None:
-        while not stopping.wait(POLL_INTERVAL_S):
-            watcher.check()
-
-    thread = threading.Thread(target=run, name="config", daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        stopping.set()
-        thread.join(STOP_TIMEOUT_S)
 
 
 def _file_version(path: Path) -> _FileVersion:

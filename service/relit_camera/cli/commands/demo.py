@@ -55,14 +55,14 @@ def demo(
         context,
         source={"source": str(demo_files.CLIP)},
         output={"unlit_allowed": True},  # the clip as filmed is part of the tour
-        subject=str(demo_files.SUBJECT),
         tracker={"name": tracker},
         matte=demo_files.matte_of_clip(),
         server={"host": host, "port": port},
     )
     _, look = tour_at(0.0)
     # Replaces the user's own look, without merging: a color of theirs is no part of another kind of background.
-    settings = settings.model_copy(update={"look": look})
+    subject = demo_files.noted_subject(settings.storage.data_dir / "demo")
+    settings = settings.model_copy(update={"look": look, "subject": str(subject)})
 
     @contextmanager
     def demo_tour(camera_service: CameraService, url: str) -> Iterator[None]:

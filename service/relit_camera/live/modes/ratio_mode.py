@@ -14,6 +14,7 @@ from relit_camera.live.modes.identity_check import IdentityCheck
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
 from relit_camera.live.modes.reenact_mode import blend_with_source
+from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.reenactment.rest_layer import RestLayer
 from relit_camera.live.reenactment.warp import PositionGrid
 from relit_camera.live.render_quality import RenderQuality
@@ -33,6 +34,7 @@ class RatioMode:
         self._relighting = relighting
         self._identity = IdentityCheck(context.face)
         self._at_rest = RestLayer(context.subject, context.size)
+        self._last_rest: tuple[LinearImage, float, WarpedLayer] | None = None
 
     def begin(
         self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
@@ -69,12 +71,20 @@ class RatioMode:
         """The relit live picture as far as a face is followed; for the rest the subject at rest, relit."""
         context = self._context
         with context.timer.stage("move"):
-            layer = self._at_rest.render(blend_with_source(context.subject, at_rest, scene.look.lighting.blend))
+            layer = self._rest_layer(at_rest, scene.look.lighting.blend)
         with context.timer.stage("compose"):
             image = context.compositor.composite_source(layer, scene, live.time_s)
         if plan is not None:
             image = crossfade(image, self._relit_live(replace(plan, presence=1.0), live, scene), plan.presence)
         return RenderedFrame(image, motion, scene, scene.look.shows_filmed)
+
+    def _rest_layer(self, at_rest: LinearImage, blend: float) -> WarpedLayer:
+        """The subject at rest; the previous layer again while neither the relit picture nor the blend has changed."""
+        last = self._last_rest
+        if last is None or last[0] is not at_rest or last[1] != blend:
+            layer = self._at_rest.render(blend_with_source(self._context.subject, at_rest, blend))
+            last = self._last_rest = at_rest, blend, layer
+        return last[2]
 
     def _relit_live(self, plan: RatioPlan | None, live: Frame, scene: Scene) -> DisplayImage:
         with self._context.timer.stage("move"):

@@ -6,27 +6,22 @@ While the camera runs its look and subject are written to a file, at most once a
 from __future__ import annotations
 
 import logging
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
-from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.config.look import Look, SettingsModel, merge_edits
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml
 from relit_camera.base.config.settings import RelitSettings, StorageSettings
 from relit_camera.base.errors import RelitError
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
+from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import ChosenSubject, SceneController
 
 log = logging.getLogger(__name__)
-
-WRITE_INTERVAL_S = 1.0
-STOP_TIMEOUT_S = 2.0
 
 
 @dataclass(frozen=True)
@@ -183,33 +178,37 @@ class SceneKeeper:
         self._configured_look = look
         self._configured_subject = before.configured_subject if given.subject else settings.subject
         self._written: dict[str, object] | None = None
+        self._written_revision: int | None = None
+        scene = scene_controller.scene
         with suppress(RelitError, ValueError):  # `check` says why
-            self._written = self._present()
+            self._written = self._to_keep(scene)
+            self._written_revision = scene.revision
         self._failed = False
 
     def check(self) -> None:
         """Write what is shown, if that is not what the file has. A failure is logged, and tried again later."""
+        scene = self._scene_controller.scene
+        if scene.revision == self._written_revision:
+            return
         try:
-            present = self._present()
-            if present == self._written:
-                return
-            make_folder(self._path.parent)
-            write_atomic(self._path, yaml.safe_dump(present, sort_keys=False, allow_unicode=True))
+            present = self._to_keep(scene)
+            if present != self._written:
+                make_folder(self._path.parent)
+                write_atomic(self._path, yaml.safe_dump(present, sort_keys=False, allow_unicode=True))
         except (RelitError, ValueError) as error:  # also a name that is no text, of a file that a person put there
             if not self._failed:
                 log.warning("the look is not kept for the next start: %s", error)
             self._failed = True
             return
-        self._written, self._failed = present, False
+        self._written, self._written_revision, self._failed = present, scene.revision, False
 
-    def _present(self) -> dict[str, object]:
-        """What the file is to have.
+    def _to_keep(self, scene: Scene) -> dict[str, object]:
+        """What the file is to have of a scene.
 
         Raises:
             StorageError: the folder of subjects cannot be read.
             ValueError: the subject's name is no text that a file can keep.
         """
-        scene = self._scene_controller.scene
         kept = KeptScene(
             look=scene.look,
             subject=scene.subject_name,
@@ -218,23 +217,3 @@ class SceneKeeper:
         )
         stored = scene.subject_name is None or scene.subject_name in self._scene_controller.subjects.names()
         return kept.model_dump(mode="json", exclude=None if stored else {"subject"})
-
-
-@contextmanager
-def keep_scene(keeper: SceneKeeper, clock: Clock = SYSTEM_CLOCK) -> Iterator[None]:
-    """Within the block: let `keeper` check once a second, in a thread, and once more at the end."""
-    stopping = threading.Event()
-
-    def run() -> None:
-        while not clock.wait(stopping, WRITE_INTERVAL_S):
-            keeper.check()
-
-    thread = threading.Thread(target=run, name="scene-keeper", daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        stopping.set()
-        thread.join(STOP_TIMEOUT_S)
-        if not thread.is_alive():
-            keeper.check()

@@ -24,6 +24,7 @@ class Scene:
         unlit_allowed: whether the picture as filmed may be published: where there is no subject, no face, before and
             after. Else the subject's relit picture at rest is, or a placeholder.
         revision: number of changes so far.
+        mode_revision: the revision with which the look's mode was last changed.
         can_undo, can_redo: whether there is a change to undo, or to do again.
     """
 
@@ -35,5 +36,6 @@ class Scene:
     frozen: bool = False
     unlit_allowed: bool = False
     revision: int = 0
+    mode_revision: int = 0
     can_undo: bool = False
     can_redo: bool = False

@@ -2,49 +2,32 @@
 
 from __future__ import annotations
 
-import re
 import threading
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.config.look import (
     LEAST_RELIT_BLEND,
-    Background,
-    ColorBackground,
-    EnvironmentBackground,
-    ImageBackground,
     Look,
     Mode,
 )
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.base.errors import (
     ConflictError,
-    InputError,
-    NotFoundError,
     PreconditionFailedError,
     RelitError,
     UnlitNotAllowedError,
 )
-from relit_camera.base.images.color import linear_from_uint8, rgb_from_hex, uint8_from_linear
-from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.light.environments.background_light import panorama_from_background
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.environments.environment_store import EnvironmentStore
-from relit_camera.light.environments.panorama_axes import between_map_and_viewer_axes
-from relit_camera.light.exposure import auto_exposure_scale
-from relit_camera.light.light_map import resample_to_light_map
 from relit_camera.live.scene.background_store import BackgroundStore
+from relit_camera.live.scene.look_loader import LookLoader
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_history import SceneHistory, ScenePoint, TakeStep
 from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_store import SubjectStore
-
-BACKGROUND_ENVIRONMENT = "background"
-"""The reserved environment name that means the light of the virtual background."""
 
 
 @dataclass(frozen=True)
@@ -72,12 +55,11 @@ class SceneController:
 
     def __init__(self, storage: StorageSettings, clock: Clock = SYSTEM_CLOCK) -> None:
         """Set up; nothing is read. `clock` tells which changes are one step to undo."""
-        self.environments = EnvironmentStore(storage.environments)
+        self._looks = LookLoader(EnvironmentStore(storage.environments), BackgroundStore(storage.backgrounds))
+        self.environments, self.backgrounds = self._looks.environments, self._looks.backgrounds
         self.subjects = SubjectStore(storage.subjects, copied=True)
-        self.backgrounds = BackgroundStore(storage.backgrounds)
         self._change = threading.Lock()
         self._history = SceneHistory(clock)
-        self._temporary_environments: dict[str, Environment] = {}
         self._subject_files: dict[str, Path] = {}
         self.scene = Scene(Look())
         self._first = _point(self.scene)
@@ -302,43 +284,28 @@ class SceneController:
             return chosen.subject
         return self.subjects.load_file(self.subject_path(chosen.name))[1]
 
-    def _with_look(self, look: Look) -> dict[str, object]:
-        """The fields of a scene with that look."""
-        before = self.scene
-        # A slider sends dozens of changes a second, so what did not change is not read again.
-        image = before.background_image if look.background == before.look.background else None
-        if image is None:
-            image = self._background_image(look.background)
-        environment = self._unchanged_environment(look) or self._environment(look, image)
-        return {"look": look, "environment": environment, "background_image": image}
-
     def register_temporary_environment(self, name_or_path: str) -> str:
-        """Make the environment of a file available under a name, for this run only; a stored one keeps its own name.
-
-        Returns:
-            The name by which a look can choose it.
+        """Make the environment of a file available under a name, for this run only; see `LookLoader.register`.
 
         Raises:
             NotFoundError: neither a stored name nor a file.
             PanoramaError: the file cannot be used as light.
         """
-        if name_or_path == BACKGROUND_ENVIRONMENT or name_or_path in self.environments.names():
-            return name_or_path
-        environment = self.environments.resolve(name_or_path)
-        name = re.sub(r"[^A-Za-z0-9_-]+", "-", Path(name_or_path).stem).strip("-_")[:50] or "file"
-        if name == BACKGROUND_ENVIRONMENT or name in self.environments.names():
-            name += "-file"
-        with self._change:
-            self._temporary_environments[name] = environment
-        return name
+        return self._looks.register(name_or_path)
 
     def temporary_environments(self) -> dict[str, Environment]:
         """The environments registered from files for this run, by name."""
-        return dict(self._temporary_environments)
+        return self._looks.temporary_environments()
 
     def background_names(self) -> list[str]:
         """The names that an `image` background may use: stored pictures and environments."""
-        return sorted({*self.backgrounds.names(), *self.environments.names()})
+        return self._looks.background_names()
+
+    def _with_look(self, look: Look) -> dict[str, object]:
+        """The fields of a scene with that look."""
+        before = self.scene
+        changes = self._looks.load(look, before)
+        return changes if look.mode is before.look.mode else changes | {"mode_revision": before.revision + 1}
 
     def _next(self, **changes: object) -> Scene:
         return replace(self.scene, **changes, revision=self.scene.revision + 1)  # type: ignore[arg-type]
@@ -348,51 +315,6 @@ class SceneController:
             self._history.note(_point(self.scene), _point(scene))
         self.scene = replace(scene, can_undo=self._history.can_undo, can_redo=self._history.can_redo)
         return self.scene
-
-    def _unchanged_environment(self, look: Look) -> Environment | None:
-        before = self.scene.look
-        if look.lighting.environment != before.lighting.environment:
-            return None
-        stays = look.lighting.environment != BACKGROUND_ENVIRONMENT or look.background == before.background
-        return self.scene.environment if stays else None
-
-    def _environment(self, look: Look, background_image: DisplayImage | None) -> Environment | None:
-        name = look.lighting.environment
-        if name is None:
-            return None
-        if name != BACKGROUND_ENVIRONMENT:
-            # Not `resolve`: a name from the API must not reach files outside the store.
-            return (
-                self._temporary_environments[name]
-                if name in self._temporary_environments
-                else self.environments.load(name)
-            )
-        background = look.background
-        if isinstance(background, ImageBackground) and background.image in self.environments.names():
-            return self.environments.load(background.image)
-        if isinstance(background, ColorBackground):
-            background_image = np.full((90, 160, 3), rgb_from_hex(background.color), dtype=np.uint8)
-        if background_image is None:
-            kind = "an environment needs a name" if isinstance(background, EnvironmentBackground) else "has no picture"
-            raise InputError(
-                f"the face cannot be lit by a background of kind '{background.kind}': it {kind}",
-                "choose an image or color background first",
-            )
-        panorama = panorama_from_background(linear_from_uint8(background_image))
-        return Environment(BACKGROUND_ENVIRONMENT, panorama, resample_to_light_map(panorama.radiance), panorama.notes)
-
-    def _background_image(self, background: Background) -> DisplayImage | None:
-        if not isinstance(background, ImageBackground):
-            return None
-        if background.image in self.backgrounds.names():
-            return self.backgrounds.load(background.image)
-        if background.image in self.environments.names():
-            environment = self.environments.load(background.image)
-            seen = between_map_and_viewer_axes(environment.panorama.radiance)
-            # A white wall of irradiance 1 reads 1 and has radiance 1/π: with the factor π, background and face match.
-            return uint8_from_linear(seen * np.float32(np.pi * auto_exposure_scale(environment.light_map)))
-        known = ", ".join(self.background_names()) or "none"
-        raise NotFoundError(f"no background picture '{background.image}'", f"there are: {known}")
 
 
 def _point(scene: Scene) -> ScenePoint:

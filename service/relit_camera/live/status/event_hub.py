@@ -18,8 +18,9 @@ class Event:
     """Something that happened to the camera.
 
     Attributes:
-        kind: `state`, `tracking`, `neutral-pose`, `degraded`, `recovered`; `collection` from the API; `caption` from
-            the demonstration's tour; `models` and `framing` from the set-up.
+        kind: `state`, `tracking`, `neutral-pose`, `degraded`, `recovered`; `collection` where something is stored,
+            renamed or deleted; `capture`, `desk-capture`, `film-capture` and `replay` from these jobs; `models` and
+            `framing` from the set-up; `caption` from the demonstration's tour.
         data: JSON-ready details.
         at: seconds since the epoch.
     """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from relit_camera.live.status.camera_status import Degradation, DegradationCode
 from relit_camera.live.status.setup_status import SpeedAdvice
 
 SMALLER_SIZES = ((1280, 720), (960, 540), (640, 360), (480, 270))
@@ -66,10 +67,30 @@ def next_speed(
     return replace(state, other_since=since, seen_at=now)
 
 
+def smaller_size(size: tuple[int, int]) -> tuple[int, int]:
+    """The next smaller size (width, height) that is advised; the same where there is none."""
+    return next((each for each in SMALLER_SIZES if each[0] * each[1] < size[0] * size[1]), size)
+
+
+def slow_cure(size: tuple[int, int]) -> str:
+    """What to do where pictures of `size` (width, height) are too much for the computer."""
+    width, height = smaller_size(size)
+    if (width, height) == size:
+        return "close other programs: no smaller size would help"
+    return f"try {width}x{height}, or close other programs"
+
+
 def speed_advice(size: tuple[int, int], expected_fps: float, new_fps: float) -> SpeedAdvice:
     """What to do where pictures of `size` (width, height) come too slowly."""
-    width, height = next((each for each in SMALLER_SIZES if each[0] * each[1] < size[0] * size[1]), size)
     what = f"the computer makes {new_fps:.0f} of {expected_fps:.0f} pictures a second"
-    if (width, height) == size:
-        return SpeedAdvice(what, "close other programs: no smaller size would help", width, height)
-    return SpeedAdvice(what, f"try {width}x{height}, or close other programs", width, height)
+    return SpeedAdvice(what, slow_cure(size), *smaller_size(size))
+
+
+def reduced_quality(latency_s: float, size: tuple[int, int]) -> Degradation:
+    """What the status says where pictures of `size` come `latency_s` seconds late, and are given less detail."""
+    return Degradation(
+        code=DegradationCode.REDUCED_QUALITY,
+        what="pictures have less detail",
+        why=f"the computer is busy: they come {1e3 * latency_s:.0f} ms late",
+        cure=f"{slow_cure(size)}; full quality comes back by itself",
+    )

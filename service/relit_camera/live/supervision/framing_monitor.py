@@ -53,8 +53,7 @@ class FramingMonitor:
         self._events, self._open_detector, self._judge, self._clock = events, open_detector, judge, clock
         self._wanted_until = self._next_at = -math.inf
         self._frames: NewestSlot[Frame] = NewestSlot(clock)
-        self._framing: NewestSlot[Framing] = NewestSlot(clock)
-        self._error: RelitError | None = None
+        self._framing: NewestSlot[Framing | RelitError] = NewestSlot(clock)
         self._closing = threading.Event()
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
@@ -72,7 +71,7 @@ class FramingMonitor:
             self._wanted_until = self._clock.now() + WANTED_S if wanted else -math.inf
             if not wanted or self._thread is not None or self._closing.is_set():
                 return
-            self._error, self._next_at, self._frames = None, -math.inf, NewestSlot(self._clock)
+            self._next_at, self._frames = -math.inf, NewestSlot(self._clock)
             self._thread = threading.Thread(target=self.run, name="framing", daemon=True)
             self._thread.start()
 
@@ -85,12 +84,12 @@ class FramingMonitor:
         after = self._framing.count
         self.want(True)
         found = self._framing.newer(after, ANSWER_S)
-        if found is not None:
-            return found[1]
-        error = self._error
-        if error is not None:
-            raise NotReadyError(error.what, error.cure)
-        raise NotReadyError("no frames come from the source", "GET /api/v1/status says why")
+        if found is None:
+            raise NotReadyError("no frames come from the source", "GET /api/v1/status says why")
+        framing = found[1]
+        if isinstance(framing, RelitError):
+            raise NotReadyError(framing.what, framing.cure)
+        return framing
 
     def close(self) -> None:
         """End the thread. Harmless when repeated."""
@@ -109,11 +108,10 @@ class FramingMonitor:
                     self._framing.put(framing)
                     self._events.publish("framing", **asdict(framing))
         except RelitError as error:
-            self._error = error
-            self._end()
+            self._end(error)
         except Exception:  # nothing that a picture shows may leave the thread behind as if it ran
             log.exception("the framing cannot be judged")
-            self._end()
+            self._end(NotReadyError("the framing cannot be judged", "please report it"))
 
     def _ended(self) -> bool:
         """Whether it is no longer wanted; then another thread may be started."""
@@ -123,6 +121,8 @@ class FramingMonitor:
             self._thread = None
             return True
 
-    def _end(self) -> None:
+    def _end(self, error: RelitError) -> None:
+        """Let whoever waits for the framing hear at once why none comes."""
         with self._lock:
             self._thread, self._wanted_until = None, -math.inf
+        self._framing.put(error)

@@ -9,9 +9,8 @@ from fastapi import APIRouter
 from relit_camera.api.bodies.schemas import DeskCaptureRequest, InstantCaptureRequest, ShownStep
 from relit_camera.api.dependencies import ApiContextDep
 from relit_camera.api.problem_details import error_responses
-from relit_camera.base.errors import ConflictError
-from relit_camera.live.status.capture_status import CaptureStage, CaptureStatus
-from relit_camera.live.status.desk_status import DeskCaptureStatus, DeskPlace, DeskStage
+from relit_camera.live.status.capture_status import CaptureStatus
+from relit_camera.live.status.desk_status import DeskCaptureStatus, DeskPlace
 
 router = APIRouter(tags=["subjects"])
 
@@ -25,7 +24,6 @@ def get_instant_capture(api: ApiContextDep) -> CaptureStatus:
 @router.post("/captures/instant", status_code=HTTPStatus.ACCEPTED, responses=error_responses(409, 422))
 def start_instant_capture(api: ApiContextDep, capture: InstantCaptureRequest) -> CaptureStatus:
     """Capture a subject from some three seconds of the webcam; it is stored and shown, in mode ratio."""
-    _require_idle(api.camera.desk_capture.status().stage)
     return api.camera.instant_capture.start(capture.name)
 
 
@@ -44,7 +42,6 @@ def get_desk_capture(api: ApiContextDep) -> DeskCaptureStatus:
 @router.post("/captures/desk", status_code=HTTPStatus.ACCEPTED, responses=error_responses(409, 422))
 def start_desk_capture(api: ApiContextDep, capture: DeskCaptureRequest) -> DeskCaptureStatus:
     """Capture a subject by the light of the screen; the page `/desk` shows the patterns."""
-    _require_idle(api.camera.instant_capture.status().stage)
     return api.camera.desk_capture.start(capture.name, DeskPlace(**capture.model_dump(exclude={"name"})))
 
 
@@ -58,9 +55,3 @@ def show_desk_step(api: ApiContextDep, shown: ShownStep) -> DeskCaptureStatus:
 def cancel_desk_capture(api: ApiContextDep) -> DeskCaptureStatus:
     """End the desk capture that runs, and put the webcam's controls back; nothing is stored then."""
     return api.camera.desk_capture.cancel()
-
-
-def _require_idle(other: CaptureStage | DeskStage) -> None:
-    """Raise ConflictError while the other kind of capture runs: both need the webcam's frames, and the processor."""
-    if other.is_running:
-        raise ConflictError("another capture runs", "wait for its end, or cancel it")

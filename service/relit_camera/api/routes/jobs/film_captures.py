@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from http import HTTPStatus
-from pathlib import Path
 
 from fastapi import APIRouter, Request
 from starlette.responses import Response
@@ -17,6 +16,7 @@ from relit_camera.api.middleware.body_limits import MAX_FILM_BYTES
 from relit_camera.api.problem_details import error_responses
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
 from relit_camera.base.errors import ConflictError
+from relit_camera.base.storage.upload import Upload
 from relit_camera.live.status.film_status import FilmCaptureStatus
 
 router = APIRouter(prefix="/captures/film", tags=["subjects"])
@@ -41,11 +41,11 @@ async def start_film_capture(api: ApiContextDep, request: Request) -> FilmCaptur
     """
 
     @contextmanager
-    def open_file(fields: Mapping[str, str], file_name: str) -> Iterator[Path]:
+    def open_file(fields: Mapping[str, str], file_name: str) -> Iterator[Upload]:
         form = read_fields(FilmCaptureForm, fields)
         _require_no_replay(api)
-        with api.camera.film_capture.receive(form.name, file_name, form.options()) as path:
-            yield path
+        with api.camera.film_capture.receive(form.name, file_name, form.options()) as upload:
+            yield upload
 
     await receive_form(request, open_file, MAX_FILM_BYTES)
     return api.camera.film_capture.status()
@@ -61,7 +61,7 @@ def resume_film_capture(api: ApiContextDep, options: FilmOptionFields | None = N
     return api.camera.film_capture.resume(None if options is None else options.options())
 
 
-@router.delete("", responses=error_responses(422))
+@router.delete("", responses=error_responses(409, 422))
 def cancel_film_capture(api: ApiContextDep, forget: bool = False) -> FilmCaptureStatus:
     """End the capture that runs; nothing is stored then. `?forget=true` deletes the film and what was made of it."""
     return api.camera.film_capture.cancel(forget)

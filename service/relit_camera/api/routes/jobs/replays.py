@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from http import HTTPStatus
-from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Request
@@ -18,6 +17,7 @@ from relit_camera.api.problem_details import error_responses
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
 from relit_camera.base.config.look import StoredName
 from relit_camera.base.errors import ConflictError
+from relit_camera.base.storage.upload import Upload
 from relit_camera.live.status.replay_status import ReplayStatus
 
 VIDEO_RESPONSE: dict[int | str, dict[str, Any]] = {
@@ -50,12 +50,12 @@ async def start_replay(api: ApiContextDep, request: Request) -> ReplayStatus:
     started: list[str] = []
 
     @contextmanager
-    def open_file(fields: Mapping[str, str], file_name: str) -> Iterator[Path]:
+    def open_file(fields: Mapping[str, str], file_name: str) -> Iterator[Upload]:
         name = read_fields(NameForm, fields).name
         if api.camera.film_capture.status().stage.is_running:
             raise ConflictError("a subject is made of a film", "wait for its end, or cancel it")
-        with api.camera.replays.receive(name, file_name) as path:
-            yield path
+        with api.camera.replays.receive(name, file_name) as upload:
+            yield upload
         started.append(name)
 
     await receive_form(request, open_file, MAX_FILM_BYTES)

@@ -16,13 +16,13 @@ import cv2
 import numpy as np
 from pydantic import ValidationError
 
+from relit_camera.app.background_job import BackgroundJob, describe_failure
 from relit_camera.app.captures.desk.controls_note import ControlsNote
 from relit_camera.app.captures.subject_maker import SubjectMaker, require_replaceable
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
-from relit_camera.base.errors import CaptureError, ConflictError, DeviceError, InputError, RelitError
+from relit_camera.base.errors import CaptureError, DeviceError, InputError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.base.images.image_types import Frame
-from relit_camera.base.storage.folder_redaction import redact_folders
 from relit_camera.capture.desk.desk_recording import CameraPlace, DeskSetup, Screen
 from relit_camera.capture.desk.desk_session import DeskSession, SessionTimings
 from relit_camera.capture.desk.patterns.pattern_sequence import Pattern, pattern_light, standard_sequence
@@ -86,6 +86,7 @@ class DeskFilming:
         wake: Callable[[], None] = lambda: None,
         timings: FilmingTimings = FilmingTimings(),
         clock: Clock = SYSTEM_CLOCK,
+        webcam: threading.Lock | None = None,
     ) -> None:
         """Set up; `start` begins.
 
@@ -100,16 +101,17 @@ class DeskFilming:
             wake: called while frames are waited for: on demand, the webcam opens while somebody wants it.
             timings: of the filming.
             clock: of all waiting.
+            webcam: is held while this runs, by one capture of those that need its frames.
         """
         self._recorder, self._scene_controller, self._events, self._build = recorder, scene_controller, events, build
         self._controls, self._note, self._frame_interval_s, self._wake = controls, note, frame_interval_s, wake
         self._maker = SubjectMaker(scene_controller, events)
         self._timings, self._clock = timings, clock
+        self._job = BackgroundJob("desk-capture", "a desk capture runs already", shared=webcam)
         self._lock = threading.RLock()
         self._status = DeskCaptureStatus()
         self._session: DeskSession | None = None
         self._canceled = threading.Event()
-        self._thread: threading.Thread | None = None
 
     def status(self) -> DeskCaptureStatus:
         """How far the last capture is."""
@@ -129,17 +131,14 @@ class DeskFilming:
         """
         setup = _setup(place)
         require_replaceable(self._scene_controller.subjects, name, REPLACED)
-        with self._lock:
-            if self._status.stage.is_running or (self._thread is not None and self._thread.is_alive()):
-                raise ConflictError("a desk capture runs already", "wait for its end, or cancel it")
-            self._canceled = threading.Event()
+        with self._job.taken() as canceled, self._lock:
+            self._canceled = canceled
             self._status = DeskCaptureStatus(
                 DeskStage.EXPOSING, name, columns=setup.patches.columns, rows=setup.patches.rows
             )
             self._begin_session(DeskStage.EXPOSING, ["white"], setup)
-            arguments = name, setup, self._canceled, self._maker.shown()
-            self._thread = threading.Thread(target=self._run, args=arguments, name="desk-capture", daemon=True)
-            self._thread.start()
+            shown = self._maker.shown()
+            self._job.begin(lambda: self._run(name, setup, canceled, shown), lambda ended: self._change(**ended))
             return self._status
 
     def page_shows(self, step: int) -> DeskCaptureStatus:
@@ -151,15 +150,11 @@ class DeskFilming:
 
     def cancel(self) -> DeskCaptureStatus:
         """End the capture that runs, if one does; nothing is stored then."""
-        with self._lock:
-            thread = self._thread
-            self._canceled.set()
-        if thread is not None:
-            thread.join(3.0)
+        self._job.cancel()
         return self.status()
 
-    def _run(self, name: str, setup: DeskSetup, canceled: threading.Event, before: Scene) -> None:
-        """Capture; `before` is what was shown when somebody asked for it."""
+    def _run(self, name: str, setup: DeskSetup, canceled: threading.Event, before: Scene) -> dict[str, object]:
+        """Capture; `before` is what was shown when somebody asked for it. Returns what its end changes."""
         try:
             with self._controls() as device:
                 self._white_balance(setup)
@@ -173,18 +168,12 @@ class DeskFilming:
             notes, not_shown = self._maker.make(
                 name, REPLACED, before, self._build, frames, text, timeout_s=limit_s, canceled=canceled
             )
-            self._change(stage=DeskStage.DONE, what="; ".join(filter(None, [*notes, not_shown])))
-        except RelitError as error:
+            return {"stage": DeskStage.DONE, "what": "; ".join(filter(None, [*notes, not_shown]))}
+        except Exception as error:  # also a fault: else the page would wait for ever
             if canceled.is_set():
-                self._change(stage=DeskStage.CANCELED, patches=())
-            else:
-                log.warning("desk capture: %s", error)
-                what, cure = redact_folders(error.what), redact_folders(error.cure)
-                self._change(stage=DeskStage.FAILED, patches=(), what=what, cure=cure)
-        except Exception as error:  # else the page would wait for ever
-            log.exception("desk capture")
-            what = redact_folders(f"the capture failed: {error}")
-            self._change(stage=DeskStage.FAILED, patches=(), what=what, cure="start again")
+                return {"stage": DeskStage.CANCELED, "patches": ()}
+            what, cure = describe_failure("desk capture", error)
+            return {"stage": DeskStage.FAILED, "patches": (), "what": what, "cure": cure}
 
     def _white_balance(self, setup: DeskSetup) -> None:
         """Wait until the page shows white, and the webcam has adapted to it."""

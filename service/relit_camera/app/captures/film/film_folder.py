@@ -7,6 +7,7 @@ stored.
 from __future__ import annotations
 
 import logging
+import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from relit_camera.base.errors import InputError, NotFoundError
 from relit_camera.base.storage.atomic_files import atomic_path, make_folder, write_atomic
+from relit_camera.base.storage.folder_lock import FolderLock
 from relit_camera.base.storage.named_files import is_valid_name
 from relit_camera.live.status.film_status import FilmOptions, FilmReport
 
@@ -59,23 +61,47 @@ class FilmRecord(BaseModel):
 
 
 class FilmFolder:
-    """The folder of one capture at a time."""
+    """The folder of one capture at a time, which one process at a time may write to."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._lock = FolderLock(folder)
 
-    @contextmanager
-    def receiving(self, suffix: str) -> Iterator[Path]:
-        """Give a path to write a film to, which on success replaces the one that is there, and all that was made of it.
+    def take(self) -> bool:
+        """Create the folder where it is missing, and take it; returns whether this process may write to it now.
 
         Raises:
-            StorageError: it cannot be written.
+            StorageError: it cannot be created.
         """
         make_folder(self.folder, private=True)
-        with atomic_path(self.folder / f"received{suffix}") as path:
+        return self._lock.take()
+
+    def take_if_there(self) -> bool:
+        """Take the folder, if it is there; returns whether this process has it now."""
+        return self.folder.is_dir() and self._lock.take()
+
+    def release(self) -> None:
+        """Let another process write to the folder. Harmless when repeated."""
+        self._lock.release()
+
+    @contextmanager
+    def receiving(self, record: FilmRecord) -> Iterator[Path]:
+        """Give a path to write the film of a record to.
+
+        Both replace what is there, and all that was made of it, when the block ends; if it fails, everything stays.
+
+        Raises:
+            StorageError: they cannot be written.
+        """
+        film = self.folder / record.film
+        with atomic_path(film) as path:
             yield path
-        self._clear(but=f"received{suffix}")
-        (self.folder / f"received{suffix}").rename(self.folder / f"film{suffix}")
+        try:
+            self.write(record)
+        except BaseException:
+            film.unlink(missing_ok=True)
+            raise
+        self._clear(but=RECORD_NAME, and_but=record.film)
 
     def read(self) -> FilmRecord | None:
         """The record; None where there is none that can be used."""
@@ -122,10 +148,8 @@ class FilmFolder:
         self._clear(but=RECORD_NAME, and_but=PICTURES)
 
     def forget(self) -> None:
-        """Delete everything."""
+        """Delete everything in the folder."""
         self._clear()
-        with suppress(OSError):
-            self.folder.rmdir()
 
     def _clear(self, but: str = "", and_but: str = "") -> None:
         try:
@@ -138,6 +162,11 @@ class FilmFolder:
             else:
                 with suppress(OSError):
                     path.unlink()
+
+
+def new_film_name(suffix: str) -> str:
+    """The name of a film's file in the folder, other than that of the film that is there."""
+    return f"film-{secrets.token_hex(4)}{suffix}"
 
 
 def film_suffix(file_name: str) -> str:

@@ -12,13 +12,20 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from relit_camera.app.captures.film.film_folder import FilmFolder, FilmRecord, RecordedState, film_suffix
+from relit_camera.app.background_job import BackgroundJob, StatusEvents, describe_failure
+from relit_camera.app.captures.film.film_folder import (
+    FilmFolder,
+    FilmRecord,
+    RecordedState,
+    film_suffix,
+    new_film_name,
+)
 from relit_camera.app.captures.film.film_progress import FilmProgress
 from relit_camera.app.captures.subject_maker import SubjectMaker, require_replaceable
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.concurrency.worker_process import Progress
 from relit_camera.base.errors import ConflictError, RelitError, StorageError
-from relit_camera.base.storage.folder_redaction import redact_folders
+from relit_camera.base.storage.upload import Upload
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.event_hub import EventHub
@@ -79,100 +86,147 @@ class FilmProcessing:
             limits: of the work.
             clock: by which steps are timed.
         """
-        self._files, self._scene_controller, self._events = FilmFolder(folder), scene_controller, events
+        self._files, self._scene_controller = FilmFolder(folder), scene_controller
         self._build, self._limits, self._clock = build, limits, clock
         self._maker = SubjectMaker(scene_controller, events)
-        self._lock = threading.RLock()
-        self._canceled = threading.Event()
-        self._thread: threading.Thread | None = None
-        self._told_at = float("-inf")
+        self._told = StatusEvents(events, "film-capture", limits.event_interval_s, clock)
+        self._job = BackgroundJob("film-capture", "a capture from a film runs already")
         self._closing = threading.Event()
-        self._record = self._files.read()
-        if self._record is None:
-            self._files.forget()  # a film that was received when the camera was killed
-        self._status = self._settled(self._record) if self._record else FilmCaptureStatus()
+        self._record: FilmRecord | None = None
+        self._status = FilmCaptureStatus()
+        if self._files.take_if_there():
+            self._look_at_what_is_kept()
 
     def status(self) -> FilmCaptureStatus:
         """How far the last capture is."""
         return self._status
 
     @contextmanager
-    def receive(self, name: str, file_name: str, options: FilmOptions) -> Iterator[Path]:
+    def receive(self, name: str, file_name: str, options: FilmOptions) -> Iterator[Upload]:
         """Give a path to write a film to; see `FilmCaptureControl.receive`."""
         suffix = film_suffix(file_name)
         require_replaceable(self._scene_controller.subjects, name, REPLACED)
-        with self._lock:
-            self._require_idle()
-            before, canceled = self._status, threading.Event()
-            self._canceled = canceled
-            self._set(FilmCaptureStatus(FilmStage.RECEIVING, name, file_name))
-        try:
-            with self._files.receiving(suffix) as path:
-                yield path
-                if canceled.is_set():
-                    raise ConflictError("the capture was canceled", "send the film again")
-            record = FilmRecord(subject=name, file_name=file_name, film=f"film{suffix}", options=options)
-            self._files.write(record)
-        except BaseException:
-            self._set(before)
-            raise
-        self._begin(record, canceled)
+        with self._job.taken() as canceled:
+            self._require_own_folder()
+            record = FilmRecord(subject=name, file_name=file_name, film=new_film_name(suffix), options=options)
+            status_before, record_before = self._status, self._record
+            try:
+                self._set(FilmCaptureStatus(FilmStage.RECEIVING, name, file_name))
+                with self._files.receiving(record) as path:
+                    upload = Upload(path, canceled, "the capture was canceled", "send the film again")
+                    yield upload
+                    upload.require_wanted()
+                self._record = record
+                self._begin(record, canceled)
+            except BaseException:
+                self._set(status_before if self._record is record_before else self._settled(record))
+                raise
 
     def resume(self, options: FilmOptions | None = None) -> FilmCaptureStatus:
         """Go on with the film that is there; see `FilmCaptureControl.resume`."""
-        with self._lock:
-            self._require_idle()
+        with self._job.taken() as canceled:
+            self._require_own_folder()
             if self._record is None or not self._status.can_resume:
                 raise ConflictError("there is no film to go on with", "send one")
             require_replaceable(self._scene_controller.subjects, self._record.subject, REPLACED)
             changes = {"state": RecordedState.BEGUN, "what": "", "cure": "", "options": options or self._record.options}
             record = self._record.model_copy(update=changes)
             self._files.write(record)
-            self._canceled = threading.Event()
-            self._begin(record, self._canceled)
+            self._record = record
+            self._begin(record, canceled)
             return self._status
 
     def cancel(self, forget: bool = False) -> FilmCaptureStatus:
         """End the capture that runs, if one does; see `FilmCaptureControl.cancel`."""
-        self._end()
-        with self._lock:
-            if forget and not self._status.stage.is_running:  # else it is being received, or does not end
+        self._job.cancel()
+        if forget:
+            with self._job.lock:
+                if not self._job.is_running:  # else it does not end
+                    self._require_own_folder()
+                    self._files.forget()
+                    self._record = None
+                    self._set(FilmCaptureStatus())
+        return self._status
+
+    def subject_renamed(self, name: str, new_name: str) -> None:
+        """Let the report of a subject's film bear its new name."""
+        with self._job.lock:
+            record = self._record
+            if record is None or not self._has_made(name):
+                return
+            renamed = record.model_copy(update={"subject": new_name})
+            try:
+                self._files.write(renamed)
+            except StorageError as error:
+                log.warning("the film's report has the subject's old name: %s", error)
+                return
+            self._record = renamed
+            self._set(replace(self._status, subject=new_name))
+
+    def subject_removed(self, name: str) -> None:
+        """Delete the report of a subject's film, and its pictures."""
+        with self._job.lock:
+            if self._has_made(name):
                 self._files.forget()
                 self._record = None
                 self._set(FilmCaptureStatus())
-            return self._status
 
     def close(self) -> None:
         """End the capture that runs, because the camera ends; it can be resumed at its next start."""
         self._closing.set()
-        self._end()
+        self._job.cancel()
+        if not self._job.is_running:  # else its thread still writes
+            self._files.release()
 
     def picture(self, name: str) -> bytes:
         """A JPEG file of the last report; see `FilmCaptureControl.picture`."""
         return self._files.picture(name)
 
-    def _end(self) -> None:
-        with self._lock:
-            thread = self._thread
-            self._canceled.set()
-        if thread is not None:
-            thread.join(3.0)
+    def _has_made(self, name: str) -> bool:
+        """Whether the last capture is done, and made the subject of that name."""
+        return (self._status.subject, self._status.stage) == (name, FilmStage.DONE)
 
-    def _require_idle(self) -> None:
-        if self._status.stage.is_running:
-            raise ConflictError("a capture from a film runs already", "wait for its end, or cancel it")
+    def _require_own_folder(self) -> None:
+        """Take the folder.
+
+        Raises:
+            ConflictError: another process has it.
+            StorageError: it cannot be created.
+        """
+        owned = self._files.take()
+        if not owned:
+            raise ConflictError(
+                "another Relit Camera has the folder of films",
+                "use that one's panel, or start this one with a data folder of its own (storage.data_dir)",
+            )
+        if self._record is None:
+            self._look_at_what_is_kept()  # the other one may have left something
+
+    def _look_at_what_is_kept(self) -> None:
+        """Read the record, and delete what belongs to none: a film that was received when the camera was killed."""
+        record = self._files.read()
+        if record is not None and record.state is RecordedState.DONE:
+            try:
+                stored = self._scene_controller.subjects.names()
+            except RelitError:
+                stored = [record.subject]  # nobody knows
+            if record.subject not in stored:
+                record = None  # deleted by other means: nothing of a person is kept beyond that
+        if record is None:
+            self._files.forget()
+        else:
+            self._record, self._status = record, self._settled(record)
 
     def _begin(self, record: FilmRecord, canceled: threading.Event) -> None:
-        with self._lock:
-            self._record = record
-            progress = FilmProgress(self._clock)
-            self._set(FilmCaptureStatus(FilmStage.READING, record.subject, record.file_name, progress.steps()))
-            arguments = record, canceled, progress, self._maker.shown()
-            self._thread = threading.Thread(target=self._run, args=arguments, name="film-capture", daemon=True)
-            self._thread.start()
+        progress = FilmProgress(self._clock)
+        self._set(FilmCaptureStatus(FilmStage.READING, record.subject, record.file_name, progress.steps()))
+        shown = self._maker.shown()
+        self._job.begin(lambda: self._run(record, canceled, progress, shown), self._set)
 
-    def _run(self, record: FilmRecord, canceled: threading.Event, progress: FilmProgress, before: Scene) -> None:
-        """Work; `before` is what was shown when somebody asked for it."""
+    def _run(
+        self, record: FilmRecord, canceled: threading.Event, progress: FilmProgress, before: Scene
+    ) -> FilmCaptureStatus:
+        """Work; `before` is what was shown when somebody asked for it. Returns how it ended."""
 
         def tell(stage: str, done: int, total: int | None) -> None:
             new_step = progress.note(stage, done, total)
@@ -201,32 +255,27 @@ class FilmProcessing:
             progress.finish()
             pictures = tuple(PICTURE_PATH.format(name) for name in report.pictures)
             report = replace(report, pictures=pictures)
-            self._settle(record, progress, RecordedState.DONE, report=report, what=not_shown)
+            ended = self._settle(record, progress, RecordedState.DONE, report=report, what=not_shown)
             self._files.keep_result()
-        except RelitError as error:
+        except Exception as error:  # also a fault: else nobody would hear that it has ended
             if not canceled.is_set():
-                log.warning("film capture: %s", error)
-                what = redact_folders(error.what.replace(str(film), f"'{record.file_name}'"))
-                self._settle(record, progress, RecordedState.FAILED, what=what, cure=redact_folders(error.cure))
-            elif self._closing.is_set():
-                self._settle(record, progress, RecordedState.BEGUN)
-            else:
-                self._settle(record, progress, RecordedState.CANCELED)
-        except Exception as error:  # else nobody would hear that it has ended
-            log.exception("the film capture failed")
-            what = redact_folders(f"it failed in a way that nobody expected ({type(error).__name__}: {error})")
-            self._settle(record, progress, RecordedState.FAILED, what=what, cure="please report it")
+                what, cure = describe_failure("film capture", error, {str(film): f"'{record.file_name}'"})
+                return self._settle(record, progress, RecordedState.FAILED, what=what, cure=cure)
+            state = RecordedState.BEGUN if self._closing.is_set() else RecordedState.CANCELED
+            return self._settle(record, progress, state)
+        return ended
 
-    def _settle(self, record: FilmRecord, progress: FilmProgress, state: RecordedState, **changes: object) -> None:
-        """Keep how a capture ended, and tell it."""
+    def _settle(
+        self, record: FilmRecord, progress: FilmProgress, state: RecordedState, **changes: object
+    ) -> FilmCaptureStatus:
+        """Keep how a capture ended; returns its status."""
         ended = record.model_copy(update={"state": state, **changes})
         try:
             self._files.write(ended)
         except StorageError as error:  # the subject is stored, or it is not: that does not depend on the record
             log.warning("how the film capture ended is not kept: %s", error)
-        with self._lock:
-            self._record = ended
-            self._set(replace(self._settled(ended), stages=progress.steps(), progress=progress.share()))
+        self._record = ended
+        return replace(self._settled(ended), stages=progress.steps(), progress=progress.share())
 
     def _settled(self, record: FilmRecord) -> FilmCaptureStatus:
         """The status of a capture that does not run."""
@@ -245,7 +294,4 @@ class FilmProcessing:
     def _set(self, status: FilmCaptureStatus, seldom: bool = False) -> None:
         """Set the status and tell it; `seldom`: only if nothing was told for a while."""
         self._status = status
-        now = self._clock.now()
-        if not seldom or now >= self._told_at + self._limits.event_interval_s:
-            self._told_at = now
-            self._events.publish("film-capture", **asdict(status))
+        self._told.publish(asdict(status), seldom)

@@ -8,13 +8,12 @@ from typing import Any
 
 from relit_camera.capture.film.pipeline.capture_options import CaptureOptions, Progress
 from relit_camera.capture.film.pipeline.checkpoint import Checkpoint, CheckpointFolder
-from relit_camera.capture.film.pipeline.film_capture import STAGES, build_samples
+from relit_camera.capture.film.pipeline.film_capture import build_samples
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.subject.subject import Subject
 
 BUILDING = "Building the field"
-ALL_STAGES = (*STAGES, BUILDING)
-"""Names of the stages that are told as progress, in their order."""
+"""Name of the stage that follows those of `build_samples`."""
 
 
 def build_film_subject(
