@@ -16,6 +16,7 @@ from tests.small_camera import wait_until
 CLICK_MS = 80
 """How long a person's finger holds the button."""
 BUILT_IN_PLACES = 6
+MOST_ENTRIES = 6
 COLOR = re.compile(r"rgba?\((\d+), (\d+), (\d+)")
 
 
@@ -58,6 +59,10 @@ class Panel:
         """Whether the pictures of all places are loaded."""
         loaded = self.thumbnails.evaluate_all("images => images.map(each => each.complete && each.naturalWidth > 0)")
         return len(loaded) >= BUILT_IN_PLACES and all(loaded)
+
+    def places_shown_on_me(self) -> int:
+        """How many places are shown on the face of who is shown."""
+        return self.page.locator('#environments img[src*="on-me.jpg"]').count()
 
     def preview_width(self) -> int:
         """The width in pixels that the preview is asked for with."""
@@ -116,7 +121,29 @@ class Panel:
 
     def choose_subject(self, name: str) -> None:
         """Choose who is shown; "" is nobody."""
-        self.page.locator("#subject").select_option(name)
+        self.face(name or "Nobody").click()
+
+    def face(self, name: str) -> Locator:
+        """The tile of a captured face."""
+        return self.page.locator("#faces").get_by_role("button", name=name, exact=True)
+
+    def choose_option(self, of: str, entry: str) -> None:
+        """Choose an entry of the menu of a face or a preset, by the keyboard."""
+        self.page.get_by_role("button", name=f"Options of {of}").press("Enter")
+        item = self.page.get_by_role("menuitem", name=entry, exact=True).locator("visible=true")
+        for _ in range(MOST_ENTRIES):
+            if item.evaluate("each => each === document.activeElement"):
+                break
+            self.page.keyboard.press("ArrowDown")
+        self.page.keyboard.press("Enter")
+
+    def what_has_the_focus(self) -> str:
+        """Id or text of the element that has the keyboard; "" where it is nowhere."""
+        found: str = self.page.evaluate(
+            "() => document.activeElement === document.body ? '' :"
+            " document.activeElement.id || document.activeElement.textContent.trim()"
+        )
+        return found
 
 
 def open_panel(open_page: OpenPage, url: str, **options: object) -> Panel:

@@ -14,6 +14,11 @@ from tests.browser.cameras import FakeServer
 from tests.browser.panel import Panel
 from tests.small_camera import wait_until
 
+SCREEN = {"width": 1280, "height": 900}
+ZOOM = 1.25
+CARD_PIXELS = 320
+"""How wide the frame is that fits the bank card, in pixels of the screen."""
+CARD_CM = 8.56
 DESK = "**/api/v1/captures/desk"
 
 
@@ -45,6 +50,41 @@ def test_another_size_of_the_window_stops_the_desk_s_patterns(fake: FakeServer, 
     desk.set_viewport_size({"width": 900, "height": 700})
     expect(desk.locator("#desk-problem")).to_contain_text("size changed")
     assert fake.camera.desk_capture.status().stage is DeskStage.CANCELED
+
+
+@pytest.mark.parametrize("zoomed", ["before", "after"])
+def test_the_size_of_the_screen_is_true_whatever_the_page_s_zoom(
+    fake: FakeServer, open_page: OpenPage, zoomed: str
+) -> None:
+    """A zoom of 125 % makes CSS pixels larger; the screen stays as it is, and so does the card that was held to it."""
+    page = open_page(f"{fake.url}desk", viewport=SCREEN, screen=SCREEN)
+    devtools = page.context.new_cdp_session(page)
+
+    def zoom() -> None:
+        size = {each: round(SCREEN[each] / ZOOM) for each in ("width", "height")}
+        screen = {"screenWidth": SCREEN["width"], "screenHeight": SCREEN["height"]}
+        metrics = size | screen | {"deviceScaleFactor": ZOOM, "mobile": False}
+        devtools.send("Emulation.setDeviceMetricsOverride", metrics)
+
+    card = CARD_PIXELS
+    if zoomed == "before":
+        zoom()
+        card = round(CARD_PIXELS / ZOOM)
+    page.locator("#understood").check()
+    page.locator("#accept").click()
+    page.locator("#card-width").evaluate(
+        "(slider, width) => { slider.value = width; slider.dispatchEvent(new Event('input')); }", card
+    )
+    page.locator("#size-next").click()
+    if zoomed == "after":
+        zoom()
+    page.locator("#place-next").click()
+    with page.expect_request(lambda request: request.method == "POST" and request.url.endswith("desk")) as asked:
+        page.locator("#start").click()
+    body = asked.value.post_data_json
+    assert body is not None
+    assert body["screen_width_cm"] == pytest.approx(CARD_CM * SCREEN["width"] / CARD_PIXELS, rel=0.005)
+    assert body["screen_height_cm"] == pytest.approx(CARD_CM * SCREEN["height"] / CARD_PIXELS, rel=0.005)
 
 
 def test_without_the_whole_screen_the_desk_s_patterns_do_not_begin(fake: FakeServer, desk: Page) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
+from relit_camera.live.status.setup_status import SpeedAdvice
 from tests.browser.browser_pages import OpenPage
 from tests.browser.cameras import FakeServer
 from tests.browser.panel import open_panel
@@ -118,3 +120,49 @@ def test_a_dialog_keeps_the_keyboard_and_gives_it_back(fake: FakeServer, open_pa
     expect(page.locator("#ask")).to_be_hidden()
     expect(page.locator("#preset-save")).to_be_focused()
     assert fake.get("presets") == []
+
+
+def test_the_keyboard_is_never_nowhere(fake: FakeServer, open_page: OpenPage) -> None:
+    """What has the focus goes away by its own action: its place has the focus then."""
+    panel = open_panel(open_page, fake.url)
+    panel.place("party").click()
+    expect(panel.page.locator("#undo")).to_be_enabled()
+    panel.page.locator("#undo").press("Enter")
+    expect(panel.page.locator("#undo")).to_be_disabled()
+    expect(panel.page.locator("#undo")).to_be_focused()
+    fake.camera.base = replace(fake.camera.base, advice=SpeedAdvice("too slow", "try 640x360", 640, 360))
+    panel.page.get_by_role("button", name="Use 640 × 360").press("Enter")
+    fake.wait_for("source", width=640, height=360)
+    fake.camera.base = replace(fake.camera.base, advice=None)
+    expect(panel.page.locator("#advice")).to_be_hidden()
+    wait_until(lambda: panel.what_has_the_focus() != "")
+    panel.page.locator("#rate").select_option("15")
+    panel.page.locator("#rate").focus()
+    fake.wait_for("source", fps=15)
+    expect(panel.page.locator("#rate")).to_be_focused()
+
+
+def test_a_webcam_that_is_plugged_in_is_there_for_the_keyboard(fake: FakeServer, open_page: OpenPage) -> None:
+    panel = open_panel(open_page, fake.url)
+    options = panel.page.locator("#webcam option")
+    expect(options.first).to_be_attached()
+    before = options.count()
+    panel.page.route("**/api/v1/devices", add_webcam)
+    panel.page.locator("#webcam").focus()
+    expect(options).to_have_count(before + 1)
+
+
+def add_webcam(route: Route) -> None:
+    """Answer with one webcam more than there is."""
+    answer = route.fetch()
+    found = answer.json()
+    found["webcams"].append({"device": "/dev/video7", "name": "New", "sizes": [], "in_use_by": [], "is_current": False})
+    route.fulfill(response=answer, json=found)
+
+
+def test_a_hidden_file_field_lies_in_its_button(fake: FakeServer, open_page: OpenPage) -> None:
+    """Else the page would be scrolled to somewhere else when it gets the focus."""
+    page = open_panel(open_page, fake.url, viewport={"width": 390, "height": 844}).page
+    places = page.locator("input.unseen").evaluate_all("inputs => inputs.map(each => each.offsetParent?.tagName ?? '')")
+    assert "LABEL" in places
+    assert set(places) <= {"LABEL", ""}  # nothing where the button is hidden

@@ -46,6 +46,13 @@ def summary(fake: FakeServer) -> tuple[str, int, str]:
     return scene["lighting"]["environment"], len(scene["lighting"]["lamps"]), scene["background"]["kind"]
 
 
+def shown_by_preset(fake: FakeServer, name: str) -> str:
+    """The environment of a preset."""
+    environment: str = fake.http.post(f"presets/{name}/apply").raise_for_status().json()["lighting"]["environment"]
+    fake.patch("lighting", environment="sunset")
+    return environment
+
+
 def test_a_lamp_goes_where_it_is_dragged(fake: FakeServer, open_page: OpenPage) -> None:
     fake.patch("lighting", lamps=[LAMP])
     panel = open_panel(open_page, fake.url)
@@ -233,6 +240,23 @@ def test_a_preset_is_renamed_and_shown_at_start_by_the_keyboard(fake: FakeServer
     panel.page.keyboard.press("Enter")
     expect(panel.preset("night")).to_be_visible()
     assert fake.get("presets") == [{"name": "night", "at_start": True}]
+
+
+def test_a_preset_is_replaced_only_when_that_was_confirmed(fake: FakeServer, open_page: OpenPage) -> None:
+    panel = open_panel(open_page, fake.url)
+    panel.place("party").click()
+    fake.wait_for("lighting", environment="party")
+    panel.ask_to_save_preset("evening")
+    panel.confirm()
+    expect(panel.preset("evening")).to_be_visible()
+    panel.place("sunset").click()
+    fake.wait_for("lighting", environment="sunset")
+    for confirmed, kept in ((False, "party"), (True, "sunset")):
+        panel.choose_option("evening", "Replace with this look")
+        expect(panel.page.locator("#ask-title")).to_have_text("Replace “evening”?")
+        panel.page.locator("#ask-ok" if confirmed else "#ask-cancel").click()
+        expect(panel.page.locator("#ask")).to_be_hidden()
+        wait_until(lambda: shown_by_preset(fake, "evening") == kept)  # noqa: B023
 
 
 def test_too_slow_is_cured_by_one_click(fake: FakeServer, open_page: OpenPage) -> None:

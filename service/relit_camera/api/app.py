@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter, Depends, FastAPI
-from starlette.responses import FileResponse
+from starlette.responses import FileResponse, HTMLResponse
 from starlette.staticfiles import StaticFiles
 
 from relit_camera import __version__
@@ -104,12 +104,19 @@ def _panel_page() -> FileResponse:
     return FileResponse(PANEL_FOLDER / "index.html", media_type="text/html")
 
 
-def _desk_page() -> FileResponse:
-    return FileResponse(PANEL_FOLDER / "capture" / "desk.html", media_type="text/html")
+def _desk_page() -> HTMLResponse:
+    return _capture_page("desk", "By the light of this screen")
 
 
-def _film_page() -> FileResponse:
-    return FileResponse(PANEL_FOLDER / "capture" / "film.html", media_type="text/html")
+def _film_page() -> HTMLResponse:
+    return _capture_page("film", "Film yourself with a lamp")
+
+
+def _capture_page(name: str, title: str) -> HTMLResponse:
+    """The steps of a capture in the frame that all such pages have."""
+    folder = PANEL_FOLDER / "capture"
+    frame, steps = ((folder / f"{each}.html").read_text(encoding="utf-8") for each in ("frame", name))
+    return HTMLResponse(frame.replace("{page}", name).replace("{title}", title).replace("{steps}", steps))
 
 
 def _cached_openapi(app: FastAPI) -> dict[str, Any]:

@@ -13,8 +13,8 @@ from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.lab.evaluate.video.moving_face_accuracy import PARTS, PartFigures, figures_table
 from relit_camera.subject.subject_file import read_subject
 from relit_studio.commands.options import Out, load_person, load_room, shown_progress
-from relit_studio.moving.moving_table import LIVE, error_sheet, evaluate_live, evaluate_mode, read_truth
-from relit_studio.moving.moving_truth import (
+from relit_studio.drive.moving.moving_table import LIVE, error_sheet, evaluate_live, evaluate_mode, read_truth
+from relit_studio.drive.moving.moving_truth import (
     LAMP_ROOMS,
     SWITCHED,
     MovingSettings,

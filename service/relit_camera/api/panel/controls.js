@@ -4,7 +4,7 @@ import "./light/ball.js";
 import "./light/sliders.js";
 import "./light/look_tiles.js";
 import "./library/places.js";
-import "./library/person.js";
+import "./library/faces.js";
 import "./library/presets.js";
 import "./camera/devices.js";
 import "./first/doors.js";

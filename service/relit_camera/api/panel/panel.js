@@ -2,28 +2,31 @@
 
 import { toast } from "./api.js";
 import "./camera/status.js";
+import { keepFocus } from "./focus.js";
 import { on, openEvents } from "./stage/events.js";
 import { firstPicture, openPreview, showBefore } from "./stage/preview.js";
 import { change, onScene, scene, step } from "./stage/scene.js";
-import { setAttribute } from "./widgets.js";
+import { hideUnlit } from "./stage/unlit.js";
+import { setAttribute, setEnabled } from "./widgets.js";
 
 const RETRY_MS = 3000;
 const byId = (id) => document.getElementById(id);
 
 // Before all else, and without the controls: nobody is to be shown unlit for longer than they want
-byId("unlit-stop").onclick = () => change({ unlit_allowed: false });
+byId("unlit-stop").onclick = hideUnlit;
+keepFocus();
 
 // Undo, redo, reset
 
-byId("undo").onclick = () => step("undo");
-byId("redo").onclick = () => step("redo");
+byId("undo").onclick = () => scene()?.can_undo && step("undo");
+byId("redo").onclick = () => scene()?.can_redo && step("redo");
 byId("reset").onclick = async () => {
   if (await step("reset")) toast("Everything is as at the first start", "Undo takes it back");
 };
 byId("freeze").onclick = () => scene() && change({ frozen: !scene().frozen });
 onScene((now) => {
-  byId("undo").disabled = !now.can_undo;
-  byId("redo").disabled = !now.can_redo;
+  setEnabled(byId("undo"), now.can_undo);
+  setEnabled(byId("redo"), now.can_redo);
   setAttribute(byId("freeze"), "aria-pressed", now.frozen);
 });
 

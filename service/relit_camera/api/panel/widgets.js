@@ -104,6 +104,7 @@ export function choose(group, value) {
  */
 export function keyed(parent, items, key, create) {
   const kept = (parent.kept ??= new Map());
+  const held = parent.contains(document.activeElement) ? document.activeElement : null;
   const wanted = new Set(items.map(key));
   let lost = -1;
   for (const [name, { element }] of kept) {
@@ -116,10 +117,17 @@ export function keyed(parent, items, key, create) {
     const name = key(item);
     if (!kept.has(name)) kept.set(name, create(item));
     const { element, update } = kept.get(name);
+    element.dataset.key = String(name);
     if (parent.children[index] !== element) parent.insertBefore(element, parent.children[index] ?? null);
     update?.(item);
   });
   if (lost >= 0) focusNear(parent, lost);
+  else if (held && document.activeElement !== held) held.focus({ preventScroll: true }); // it was moved
+}
+
+/** Moves the keyboard to the item of a key, where `keyed` has one; nothing where `name` is null. */
+export function focusItem(parent, name) {
+  if (name !== null) parent.querySelector(`[data-key="${CSS.escape(name)}"] button`)?.focus();
 }
 
 /** Moves the keyboard from what was removed to its neighbour; where none is left, to the section's heading. */
@@ -133,6 +141,12 @@ function focusNear(parent, index) {
 /** Sets an attribute only where it differs, so that nothing is drawn or read aloud again. */
 export function setAttribute(element, name, value) {
   if (element.getAttribute(name) !== String(value)) element.setAttribute(name, String(value));
+}
+
+/** Makes a button do nothing, or something again. Unlike `disabled` this leaves it the focus; its click asks for itself. */
+export function setEnabled(button, enabled) {
+  if (enabled) button.removeAttribute("aria-disabled");
+  else setAttribute(button, "aria-disabled", true);
 }
 
 /** Sets the text only where it differs. */
@@ -151,16 +165,16 @@ export function setOptions(select, pairs, chosen) {
 }
 
 /**
- * A tile with a picture (or a symbol), a name, and, where it may be deleted, a button for that.
+ * A tile with a picture (or a symbol), a name, and, where it may be deleted, a button for that, or a menu: its elements.
  * Answers {element, image, update({chosen})}.
  */
-export function tile({ name, title = name, picture, symbol, onChoose, onDelete }) {
+export function tile({ name, title = name, picture, symbol, onChoose, onDelete, menu = [] }) {
   const image = make("img", { alt: "" });
   const face = picture ? make("span", { className: "face" }, image) : make("span", { className: "symbol", "aria-hidden": "true" }, symbol);
   const button = make("button", { type: "button", "aria-pressed": "false", title }, face, make("span", { className: "name" }, name));
   button.onclick = onChoose;
   if (picture) loadPicture(image, picture);
-  const element = make("div", { className: "tile" }, button);
+  const element = make("div", { className: "tile" }, button, ...menu);
   if (onDelete) {
     const remove = make("button", { type: "button", className: "close", "aria-label": `Delete ${name}` }, "×");
     remove.onclick = onDelete;

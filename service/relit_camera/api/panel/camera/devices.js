@@ -1,15 +1,22 @@
 // Which webcam, in what size and rate, and which tracker: chosen while the camera runs.
 
-import { attempt, sentence } from "../api.js";
+import { Latest, attempt, request, sentence } from "../api.js";
+import { on } from "../stage/events.js";
 import { setOptions, setText } from "../widgets.js";
 
 const SIZES = [[1920, 1080], [1280, 720], [960, 540], [640, 360]];
 const RATES = [15, 24, 30, 60];
 
 const byId = (id) => document.getElementById(id);
-let source = null;
 
 const sizeText = ([width, height]) => `${width} × ${height}`;
+
+let loading = null;
+
+/** Shows what there is now; whoever asks while that is on its way gets the same. */
+function look() {
+  loading ??= load().finally(() => { loading = null; });
+}
 
 async function load() {
   const [devices, now, tracker] = await Promise.all([attempt("GET", "devices"), attempt("GET", "source"), attempt("GET", "tracker")]);
@@ -18,7 +25,6 @@ async function load() {
 }
 
 function showSource({ webcams }, now) {
-  source = now;
   const found = webcams.map((webcam) => [webcam.device, webcam.name + (webcam.in_use_by.length ? ` (in use by ${webcam.in_use_by.join(", ")})` : "")]);
   if (!webcams.some((webcam) => webcam.device === now.device)) found.push([now.device, fileName(now.device)]);
   setOptions(byId("webcam"), found, now.device);
@@ -41,11 +47,16 @@ function withOwn(sizes, own) {
 }
 
 /** Asks for another source; whether it was taken or not, what then stands is shown. */
-async function changeSource(change) {
-  for (const id of ["webcam", "size", "rate"]) byId(id).disabled = true;
-  await attempt("PATCH", "source", change);
-  for (const id of ["webcam", "size", "rate"]) byId(id).disabled = false;
-  await load();
+const changes = new Latest((change) => request("PATCH", "source", change), {
+  settled: async () => {
+    await loading; // which may have been asked before the change
+    look();
+  },
+});
+
+function changeSource(change) {
+  setText(byId("source-hint"), "Opening…");
+  changes.push(change);
 }
 
 byId("webcam").onchange = () => changeSource({ device: byId("webcam").value });
@@ -56,7 +67,15 @@ byId("size").onchange = () => {
 byId("rate").onchange = () => changeSource({ fps: Number(byId("rate").value) });
 byId("tracker").onchange = async () => {
   await attempt("PUT", "tracker", { name: byId("tracker").value });
-  await load();
+  await loading;
+  look();
 };
-byId("camera-part").addEventListener("pointerenter", () => source && load()); // a webcam may have been plugged in
-load();
+
+// A webcam may have been plugged in, or changed from elsewhere: looked at anew whenever the section comes into view, and
+// whenever somebody comes to it by pointer or keyboard.
+const part = byId("camera-part");
+new IntersectionObserver(([seen]) => seen.isIntersecting && look()).observe(part);
+part.addEventListener("pointerenter", look);
+part.addEventListener("focusin", ({ relatedTarget }) => !part.contains(relatedTarget) && look());
+on("open", look);
+look();

@@ -8,7 +8,7 @@ const STATES = {
   starting: "Starting…",
   live: "Live",
   searching: "Looking for your face",
-  "standing-in": "Your captured picture stands in",
+  "standing-in": "Your captured face stands in",
   waiting: "Waiting for the webcam",
   released: "Webcam released until somebody looks",
   capturing: "Nobody is shown yet",

@@ -9,6 +9,7 @@ import { Steps } from "./steps.js";
 const CARD_CM = 8.56; // ISO/IEC 7810 ID-1: every bank card
 const CARD_HEIGHT_CM = 5.398;
 const POLL_MS = 80;
+const ZOOMS = [0.25, 1 / 3, 0.5, 2 / 3, 0.75, 0.8, 0.9, 1, 1.1, 1.25, 1.5, 1.75, 2, 2.5, 3, 4, 5]; // that browsers offer
 const $ = (id) => document.getElementById(id);
 
 const RESIZED = { what: "the window’s size changed while the patterns were shown", cure: "leave it as it is until they end" };
@@ -17,26 +18,33 @@ const GONE = { what: "the camera ended meanwhile", cure: "begin again" };
 let wanted = false; // patterns were asked for, and nobody has stopped them
 let running = false; // the camera films them
 
-/** Centimeters a CSS pixel is wide, by the card. */
-function pixelCm() {
-  return CARD_CM / Number($("card-width").value);
-}
+/** Centimeters that a pixel of the screen is wide, by the card. CSS pixels grow with the page's zoom, these do not. */
+let pixelCm = 0;
 
 function showSize() {
   const width = Number($("card-width").value);
   $("card").style.width = `${width}px`;
   $("card").style.height = `${(width * CARD_HEIGHT_CM) / CARD_CM}px`;
-  const cm = [screen.width, screen.height].map((pixels) => pixels * pixelCm());
+  pixelCm = CARD_CM / (width * devicePixelRatio);
+  const cm = [screen.width, screen.height].map((pixels) => pixels * unzoomedRatio() * pixelCm);
   const inches = Math.hypot(...cm) / 2.54;
   $("screen-size").textContent = `The screen is ${cm[0].toFixed(1)} × ${cm[1].toFixed(1)} cm, ${inches.toFixed(0)} inches.`;
 }
 
+/** Pixels of the screen for one of `screen.width`: some browsers count that in CSS pixels, others without the zoom. */
+function unzoomedRatio() {
+  const zoom = outerWidth / innerWidth; // 1 in browsers whose windows are measured in CSS pixels, too
+  const nearest = ZOOMS.reduce((best, each) => (Math.abs(each - zoom) < Math.abs(best - zoom) ? each : best));
+  return devicePixelRatio / nearest;
+}
+
+/** What the camera is to know. The patterns fill the window, which is the whole screen now. */
 function body() {
-  const height = screen.height * pixelCm();
+  const [width, height] = [innerWidth, innerHeight].map((pixels) => pixels * devicePixelRatio * pixelCm);
   const up = height / 2 + Number($("camera-edge").value);
   return {
     name: $("name").value,
-    screen_width_cm: screen.width * pixelCm(),
+    screen_width_cm: width,
     screen_height_cm: height,
     distance_cm: Number($("distance").value),
     camera_up_cm: $("camera").value === "top" ? up : -up,
@@ -180,6 +188,7 @@ $("framing-help").append(framing.view, framing.advice, framing.marks);
 
 const steps = new Steps(["warning", "size", "place", "framing", "building", "result"], ["warning", "size", "place", "framing"], (name) => {
   if (name !== "result") $("result-picture").removeAttribute("src");
+  if (name === "size") showSize();
   $("start").disabled = !$("understood").checked;
   if (name === "framing") framing.start();
   else framing.close();
@@ -198,6 +207,7 @@ $("start").onclick = begin;
 $("desk-again").onclick = () => steps.show("framing", true);
 $("desk-cancel").onclick = () => cancel();
 $("card-width").oninput = showSize;
+addEventListener("resize", () => { if (steps.current === "size") showSize(); }); // zoomed while the card is held there
 document.addEventListener("fullscreenchange", () => { if (!document.fullscreenElement) stop(); });
 document.addEventListener("keydown", (event) => { if (event.key === "Escape") stop(); });
 document.addEventListener("visibilitychange", () => { if (document.hidden) stop(); });

@@ -2,6 +2,7 @@
 
 import { call, sentence } from "../api.js";
 import { showProblem } from "../first/problem.js";
+import { checkFile } from "../library/limits.js";
 import { on, openEvents } from "../stage/events.js";
 import { make } from "../widgets.js";
 import { coverageBall } from "./coverage.js";
@@ -12,7 +13,7 @@ const VERDICTS = { good: "Good", usable: "Usable", again: "Better film again" };
 const TITLES = {
   receiving: "The film is being sent",
   reading: "Reading the film",
-  building: "Making your subject",
+  building: "Making your face",
   failed: "That did not work",
   canceled: "Stopped",
   interrupted: "Interrupted",
@@ -81,6 +82,19 @@ function showSending(on) {
   $("film-upload").hidden = on;
   for (const field of $("upload-form").querySelectorAll("input, select")) field.disabled = on;
   if (held) (on ? $("upload-cancel") : $("film-upload")).focus();
+}
+
+/** Whether the camera would take the film, which is said before it is sent. */
+function checkFilm() {
+  const [film] = $("film-file").files;
+  try {
+    if (film) checkFile(film, "captures/film");
+    showProblem($("upload-problem"), null);
+    return true;
+  } catch (error) {
+    showProblem($("upload-problem"), error);
+    return false;
+  }
 }
 
 async function send() {
@@ -235,8 +249,9 @@ $("prepare-next").onclick = () => steps.show("film");
 $("film-next").onclick = () => steps.show("upload");
 $("upload-form").onsubmit = (event) => {
   event.preventDefault();
-  send();
+  if (checkFilm()) send();
 };
+$("film-file").onchange = checkFilm;
 $("upload-cancel").onclick = () => sending?.abort();
 $("film-cancel").onclick = () => ask("DELETE", "captures/film");
 $("film-resume").onclick = () => {

@@ -1,14 +1,14 @@
 // Who will be seen: three doors for a first visit, and a quiet fourth.
 
 import { call, toast } from "../api.js";
-import { upload } from "../capture/upload.js";
+import { store } from "../library/stored.js";
 import { on } from "../stage/events.js";
 import { onScene, scene } from "../stage/scene.js";
-import { make, storedName } from "../widgets.js";
+import { comesBack, showUnlit } from "../stage/unlit.js";
+import { make } from "../widgets.js";
 import { DRAWINGS } from "./drawings.js";
 import { problemPlace, showProblem } from "./problem.js";
 
-const MOST_NAMES = 9;
 const CAPTURING = {
   filming: "Measuring your face: look at the camera and hold still…",
   building: "Making you of what was filmed: some seconds…",
@@ -29,7 +29,7 @@ section.innerHTML = `
   <input type="file" id="door-file-input" accept=".relit" hidden>
   <p id="doors-state" class="hint" role="status"></p>
   <p class="buttons">
-    <button type="button" class="quiet" id="door-unlit">Show my webcam unlit…</button>
+    <button type="button" class="quiet" id="door-unlit">Show me unlit…</button>
     <button type="button" class="quiet" id="doors-close" hidden>Close</button>
   </p>`;
 const problem = problemPlace("doors-problem");
@@ -65,7 +65,7 @@ export async function captureFace() {
 
 function draw() {
   const now = scene();
-  const nobody = now !== null && now.subject === null && !now.unlit_allowed;
+  const nobody = now !== null && now.subject === null && !now.unlit_allowed && !comesBack();
   const shown = now !== null && (nobody || opened);
   if (section.hidden === !shown) return;
   const inside = section.contains(document.activeElement);
@@ -116,25 +116,11 @@ async function showDemo() {
   await call("PATCH", "scene", { subject: name, mode: "reenact", unlit_allowed: false });
 }
 
-/** Stores the file under its own name, or where that is taken, with a number. */
 async function openFile(file) {
-  const base = storedName(file.name).slice(0, 60);
-  for (let number = 1; ; number++) {
-    const form = new FormData();
-    const name = number === 1 ? base : `${base} ${number}`;
-    form.append("name", name);
-    form.append("file", file);
-    const shown = (share) => {
-      byId("doors-state").textContent = `Reading ${file.name}: ${Math.round(100 * share)} %`;
-    };
-    try {
-      await upload("subjects", form, shown);
-    } catch (error) {
-      if (error.status === 409 && number < MOST_NAMES) continue;
-      throw error;
-    }
-    return call("PATCH", "scene", { subject: name, unlit_allowed: false });
-  }
+  const subject = await store("subjects", file, (share) => {
+    byId("doors-state").textContent = `Uploading ${file.name}: ${Math.round(100 * share)} %`;
+  });
+  await call("PATCH", "scene", { subject, unlit_allowed: false });
 }
 
 /** Asks, with the picture that others would see, whether it may be published; only a yes changes anything. */
@@ -155,7 +141,7 @@ export function askUnlit() {
   no.onclick = () => dialog.close();
   yes.onclick = async () => {
     try {
-      await call("PATCH", "scene", { subject: null, unlit_allowed: true });
+      await showUnlit();
       leave();
       dialog.close();
     } catch (error) {
@@ -176,7 +162,7 @@ byId("door-file").onclick = () => byId("door-file-input").click();
 byId("door-file-input").onchange = ({ target }) => {
   const [file] = target.files;
   target.value = "";
-  if (file) pass(() => openFile(file), `Reading ${file.name}…`);
+  if (file) pass(() => openFile(file), `Uploading ${file.name}…`);
 };
 byId("door-unlit").onclick = askUnlit;
 byId("doors-close").onclick = leave;

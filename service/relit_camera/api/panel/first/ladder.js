@@ -58,7 +58,7 @@ function nextRung(now, rung) {
 }
 
 function people() {
-  const button = make("button", { type: "button", id: "ladder-people", className: "quiet" }, "Another person…");
+  const button = make("button", { type: "button", id: "ladder-people", className: "quiet" }, "Another face…");
   button.onclick = openDoors;
   return button;
 }

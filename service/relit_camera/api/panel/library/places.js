@@ -40,7 +40,7 @@ function items(chosen) {
   const places = stored("environments").map((item) => ({
     key: `place ${item.name}`,
     value: item.name,
-    name: item.name,
+    name: item.builtin ? item.name.replaceAll("-", " ") : item.name,
     picture: item.thumbnail,
     onChoose: () => choose(item.name),
     onDelete: item.builtin || item.temporary ? null : () => remove("environments", item.name),
@@ -56,7 +56,7 @@ function items(chosen) {
 function draw() {
   keyed(strip, items(scene()?.lighting.environment), ({ key }) => key, (item) => {
     const made = tile(item);
-    if (item.picture) faces.set(item.name, made.image);
+    if (item.picture) faces.set(item.value, made.image);
     return made;
   });
 }

@@ -1,10 +1,12 @@
 // What is stored: environments, backgrounds, subjects, presets, kept in step with the camera; and adding to it.
 
-import { attempt, request, toast } from "../api.js";
+import { attempt, toast } from "../api.js";
+import { upload } from "../capture/upload.js";
 import { on } from "../stage/events.js";
-import { ask, storedName } from "../widgets.js";
+import { ask, setAttribute, setEnabled, storedName } from "../widgets.js";
+import { checkFile } from "./limits.js";
 
-const MOST_BYTES = 64 * 1024 * 1024;
+const MOST_TRIES = 9;
 
 const items = { environments: [], backgrounds: [], subjects: [], presets: [] };
 const listeners = [];
@@ -36,33 +38,65 @@ export async function remove(collection, name) {
   }
 }
 
-/** Lets a file input add to a collection; `then(name)` is called when it is stored. */
-export function uploads(input, collection, then) {
-  input.onchange = async () => {
-    const [file] = input.files;
-    if (!file) return;
-    const name = storedName(file.name);
-    const taken = await upload(collection, file, name);
-    input.value = "";
-    if (taken) then(name);
-  };
+/** Asks for another name of what is stored; answers it, or null where it keeps its own. */
+export async function rename(collection, name) {
+  const other = await ask(`New name of “${name}”`, "Rename", name);
+  if (!other || other === name) return null;
+  if (!(await attempt("PATCH", `${collection}/${encodeURIComponent(name)}`, { name: other }))) return null;
+  await load(collection);
+  return other;
 }
 
-async function upload(collection, file, name) {
-  if (file.size > MOST_BYTES) {
-    toast(`${file.name} has ${Math.round(file.size / 1e6)} MB`, "The largest that is taken has 67 MB; scale it down");
-    return false;
+/**
+ * Stores a file under its own name or, where that is taken, with a number: "Studio 2". Answers the name.
+ * `onProgress(share)` hears how much of it is sent, 0 to 1. Throws `Refused`.
+ */
+export async function store(collection, file, onProgress) {
+  checkFile(file, collection);
+  const base = storedName(file.name).slice(0, 60);
+  const taken = new Set(stored(collection).map((item) => item.name));
+  for (let number = 1, tries = 1; ; number++) {
+    const name = number === 1 ? base : `${base} ${number}`;
+    if (taken.has(name)) continue;
+    const form = new FormData();
+    form.append("name", name);
+    form.append("file", file); // the last one: a large file is written as it comes
+    try {
+      await upload(collection, form, onProgress);
+    } catch (error) {
+      // Somebody else has just stored one of that name.
+      if (error.status === 409 && tries++ < MOST_TRIES) continue;
+      throw error;
+    }
+    await load(collection);
+    return name;
   }
-  const form = new FormData();
-  form.append("name", name);
-  form.append("file", file);
-  try {
-    await request("POST", collection, form);
-  } catch {
-    return false; // the toast has said why
-  }
-  await load(collection);
-  return true;
+}
+
+/** Lets a file input, in its label, add to a collection; `then(name)` is called when it is stored. */
+export function uploads(input, collection, then) {
+  const label = input.closest("label");
+  const words = label.firstChild.textContent;
+  const show = (text, busy) => {
+    label.firstChild.textContent = text;
+    setAttribute(label, "aria-busy", busy);
+    setEnabled(input, !busy);
+  };
+  input.onclick = (event) => {
+    if (label.ariaBusy === "true") event.preventDefault();
+  };
+  input.onchange = async () => {
+    const [file] = input.files;
+    input.value = "";
+    if (!file || label.ariaBusy === "true") return;
+    show("Uploading…", true);
+    try {
+      then(await store(collection, file, (share) => show(share < 1 ? `Uploading… ${Math.round(100 * share)} %` : "Storing…", true)));
+    } catch (error) {
+      toast(error.what, error.cure);
+    }
+    show(words, false);
+  };
 }
 
 on("collection", ({ name }) => name in items && load(name));

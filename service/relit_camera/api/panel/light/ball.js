@@ -1,6 +1,6 @@
 // The ball of light over the picture: a dot for each lamp and one for the place's main light, all to be dragged.
 
-import { make, setAttribute } from "../widgets.js";
+import { make, setAttribute, setEnabled } from "../widgets.js";
 import { mirrored, onMirror } from "../stage/preview.js";
 import { change, onScene, scene } from "../stage/scene.js";
 import { lampHex } from "./colors.js";
@@ -67,7 +67,7 @@ function draw(now) {
   }
   const silent = environment === null && lamps.every((lamp) => lamp.muted || lamp.intensity === 0);
   document.getElementById("no-light").hidden = !silent;
-  document.getElementById("lamp-add").disabled = lamps.length >= MOST_LAMPS;
+  setEnabled(document.getElementById("lamp-add"), lamps.length < MOST_LAMPS);
   showCard(now, dots);
 }
 
@@ -203,6 +203,7 @@ ball.ondblclick = (event) => {
 };
 
 document.getElementById("lamp-add").onclick = () => {
+  if (dots.length >= MOST_LAMPS) return;
   addLamp();
   openCard(dots.length - 1);
 };

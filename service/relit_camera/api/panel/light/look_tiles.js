@@ -1,37 +1,38 @@
-// The looks as tiles: each shows where its lamps stand and in what colour, and is applied by a click.
+// The looks as tiles: each is a small picture of a head in its light, and is applied by a click.
 
 import { make, setAttribute } from "../widgets.js";
 import { backgroundToMatch, keepsBackground } from "../library/background.js";
-import { loadPicture } from "../pictures.js";
 import { change, onScene } from "../stage/scene.js";
-import { lampHex } from "./colors.js";
-import { pointOf } from "./directions.js";
+import { linearOfHex } from "./colors.js";
 import { LOOKS, standingLook } from "./looks.js";
+import { pictureOf, texelsOf } from "./main_light.js";
+import { drawBehind, drawHead, lampLight, placeLight } from "./portrait.js";
 
-const SVG = "http://www.w3.org/2000/svg";
-const WIDTH = 96;
-const HEIGHT = 60;
-const RADIUS = [34, 24];
+const SIZE = [240, 150];
+/** What stands for a background of one's own: evening sky at the left, dusk at the right. */
+const OWN = { sides: ["#e8a05f", "#3c6ea0"], elevation_deg: 10, size_deg: 90, intensity: 0.8 };
 
-function svg(tag, attributes) {
-  const element = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  return element;
-}
-
-/** The ball in small, mirrored as the preview is at first: a head, and the lamps round it. */
-function diagram(look) {
-  const picture = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "diagram", "aria-hidden": "true" });
-  const [middleX, middleY] = [WIDTH / 2, HEIGHT / 2];
-  if (look.background?.color) picture.append(svg("rect", { width: WIDTH, height: HEIGHT, fill: look.background.color }));
-  picture.append(svg("path", { class: "bust", d: "M48 14c8 0 12 6 12 13s-4 15-12 15-12-8-12-15 4-13 12-13zM22 60c2-11 12-15 26-15s24 4 26 15z" }));
-  for (const lamp of look.lighting.lamps) {
-    const { x, y, behind } = pointOf(lamp.azimuth_deg, lamp.elevation_deg, true);
-    const at = { cx: middleX + x * RADIUS[0], cy: middleY + y * RADIUS[1] };
-    picture.append(svg("circle", { ...at, r: 4 + lamp.size_deg / 8, fill: lampHex(lamp), opacity: 0.3 }));
-    picture.append(svg("circle", { ...at, r: 4, ...(behind ? { fill: "none", stroke: lampHex(lamp), "stroke-width": 2 } : { fill: lampHex(lamp) }) }));
+/** Draws a look: a head in its light, before its background. */
+async function draw(canvas, look) {
+  [canvas.width, canvas.height] = SIZE;
+  const { environment, lamps, yaw_deg: yaw } = look.lighting;
+  const context = canvas.getContext("2d");
+  const lights = lamps.map(lampLight);
+  if (look.background === null) {
+    const sky = context.createLinearGradient(0, 0, SIZE[0], 0);
+    OWN.sides.forEach((color, side) => {
+      sky.addColorStop(side, color);
+      lights.push(lampLight({ ...OWN, azimuth_deg: side ? 70 : -70, color: linearOfHex(color) }));
+    });
+    context.fillStyle = sky;
+  } else {
+    context.fillStyle = look.background.color ?? "#222";
   }
-  return picture;
+  context.fillRect(0, 0, ...SIZE);
+  const behind = look.background?.kind === "image" ? look.background.image : look.background?.kind === "environment" ? environment : null;
+  const picture = behind && (await pictureOf(behind));
+  if (picture) drawBehind(canvas, picture, behind === environment ? yaw : 0);
+  drawHead(canvas, lights, picture && behind === environment ? placeLight(texelsOf(picture), yaw) : null);
 }
 
 function apply(look, now) {
@@ -42,13 +43,9 @@ function apply(look, now) {
 
 let shown = null;
 const tiles = LOOKS.map((look) => {
-  const face = make("span", { className: "face" });
-  if (look.lighting.environment && look.lighting.environment !== "background") {
-    const place = make("img", { alt: "" });
-    loadPicture(place, `/api/v1/environments/${look.lighting.environment}/thumbnail.jpg`);
-    face.append(place);
-  }
-  face.append(diagram(look));
+  const picture = make("canvas", { className: "portrait", "aria-hidden": "true" });
+  draw(picture, look);
+  const face = make("span", { className: "face" }, picture);
   const button = make("button", { type: "button", "aria-pressed": "false" }, face, make("span", { className: "name" }, look.name));
   button.onclick = () => shown && apply(look, shown);
   document.getElementById("looks").append(make("div", { className: "tile" }, button));

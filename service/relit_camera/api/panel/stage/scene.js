@@ -22,7 +22,7 @@ export function onScene(callback) {
 export function change(parts) {
   unsettled = joined(unsettled ?? {}, parts);
   queue.push(parts);
-  show();
+  redraw();
 }
 
 /** A step back or forward, or everything as at the first start: "undo", "redo", "reset". Answers the scene, or null. */
@@ -33,10 +33,15 @@ export async function step(which) {
   return body;
 }
 
+/** Answers when everything that was changed here is sent. */
+export function settled() {
+  return queue.settled();
+}
+
 /** Shows what the camera has answered, without waiting for the event. */
 export function accept(body) {
   if (!told || body.revision >= told.revision) told = body;
-  show();
+  redraw();
 }
 
 function joined(before, parts) {
@@ -44,7 +49,8 @@ function joined(before, parts) {
   return { ...before, ...parts, ...(lighting && { lighting }) };
 }
 
-function show() {
+/** Tells the scene to all who follow it, once more. */
+export function redraw() {
   const now = scene();
   if (now) for (const callback of listeners) callback(now);
 }
@@ -58,7 +64,7 @@ const queue = new Latest(
     join: joined,
     settled: () => {
       unsettled = null;
-      show();
+      redraw();
     },
   },
 );

@@ -1,0 +1,79 @@
+// Whose face is shown and how; faces are renamed and deleted here; and the switch to be seen as filmed.
+
+import { attempt } from "../api.js";
+import { askUnlit } from "../first/doors.js";
+import { loadPicture } from "../pictures.js";
+import { on } from "../stage/events.js";
+import { change, onScene, scene, settled } from "../stage/scene.js";
+import { hideUnlit } from "../stage/unlit.js";
+import { ask, choose, focusItem, keyed, setAttribute, setText, tile } from "../widgets.js";
+import { menuButton, menuEntry } from "./menu.js";
+import { onStored, rename, stored } from "./stored.js";
+
+const MODE_HINTS = {
+  reenact: "Your captured face, relit, moves as you move: the webcam’s picture stays private.",
+  ratio: "Your live picture itself, relit: your own mouth and eyes.",
+};
+const UNLIT_HINT = "The webcam’s picture is shown to others as it is.";
+const HIDDEN_HINT = "Nobody is shown: others see a still placeholder.";
+
+const list = document.getElementById("faces");
+const allow = document.getElementById("unlit-allow");
+const pictures = new Map();
+let unlit = false;
+let version = 0;
+
+// Whoever is relit again is not to be shown as filmed later, when the face is lost.
+const show = (name) => change({ subject: name, unlit_allowed: false });
+
+async function remove(name) {
+  const shown = scene()?.subject === name;
+  const words = shown ? "This cannot be undone. Others see a placeholder until you choose another face." : "This cannot be undone.";
+  if (!(await ask(`Delete “${name}”?`, "Delete", null, words))) return;
+  if (shown) show(null);
+  await settled(); // who is shown cannot be deleted
+  await attempt("DELETE", `subjects/${encodeURIComponent(name)}`);
+}
+
+function face({ name, own, thumbnail }) {
+  if (name === null) return tile({ name: "Nobody", title: HIDDEN_HINT, symbol: "∅", onChoose: () => show(null) });
+  const menu = menuButton(`Options of ${name}`,
+    menuEntry("Rename", async () => focusItem(list, await rename("subjects", name))),
+    menuEntry("Delete", () => remove(name)));
+  const made = tile({ name, picture: thumbnail, onChoose: () => show(name), menu: own ? menu : [] });
+  pictures.set(name, made.image);
+  return made;
+}
+
+function draw() {
+  const now = scene();
+  if (!now) return;
+  const faces = stored("subjects").map(({ name, temporary, thumbnail }) => ({ name, own: !temporary, thumbnail }));
+  const items = [...faces, { name: null }].map((item) => ({ ...item, chosen: item.name === now.subject && !now.unlit_allowed }));
+  keyed(list, items, ({ name }) => name ?? "", face);
+  choose(document.getElementById("mode"), now.mode);
+  const hint = now.subject ? MODE_HINTS[now.mode] : HIDDEN_HINT;
+  setText(document.getElementById("mode-hint"), unlit ? UNLIT_HINT : hint);
+  setAttribute(allow, "aria-pressed", now.unlit_allowed);
+}
+
+allow.onclick = () => (scene()?.unlit_allowed ? hideUnlit() : askUnlit());
+document.getElementById("mode").onclick = (event) => {
+  const mode = event.target.closest("button")?.value;
+  if (mode) change({ mode });
+};
+document.getElementById("neutral").onclick = () => attempt("POST", "neutral-pose");
+on("status", (status) => {
+  if (unlit === Boolean(status.unlit)) return;
+  unlit = Boolean(status.unlit);
+  draw();
+});
+onScene(draw);
+onStored((collection) => collection === "subjects" && draw());
+on("collection", ({ name }) => {
+  if (name !== "subjects") return;
+  version += 1; // perhaps captured anew under the same name
+  for (const { name: own, thumbnail } of stored("subjects")) {
+    if (pictures.has(own)) loadPicture(pictures.get(own), `${thumbnail}?version=${version}`);
+  }
+});

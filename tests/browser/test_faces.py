@@ -1,0 +1,132 @@
+"""The section of faces: who is shown, unlit and back, another name, deleted; by the keyboard."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from playwright.sync_api import expect
+
+from relit_camera.subject.subject_file import write_subject
+from tests.app.subject_builders import captured
+from tests.browser.browser_pages import OpenPage
+from tests.browser.cameras import SUBJECT, FakeServer
+from tests.browser.panel import Panel, open_panel
+from tests.small_camera import wait_until
+
+
+def store(fake: FakeServer, name: str) -> None:
+    write_subject(fake.camera.scene_controller.subjects.new_path(name), captured("film"))
+
+
+def names(fake: FakeServer) -> list[str]:
+    return sorted(item["name"] for item in fake.get("subjects"))
+
+
+def show_unlit(fake: FakeServer, panel: Panel) -> None:
+    """Confirm to be shown unlit, by the switch."""
+    panel.page.locator("#unlit-allow").press("Enter")
+    panel.page.locator("#unlit-yes").click()
+    fake.wait_for("scene", unlit_allowed=True, subject=None)
+    fake.camera.base = replace(fake.camera.base, unlit=True)
+    expect(panel.unlit).to_be_visible()
+
+
+def test_one_switch_shows_unlit_and_leads_back_to_the_same_face(fake: FakeServer, open_page: OpenPage) -> None:
+    panel = open_panel(open_page, fake.url)
+    switch = panel.page.locator("#unlit-allow")
+    for _ in range(2):
+        show_unlit(fake, panel)
+        expect(switch).to_have_attribute("aria-pressed", "true")
+        expect(panel.doors).to_be_hidden()
+        panel.page.reload()
+        expect(switch).to_have_attribute("aria-pressed", "true")
+        switch.press("Enter")
+        fake.camera.base = replace(fake.camera.base, unlit=False)
+        fake.wait_for("scene", unlit_allowed=False, subject=SUBJECT)
+        expect(switch).to_have_attribute("aria-pressed", "false")
+        expect(switch).to_have_text("Show me unlit")
+        expect(panel.face(SUBJECT)).to_have_attribute("aria-pressed", "true")
+        expect(panel.doors).to_be_hidden()
+
+
+def test_hiding_the_unlit_picture_at_once_leads_back_too_and_keeps_the_keyboard(
+    fake: FakeServer, open_page: OpenPage
+) -> None:
+    panel = open_panel(open_page, fake.url)
+    show_unlit(fake, panel)
+    panel.page.locator("#unlit-stop").press("Enter")
+    fake.wait_for("scene", unlit_allowed=False, subject=SUBJECT)
+    fake.camera.base = replace(fake.camera.base, unlit=False)
+    expect(panel.unlit).to_be_hidden()
+    wait_until(lambda: panel.what_has_the_focus() != "")
+
+
+def test_a_face_that_is_gone_does_not_keep_the_unlit_picture(fake: FakeServer, open_page: OpenPage) -> None:
+    panel = open_panel(open_page, fake.url)
+    show_unlit(fake, panel)
+    fake.http.delete(f"subjects/{SUBJECT}").raise_for_status()
+    panel.page.locator("#unlit-stop").click()
+    fake.wait_for("scene", unlit_allowed=False, subject=None)
+    expect(panel.doors).to_be_visible()
+
+
+def test_who_chose_nobody_is_nobody_after_being_unlit(fake: FakeServer, open_page: OpenPage) -> None:
+    panel = open_panel(open_page, fake.url)
+    show_unlit(fake, panel)
+    panel.face("Nobody").click()
+    fake.wait_for("scene", unlit_allowed=False, subject=None)
+    fake.camera.base = replace(fake.camera.base, unlit=False)
+    panel.page.locator("#door-unlit").click()
+    panel.page.locator("#unlit-yes").click()
+    fake.wait_for("scene", unlit_allowed=True)
+    panel.page.locator("#unlit-allow").click()
+    fake.wait_for("scene", unlit_allowed=False, subject=None)
+    expect(panel.doors).to_be_visible()
+
+
+def test_a_face_gets_another_name_by_the_keyboard(fake: FakeServer, open_page: OpenPage) -> None:
+    store(fake, "bea")
+    panel = open_panel(open_page, fake.url)
+    panel.choose_option(SUBJECT, "Rename")
+    expect(panel.page.locator("#ask-text")).to_be_focused()
+    panel.page.locator("#ask-text").fill("cleo")
+    panel.page.keyboard.press("Enter")
+    expect(panel.face("cleo")).to_have_attribute("aria-pressed", "true")
+    expect(panel.face("cleo")).to_be_focused()
+    assert names(fake) == ["bea", "cleo"]
+    assert fake.get("scene")["subject"] == "cleo"
+
+
+def test_a_name_that_another_face_has_is_refused(fake: FakeServer, open_page: OpenPage) -> None:
+    store(fake, "bea")
+    panel = open_panel(open_page, fake.url)
+    panel.choose_option("bea", "Rename")
+    panel.page.locator("#ask-text").fill(SUBJECT)
+    panel.page.keyboard.press("Enter")
+    expect(panel.message).to_be_visible()
+    assert names(fake) == [SUBJECT, "bea"]
+
+
+def test_a_face_is_deleted_only_when_that_was_confirmed(fake: FakeServer, open_page: OpenPage) -> None:
+    store(fake, "bea")
+    panel = open_panel(open_page, fake.url)
+    panel.choose_option("bea", "Delete")
+    panel.page.keyboard.press("Escape")
+    expect(panel.page.get_by_role("button", name="Options of bea")).to_be_focused()
+    assert names(fake) == [SUBJECT, "bea"]
+    panel.choose_option("bea", "Delete")
+    panel.page.locator("#ask-ok").press("Enter")
+    expect(panel.face("bea")).to_be_hidden()
+    wait_until(lambda: panel.what_has_the_focus() != "")
+    assert names(fake) == [SUBJECT]
+    assert fake.get("scene")["subject"] == SUBJECT
+
+
+def test_the_face_that_is_shown_is_deleted_too(fake: FakeServer, open_page: OpenPage) -> None:
+    panel = open_panel(open_page, fake.url)
+    panel.choose_option(SUBJECT, "Delete")
+    expect(panel.page.locator("#ask-words")).to_contain_text("Others see a placeholder")
+    panel.confirm()
+    wait_until(lambda: names(fake) == [])
+    assert fake.get("scene")["subject"] is None
+    expect(panel.doors).to_be_visible()
