@@ -20,22 +20,29 @@ from relit_camera.base.images.tone_mapping import linear_from_display, tone_curv
 _CODES = np.arange(256, dtype=np.uint8)
 _ONE = 1 << 14
 """What stands for a root of 1 in 16 bits. The largest, a light of 27, reads 255; a code is 60 steps wide."""
-_POWER = 2.4
+POWER = 2.4
+"""Of the root of light in which pictures are multiplied."""
 _BAND_CELLS = 32
 """Rows of cells that are multiplied at a time: their 16-bit numbers stay in the processor's cache."""
 
 
 def root_of_light(light: NDArray[np.float32]) -> NDArray[np.float32]:
     """The 2.4th root of non-negative light or factors of light, float32 of the same shape (up to four channels)."""
-    return np.asarray(cv2.pow(light, 1 / _POWER), np.float32)
+    return np.asarray(cv2.pow(light, 1 / POWER), np.float32)
 
 
 def light_of_root(root: NDArray[np.float32]) -> NDArray[np.float32]:
     """The inverse of `root_of_light`."""
-    return np.asarray(cv2.pow(root, _POWER), np.float32)
+    return np.asarray(cv2.pow(root, POWER), np.float32)
 
 
-def multiply_light(image: DisplayImage, roots: NDArray[np.float32], step: int, as_shown: float = 0.0) -> DisplayImage:
+def multiply_light(
+    image: DisplayImage,
+    roots: NDArray[np.float32],
+    step: int,
+    as_shown: float = 0.0,
+    added: NDArray[np.float32] | None = None,
+) -> DisplayImage:
     """A picture with its light multiplied, as the display shows it: uint8 sRGB of the same shape.
 
     Args:
@@ -45,11 +52,12 @@ def multiply_light(image: DisplayImage, roots: NDArray[np.float32], step: int, a
         step: the side of a cell in pixels.
         as_shown: how far the picture's brightest codes are taken for the light that the display curve would show so: 0
             takes them for just what sRGB says, 1 gives back the picture itself where the factor is 1.
+        added: roots of the shape of `roots` that are added after that; none if None.
     """
     height, width = image.shape[:2]
-    cells = cv2.multiply(roots, (_ONE,) * 4, dtype=cv2.CV_16U)
+    cells = _bordered_codes(roots)
+    more = None if added is None or not added.any() else _bordered_codes(added)
     columns = step * cells.shape[1]
-    cells = cv2.copyMakeBorder(cells, 1, 1, 0, 0, cv2.BORDER_REPLICATE)
     image, shown = np.ascontiguousarray(image), np.empty(image.shape, np.uint8)
     fine = np.empty((step * (_BAND_CELLS + 2), columns, 3), np.uint16)
     for first in range(0, len(cells) - 2, _BAND_CELLS):
@@ -57,12 +65,23 @@ def multiply_light(image: DisplayImage, roots: NDArray[np.float32], step: int, a
         above = cv2.resize(some, (columns, step * len(some)), fine[: step * len(some)], interpolation=cv2.INTER_LINEAR)
         top, bottom = step * first, min(step * (first + _BAND_CELLS), height)
         product = _roots_of(image[top:bottom], as_shown)
-        cv2.multiply(product, above[step : step + bottom - top, :width], dst=product, scale=1 / _ONE)
+        inner = np.s_[step : step + bottom - top, :width]
+        cv2.multiply(product, above[inner], dst=product, scale=1 / _ONE)
+        if more is not None and more[first : first + _BAND_CELLS + 2].any():
+            some = more[first : first + _BAND_CELLS + 2]
+            cv2.resize(some, (columns, step * len(some)), fine[: step * len(some)], interpolation=cv2.INTER_LINEAR)
+            cv2.add(product, fine[inner], dst=product)
         if WIDE_TABLES:
             cv2.LUT(product, _codes_of_roots(), dst=shown[top:bottom])
         else:
             _codes_of_roots().take(product, out=shown[top:bottom], mode="clip")  # other modes would copy `out`
     return shown
+
+
+def _bordered_codes(roots: NDArray[np.float32]) -> NDArray[np.uint16]:
+    """Roots in 16 bits, with the first and last row repeated."""
+    codes = cv2.multiply(roots, (_ONE,) * 4, dtype=cv2.CV_16U)
+    return np.asarray(cv2.copyMakeBorder(codes, 1, 1, 0, 0, cv2.BORDER_REPLICATE), np.uint16)
 
 
 def _roots_of(image: DisplayImage, as_shown: float) -> NDArray[np.uint16]:
@@ -83,10 +102,10 @@ def _roots_of_pairs(as_shown: float) -> NDArray[np.int32]:
 @lru_cache(maxsize=64)
 def _roots_of_codes(as_shown: float) -> NDArray[np.uint16]:
     light = (1 - as_shown) * linear_from_uint8(_CODES) + as_shown * linear_from_display(_CODES[None])[0]
-    return np.asarray(np.round(_ONE * light ** (1 / _POWER)), np.uint16)
+    return np.asarray(np.round(_ONE * light ** (1 / POWER)), np.uint16)
 
 
 @lru_cache(maxsize=1)
 def _codes_of_roots() -> NDArray[np.uint8]:
-    light = (np.arange(1 << 16) / _ONE) ** _POWER
+    light = (np.arange(1 << 16) / _ONE) ** POWER
     return np.round(255 * srgb_encode(tone_curve(light))).astype(np.uint8)

@@ -105,16 +105,17 @@ class RatioMode:
         if mismatch is not None:
             return mismatch
         followed = context.executor.submit(self._follow, motion, frame)
-        roots = context.scene_relighting.compare(
+        pictures = context.scene_relighting.compare(
             scene,
             motion.rotation,
             frame.time_s,
             room.light_map,
             room.in_head_frame,
-            relighting.ratio_roots,
+            relighting.light_roots,
             quality.relight_every,
         )
-        return RatioPlan(frame, float(motion.presence), room.gain, roots, followed.result())
+        eye_distance = context.face.scheme.eye_span(motion.landmarks)
+        return RatioPlan(frame, float(motion.presence), room.gain, pictures, followed.result(), eye_distance)
 
     def _follow(self, motion: FaceMotion, frame: Frame) -> PositionGrid:
         assert motion.pose is not None

@@ -17,7 +17,8 @@ from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImag
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.live.modes.light_multiplication import light_of_root, multiply_light, root_of_light
+from relit_camera.live.modes.light_multiplication import POWER, light_of_root, multiply_light, root_of_light
+from relit_camera.live.modes.live_detail import SourceCells, blend_cells, live_cells
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion
@@ -27,11 +28,12 @@ from relit_camera.live.reenactment.source_image import SourceFace, feather_edges
 from relit_camera.live.reenactment.warp import PositionGrid, Warp
 from relit_camera.subject.subject import Subject
 
-RATIO_RANGE = (0.02, 12.0)
 RATIO_FLOOR = 0.03
 """Share of the room-lit face's mean that is added to both sides of the ratio: shadows stay bounded."""
 MIN_CHANNEL_MEAN = 1e-3
 """Linear: the least mean of a channel under the room's light that counts; three sRGB codes."""
+MOVING_REACH, SOFT_PX = 1.25, 1.5
+"""By how much the outlines of eyes and lips are enlarged, and how soft the borders are, in source pixels."""
 EDGE_MARGIN = 0.02
 """Share of the source image's width at the matte's edge that is not trusted."""
 RATIO_CELLS = 120
@@ -58,21 +60,23 @@ class RatioPlan:
         frame: the live frame.
         presence: how far it is relit, 0..1: 0 shows it as it is.
         gain: (3,) float32 by which its exposure differs from that of the ratio, see `RoomLightEstimate`.
-        roots: (height, width, 4) float32 of the source image's size, see `RatioRelighting.ratio_roots`.
+        pictures: (2 · height, width, 3) float32, see `RatioRelighting.light_roots`.
         positions: where cells of some pixels of the frame lie in the source image.
+        eye_distance: in the frame, pixels.
     """
 
     frame: Frame
     presence: float
     gain: NDArray[np.float32]
-    roots: NDArray[np.float32]
+    pictures: NDArray[np.float32]
     positions: PositionGrid
+    eye_distance: float
 
 
 class RatioRelighting:
     """Exchanges the light on the live face of one subject.
 
-    `positions`, `ratio_roots` and `apply` share nothing that changes: each may run in a thread of its own.
+    `positions`, `light_roots` and `apply` share nothing that changes: each may run in a thread of its own.
 
     Attributes:
         room_light: estimates the room's light from the live face.
@@ -92,15 +96,15 @@ class RatioRelighting:
         self._motion = motion
         self._points = control_points(face, head_and_shoulder_anchors(face.pose, face.size))
         self._mesh = triangulate_face(face)
-        self._weight = ratio_confidence(feather_edges(subject.matte))
-        self._weights = cv2.merge([self._weight] * 3)
-        self._inside = (self._weight > 0.5).astype(np.uint8)
+        confidence = ratio_confidence(feather_edges(subject.matte))
+        self._inside = (confidence > 0.5).astype(np.uint8)
+        self._parts = cv2.merge([confidence, still_skin(face), inside_face(face)])
 
-    def ratio_roots(self, relit: LinearImage, under_room: LinearImage) -> NDArray[np.float32]:
-        """How much brighter the source image is under the scene's light than under the room's.
+    def light_roots(self, relit: LinearImage, under_room: LinearImage) -> NDArray[np.float32]:
+        """The source image under the scene's light and, below it, under the room's: (2 · height, width, 3) float32.
 
-        As roots (`light_multiplication`), each times the confidence in it, and the confidence: (height, width, 4)
-        float32. In roots, because the step between two of them is about as visible anywhere.
+        As roots (`light_multiplication`), because the step between two of them is about as visible anywhere. Both have
+        a little light added, so that their ratio is bounded in shadows.
 
         Args:
             relit: (height, width, 3) float32 linear, the source image under the scene's light.
@@ -108,11 +112,8 @@ class RatioRelighting:
         """
         # A room may have no light at all of one colour; then the live picture has none of it either.
         floor = tuple(RATIO_FLOOR * max(mean, MIN_CHANNEL_MEAN) for mean in cv2.mean(under_room, self._inside))
-        ratio = np.maximum(under_room, 0)
-        cv2.divide(cv2.add(relit, floor), cv2.add(ratio, floor, dst=ratio), dst=ratio)
-        roots = root_of_light(np.clip(ratio, *RATIO_RANGE, out=ratio))
-        cv2.multiply(roots, self._weights, dst=roots)
-        return np.asarray(cv2.merge([*cv2.split(roots), self._weight]), np.float32)
+        both = cv2.add(np.concatenate([relit, np.maximum(under_room, 0)]), floor)
+        return root_of_light(np.maximum(both, 0, out=both))
 
     def positions(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> PositionGrid:
         """Where a live frame of `size` (width, height) lies in the source image.
@@ -126,7 +127,7 @@ class RatioRelighting:
         return self._warp(motion, pose, size).grid((0, 0, *size), step)
 
     def apply(self, plan: RatioPlan, blend: float = 1.0) -> DisplayImage:
-        """The planned frame in the light of the plan's ratio, uint8 sRGB.
+        """The planned frame in the scene's light, uint8 sRGB.
 
         `blend` is how far, in light: 0 gives the frame as it is. Its brightest codes are taken for no more light than
         sRGB says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
@@ -134,12 +135,22 @@ class RatioRelighting:
         """
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
         nodes = plan.positions.nodes() - np.float32(0.5)
-        roots = extrapolate_roots(cv2.remap(plan.roots, nodes, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
-        roots = cv2.multiply(roots, (*map(float, root_of_light(np.reciprocal(plan.gain)).ravel()), 0.0))
+        relit, under_room, parts = (
+            cv2.remap(each, nodes, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            for each in (*np.split(plan.pictures, 2), self._parts)
+        )
+        gain = tuple(map(float, root_of_light(plan.gain).ravel()))
+        under_room = cv2.multiply(under_room, (*gain, 1.0), dst=under_room)
+        step = plan.positions.step
+        live, brightest = live_cells(plan.frame.image, step, relit.shape[:2])
+        confidence, skin, face = cv2.split(parts)
+        source = SourceCells(relit, under_room, confidence, skin, face)
+        cells = blend_cells(live, brightest, source, plan.eye_distance / step)
+        factor = extrapolate_roots(cells.ratio) * cells.trust[..., None]
+        added = relit * (1 - cells.trust[..., None])
         if blend < 1:
-            mixed = 1 - blend + blend * light_of_root(np.asarray(roots, np.float32))
-            roots = root_of_light(mixed.astype(np.float32))
-        shown = multiply_light(plan.frame.image, roots, plan.positions.step, as_shown=1 - blend)
+            factor, added = blend_toward_live(factor, added, live, blend)
+        shown = multiply_light(plan.frame.image, factor, step, as_shown=1 - blend, added=added)
         if plan.presence < 1:
             # Where nobody is tracked with confidence the picture eases back to the live one, as both are shown:
             # in linear light that guess would be in the mixture.
@@ -169,6 +180,23 @@ def ratio_confidence(matte: Mask) -> Mask:
     return np.asarray(cv2.GaussianBlur(inner, (0, 0), reach / 2), dtype=np.float32)
 
 
+def still_skin(face: SourceFace) -> Mask:
+    """Where the source image shows what the live picture shows too, 0..1: not eyes and lips, which open and close."""
+    scheme, skin = face.scheme, np.ones(face.size[::-1], np.float32)
+    for moving in (scheme.right_eye.lids, scheme.left_eye.lids, scheme.lips):
+        outline = cv2.convexHull(face.landmarks[list(moving)])[:, 0]
+        grown = outline.mean(axis=0) + MOVING_REACH * (outline - outline.mean(axis=0))
+        cv2.fillConvexPoly(skin, np.round(grown).astype(np.int32), 0.0)
+    return np.asarray(cv2.GaussianBlur(skin, (0, 0), SOFT_PX), np.float32)
+
+
+def inside_face(face: SourceFace) -> Mask:
+    """Where the source image shows the face, 0..1."""
+    drawn = np.zeros(face.size[::-1], np.float32)
+    cv2.fillPoly(drawn, [np.round(face.landmarks[list(face.scheme.oval)]).astype(np.int32)], 1.0)
+    return np.asarray(cv2.GaussianBlur(drawn, (0, 0), SOFT_PX), np.float32)
+
+
 def fit_similarity(points: NDArray[np.float64], onto: NDArray[np.floating]) -> NDArray[np.float64]:
     """The rotation, scale and shift (2, 3) that bring `points` (count, 2) nearest to `onto` in least squares."""
     center, goal = points.mean(axis=0), onto.mean(axis=0)
@@ -177,6 +205,21 @@ def fit_similarity(points: NDArray[np.float64], onto: NDArray[np.floating]) -> N
     factor = np.vdot(p, q) / max(np.vdot(p, p).real, 1e-12)
     turn = np.array([[factor.real, -factor.imag], [factor.imag, factor.real]])
     return np.column_stack([turn, goal - turn @ center])
+
+
+def blend_toward_live(
+    factor: NDArray[np.float32], added: NDArray[np.float32], live: NDArray[np.float32], share: float
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """What a root x is multiplied by, and what is added to it, where a `share` in light of x · factor + added is shown.
+
+    The rest is x itself. The mixture in light is not linear in x: it is so near `live`, the cells' own root, and
+    everywhere where nothing is added. All are (rows, columns, 3).
+    """
+    live = np.maximum(live, np.float32(1e-3))
+    relit = live * factor + added
+    mixed = np.maximum(((1 - share) * live**POWER + share * relit**POWER) ** (1 / POWER), 1e-3)
+    toward_live, toward_relit = (1 - share) * (live / mixed) ** (POWER - 1), share * (relit / mixed) ** (POWER - 1)
+    return np.asarray(toward_live + toward_relit * factor, np.float32), np.asarray(toward_relit * added, np.float32)
 
 
 def extrapolate_roots(warped: NDArray[np.float32]) -> NDArray[np.float32]:

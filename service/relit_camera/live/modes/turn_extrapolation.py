@@ -57,7 +57,7 @@ class TurnExtrapolation:
     def picture(
         self, rotation: Rotation, whole: object, part: object, every: int, compute: Callable[[], NDArray[np.float32]]
     ) -> NDArray[np.float32]:
-        """The picture (height, width, 3 or 4) with the head under `rotation`; it must not be written to.
+        """The picture (height, width, channels) with the head under `rotation`; it must not be written to.
 
         Args:
             rotation: of the head.

@@ -77,12 +77,13 @@ class LiveRatio:
         self.residual = room.residual
         pose = self._last.motion.pose
         assert pose is not None
+        self._eye_distance = face.scheme.eye_span(self._last.motion.landmarks)
         self._positions = self._relighting.positions(self._last.motion, pose, self._last.frame.size)
 
     def relit(self, light: LightMap) -> DisplayImage:
         """The last frame, as the program shows it in a light in display exposure."""
         maps = np.stack([light * self._gain, self._room.in_head_frame])
-        roots = self._relighting.ratio_roots(*self._relighter.relight(maps))
+        pictures = self._relighting.light_roots(*self._relighter.relight(maps))
         presence = float(self._last.motion.presence)
-        plan = RatioPlan(self._last.frame, presence, self._room.gain, roots, self._positions)
+        plan = RatioPlan(self._last.frame, presence, self._room.gain, pictures, self._positions, self._eye_distance)
         return self._relighting.apply(plan)

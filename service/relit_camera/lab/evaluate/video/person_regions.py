@@ -15,7 +15,7 @@ Region = NDArray[np.bool_]
 
 INSIDE = 0.5
 """Matte from which a pixel is the person's."""
-OPEN_MOUTH, SHUT_EYES = 0.06, 0.07
+OPEN_MOUTH, SHUT_EYES = 0.12, 0.07
 """Opening of the mouth from which it counts as open, and of the lids below which they count as shut."""
 FAR_CHEEK_DEG = 25.0
 """Yaw from which the half of the face that turns away counts by itself."""

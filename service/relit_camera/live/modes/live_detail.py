@@ -1,0 +1,180 @@
+"""How far a relit live picture leans on the live picture, and how far on the relit source image.
+
+The product of the live picture and a ratio of light is only as good as the estimate of the room: where its light is
+hard, the old shading shows through. The relit source image has no trace of the room, but it is coarse, and it lies on
+the live face only as well as the landmarks do. So the coarse part of the shown picture is that of the relit source
+image, and the detail is the live picture's: each of the two where it is better. Where the live picture has no detail to
+trust, because it is overexposed or so dark that the ratio would multiply its noise, the source image gives that too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.live.modes.light_multiplication import POWER, light_of_root, root_of_light
+
+Cells = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class LiveDetailTunables:
+    """Constants, chosen on one rendered person in two rooms: soft light, and one window at the side.
+
+    Attributes:
+        coarse: sigma of what counts as coarse, in eye distances.
+        needed: deviation of the person's coarse light from that of the relit source image, RMS of logarithms, at which
+            half of it is corrected: less comes from landmarks that lie badly, more from a room that is hard to know.
+        range: limits of the correction.
+        floor: share of the person's mean light that is added to both sides of the correction.
+        full_code, clipped_code: brightest code of a live pixel up to which its detail is trusted, and from which not.
+        noise: root of the ratio at which half of the detail is trusted.
+        mismatch, mismatch_face: logarithm of how much darker or brighter than expected a cell is that half counts as
+            something else: beside the face, and inside it.
+        mismatch_floor: share of the person's mean root below which differences do not count as such.
+        wide: sigma of the neighborhood that tells what is expected, in eye distances.
+    """
+
+    coarse: float = 0.08
+    needed: float = 0.3
+    range: tuple[float, float] = (0.2, 5.0)
+    floor: float = 0.02
+    full_code: float = 235.0
+    clipped_code: float = 250.0
+    noise: float = 3.5
+    mismatch: float = 0.5
+    mismatch_face: float = 1.2
+    mismatch_floor: float = 0.15
+    wide: float = 0.6
+
+
+TUNABLES = LiveDetailTunables()
+
+
+@dataclass(frozen=True)
+class SourceCells:
+    """What is known of the source image where the cells of the live picture look; all (rows, columns, 3 or none).
+
+    Attributes:
+        relit: roots of its light under the scene's light.
+        under_room: the same under the room's, in the live frame's exposure.
+        confidence: how far the ratio counts, 0..1.
+        skin: how far a cell is on skin or hair that moves with the head: not lids, eyes, lips or what they show.
+        face: how far it is inside the outline of the face.
+    """
+
+    relit: Cells
+    under_room: Cells
+    confidence: Cells
+    skin: Cells
+    face: Cells
+
+
+@dataclass(frozen=True)
+class CellBlend:
+    """How the shown picture is made of the live one and the source image.
+
+    Attributes:
+        ratio: (rows, columns, 4) roots of the ratio times the confidence, and the confidence.
+        trust: (rows, columns) how far the live picture's detail is shown, 0..1.
+    """
+
+    ratio: Cells
+    trust: Cells
+
+
+def blend_cells(live: Cells, brightest: Cells, source: SourceCells, unit: float) -> CellBlend:
+    """Find the ratio for each cell of the live picture, and how far its detail can be trusted.
+
+    Args:
+        live: (rows, columns, 3) roots of the live picture's light.
+        brightest: (rows, columns) its brightest code there, 0..255.
+        source: of the source image there.
+        unit: the eye distance in cells.
+    """
+    tuning = TUNABLES
+    clipped = np.clip((brightest - tuning.full_code) / (tuning.clipped_code - tuning.full_code), 0, 1)
+    seen = source.skin * source.confidence * (1 - clipped)
+    match = _match(live, clipped, source, seen, unit)
+    confidence = np.maximum(source.confidence * match, _LEAST)
+    ratio = cv2.divide(source.relit, np.maximum(source.under_room, _LEAST))
+    ratio *= _correction(source.relit, live * ratio, seen * match, tuning.coarse * unit)
+    amplified = (_largest(ratio) / np.float32(tuning.noise)) ** 2
+    trust = (1 - clipped) / (1 + amplified * amplified)
+    trust = 1 - (1 - trust) * np.minimum(_SURE * confidence, 1)
+    weighted = cv2.merge([*(cv2.multiply(each, confidence) for each in cv2.split(ratio)), confidence])
+    return CellBlend(np.asarray(weighted, np.float32), np.asarray(trust, np.float32))
+
+
+def live_cells(image: DisplayImage, step: int, cells: tuple[int, ...]) -> tuple[Cells, Cells]:
+    """The live picture in cells of `step` pixels: roots of its light (rows, columns, 3), its brightest code there.
+
+    The middle of each cell stands for it: what is made of cells is blurred.
+    """
+    rows, columns = (min(side // step, count) for side, count in zip(image.shape, cells, strict=False))
+    whole = image[: rows * step, : columns * step]
+    small = whole if step == 1 else cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    small = cv2.copyMakeBorder(small, 0, cells[0] - rows, 0, cells[1] - columns, cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.LUT(small, _ROOTS_OF_CODES), np.float32), _largest(small).astype(np.float32)
+
+
+_ROOTS_OF_CODES = root_of_light(linear_from_uint8(np.arange(256, dtype=np.uint8)[None]))[0]
+_LEAST, _SURE = np.float32(1e-4), np.float32(1.5)
+"""A least divisor; and what makes a confidence of two thirds count as certainty, since it is soft at the rim."""
+_GRAY = np.full((1, 3), 1 / 3, np.float32)
+_ROBUST_ROUNDS, _REDUCTION = 2, 4
+"""Of the expectation, which is so wide that it is computed for fewer cells, by a factor on each side."""
+
+
+def _match(live: Cells, clipped: Cells, source: SourceCells, seen: Cells, unit: float) -> Cells:
+    """How far each cell shows what the source image has there, 0..1; a hand or hair that moved is something else.
+
+    Inside the face more is allowed: shadows that the room's estimate lacks fall there.
+    """
+    tuning = TUNABLES
+    bright, known = cv2.transform(live, _GRAY), cv2.transform(source.under_room, _GRAY)
+    least = np.float32(tuning.mismatch_floor * float((known * seen).sum()) / max(float(seen.sum()), 1e-6))
+    apart = cv2.log((bright + least) / (known + least)) * np.float32(POWER)
+    limit = tuning.mismatch + np.float32(tuning.mismatch_face - tuning.mismatch) * source.face
+    rows, columns = apart.shape
+    size = (max(columns // _REDUCTION, 1), max(rows // _REDUCTION, 1))
+    few, goal, weight = (cv2.resize(each, size, interpolation=cv2.INTER_LINEAR) for each in (limit, apart, seen))
+    error = goal
+    for _ in range(_ROBUST_ROUNDS):
+        counted = weight / (1 + (error / few) ** 2)
+        sums = cv2.GaussianBlur(cv2.merge([goal * counted, counted]), (0, 0), tuning.wide * unit / _REDUCTION)
+        expected = sums[..., 0] / (sums[..., 1] + np.float32(1e-6))
+        error = goal - expected
+    error = apart - cv2.resize(expected, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    error *= 1 - clipped  # how bright an overexposed cell is nobody knows
+    return np.asarray(1 / (1 + (error / limit) ** 2), np.float32)
+
+
+def _correction(goal: Cells, found: Cells, weight: Cells, sigma: float) -> Cells:
+    """By what roots `found` are multiplied so that their coarse light is that of `goal`, as far as both differ much."""
+    rows, columns = weight.shape
+    size = (-(-columns // 2), -(-rows // 2))
+    goal, found, weight = (cv2.resize(each, size, interpolation=cv2.INTER_LINEAR) for each in (goal, found, weight))
+    weights = cv2.merge([weight] * 3)
+    total = max(float(weight.sum()), 1e-6)
+    coarse = []
+    for roots in (goal, found):
+        light = cv2.multiply(light_of_root(np.asarray(roots, np.float32)), weights)
+        floor = np.maximum(TUNABLES.floor * np.array(cv2.sumElems(light)[:3]) / total, 1e-6)
+        coarse.append(cv2.add(cv2.GaussianBlur(light, (0, 0), sigma / 2), (*floor, 0.0)))
+    logarithm = cv2.log(np.clip(cv2.divide(*coarse), *TUNABLES.range))
+    deviation = sum(cv2.sumElems(cv2.multiply(cv2.multiply(logarithm, logarithm), weights))) / (3 * total)
+    share = 1 / (1 + (TUNABLES.needed**2 / max(deviation, 1e-9)) ** 2)
+    roots = cv2.exp(cv2.multiply(logarithm, (share / POWER,) * 4))
+    return np.asarray(cv2.resize(roots, (columns, rows), interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def _largest(image: NDArray) -> NDArray:
+    """The largest of each pixel's three channels, (height, width)."""
+    first, second, third = cv2.split(image)
+    return np.asarray(cv2.max(cv2.max(first, second), third))

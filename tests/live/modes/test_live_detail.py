@@ -1,0 +1,84 @@
+"""How far a relit live picture leans on the live picture, and how far on the relit source image."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relit_camera.live.modes.light_multiplication import light_of_root, root_of_light
+from relit_camera.live.modes.live_detail import CellBlend, SourceCells, blend_cells, live_cells
+
+ROWS, COLUMNS, UNIT = 60, 80, 20.0
+ALBEDO = 0.3 + 0.2 * np.random.default_rng(1).random((ROWS, COLUMNS, 3))
+"""Detail that the live picture has, and the source image has not."""
+SIDE = np.linspace(0.4, 1.6, COLUMNS)[None, :, None]
+"""Light from one side, which the scene wants."""
+EVERYWHERE = np.ones((ROWS, COLUMNS), np.float32)
+
+
+def blended(live: np.ndarray, room: np.ndarray, scene: np.ndarray = SIDE, brightest: float = 150.0) -> CellBlend:
+    """The blend of a picture, with a source image of even albedo under the estimated room and the scene."""
+    even = np.full((ROWS, COLUMNS, 3), ALBEDO.mean())
+    relit, under_room = (root_of_light((even * light).astype(np.float32)) for light in (scene, room))
+    source = SourceCells(relit, under_room, EVERYWHERE, EVERYWHERE, EVERYWHERE)
+    return blend_cells(root_of_light(live.astype(np.float32)), brightest * EVERYWHERE, source, UNIT)
+
+
+def ratio_of(blend: CellBlend) -> np.ndarray:
+    return light_of_root(blend.ratio[..., :3] / blend.ratio[..., 3:])
+
+
+def error(live: np.ndarray, blend: CellBlend) -> float:
+    """RMS error of the live picture times the ratio, as a fraction of the truth's mean, away from the border."""
+    off = (live * ratio_of(blend) - ALBEDO * SIDE)[10:-10, 10:-10]
+    return float(np.sqrt((off**2).mean()) / ALBEDO.mean())
+
+
+def test_where_the_room_is_known_the_light_alone_is_exchanged() -> None:
+    room = np.linspace(1.2, 0.8, ROWS)[:, None, None] * np.ones((1, COLUMNS, 1))
+    live = ALBEDO * room
+    blend = blended(live, room)
+    assert error(live, blend) < 0.02
+    assert blend.trust.min() > 0.9
+
+
+def test_a_shadow_that_the_estimate_lacks_is_taken_from_the_coarse_light() -> None:
+    """Truth: the same surface without it. Multiplied by the ratio alone, the shadow would stay."""
+    shadow = np.where(np.arange(COLUMNS) < COLUMNS / 2, 0.35, 1.0)[None, :, None] * np.ones((ROWS, 1, 1))
+    live = ALBEDO * shadow
+    blend = blended(live, np.ones((ROWS, COLUMNS, 1)))
+    multiplied = float(np.sqrt((((ALBEDO * shadow - ALBEDO) * SIDE)[10:-10, 10:-10] ** 2).mean()) / ALBEDO.mean())
+    assert error(live, blend) < 0.5 * multiplied
+
+
+@pytest.mark.parametrize("gain", [0.5, 2.0])
+def test_the_webcams_exposure_is_corrected_at_once(gain: float) -> None:
+    live = gain * ALBEDO
+    assert error(live, blended(live, np.ones((ROWS, COLUMNS, 1)))) < 0.1
+
+
+def test_overexposed_cells_have_no_detail() -> None:
+    assert blended(ALBEDO, np.ones((ROWS, COLUMNS, 1)), brightest=255).trust.max() == 0
+    assert blended(ALBEDO, np.ones((ROWS, COLUMNS, 1)), brightest=200).trust.min() > 0.9
+
+
+def test_noise_is_not_multiplied_without_limit() -> None:
+    bright = np.full((ROWS, COLUMNS, 1), 30.0)
+    trust = blended(0.02 * ALBEDO, np.full((ROWS, COLUMNS, 1), 0.02), bright).trust
+    assert trust.max() < 0.1
+
+
+def test_something_else_before_the_face_is_not_painted_as_skin() -> None:
+    live = ALBEDO.copy()
+    live[20:40, 30:50] = 0.01  # a dark mug
+    ratio = ratio_of(blended(live, np.ones((ROWS, COLUMNS, 1))))
+    assert ratio[25:35, 35:45].max() < 3  # not the 40 that would make skin of it
+
+
+def test_cells_are_the_live_pictures() -> None:
+    image = np.arange(0, 240, 1, dtype=np.uint8)[None, :, None].repeat(60, 0).repeat(3, 2)
+    light, brightest = live_cells(image, 6, (10, 40))
+    assert light.shape == (10, 40, 3)
+    np.testing.assert_allclose(brightest[0], np.arange(40) * 6 + 2.5, atol=0.6)
+    light, brightest = live_cells(image[:-1, :-1], 6, (10, 40))
+    assert light.shape == (10, 40, 3)
