@@ -8,7 +8,7 @@ PROCESSES ?= 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest coverage browser test-browser vm test-vm vm-picture clean
+.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest fuzz coverage browser test-browser vm test-vm vm-picture clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -62,6 +62,9 @@ pytest: setup ## the tests alone, in two processes; make pytest PROCESSES=4
 	# By themselves: browser and emulated machine take both cores, and tests that hold in real time would not.
 	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup tests/browser
 	$(BIN)/python -m pytest tests/vm
+
+fuzz: setup ## mutated files on every reader, for an hour; make fuzz FUZZ="--seconds 60 --seed 3"
+	$(BIN)/python -m tests.fuzz.fuzzing $(FUZZ)
 
 coverage: setup ## the first of these with the share of lines that they execute: build/coverage/index.html
 	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --cov --cov-report=

@@ -17,17 +17,26 @@ from pydantic import BaseModel
 from typer.core import TyperCommand, TyperGroup
 
 from relit_camera.api.middleware.body_limits import MAX_JSON_BYTES, MAX_UPLOAD_BYTES
+from relit_camera.api.middleware.upload_limits import MAX_UPLOADS
 from relit_camera.api.preview_stream import MAX_FRAMES_SENT_PER_S, MAX_VARIANTS, MAX_VIEWERS
 from relit_camera.api.problem_details import PROBLEM_TYPES
 from relit_camera.api.server.connection_timeouts import MIN_BODY_BYTES_PER_TIMEOUT, WRITE_TIMEOUT_S
+from relit_camera.base.concurrency import decoding_process
 from relit_camera.base.config.access_token import MIN_TOKEN_LENGTH
-from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH
-from relit_camera.base.config.settings import RelitSettings
-from relit_camera.base.images.image_limits import MAX_EXR_VALUES, MAX_IMAGE_PIXELS, MAX_JPEG_SCANS
+from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH, MAX_YAML_NODES
+from relit_camera.base.config.settings import RelitSettings, StorageSettings
+from relit_camera.base.images.image_limits import (
+    MAX_DECODED_BYTES,
+    MAX_EXR_VALUES,
+    MAX_FILE_BYTES,
+    MAX_IMAGE_PIXELS,
+    MAX_JPEG_SCANS,
+)
 from relit_camera.base.models.model_manifest import public_manifest
+from relit_camera.base.video import video_decoding
 from relit_camera.capture import lights_file, subject_landmarks
 from relit_camera.cli.main import app
-from relit_camera.face import matting
+from relit_camera.face import matte_files
 from relit_camera.face.tracking import track_recording
 from relit_camera.light.environments.environment_panorama import MAX_PANORAMA_PIXELS
 from relit_camera.live.scene.background_store import MAX_SIDE_PX as MAX_BACKGROUND_SIDE_PX
@@ -126,14 +135,35 @@ def test_the_table_of_degradations_names_every_code() -> None:
 LIMITS = {
     "a file sent": [f"{MAX_UPLOAD_BYTES // MIB} MiB"],
     "JSON sent": [f"{MAX_JSON_BYTES // MIB} MiB"],
-    "a picture": [f"{MAX_IMAGE_PIXELS // 10**6} million pixels", f"{MAX_JPEG_SCANS} scans"],
+    "a picture": [
+        f"{MAX_IMAGE_PIXELS // 10**6} million pixels",
+        f"{MAX_DECODED_BYTES // 10**6} MB",
+        f"{MAX_FILE_BYTES // MIB} MiB",
+        f"{MAX_JPEG_SCANS} scans",
+    ],
     "a panorama": [f"{MAX_PANORAMA_PIXELS / 1e6:.1f} million", f"{MAX_EXR_VALUES // 10**6} million values"],
+    "a video's picture": [f"{video_decoding.MAX_PIXELS // 10**6} million", f"{video_decoding.MAX_SIDE} a side"],
+    "decoding a file": [
+        f"{decoding_process.MOST_BYTES // (1 << 30)} GiB",
+        f"{decoding_process.CPU_LIMIT_S} s",
+    ],
+    "files that are received": [f"{MAX_UPLOADS}"],
+    "the data folder": [f"{StorageSettings().quota_gb:.0f} GB"],
     "a stored background": [f"{MAX_BACKGROUND_SIDE_PX} pixels"],
-    "a preset's or settings file": [f"{MAX_YAML_BYTES // MIB} MiB", f"{MAX_YAML_DEPTH} levels"],
+    "a preset's or settings file": [
+        f"{MAX_YAML_BYTES // MIB} MiB",
+        f"{MAX_YAML_DEPTH} levels",
+        f"{MAX_YAML_NODES:,} values",
+    ],
     "a subject that is shown by the camera": [f"{subject_file.MAX_COPIED_BYTES // (1 << 30)} GiB"],
     "a subject file elsewhere": [f"{subject_file.MAX_BYTES // (1 << 30)} GiB"],
-    "any subject file": [f"{subject_file.MAX_TENSORS} tensors", f"{MAX_SIDE_PX} pixels"],
-    "a recorded matte": [f"{matting.MAX_RECORDED_BYTES // (1 << 30)} GiB"],
+    "any subject file": [
+        f"{subject_file.MAX_TENSORS} tensors",
+        f"{subject_file.MAX_DIMENSIONS} dimensions",
+        f"{subject_file.MAX_HEADER_BYTES // MIB} MiB",
+        f"{MAX_SIDE_PX} pixels",
+    ],
+    "a recorded matte": [f"{matte_files.MAX_RECORDED_BYTES // (1 << 30)} GiB", f"{matte_files.MAX_MEMBERS} members"],
     "a track; landmarks; an .lp file": [
         "; ".join(f"{module.MAX_BYTES // MIB} MiB" for module in (track_recording, subject_landmarks, lights_file))
     ],

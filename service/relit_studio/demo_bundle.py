@@ -17,7 +17,7 @@ from relit_camera.capture.picture_import import import_samples
 from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.capture.subject_landmarks import read_landmarks
-from relit_camera.face.matting import write_mattes
+from relit_camera.face.matte_files import write_mattes
 from relit_camera.face.tracking.track_recording import read_track
 from relit_camera.subject.compression.webp_packing import pack_subject
 from relit_camera.subject.subject_file import write_subject

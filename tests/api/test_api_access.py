@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import socket
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
 import pytest
+from fastapi import FastAPI
 from pydantic import SecretStr
 
 from relit_camera.api.app import PANEL_FOLDER, create_app
-from relit_camera.api.middleware.token_authentication import SESSION_COOKIE
+from relit_camera.api.middleware import token_authentication
+from relit_camera.api.middleware.token_authentication import MAX_WAITING, SESSION_COOKIE
 from relit_camera.api.server.http_server import ApiServer, start_api_server
 from relit_camera.api.server.listener import open_listener
 from relit_camera.base.config.settings import RelitSettings, ServerSettings
@@ -25,6 +29,11 @@ BEARER = {"authorization": f"Bearer {TOKEN}"}
 HOST = "192.168.7.5"
 NAMES = ("camera.lan", "camera.example:8443", "proxied.example")
 SERVER = ServerSettings(host=HOST, token=SecretStr(TOKEN), names=NAMES)
+
+
+@pytest.fixture(autouse=True)
+def short_delays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(token_authentication, "WRONG_TOKEN_DELAY_S", 0.01)
 
 
 @pytest.fixture
@@ -169,6 +178,43 @@ def test_a_session_ends_with_its_camera(guarded: Client, camera: FakeCamera, set
 def test_only_get_and_post_reach_the_login_page(guarded: Client) -> None:
     assert check_problem(guarded.delete("/login"), 405)
     assert guarded.request("HEAD", "/login").status_code == 200
+
+
+async def statuses(app: FastAPI, tokens: list[str]) -> list[int]:
+    """Answers to requests with these tokens, sent together."""
+    async with httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url=f"http://{HOST}:8471") as client:
+        asked = [client.get("/api/v1/mode", headers={"authorization": f"Bearer {token}"}) for token in tokens]
+        return [answer.status_code for answer in await asyncio.gather(*asked)]
+
+
+def test_wrong_ones_are_answered_slowly_and_few_may_wait(
+    camera: FakeCamera, settings: RelitSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(token_authentication, "WRONG_TOKEN_DELAY_S", 0.05)
+    server = SERVER.model_copy(update={"names": (*NAMES, f"{HOST}:8471")})
+    app = create_app(camera, settings.model_copy(update={"server": server}))
+    began = time.monotonic()
+    answered = asyncio.run(statuses(app, ["wrong"] * (MAX_WAITING + 4)))
+    assert time.monotonic() - began >= 0.05 * MAX_WAITING
+    assert sorted(answered) == [401] * MAX_WAITING + [429] * 4
+
+
+def test_the_right_one_waits_for_nobody(
+    camera: FakeCamera, settings: RelitSettings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(token_authentication, "WRONG_TOKEN_DELAY_S", 3600.0)
+    server = SERVER.model_copy(update={"names": (*NAMES, f"{HOST}:8471")})
+    app = create_app(camera, settings.model_copy(update={"server": server}))
+
+    async def both() -> list[int]:
+        wrong = asyncio.create_task(statuses(app, ["wrong"] * (MAX_WAITING + 1)))
+        await asyncio.sleep(0.1)
+        right = await statuses(app, [TOKEN])
+        assert not wrong.done()
+        wrong.cancel()
+        return right
+
+    assert asyncio.run(both()) == [200]
 
 
 def test_without_a_token_there_is_no_login_page(client: Client) -> None:

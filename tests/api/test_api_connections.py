@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import logging
 import socket
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 import pytest
 from fastapi import FastAPI
 
 from relit_camera.api.app import create_app
 from relit_camera.api.server import connection_timeouts
-from relit_camera.api.server.http_server import ApiServer, start_api_server
+from relit_camera.api.server.http_server import (
+    MALFORMED_INTERVAL_S,
+    MALFORMED_REQUEST,
+    ApiServer,
+    MalformedRequestFilter,
+    start_api_server,
+)
 from relit_camera.base.config.settings import RelitSettings, ServerSettings
 from tests.api.fake_camera import FakeCamera
 
@@ -120,3 +128,49 @@ def test_who_asks_again_in_time_stays(server: ApiServer) -> None:
         for _ in range(8):
             ask_whether_alive(server, client)
             time.sleep(SILENT_S / 3)
+
+
+def test_a_body_whose_length_is_stated_twice_is_refused_and_the_connection_ended(server: ApiServer) -> None:
+    with connect(server) as client:
+        both = "Content-Length: 4", "Transfer-Encoding: chunked", "Content-Type: application/json"
+        client.sendall(question(server, "PATCH /api/v1/lighting", *both) + b"0\r\n\r\nGET /healthz HTTP/1.1\r\n")
+        assert b" 400 " in client.recv(1 << 16).partition(b"\r\n")[0]
+        assert is_cut_off(client)
+
+
+@pytest.mark.parametrize("path", ["/healthz", "/nothing", "/api/v1/lighting"])
+def test_a_body_without_end_is_cut_off(server: ApiServer, monkeypatch: pytest.MonkeyPatch, path: str) -> None:
+    monkeypatch.setattr(connection_timeouts, "READ_TIMEOUT_S", 60.0)
+    monkeypatch.setattr(connection_timeouts, "MAX_UNREAD_BODY_BYTES", 4 << 20)
+    sent, chunk = 0, b"10000\r\n" + bytes(1 << 16) + b"\r\n"
+    with connect(server) as client:
+        headers = "Transfer-Encoding: chunked", "Content-Type: application/json"
+        client.sendall(question(server, f"PUT {path}", *headers))
+        with suppress(ConnectionError):
+            while sent < 64 << 20:
+                client.sendall(chunk)
+                sent += len(chunk)
+    assert sent < 32 << 20  # buffers of the system hold some
+
+
+def test_malformed_requests_do_not_fill_the_log(server: ApiServer, caplog: pytest.LogCaptureFixture) -> None:
+    for _ in range(20):
+        with connect(server) as client:
+            client.sendall(b"\0\1\2\r\n\r\n")
+            assert b" 400 " in client.recv(1000)
+    assert sum("Invalid HTTP request" in record.getMessage() for record in caplog.records) <= 2
+
+
+def test_malformed_requests_are_counted_in_the_log() -> None:
+    now = [0.0]
+    few = MalformedRequestFilter(lambda: now[0])
+
+    def passes(text: str) -> str | None:
+        record = logging.LogRecord("uvicorn.error", logging.WARNING, "", 0, text, None, None)
+        return record.getMessage() if few.filter(record) else None
+
+    assert [passes(MALFORMED_REQUEST) for _ in range(3)] == [MALFORMED_REQUEST, None, None]
+    assert passes("another") == "another"
+    now[0] = MALFORMED_INTERVAL_S
+    assert passes(MALFORMED_REQUEST) == f"{MALFORMED_REQUEST} (2 more since the last such line)"
+    assert passes(MALFORMED_REQUEST) is None

@@ -23,6 +23,7 @@ from relit_camera.devices.on_demand import on_demand_source
 from relit_camera.devices.sinks.sink import NullSink, Sink
 from relit_camera.devices.sources.source import Source
 from relit_camera.face import matting
+from relit_camera.face.matte_files import write_mattes
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import DegradationCode
 from tests.cli.relit_command import Material, write_material
@@ -198,7 +199,7 @@ def test_recorded_mattes_are_read_once(tmp_path: Path, monkeypatch: pytest.Monke
         return real(path)
 
     monkeypatch.setattr(matting, "RecordedMatting", note)
-    matting.write_mattes(tmp_path / "mattes.npz", [np.ones((4, 4), np.float32)])
+    write_mattes(tmp_path / "mattes.npz", [np.ones((4, 4), np.float32)])
     settings = RelitSettings(matte=f"recorded:{tmp_path / 'mattes.npz'}")
     check_before_devices(settings)
     for _ in range(2):  # another worker's as well

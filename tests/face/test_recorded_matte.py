@@ -11,7 +11,8 @@ from relit_camera.base.errors import InputError, NotFoundError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.base.models.session_with_fallback import SessionOptions
-from relit_camera.face.matting import RecordedMatting, matting_factory, write_mattes
+from relit_camera.face.matte_files import write_mattes
+from relit_camera.face.matting import RecordedMatting, matting_factory
 
 
 def frame(index: int, width: int = 64, height: int = 36) -> Frame:
@@ -48,7 +49,7 @@ def test_a_file_that_holds_none_is_refused(tmp_path: Path) -> None:
     np.savez(other, alpha=np.zeros((2, 3), np.float32))
     text.write_text("mattes")
     np.save(bare, np.zeros((2, 3, 4), np.uint8))
-    reasons = (other, "float32"), (text, "holds no"), (bare, "holds no"), (tmp_path / "gone.npz", "cannot read")
+    reasons = (other, "<f4"), (text, "holds no"), (bare, "holds no"), (tmp_path / "gone.npz", "cannot read")
     for path, words in reasons:
         with pytest.raises(InputError, match=words):
             RecordedMatting(path)

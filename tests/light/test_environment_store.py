@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import cv2
@@ -48,7 +49,7 @@ def test_add_load_and_remove(store: EnvironmentStore, tmp_path: Path) -> None:
 
 def test_bytes_are_stored_as_they_are(store: EnvironmentStore, tmp_path: Path) -> None:
     data = hdr(tmp_path / "a.hdr").read_bytes()
-    store.add_upload("upload", data, ".HDR")
+    store.add_upload("upload", io.BytesIO(data), ".HDR")
     assert (store.folder / "upload.hdr").read_bytes() == data
 
 
@@ -99,10 +100,10 @@ def test_built_in_environments_stay(store: EnvironmentStore) -> None:
 def test_what_is_no_light_is_refused_and_leaves_what_was(store: EnvironmentStore, tmp_path: Path) -> None:
     good = store.add("room", hdr(tmp_path / "a.hdr"))
     with pytest.raises(PanoramaError, match=r"^room\.hdr cannot be read") as caught:
-        store.add_upload("room", b"rubbish", ".hdr")
+        store.add_upload("room", io.BytesIO(b"rubbish"), ".hdr")
     assert str(tmp_path) not in str(caught.value)
     with pytest.raises(PanoramaError, match="format"):
-        store.add_upload("room", b"rubbish", "")
+        store.add_upload("room", io.BytesIO(b"rubbish"), "")
     with pytest.raises(PanoramaError, match="no panorama at"):
         store.add("room", tmp_path / "none.hdr")
     assert store.load("room") is good

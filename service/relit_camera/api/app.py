@@ -16,6 +16,7 @@ from relit_camera.api.middleware.error_handlers import install_error_handlers
 from relit_camera.api.middleware.json_bodies import require_strict_json
 from relit_camera.api.middleware.same_origin import AllowedHosts, SameOriginMiddleware
 from relit_camera.api.middleware.token_authentication import TokenAuthMiddleware
+from relit_camera.api.middleware.upload_limits import UploadLimitMiddleware
 from relit_camera.api.openapi.openapi_document import openapi_document, operation_id
 from relit_camera.api.routes import (
     backgrounds,
@@ -49,6 +50,11 @@ def create_app(camera: CameraControl, settings: RelitSettings) -> FastAPI:
     app.state.context = create_context(camera, settings)
     token = read_token(settings.server)
     app.add_middleware(HeadRequestMiddleware)
+    app.add_middleware(
+        UploadLimitMiddleware,
+        folder=settings.storage.data_dir,
+        most_bytes=int(settings.storage.quota_gb * 1e9),
+    )
     app.add_middleware(BodyLimitMiddleware)
     if token is not None:
         app.add_middleware(TokenAuthMiddleware, token=token)

@@ -83,6 +83,7 @@ PROBLEM_TYPES = {
     415: ("media-type", "Of a kind that is not taken"),
     421: ("wrong-host", "Wrong host"),
     422: ("invalid-input", "The input is at fault"),
+    429: ("too-many", "Too many requests"),
     500: ("fault", "A fault of the program"),
     503: ("not-available", "Not available now"),
     507: ("not-stored", "Could not be stored"),

@@ -67,6 +67,12 @@ def _light(path: Path, number: int, line: str) -> LightPicture:
             "give unit vectors toward the light",
         )
     picture = path.parent / parts[0]
-    if not picture.is_file():
-        raise LightsError(f"{path} line {number}: no picture at {picture}", "correct the name or bring the file")
+    try:
+        is_there = picture.is_file()
+    except OSError:  # no file can have such a name
+        is_there = False
+    if not is_there:
+        raise LightsError(
+            f"{path} line {number}: no picture at {str(picture)[:300]}", "correct the name or bring the file"
+        )
     return LightPicture(picture, direction / norm)

@@ -9,9 +9,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
-from pydantic import TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from relit_camera.base.errors import LightsError, ModelError
 from relit_camera.base.images.image_types import DisplayImage, Points
@@ -24,7 +25,8 @@ LANDMARK_TRACKERS = ("mesh", "openseeface")
 MAX_BYTES = 16 << 20
 """Of a landmarks file."""
 
-_Layout = TypeAdapter(dict[str, list[tuple[float, float]]])
+_Pixel = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+_Layout = TypeAdapter(dict[str, list[tuple[_Pixel, _Pixel]]])
 
 
 def find_landmarks(neutral: DisplayImage) -> Mapping[str, Points]:

@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-import math
-import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Protocol
-from zipfile import BadZipFile, ZipFile
+from typing import Protocol
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from relit_camera.base.errors import InputError, ModelError, NotFoundError
 from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame, Mask
 from relit_camera.base.images.resize import halve, resize_to_fill
 from relit_camera.base.models.model_store import model_path
 from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
-from relit_camera.base.storage.atomic_files import atomic_path
+from relit_camera.face.matte_files import UNREADABLE_MATTES, read_mattes
 
 LANDSCAPE_MODEL = "selfie_landscape"
 SQUARE_MODEL = "selfie_square"
 
-MAX_RECORDED_BYTES = 1 << 30
-"""Most memory that the mattes of one file may take: ten minutes of 256x256 at 30 frames a second."""
 RECORDED_CURE = "name a file that holds `alpha`, uint8 (frames, height, width)"
 
 
@@ -203,10 +197,10 @@ class RecordedMatting:
             InputError: the file is missing or holds no mattes.
         """
         try:
-            self._alpha = _read_alpha(path)
+            self._alpha = read_mattes(path)
         except OSError as error:
             raise InputError(f"cannot read {path}: {error.strerror or error}", RECORDED_CURE) from error
-        except (ValueError, KeyError, EOFError, NotImplementedError, BadZipFile, zlib.error) as error:
+        except UNREADABLE_MATTES as error:
             raise InputError(f"{path} holds no recorded mattes: {error}", RECORDED_CURE) from error
 
     def matte(self, frame: Frame) -> Alpha:
@@ -216,34 +210,3 @@ class RecordedMatting:
         """
         alpha = self._alpha[frame.index % len(self._alpha)]
         return resize_to_fill(alpha, frame.size, cv2.INTER_LINEAR)
-
-
-def _read_alpha(path: Path) -> NDArray[np.uint8]:
-    """The array `alpha` of an .npz file. Its header is checked first: a small zip may unpack to any size."""
-    with ZipFile(path) as kept, kept.open("alpha.npy") as file:
-        shape, _, dtype = _header(file)
-        if dtype != np.uint8 or len(shape) != 3 or 0 in shape:
-            raise ValueError(f"they are {dtype} {shape}")
-        if math.prod(shape) > MAX_RECORDED_BYTES:
-            raise ValueError(f"they are {math.prod(shape) >> 20} MiB, more than {MAX_RECORDED_BYTES >> 20}")
-        file.seek(0)  # np.load would take a member called `alpha` instead of `alpha.npy`
-        alpha: NDArray[np.uint8] = np.lib.format.read_array(file, allow_pickle=False)
-        return alpha
-
-
-def _header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
-    version = np.lib.format.read_magic(file)
-    if version == (1, 0):
-        return np.lib.format.read_array_header_1_0(file)
-    return np.lib.format.read_array_header_2_0(file)
-
-
-def write_mattes(path: Path, mattes: Sequence[Mask]) -> None:
-    """Write mattes (height, width) in 0..1 to an .npz file, as `alpha` in 8 bits.
-
-    Raises:
-        StorageError: the file cannot be written.
-    """
-    alpha = np.rint(np.clip(np.stack(mattes), 0, 1) * 255).astype(np.uint8)
-    with atomic_path(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, alpha=alpha)

@@ -29,6 +29,9 @@ SUFFIX = ".relit"
 HEADER_KEY = "relit_subject"
 LANDMARKS_PREFIX = "landmarks."
 MAX_TENSORS = 64
+MAX_HEADER_BYTES = 1 << 20
+"""Of the JSON text before the tensors; those of subjects have some kilobytes. safetensors itself takes 100 MB."""
+MAX_DIMENSIONS = 4
 MAX_BYTES = 8 << 30
 """Largest file that is memory-mapped."""
 MAX_COPIED_BYTES = 1 << 30
@@ -104,12 +107,9 @@ def read_subject(path: Path, copied: bool = False) -> Subject:
     """
     with _open_safetensors(path, MAX_COPIED_BYTES if copied else MAX_BYTES) as file:
         metadata = _metadata(path, file.metadata() or {})
-        names = list(file.keys())
-        if len(names) > MAX_TENSORS:
-            raise _damaged_file_error(path, f"it holds {len(names)} tensors")
         try:
-            tensors = _tensor_views(path, names, copied)
-        except (KeyError, ValueError) as error:  # replaced by another file meanwhile
+            tensors = _tensor_views(path, list(file.keys()), copied)
+        except (KeyError, TypeError, ValueError) as error:  # replaced by another file meanwhile
             raise _damaged_file_error(path, f"it changed while it was read ({error})") from error
     _require_valid_tensors(path, tensors, metadata.format_version)
     landmarks = {n.removeprefix(LANDMARKS_PREFIX): t for n, t in tensors.items() if n.startswith(LANDMARKS_PREFIX)}
@@ -172,10 +172,26 @@ def _open_safetensors(path: Path, most_bytes: int) -> Iterator[Any]:
     if path.stat().st_size > most_bytes:
         raise SubjectError(f"{path} is larger than {most_bytes >> 30} GiB", "build it again at a smaller size")
     try:
+        with path.open("rb") as start:
+            header_bytes = int.from_bytes(start.read(8), "little")
+        if header_bytes > MAX_HEADER_BYTES:  # which would be parsed whole, into twenty times as much memory
+            raise _damaged_file_error(path, f"its header states {header_bytes} bytes")
         with safe_open(path, framework="numpy") as file:
+            _require_plain_shapes(path, file)
             yield file
     except (SafetensorError, OSError) as error:
         raise _damaged_file_error(path, str(error)) from error
+
+
+def _require_plain_shapes(path: Path, file: Any) -> None:
+    names = list(file.keys())
+    if len(names) > MAX_TENSORS:
+        raise _damaged_file_error(path, f"it holds {len(names)} tensors")
+    for name in names:
+        shape = file.get_slice(name).get_shape()
+        if not 1 <= len(shape) <= MAX_DIMENSIONS or not all(1 <= side <= MAX_BYTES for side in shape):
+            shown = " x ".join(map(str, shape[: 2 * MAX_DIMENSIONS]))
+            raise _damaged_file_error(path, f"'{name[:40]}' has {len(shape)} dimensions: {shown}")
 
 
 def _basis(tensors: Mapping[str, NDArray], metadata: SubjectMetadata) -> LocalBasis:

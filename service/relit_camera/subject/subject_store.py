@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from relit_camera.base.concurrency.decoding_process import DECODING_PROCESS, Decoded
 from relit_camera.base.errors import ConflictError, NotFoundError, SubjectError
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import make_folder, storage_error
@@ -49,15 +50,16 @@ class SubjectStore(NamedFiles):
 
         Raises:
             ConflictError: there is one of that name.
-            InputError: the name is not allowed.
             SubjectError: what was written is no subject, or too large.
+            InputError: the name is not allowed, or what was written takes too much memory or time to be read.
             StorageError: it cannot be written.
+            NotReadyError: no process that checks it can be started.
         """
         self._require_new(name)
         with self.replacing(name, SUFFIX) as path:
             yield path
             try:
-                read_subject(path, self._copied)
+                DECODING_PROCESS.decode(_check_subject, path, self._copied)
             except SubjectError as error:
                 raise SubjectError(error.what.replace(str(path), f"'{called}'"), error.cure) from error
             self._require_new(name)
@@ -133,3 +135,8 @@ class SubjectStore(NamedFiles):
         if name_or_path not in self.names() and Path(name_or_path).exists():
             return self.load_file(Path(name_or_path))
         return name_or_path, self.load(name_or_path)
+
+
+def _check_subject(path: Path, copied: bool) -> Decoded:
+    read_subject(path, copied)
+    return Decoded()

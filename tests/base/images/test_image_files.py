@@ -12,7 +12,7 @@ import pytest
 from relit_camera.base.errors import ImageError
 from relit_camera.base.images import image_files, image_limits
 from relit_camera.base.images.image_files import read_linear, read_mask, write_linear
-from relit_camera.base.images.image_limits import image_size_from_header
+from relit_camera.base.images.image_limits import image_header_of_file
 
 GREY = np.array([[0, 51, 255], [102, 255, 0]], np.uint8)
 
@@ -53,7 +53,7 @@ def test_the_header_tells_the_size_and_too_large_is_refused_unread(
     picture = np.random.default_rng(0).integers(0, 256, (300, 517, channels), dtype=np.uint8)
     path = tmp_path / f"a{suffix}"
     assert cv2.imwrite(str(path), picture.astype(np.float32) if suffix == ".hdr" else picture, options)
-    assert image_size_from_header(path) == (517, 300)
+    assert image_header_of_file(path).size == (517, 300)
     assert read_linear(path).shape == (300, 517, 3)
     monkeypatch.setattr(image_limits, "MAX_IMAGE_PIXELS", 517 * 300 - 1)
     monkeypatch.setattr(cv2, "imdecode", None)  # calling it would raise TypeError
@@ -79,9 +79,9 @@ def test_tiff_of_the_other_byte_order_and_bmp_from_the_top(tmp_path: Path) -> No
     entries = [(256, 3, 1, 517 << 16), (257, 4, 1, 300)]
     directory = b"".join(struct.pack(">HHII", *entry) for entry in entries)
     (tmp_path / "a.tif").write_bytes(b"MM\0*" + struct.pack(">IH", 8, 2) + directory)
-    assert image_size_from_header(tmp_path / "a.tif") == (517, 300)
+    assert image_header_of_file(tmp_path / "a.tif").size == (517, 300)
     (tmp_path / "a.bmp").write_bytes(b"BM" + bytes(12) + struct.pack("<Iii", 40, 517, -300))
-    assert image_size_from_header(tmp_path / "a.bmp") == (517, 300)
+    assert image_header_of_file(tmp_path / "a.bmp").size == (517, 300)
 
 
 def test_what_is_no_picture_is_said(tmp_path: Path) -> None:

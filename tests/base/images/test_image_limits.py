@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.base.images.image_limits import image_size_from_bytes
+from relit_camera.base.images.image_limits import image_header
 from tests.bad_pictures import encoded
 
 WIDTH, HEIGHT = 517, 300
@@ -35,14 +35,14 @@ def comment_with_frame() -> bytes:
 def test_the_frame_of_a_jpeg_is_the_one_that_is_decoded(marker: bytes) -> None:
     data = jpeg_with(marker + comment_with_frame())
     decoded = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    assert image_size_from_bytes(data) == (WIDTH, HEIGHT)
+    assert image_header(data).size == (WIDTH, HEIGHT)
     assert decoded is None or decoded.shape[:2] == (HEIGHT, WIDTH)
 
 
 @pytest.mark.parametrize("start", [b"\xff\x00", b"\xff\xd8", b"\xff\xd9", b"\xff\xfe\0\0", b"\xff\xfe\0\1", b"\0"])
 def test_what_is_no_segment_of_a_jpeg_is_refused(start: bytes) -> None:
     with pytest.raises(ValueError, match="JPEG"):
-        image_size_from_bytes(jpeg_with(start + comment_with_frame()))
+        image_header(jpeg_with(start + comment_with_frame()))
 
 
 def tiff(entries: list[tuple[int, int, int, int]]) -> bytes:
@@ -52,13 +52,13 @@ def tiff(entries: list[tuple[int, int, int, int]]) -> bytes:
 
 def test_a_tiff_file_with_two_sizes_is_refused() -> None:
     sides = [(256, 4, 1, 9000), (257, 4, 1, 9000)]
-    assert image_size_from_bytes(tiff(sides)) == (9000, 9000)
+    assert image_header(tiff(sides)).size == (9000, 9000)
     for repeated in (256, 257):
         with pytest.raises(ValueError, match="size"):
-            image_size_from_bytes(tiff([*sides, (repeated, 4, 1, 64)]))
+            image_header(tiff([*sides, (repeated, 4, 1, 64)]))
 
 
 def test_a_side_of_a_tiff_file_stands_in_its_entry() -> None:
     """64 bits (type 16) do not fit: the entry would hold the place where the side is."""
     with pytest.raises(ValueError, match="size"):
-        image_size_from_bytes(tiff([(256, 16, 1, 64), (257, 4, 1, 64)]))
+        image_header(tiff([(256, 16, 1, 64), (257, 4, 1, 64)]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import struct
 from pathlib import Path
 
@@ -34,14 +35,14 @@ def photograph(orientation: int) -> bytes:
 
 def test_a_picture_comes_back_as_it_was(tmp_path: Path) -> None:
     store = BackgroundStore(tmp_path / "new folder")
-    store.add("beach", encoded(red_and_blue()))
+    store.add("beach", io.BytesIO(encoded(red_and_blue())))
     assert store.names() == ["beach"]
     assert np.abs(store.load("beach").astype(int) - red_and_blue()).mean() < 3
 
 
 def test_a_photograph_is_turned_upright_and_loses_its_metadata(tmp_path: Path) -> None:
     store = BackgroundStore(tmp_path)
-    store.add("phone", photograph(orientation=6))
+    store.add("phone", io.BytesIO(photograph(orientation=6)))
     picture = store.load("phone")
     assert picture.shape == (120, 60, 3)  # 6: turned a quarter clockwise to be seen, so that red is above
     assert picture[:50, :, 0].mean() > 240
@@ -51,14 +52,14 @@ def test_a_photograph_is_turned_upright_and_loses_its_metadata(tmp_path: Path) -
 
 def test_a_large_picture_is_scaled_down(tmp_path: Path) -> None:
     store = BackgroundStore(tmp_path)
-    store.add("wide", encoded(red_and_blue(20, MAX_SIDE_PX + 160), ".jpg"))
+    store.add("wide", io.BytesIO(encoded(red_and_blue(20, MAX_SIDE_PX + 160), ".jpg")))
     assert store.load("wide").shape[1] == MAX_SIDE_PX
 
 
 def test_a_picture_takes_the_place_of_one_of_its_name(tmp_path: Path) -> None:
     (tmp_path / "beach.png").write_bytes(encoded(red_and_blue()))
     store = BackgroundStore(tmp_path)
-    store.add("beach", encoded(np.full((8, 8, 3), 40, np.uint8)))
+    store.add("beach", io.BytesIO(encoded(np.full((8, 8, 3), 40, np.uint8))))
     assert [path.name for path in tmp_path.iterdir()] == ["beach.jpg"]
     assert abs(store.load("beach").mean() - 40) < 2
 
@@ -66,9 +67,9 @@ def test_a_picture_takes_the_place_of_one_of_its_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize("data", [b"", b"text", encoded(red_and_blue())[:100]])
 def test_what_is_no_picture_is_refused_and_leaves_what_was(tmp_path: Path, data: bytes) -> None:
     store = BackgroundStore(tmp_path)
-    store.add("beach", encoded(red_and_blue()))
+    store.add("beach", io.BytesIO(encoded(red_and_blue())))
     with pytest.raises(ImageError, match="the file cannot be read as a picture"):
-        store.add("beach", data)
+        store.add("beach", io.BytesIO(data))
     assert np.abs(store.load("beach").astype(int) - red_and_blue()).mean() < 3
     assert [path.name for path in tmp_path.iterdir()] == ["beach.jpg"]
 
@@ -82,7 +83,7 @@ def test_other_files_are_no_backgrounds(tmp_path: Path) -> None:
 
 def test_unknown_names_are_told_a_close_one(tmp_path: Path) -> None:
     store = BackgroundStore(tmp_path)
-    store.add("beach", encoded(red_and_blue()))
+    store.add("beach", io.BytesIO(encoded(red_and_blue())))
     with pytest.raises(NotFoundError) as caught:
         store.load("beech")
     assert caught.value.cure == "did you mean 'beach'?"
@@ -95,4 +96,4 @@ def test_unknown_names_are_told_a_close_one(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(StorageError):
-        BackgroundStore(tmp_path / "file" / "backgrounds").add("beach", encoded(red_and_blue()))
+        BackgroundStore(tmp_path / "file" / "backgrounds").add("beach", io.BytesIO(encoded(red_and_blue())))

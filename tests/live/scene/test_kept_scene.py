@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -143,7 +144,7 @@ def test_a_subject_that_is_not_stored_is_left_to_the_settings(folder: Path, tmp_
 def test_what_is_gone_is_left_out_and_said(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
     def change(controller: SceneController) -> None:
         sunset_ratio(controller)
-        controller.environments.add_upload("room", hdr(), ".hdr")
+        controller.environments.add_upload("room", io.BytesIO(hdr()), ".hdr")
         controller.update_look(
             lambda look: look.model_copy(update={"lighting": look.lighting.model_copy(update={"environment": "room"})})
         )

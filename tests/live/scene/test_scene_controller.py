@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import threading
 from collections.abc import Callable
@@ -110,7 +111,7 @@ def test_a_colour_lights_the_face_in_its_colour(scene_controller: SceneControlle
 
 @pytest.mark.parametrize("right", [True, False])
 def test_a_picture_lights_the_face_from_its_bright_side(right: bool, scene_controller: SceneController) -> None:
-    scene_controller.backgrounds.add("room", half_bright(right))
+    scene_controller.backgrounds.add("room", io.BytesIO(half_bright(right)))
     look = Look(lighting=Lighting(environment=BACKGROUND_ENVIRONMENT), background=ImageBackground(image="room"))
     scene = scene_controller.set_look(look)
     assert scene.background_image is not None
@@ -119,7 +120,7 @@ def test_a_picture_lights_the_face_from_its_bright_side(right: bool, scene_contr
 
 def test_another_background_lights_anew(scene_controller: SceneController) -> None:
     for name, right in (("a", True), ("b", False)):
-        scene_controller.backgrounds.add(name, half_bright(right))
+        scene_controller.backgrounds.add(name, io.BytesIO(half_bright(right)))
     lighting = Lighting(environment=BACKGROUND_ENVIRONMENT)
     scene_controller.set_look(Look(lighting=lighting, background=ImageBackground(image="a")))
     assert lit_from_right(scene_controller) > 0
@@ -143,7 +144,7 @@ def test_an_environment_as_background_picture_is_seen_from_inside(scene_controll
 
 
 def test_what_a_change_leaves_alone_is_kept(scene_controller: SceneController, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene_controller.backgrounds.add("room", half_bright(True))
+    scene_controller.backgrounds.add("room", io.BytesIO(half_bright(True)))
     before = scene_controller.set_look(Look(background=ImageBackground(image="room")))
     monkeypatch.setattr(scene_controller.backgrounds, "load", pytest.fail)
     monkeypatch.setattr(scene_controller.environments, "load", pytest.fail)
@@ -278,5 +279,7 @@ def test_changes_from_many_threads_are_all_made(scene_controller: SceneControlle
 
 
 def test_background_names(scene_controller: SceneController) -> None:
-    scene_controller.backgrounds.add("beach", cv2.imencode(".png", np.zeros((8, 8, 3), np.uint8))[1].tobytes())
+    scene_controller.backgrounds.add(
+        "beach", io.BytesIO(cv2.imencode(".png", np.zeros((8, 8, 3), np.uint8))[1].tobytes())
+    )
     assert {"beach", "studio"} <= set(scene_controller.background_names())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from http import HTTPStatus
+from typing import BinaryIO
 
 from fastapi import UploadFile
 from starlette.datastructures import Headers
@@ -93,16 +94,16 @@ class HeadRequestMiddleware:
         await self.app({**scope, "method": "GET"}, receive, send_without_body)
 
 
-def read_upload(file: UploadFile) -> bytes:
-    """Read an uploaded file of a multipart form.
+def uploaded_file(file: UploadFile) -> BinaryIO:
+    """The uploaded file of a multipart form, which may lie in the folder of temporary files.
 
     Raises:
         TooLargeError: more than 64 MiB.
         InputError: it is empty.
     """
-    data = file.file.read(MAX_UPLOAD_BYTES + 1)
-    if len(data) > MAX_UPLOAD_BYTES:
-        raise body_too_large(len(data), MAX_UPLOAD_BYTES)
-    if not data:
+    size = file.size or 0
+    if size > MAX_UPLOAD_BYTES:
+        raise body_too_large(size, MAX_UPLOAD_BYTES)
+    if not size:
         raise InputError(f"the file '{file.filename}' is empty", "choose a picture file")
-    return data
+    return file.file

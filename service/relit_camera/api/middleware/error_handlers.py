@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import errno
+import logging
+import tempfile
 from collections.abc import Sequence
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI, Request
@@ -16,8 +20,14 @@ from relit_camera.api.middleware.json_bodies import JSON_TYPE, json_body_type, m
 from relit_camera.api.middleware.same_origin import SECURITY_HEADERS
 from relit_camera.api.problem_details import FieldProblem, problem_response, problem_response_from
 from relit_camera.base.errors import RelitError
+from relit_camera.base.storage.atomic_files import storage_error
+
+log = logging.getLogger(__name__)
 
 HTTP_METHODS = ("GET", "PUT", "PATCH", "POST", "DELETE")
+REFUSED_BY_DISK = frozenset(
+    {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO}
+)
 OPENAPI_HINT = "GET /api/v1/openapi.json describes every operation"
 
 
@@ -26,11 +36,20 @@ def install_error_handlers(app: FastAPI) -> None:
     app.exception_handler(RelitError)(_relit_error)
     app.exception_handler(RequestValidationError)(_validation_error)
     app.exception_handler(HTTPException)(_http_error)
+    app.exception_handler(OSError)(_storage_error)
     app.exception_handler(Exception)(_unhandled_error)
 
 
 async def _relit_error(request: Request, error: RelitError) -> Response:
     return problem_response_from(error)
+
+
+async def _storage_error(request: Request, error: OSError) -> Response:
+    """What the disk refused, and no store expected: a file that cannot be deleted, a full folder of temporary files."""
+    if error.errno not in REFUSED_BY_DISK:
+        raise error
+    log.warning("%s %s: %s", request.method, request.url.path, error)
+    return problem_response_from(storage_error(Path(str(error.filename or tempfile.gettempdir())), error))
 
 
 async def _validation_error(request: Request, error: RequestValidationError) -> Response:
@@ -66,6 +85,8 @@ def _field_problem(detail: Any, meant: str | None) -> FieldProblem:
 
 
 async def _http_error(request: Request, error: HTTPException) -> Response:
+    if isinstance(error.__cause__, OSError):  # while Starlette wrote a form's file to the folder of temporary files
+        return await _storage_error(request, error.__cause__)
     path = request.url.path
     headers = dict(error.headers or {})
     if error.status_code == HTTPStatus.NOT_FOUND:

@@ -128,6 +128,10 @@ class SameOriginMiddleware:
 
 def rejection_for(method: str, headers: Headers, place: ServerEndpoint, names: AllowedHosts) -> Response | None:
     """The answer to a request that must not be served, or None for one that may."""
+    if "content-length" in headers and "transfer-encoding" in headers:
+        # RFC 9112, 6.3: who stands between may have taken another of the two for the body's end (request smuggling).
+        what, cure = "the body's length is stated in two ways", "send Content-Length or Transfer-Encoding, not both"
+        return problem_response(HTTPStatus.BAD_REQUEST, what, cure, headers={"Connection": "close"})
     host = headers.get("host", "")
     if not names.allows_host(host, place):
         cure = f"use http://127.0.0.1:{place.port}, or name it in server.names"

@@ -7,6 +7,7 @@ sent from other sites' pages.
 
 from __future__ import annotations
 
+import asyncio
 import hmac
 import secrets
 from http import HTTPStatus
@@ -26,6 +27,10 @@ PUBLIC_PATHS = frozenset({"/healthz", LOGIN_PATH, "/panel/panel.css", "/panel/ic
 SESSION_COOKIE = "relit_session"
 MAX_LOGIN_FORM_BYTES = 4096
 ERROR_PLACEHOLDER = "<!-- wrong -->"
+WRONG_TOKEN_DELAY_S = 0.5
+"""Wrong tokens are answered one after another, each after this long: so many can be tried, whoever tries them."""
+MAX_WAITING = 16
+"""Wrong tokens that wait for their answer; further ones are answered by 429 at once."""
 
 _LOGIN_PAGE = Path(__file__).parents[1] / "panel" / "login.html"
 
@@ -37,6 +42,8 @@ class TokenAuthMiddleware:
         self.app = app
         self.token = token
         self.session = secrets.token_urlsafe(32).encode()
+        self._answering = asyncio.Lock()
+        self._waiting = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
@@ -49,11 +56,13 @@ class TokenAuthMiddleware:
 
     async def _answer(self, request: Request) -> Response | None:
         """The middleware's answer, or None for a request that may pass."""
-        path = request.url.path
+        path = request.scope["path"]  # not the URL's: that is made of the Host header too
         if path == LOGIN_PATH:
             return await self._login(request)
         if path in PUBLIC_PATHS or self._knows_token(request.headers) or self._has_session(request):
             return None
+        if "authorization" in request.headers and not await self._has_waited():
+            return _too_many_wrong_tokens()
         if path in ("/", "/desk", "/film"):
             return RedirectResponse(LOGIN_PATH, HTTPStatus.SEE_OTHER)
         return problem_response(
@@ -73,11 +82,23 @@ class TokenAuthMiddleware:
                 HTTPStatus.METHOD_NOT_ALLOWED, what, f"allowed are {allowed}", headers={"Allow": allowed}
             )
         if not hmac.compare_digest(await _token_in_form(request), self.token):
-            return _login_page(wrong=True)
+            return _login_page(wrong=True) if await self._has_waited() else _too_many_wrong_tokens()
         answer = RedirectResponse("/", HTTPStatus.SEE_OTHER)
         by_tls = request.headers.get("origin", "").startswith("https://")  # through a proxy that ends TLS
         answer.set_cookie(SESSION_COOKIE, self.session.decode(), secure=by_tls, httponly=True, samesite="strict")
         return answer
+
+    async def _has_waited(self) -> bool:
+        """Wait as long as somebody must who gave a wrong token. False, without waiting, where too many wait already."""
+        if self._waiting == MAX_WAITING:
+            return False
+        self._waiting += 1
+        try:
+            async with self._answering:
+                await asyncio.sleep(WRONG_TOKEN_DELAY_S)
+        finally:
+            self._waiting -= 1
+        return True
 
     def _knows_token(self, headers: Headers) -> bool:
         scheme, _, given = headers.get("authorization", "").partition(" ")
@@ -85,6 +106,16 @@ class TokenAuthMiddleware:
 
     def _has_session(self, request: Request) -> bool:
         return hmac.compare_digest(request.cookies.get(SESSION_COOKIE, "").encode(), self.session)
+
+
+def _too_many_wrong_tokens() -> Response:
+    seconds = int(MAX_WAITING * WRONG_TOKEN_DELAY_S)
+    return problem_response(
+        HTTPStatus.TOO_MANY_REQUESTS,
+        "too many wrong tokens are being tried",
+        f"try again in {seconds} seconds",
+        headers={"Retry-After": str(seconds)},
+    )
 
 
 def _login_page(wrong: bool = False) -> Response:

@@ -11,7 +11,7 @@ from starlette.responses import Response
 from relit_camera.api.bodies.schemas import BackgroundPicture
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, encode_thumbnail, jpeg_response, thumbnail_url_path
-from relit_camera.api.middleware.body_limits import read_upload
+from relit_camera.api.middleware.body_limits import uploaded_file
 from relit_camera.api.problem_details import error_responses
 from relit_camera.base.config.look import Background, ImageBackground, StoredName
 from relit_camera.base.errors import ConflictError
@@ -41,7 +41,7 @@ def list_backgrounds(api: ApiContextDep) -> list[BackgroundPicture]:
 @router.post("/backgrounds", status_code=HTTPStatus.CREATED, responses=error_responses(409, 413, 422, 503, 507))
 def add_background(api: ApiContextDep, name: Annotated[StoredName, Form()], file: UploadFile) -> BackgroundPicture:
     """Store a picture (.jpg, .png, .webp …) to be used as background."""
-    scene_controller, data = api.camera.scene_controller, read_upload(file)
+    scene_controller, data = api.camera.scene_controller, uploaded_file(file)
     with api.exclusive_image_work():  # with the check: of two uploads of one name at a time, one must fail
         if name in scene_controller.background_names():
             raise ConflictError(f"a background or environment '{name}' is stored already", "choose another name")

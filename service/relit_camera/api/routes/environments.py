@@ -13,7 +13,7 @@ from starlette.responses import Response
 from relit_camera.api.bodies.schemas import EnvironmentDetails, EnvironmentItem
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response, thumbnail_url_path
-from relit_camera.api.middleware.body_limits import read_upload
+from relit_camera.api.middleware.body_limits import uploaded_file
 from relit_camera.api.problem_details import error_responses
 from relit_camera.base.config.look import ImageBackground, StoredName
 from relit_camera.base.errors import ConflictError, NotFoundError
@@ -39,7 +39,7 @@ def list_environments(api: ApiContextDep) -> list[EnvironmentItem]:
 @router.post("", status_code=HTTPStatus.CREATED, responses=error_responses(409, 413, 422, 503, 507))
 def add_environment(api: ApiContextDep, name: Annotated[StoredName, Form()], file: UploadFile) -> EnvironmentDetails:
     """Store a 360° panorama (.hdr, .exr, .png or .jpg, twice as wide as high), as seen from inside."""
-    scene_controller, data = api.camera.scene_controller, read_upload(file)
+    scene_controller, data = api.camera.scene_controller, uploaded_file(file)
     with api.exclusive_image_work():  # with the check: of two uploads of one name at a time, one must fail
         if name in RESERVED_NAMES or name in {
             *scene_controller.background_names(),

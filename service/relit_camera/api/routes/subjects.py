@@ -67,7 +67,7 @@ def store_demo_subject(api: ApiContextDep) -> SubjectItem:
 @router.post(
     "/subjects",
     status_code=HTTPStatus.CREATED,
-    responses=error_responses(409, 413, 415, 422, 507),
+    responses=error_responses(409, 413, 415, 422, 503, 507),
     openapi_extra=form_description(NameForm, "A subject's file, .relit, as `relit capture` writes it."),
 )
 async def add_subject(api: ApiContextDep, request: Request) -> SubjectItem:

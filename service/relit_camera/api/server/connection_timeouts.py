@@ -19,6 +19,10 @@ READ_TIMEOUT_S = 10.0
 may take as long for each `MIN_BODY_BYTES_PER_TIMEOUT`."""
 MIN_BODY_BYTES_PER_TIMEOUT = 16 << 10
 
+MAX_UNREAD_BODY_BYTES = 128 << 20
+"""Of a body that was answered before its end, so much is read and forgotten: most clients send all of it before they
+read the answer."""
+
 
 class AwaitedInput(Enum):
     """What the client has to send next."""
@@ -33,8 +37,9 @@ class TimeoutHttpProtocol(H11Protocol):
     _read_timer: asyncio.TimerHandle | None = None
     _write_timer: asyncio.TimerHandle | None = None
     _awaited: AwaitedInput | None = None
-    _received = _unsent = 0
-    """Bytes received since the read timer was started, and bytes that the client had not read when it was."""
+    _received = _unsent = _unread = 0
+    """Bytes received since the read timer was started, bytes that the client had not read when it was, and bytes
+    received of a body after its answer."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Start the read timer for the first request."""
@@ -51,6 +56,13 @@ class TimeoutHttpProtocol(H11Protocol):
     def data_received(self, data: bytes) -> None:
         """Take what the client sent, and stop the read timer if that completes the request or its body."""
         self._received += len(data)
+        if self.cycle is not None and self.cycle.response_complete and self.cycle.more_body:
+            self._unread += len(data)
+            if self._unread > MAX_UNREAD_BODY_BYTES:
+                self.transport.abort()
+                return
+        else:
+            self._unread = 0
         super().data_received(data)
         self._update_read_timer()
 

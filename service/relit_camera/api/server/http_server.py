@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
 
@@ -16,12 +18,44 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from relit_camera.api.problem_details import problem_response_from
 from relit_camera.api.server.connection_timeouts import TimeoutHttpProtocol
 from relit_camera.api.server.listener import open_listener
+from relit_camera.base.concurrency.decoding_process import DECODING_PROCESS
 from relit_camera.base.config.settings import ServerSettings
 from relit_camera.base.errors import NotReadyError, RelitError
 
 START_TIMEOUT_S = 10.0
 SHUTDOWN_GRACE_S = 1
 """When the server stops, answers may take this long to end before they are aborted."""
+
+MALFORMED_REQUEST = "Invalid HTTP request received."
+"""What uvicorn logs of a request that is no HTTP."""
+MALFORMED_INTERVAL_S = 10.0
+"""Between two such lines of the log."""
+
+
+class MalformedRequestFilter(logging.Filter):
+    """Lets a line on a malformed request pass if none has for a while, with how many were left out meanwhile."""
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._now = now
+        self._last_s: float | None = None
+        self._left_out = 0
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether the record is written."""
+        if record.msg != MALFORMED_REQUEST:
+            return True
+        now = self._now()
+        if self._last_s is not None and now - self._last_s < MALFORMED_INTERVAL_S:
+            self._left_out += 1
+            return False
+        if self._left_out:
+            record.msg = f"{MALFORMED_REQUEST} ({self._left_out} more since the last such line)"
+        self._last_s, self._left_out = now, 0
+        return True
+
+
+_MALFORMED_REQUESTS = MalformedRequestFilter()
 
 
 @dataclass(frozen=True)
@@ -56,6 +90,7 @@ class ApiServer:
             timeout_graceful_shutdown=SHUTDOWN_GRACE_S,
         )
         self._server = uvicorn.Server(config)
+        logging.getLogger("uvicorn.error").addFilter(_MALFORMED_REQUESTS)
         # Outside the main thread uvicorn handles no signals. It is no daemon thread, nor are the workers that it
         # starts: at exit Python would stop those inside C++ code, which aborts the process.
         self._thread = threading.Thread(target=self._server.run, args=([listener],), name="api")
@@ -78,6 +113,7 @@ class ApiServer:
         """Stop: endless answers end at once, others get a second. Returns when all have ended, or after the timeout."""
         self._closing.set()
         self._server.should_exit = True
+        DECODING_PROCESS.interrupt()  # an upload would be waited for
         self._thread.join(timeout_s)
 
     def __enter__(self) -> ApiServer:

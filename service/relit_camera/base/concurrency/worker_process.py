@@ -67,7 +67,7 @@ def run_in_worker_process(
     connection, of_worker = context.Pipe()
     process = context.Process(target=_work, args=(of_worker, progress is not None, most_bytes), daemon=True)
     try:
-        with _interrupts_blocked():
+        with interrupts_blocked():
             process.start()
     except OSError as error:
         connection.close()
@@ -81,7 +81,7 @@ def run_in_worker_process(
         raise WorkerError(f"the worker process died (exit code {process.exitcode})", _MEMORY_CURE) from None
     finally:
         connection.close()
-        _end(process)
+        end_process(process)
     if not succeeded:
         raise result
     value: T = result
@@ -89,7 +89,7 @@ def run_in_worker_process(
 
 
 @contextmanager
-def _interrupts_blocked() -> Iterator[None]:
+def interrupts_blocked() -> Iterator[None]:
     """Block SIGINT in this thread, and so in a process that it starts: Ctrl-C reaches the whole terminal.
 
     Without this, Ctrl-C while Python starts in the worker would print a traceback there.
@@ -136,14 +136,20 @@ def _answer(
             progress(*answer)
 
 
-def _end(process: Any) -> None:
+def end_process(process: Any) -> None:
+    """Kill a process that still runs, and wait for its end."""
     process.join(0.0)
     if process.is_alive():
         process.kill()
     process.join(EXIT_TIMEOUT_S)
 
 
-def _work(connection: Connection, tells_progress: bool, most_bytes: int | None) -> None:
+def become_worker(most_bytes: int | None) -> None:
+    """Make this process one that works for another: at low priority, ended with it, with a limit of memory.
+
+    Args:
+        most_bytes: as of `run_in_worker_process`.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole terminal; the camera ends this process
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if hasattr(os, "nice"):
@@ -153,6 +159,10 @@ def _work(connection: Connection, tells_progress: bool, most_bytes: int | None) 
         Path("/proc/self/oom_score_adj").write_text(KILLED_FIRST)
     _limit_memory(most_bytes)
     limit_threads()
+
+
+def _work(connection: Connection, tells_progress: bool, most_bytes: int | None) -> None:
+    become_worker(most_bytes)
 
     def tell(stage: str, done: int, total: int | None) -> None:
         connection.send(("progress", stage, done, total))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import yaml
 from pydantic import ValidationError
 
 from relit_camera.base.config.look import Preset
-from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml
+from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml, yaml_text
 from relit_camera.base.errors import ConflictError, InputError, StorageError
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.base.storage.named_files import NamedFiles
@@ -125,4 +124,4 @@ def read_preset(path: Path) -> Preset:
 
 def preset_text(preset: Preset) -> str:
     """The text of a preset's file."""
-    return yaml.safe_dump(preset.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+    return yaml_text(preset.model_dump(mode="json"))

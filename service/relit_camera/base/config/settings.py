@@ -146,6 +146,8 @@ class StorageSettings(SettingsModel):
     """Where environments, subjects, backgrounds and presets are kept."""
 
     data_dir: Path = Field(default_factory=lambda: user_data_path("relit-camera", appauthor=False))
+    quota_gb: Annotated[float, Field(gt=0, le=100_000)] = 20.0
+    """Gigabytes that the data folder may hold: an upload that would not fit is refused."""
 
     @property
     def folders(self) -> tuple[Path, ...]:

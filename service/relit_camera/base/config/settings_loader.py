@@ -167,7 +167,7 @@ def _origin_of(location: list[Any], overrides: NestedValues, path: Path | None, 
 
 def _line_of(text: str, location: list[Any]) -> int | None:
     """Line of a key in the YAML text, or None where it is not there."""
-    node = yaml.compose(text)  # which `parse_yaml` has read
+    node = yaml.compose(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # which `parse_yaml` has read
     line = None
     for part in location:
         if isinstance(node, yaml.MappingNode):

@@ -16,9 +16,12 @@ from relit_camera.base.errors import ImageError
 from relit_camera.base.images.color import Gamma, decode, uint8_from_linear
 from relit_camera.base.images.decoder_messages import suppress_decoder_messages
 from relit_camera.base.images.image_limits import (
-    image_size_from_bytes,
-    image_size_from_header,
-    require_readable_size,
+    HDR_FORMAT,
+    ImageHeader,
+    image_header,
+    image_header_of_file,
+    radiance_header,
+    require_readable_header,
 )
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
 from relit_camera.base.storage.atomic_files import atomic_path, write_atomic
@@ -39,17 +42,15 @@ def read_linear(path: Path, gamma: Gamma = "srgb") -> LinearImage:
         raise ImageError(f"no picture at {path}", "check the path")
     if suffix not in LDR_SUFFIXES | {".exr", ".hdr"}:
         raise ImageError(f"{path}: '{suffix}' is not a picture format known here", "use .png, .jpg, .exr or .hdr")
-    require_readable_size(lambda: image_size_from_header(path), path)
+    header = require_readable_header(lambda: image_header_of_file(path), path)
     if suffix == ".exr":
-        image = _read_exr(path)
+        image = _read_exr(path, header)
     elif suffix == ".hdr":
-        image = _scaled_to_unit_range(_rgb(_decoded(path.read_bytes(), path)))
+        image = _rgb(_decoded(_plain_radiance(_read_bytes(path)), path, header)).astype(np.float32, copy=False)
     else:
-        coded = _decoded(path.read_bytes(), path)
-        if coded.dtype == np.uint8:  # by a table: computed for each pixel it would take seconds and thrice the memory
-            table = decode(np.arange(256, dtype=np.float32) / np.float32(255), gamma)
-            return np.asarray(cv2.LUT(_rgb(coded), table), dtype=np.float32)
-        image = decode(_scaled_to_unit_range(_rgb(coded)), gamma)
+        coded = _rgb(_decoded(_read_bytes(path), path, header))
+        with np.errstate(over="ignore", invalid="ignore"):  # such values are refused below
+            image = decode(coded, gamma) if coded.dtype == np.float32 else _by_table(coded, gamma)
     if not np.isfinite(image).all():
         raise ImageError(f"{path} holds NaN or infinity", "render or export it again")
     return image
@@ -72,11 +73,15 @@ def decode_display(data: bytes, name: str = "the file") -> DisplayImage:
     Raises:
         ImageError: they are none of these, damaged or too large; the message calls the file `name`.
     """
-    require_readable_size(lambda: image_size_from_bytes(data), name)
-    coded = _rgb(_decoded(data, name))
+    header = require_readable_header(lambda: image_header(data), name)
+    coded = _rgb(_decoded(data, name, header))
+    if coded.dtype == np.uint16:
+        return np.asarray(cv2.convertScaleAbs(coded, alpha=255 / 65535))
     if coded.dtype == np.uint8:
-        return coded
-    return np.rint(np.clip(_scaled_to_unit_range(coded), 0, 1) * 255).astype(np.uint8)
+        return np.asarray(coded, np.uint8)
+    if not np.isfinite(coded).all():
+        raise ImageError(f"{name} holds NaN or infinity", "save it with 8 bits a channel")
+    return np.asarray(np.rint(np.clip(coded, 0, 1) * 255), np.uint8)
 
 
 def read_mask(path: Path) -> Mask:
@@ -87,15 +92,15 @@ def read_mask(path: Path) -> Mask:
     """
     if not path.is_file():
         raise ImageError(f"no matte at {path}", "check the path")
-    require_readable_size(lambda: image_size_from_header(path), path)
-    coded = _imdecode(path.read_bytes(), cv2.IMREAD_UNCHANGED)
-    if coded is None:
-        raise ImageError(f"{path} cannot be read as a picture", "save it again as PNG")
-    scaled = _scaled_to_unit_range(coded)
+    header = require_readable_header(lambda: image_header_of_file(path), path)
+    scaled = _scaled_to_unit_range(_decoded(_read_bytes(path), path, header, cv2.IMREAD_UNCHANGED))
     if scaled.ndim == 3:
         # Picture editors add an opaque alpha channel to grey pictures: such a one is no matte.
         has_alpha = scaled.shape[2] == 4 and bool((scaled[..., 3] < 1).any())
-        scaled = scaled[..., 3] if has_alpha else scaled[..., :3].mean(axis=2)
+        with np.errstate(over="ignore", invalid="ignore"):  # such values are refused below
+            scaled = scaled[..., 3] if has_alpha else scaled[..., :3].mean(axis=2)
+    if not np.isfinite(scaled).all():
+        raise ImageError(f"{path} holds NaN or infinity", "save it with 8 bits a channel")
     return np.ascontiguousarray(scaled, dtype=np.float32)
 
 
@@ -146,20 +151,39 @@ def encode_display(image: DisplayImage, suffix: str = ".jpg", quality: int = 90)
 _UPRIGHT = cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH
 
 
-def _imdecode(data: bytes, flags: int = _UPRIGHT) -> NDArray | None:
+def _decoded(data: bytes, name: object, header: ImageHeader, flags: int = _UPRIGHT) -> NDArray:
+    """OpenCV's picture of a file's bytes: (height, width) or (height, width, channels), uint8, uint16 or float32."""
     # From memory: cv2.imread knows no paths beyond the locale's encoding.
+    coded = None
     try:
         with suppress_decoder_messages():
-            return cv2.imdecode(np.frombuffer(data, np.uint8), flags) if data else None
+            coded = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except (cv2.error, MemoryError):
-        return None
-
-
-def _decoded(data: bytes, name: object) -> NDArray:
-    coded = _imdecode(data)
-    if coded is None:
+        pass
+    if coded is None or coded.dtype not in (np.uint8, np.uint16, np.float32):
         raise ImageError(f"{name} cannot be read as a picture", "it may be truncated; save or download it again")
-    return coded
+    if coded.shape[:2] not in (header.size, header.size[::-1]):  # EXIF may turn it
+        what = f"{name} states {header.width}x{header.height} pixels and holds {coded.shape[1]}x{coded.shape[0]}"
+        raise ImageError(what, "save it again")
+    return np.asarray(coded)
+
+
+def _by_table(coded: NDArray, gamma: Gamma) -> LinearImage:
+    """Codes of 8 or 16 bits as linear light: computed for each pixel it would take seconds and thrice the memory."""
+    white = int(np.iinfo(coded.dtype).max)
+    table = decode(np.arange(white + 1, dtype=np.float32) / np.float32(white), gamma)
+    if coded.dtype == np.uint8:
+        return np.asarray(cv2.LUT(coded, table), dtype=np.float32)
+    image = np.empty(coded.shape, np.float32)
+    for codes, row in zip(coded, image, strict=True):  # NumPy makes indices of 64 bits of what it looks up at once
+        row[:] = table[codes]
+    return image
+
+
+def _plain_radiance(data: bytes) -> bytes:
+    """A Radiance file with a header that holds its size and nothing else: readers differ in what they skip."""
+    header, start = radiance_header(data)
+    return b"#?RADIANCE\n" + HDR_FORMAT + f"\n\n-Y {header.height} +X {header.width}\n".encode() + data[start:]
 
 
 def _rgb(coded: NDArray) -> NDArray:
@@ -186,22 +210,30 @@ def _scaled_to_unit_range(coded: NDArray) -> NDArray[np.float32]:
     return coded.astype(np.float32)
 
 
-def _read_exr(path: Path) -> NDArray[np.float32]:
+def _read_exr(path: Path, header: ImageHeader) -> NDArray[np.float32]:
     import OpenEXR
 
     try:
         with suppress_decoder_messages(), OpenEXR.File(str(path), separate_channels=True) as file:
-            planes = {name.lower(): np.asarray(c.pixels, np.float32) for name, c in file.channels().items()}
+            planes = {name.lower(): channel.pixels for name, channel in file.channels().items()}
     except Exception as error:  # OpenEXR raises RuntimeError, ValueError or its own types for damaged files
         raise ImageError(f"{path} cannot be read as OpenEXR: {error}", "export it again") from error
     # Layers are named "layer.R"; the first complete set wins, the unnamed layer first.
     layers = sorted({name.rpartition(".")[0] for name in planes})
     for names in (("r", "g", "b"), ("red", "green", "blue"), ("y",), ("v",)):
         for layer in layers:
-            found = [planes.get(f"{layer}.{name}" if layer else name) for name in names]
-            if all(plane is not None for plane in found):
-                return np.stack(found * (3 // len(found)), axis=-1)  # type: ignore[arg-type]
-    raise ImageError(f"{path} has channels {', '.join(sorted(planes))}", "export it with R, G, B or Y")
+            wanted = [f"{layer}.{name}" if layer else name for name in names]
+            if not set(wanted) <= planes.keys():
+                continue
+            found = [planes[name] for name in wanted]
+            if any(plane.shape != header.size[::-1] for plane in found):
+                raise ImageError(f"{path} has channels of several sizes", "export it without subsampling")
+            image = np.empty((header.height, header.width, 3), np.float32)
+            for channel in range(3):
+                image[..., channel] = found[channel % len(found)]
+            return image
+    listed = ", ".join(name if name.isprintable() else repr(name) for name in sorted(planes))
+    raise ImageError(f"{path} has channels {listed[:200]}", "export it with R, G, B or Y")
 
 
 def _write_exr(path: Path, image: LinearImage) -> None:

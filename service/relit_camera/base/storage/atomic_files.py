@@ -68,7 +68,8 @@ def atomic_path(target: Path) -> Iterator[Path]:
             raise storage_error(target, error) from error
         raise
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):  # a disk that has become read-only: `remove_unfinished_files` deletes it later
+            temporary.unlink(missing_ok=True)
 
 
 def remove_unfinished_files(folder: Path, target: Path | None = None) -> list[Path]:

@@ -16,7 +16,11 @@ from relit_camera.base.errors import VideoError
 from relit_camera.base.video.video_truncation import is_truncated
 
 MIN_SIDE, MAX_SIDE = 16, 8192
+MAX_PIXELS = 36_000_000
+"""Of a video's picture: 8K, and a little more. Decoders hold several at a time."""
 MAX_FPS = 240
+DECODER_LIMITS = {"max_pixels": str(MAX_PIXELS)}
+"""For FFmpeg, which decodes the first pictures while it opens a file, and may find larger ones than the file states."""
 
 HDR_TRANSFER_FUNCTIONS = {16: "PQ", 18: "HLG"}
 """Transfer curves not meant for an ordinary screen, by their code points in ITU-T H.273."""
@@ -42,10 +46,12 @@ def open_stream(path: Path) -> tuple[Any, Any]:
         raise VideoError(f"no video at {path}", "check the path")
     if path.stat().st_size == 0:
         raise VideoError(f"{path} is empty", "record or copy it again")
-    cut_off = is_truncated(path)
+    cut_off = False
     try:
-        container = av.open(str(path.absolute()))  # FFmpeg takes what stands before a colon for a protocol
-    except (av.FFmpegError, OSError) as error:
+        cut_off = is_truncated(path)
+        # FFmpeg takes what stands before a colon for a protocol. Titles and the like may be in any encoding.
+        container = av.open(str(path.absolute()), options=DECODER_LIMITS, metadata_errors="replace")
+    except (av.FFmpegError, OSError, ValueError) as error:
         if cut_off:
             raise VideoError(f"{path} is cut off: 0 frames can be read", "record or copy it again") from error
         reason = getattr(error, "strerror", None) or error
@@ -156,10 +162,13 @@ def _video_stream(container: Any, path: Path) -> Any:
     if container.format.name.endswith("_pipe") or container.format.name == "image2":
         raise VideoError(f"{path} is a picture, not a video", "choose a video file")
     stream = streams[0]
+    stream.codec_context.options = DECODER_LIMITS
     width, height = stream.width, stream.height
-    if not (MIN_SIDE <= width <= MAX_SIDE and MIN_SIDE <= height <= MAX_SIDE):
-        limits = f"a side of {MIN_SIDE} to {MAX_SIDE} pixels is possible"
-        raise VideoError(f"{path} is {width}x{height} pixels; {limits}", "scale it")
+    sides_fit = min(width, height) >= MIN_SIDE and max(width, height) <= MAX_SIDE
+    if not sides_fit or width * height > MAX_PIXELS:
+        limits = f"a side of {MIN_SIDE} to {MAX_SIDE} pixels is possible, {MAX_PIXELS // 10**6} million in all"
+        size = f"is {width}x{height} pixels" if width and height else "states no size, or too large a one"
+        raise VideoError(f"{path} {size}; {limits}", "scale it")
     curve = HDR_TRANSFER_FUNCTIONS.get(stream.codec_context.color_trc)
     if curve:
         cure = "record with HDR video switched off, or convert it to SDR (BT.709)"

@@ -11,17 +11,23 @@ from typing import BinaryIO
 
 EBML_MAGIC = b"\x1a\x45\xdf\xa3"
 SEGMENT_ID = b"\x18\x53\x80\x67"
+MAX_BOXES = 100_000
+"""At the top of an ISO file. One that was recorded in fragments has a few for each second."""
 ISO_FIRST_BOXES = frozenset({b"ftyp", b"moov", b"mdat", b"free", b"wide", b"skip"})
 
 
 def is_truncated(path: Path) -> bool:
-    """Whether `path` is shorter than its container states. False for formats that state no sizes."""
+    """Whether `path` is shorter than its container states. False for formats that state no sizes.
+
+    Raises:
+        ValueError: it has more than `MAX_BOXES` boxes.
+    """
     length = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(12)
         file.seek(0)
         if head.startswith(EBML_MAGIC):
-            return _matroska_end(file) > length
+            return _matroska_end(file, length) > length
         if head[:4] == b"RIFF":
             announced = int.from_bytes(head[4:8], "little")
             return announced not in (0, 0xFFFFFFFF) and announced + 8 > length
@@ -36,7 +42,9 @@ def is_truncated(path: Path) -> bool:
 def _iso_end(file: BinaryIO, length: int) -> int:
     """Find where the last top-level box should end."""
     start = 0
-    while start < length:
+    for _ in range(MAX_BOXES):
+        if start >= length:
+            return start
         file.seek(start)
         header = file.read(16)
         size = int.from_bytes(header[:4], "big")
@@ -47,15 +55,17 @@ def _iso_end(file: BinaryIO, length: int) -> int:
         if size < 8:  # no box: something else follows the video
             return start
         start += size
-    return start
+    raise ValueError(f"it has more than {MAX_BOXES} boxes")
 
 
-def _matroska_end(file: BinaryIO) -> int:
+def _matroska_end(file: BinaryIO, length: int) -> int:
     """Find where the segment should end; 0 if it was written live and its size left open."""
     file.seek(4)
     header_size = _variable_integer(file)
     if header_size is None:
         return 0
+    if header_size > length:
+        return header_size
     file.seek(header_size, 1)
     if file.read(4) != SEGMENT_ID:
         return 0

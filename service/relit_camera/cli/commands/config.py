@@ -44,9 +44,8 @@ def schema() -> None:
 @app.command()
 def show(context: typer.Context) -> None:
     """Print the settings that hold here, as YAML: it can be used as a configuration file."""
-    import yaml
-
+    from relit_camera.base.config.safe_yaml import yaml_text
     from relit_camera.cli.arguments import load_command_settings
 
     settings = load_command_settings(context).model_dump(mode="json")
-    typer.echo(yaml.safe_dump(settings, sort_keys=False, allow_unicode=True), nl=False)
+    typer.echo(yaml_text(settings), nl=False)

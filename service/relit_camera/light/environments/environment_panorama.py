@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.concurrency.decoding_process import DECODING_PROCESS, Decoded
 from relit_camera.base.errors import ImageError, PanoramaError
 from relit_camera.base.images.image_files import read_linear
-from relit_camera.base.images.image_limits import image_size_from_header
+from relit_camera.base.images.image_limits import image_header_of_file
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.environments.panorama_axes import Axes, between_map_and_picture_axes
 from relit_camera.light.light_map import LightMap, resample_by_area, resample_to_light_map
@@ -64,6 +65,25 @@ def read_panorama(path: Path, axes: Axes = "picture") -> Panorama:
     return Panorama(_to_map_axes(image, axes, str(path)), clipped, notes)
 
 
+def read_panorama_apart(path: Path) -> Panorama:
+    """What `read_panorama` gives of a file in `picture` axes, decoded in a process of its own.
+
+    Raises:
+        PanoramaError: as `read_panorama`.
+        InputError: it takes too much memory or time, or ends its decoder.
+        NotReadyError: no such process can be started.
+    """
+    decoded = DECODING_PROCESS.decode(_decode_panorama, path)
+    (radiance,) = decoded.arrays
+    return Panorama(radiance, decoded.facts["clipped_fraction"], tuple(decoded.facts["notes"]))
+
+
+def _decode_panorama(path: Path) -> Decoded:
+    panorama = read_panorama(path)
+    facts = {"clipped_fraction": panorama.clipped_fraction, "notes": panorama.notes}
+    return Decoded((panorama.radiance,), facts)
+
+
 def panorama_from_radiance(radiance: NDArray[np.float32], name: str = "panorama") -> Panorama:
     """A panorama of radiance (h, about 2h, 3) in map axes, checked as a file's.
 
@@ -90,7 +110,7 @@ def _require_usable_header(path: Path) -> None:
         raise PanoramaError(f"no panorama at {path}", "check the path")
     require_panorama_suffix(path.suffix, str(path))
     try:
-        width, height = image_size_from_header(path)
+        width, height = image_header_of_file(path).size
     except ValueError as error:
         raise PanoramaError(f"{path} cannot be read: {error}", "save or download it again") from error
     except OSError as error:
@@ -125,19 +145,19 @@ def _to_map_axes(image: NDArray[np.float32], axes: Axes, name: str) -> NDArray[n
 def _require_usable_radiance(image: NDArray[np.float32], name: str) -> NDArray[np.float32]:
     """The image with rounding errors below 0 clamped; PanoramaError where it cannot be radiance."""
     cure = "export it again from the program that made it"
-    usable = np.isfinite(image) & (np.abs(image) <= _MAX_RADIANCE)
-    if not usable.all():
+    lowest, highest = float(image.min()), float(image.max())
+    if not (lowest >= -_MAX_RADIANCE and highest <= _MAX_RADIANCE):  # either is NaN if any value is
+        usable = np.isfinite(image) & (np.abs(image) <= _MAX_RADIANCE)
         row, column = np.argwhere(~usable)[0][:2]
         raise PanoramaError(
             f"{name} holds NaN, infinity or values beyond 1e9, first at row {row}, column {column}", cure
         )
-    lowest, highest = float(image.min()), float(image.max())
     if highest <= 0 and lowest >= 0:
         raise PanoramaError(f"{name} is all black", "use a panorama that has light in it")
     if lowest < -_NEGATIVE_TOLERANCE * highest:
         row, column = np.unravel_index(int(image.argmin()), image.shape)[:2]
         raise PanoramaError(f"{name} holds negative light, {lowest:.3g} at row {row}, column {column}", cure)
-    return np.maximum(image, 0).astype(np.float32)
+    return np.asarray(np.maximum(image, 0) if lowest < 0 else image, np.float32)
 
 
 def _clipped_fraction(image: NDArray[np.float32]) -> float:

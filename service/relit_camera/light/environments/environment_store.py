@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from functools import lru_cache
 from pathlib import Path
+from typing import BinaryIO
 
 from platformdirs import user_data_path
 
@@ -16,8 +17,10 @@ from relit_camera.light.environments.builtin.builtin_thumbnails import builtin_t
 from relit_camera.light.environments.environment_panorama import (
     PANORAMA_SUFFIXES,
     Environment,
+    Panorama,
     environment_from_panorama,
     read_panorama,
+    read_panorama_apart,
     require_panorama_suffix,
 )
 from relit_camera.light.environments.environment_thumbnail import thumbnail_image
@@ -33,14 +36,17 @@ class EnvironmentStore(NamedFiles):
     Files may be put there by hand. What was read is kept while the file stays as it is.
     """
 
-    def __init__(self, folder: Path | None = None) -> None:
+    def __init__(self, folder: Path | None = None, apart: bool = False) -> None:
         """Set up; nothing is read.
 
         Args:
             folder: where the files are; the user's own data folder if not given.
+            apart: whether files are decoded in a process of its own, as the camera does: what `read_panorama_apart`
+                raises may then come from every method that reads one.
         """
         folder = user_data_path("relit-camera", appauthor=False) / "environments" if folder is None else folder
         super().__init__(folder, "environment", sorted(PANORAMA_SUFFIXES), RESERVED_NAMES)
+        self._apart = apart
 
     def names(self) -> list[str]:
         """The built-in names, then the stored ones in alphabetical order."""
@@ -56,7 +62,7 @@ class EnvironmentStore(NamedFiles):
         if name in BUILTIN_NAMES:
             return builtin_environment(name)
         path = self.path(name)
-        return _read_cached(path, file_version(path))
+        return _read_cached(path, file_version(path), self._apart)
 
     def resolve(self, name_or_path: str) -> Environment:
         """The environment of a stored name, else of the panorama file at that path.
@@ -67,7 +73,7 @@ class EnvironmentStore(NamedFiles):
         """
         path = Path(name_or_path)
         if name_or_path not in self.names() and (path.is_file() or path.suffix.lower() in PANORAMA_SUFFIXES):
-            return environment_from_panorama(path.stem, read_panorama(path))
+            return environment_from_panorama(path.stem, _read(path, self._apart))
         return self.load(name_or_path)
 
     def thumbnail(self, name: str) -> bytes:
@@ -79,7 +85,7 @@ class EnvironmentStore(NamedFiles):
         if name in BUILTIN_NAMES:
             return builtin_thumbnail(name)
         path = self.path(name)
-        return _thumbnail(path, file_version(path))
+        return _thumbnail(path, file_version(path), self._apart)
 
     def add(self, name: str, source: Path, axes: Axes = "picture") -> Environment:
         """Store a panorama file and give its environment.
@@ -101,8 +107,8 @@ class EnvironmentStore(NamedFiles):
                 write_linear(temporary, between_map_and_picture_axes(panorama.radiance))
         return self.load(name)
 
-    def add_upload(self, name: str, data: bytes, suffix: str) -> Environment:
-        """Store the bytes of a panorama file of that suffix (".hdr"), in `picture` axes, as `add` does.
+    def add_upload(self, name: str, data: BinaryIO, suffix: str) -> Environment:
+        """Store a panorama file of that suffix (".hdr"), in `picture` axes, as `add` does; `data` is read to its end.
 
         Raises:
             InputError, PanoramaError, StorageError: as `add`.
@@ -112,9 +118,10 @@ class EnvironmentStore(NamedFiles):
         require_panorama_suffix(suffix, name + suffix)
         # Written and checked in the store's folder, not in /tmp: what a crash leaves here is deleted at the next start.
         with self.replacing(name, suffix) as temporary:
-            temporary.write_bytes(data)
+            with temporary.open("wb") as written:
+                shutil.copyfileobj(data, written)
             try:
-                read_panorama(temporary)
+                _read(temporary, self._apart)
             except PanoramaError as error:
                 raise PanoramaError(error.what.replace(str(temporary), name + suffix), error.cure) from error
         return self.load(name)
@@ -132,11 +139,15 @@ class EnvironmentStore(NamedFiles):
         super().remove(name)
 
 
+def _read(path: Path, apart: bool) -> Panorama:
+    return read_panorama_apart(path) if apart else read_panorama(path)
+
+
 @lru_cache(maxsize=4)
-def _read_cached(path: Path, version: FileVersion) -> Environment:
-    return environment_from_panorama(path.stem, read_panorama(path))
+def _read_cached(path: Path, version: FileVersion, apart: bool) -> Environment:
+    return environment_from_panorama(path.stem, _read(path, apart))
 
 
 @lru_cache(maxsize=256)
-def _thumbnail(path: Path, version: FileVersion) -> bytes:
-    return encode_display(thumbnail_image(_read_cached(path, version).panorama))
+def _thumbnail(path: Path, version: FileVersion, apart: bool) -> bytes:
+    return encode_display(thumbnail_image(_read_cached(path, version, apart).panorama))

@@ -10,11 +10,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from relit_camera.base.config.look import Look, SettingsModel, merge_edits
 from relit_camera.base.config.preset_store import PresetStore
-from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml
+from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml, yaml_text
 from relit_camera.base.config.settings import RelitSettings, StorageSettings
 from relit_camera.base.errors import RelitError
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
@@ -194,7 +192,7 @@ class SceneKeeper:
             present = self._to_keep(scene)
             if present != self._written:
                 make_folder(self._path.parent)
-                write_atomic(self._path, yaml.safe_dump(present, sort_keys=False, allow_unicode=True))
+                write_atomic(self._path, yaml_text(present))
         except (RelitError, ValueError) as error:  # also a name that is no text, of a file that a person put there
             if not self._failed:
                 log.warning("the look is not kept for the next start: %s", error)

@@ -55,7 +55,8 @@ class SceneController:
 
     def __init__(self, storage: StorageSettings, clock: Clock = SYSTEM_CLOCK) -> None:
         """Set up; nothing is read. `clock` tells which changes are one step to undo."""
-        self._looks = LookLoader(EnvironmentStore(storage.environments), BackgroundStore(storage.backgrounds))
+        environments = EnvironmentStore(storage.environments, apart=True)
+        self._looks = LookLoader(environments, BackgroundStore(storage.backgrounds))
         self.environments, self.backgrounds = self._looks.environments, self._looks.backgrounds
         self.subjects = SubjectStore(storage.subjects, copied=True)
         self._change = threading.Lock()

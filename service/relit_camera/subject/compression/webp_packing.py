@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import InputError, SubjectError
 from relit_camera.base.images.decoder_messages import suppress_decoder_messages
-from relit_camera.base.images.image_limits import MAX_IMAGE_PIXELS, image_size_from_bytes
+from relit_camera.base.images.image_limits import MAX_IMAGE_PIXELS, image_header
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.subject.compression.local_basis import global_basis
 from relit_camera.subject.subject import Subject
@@ -123,13 +123,17 @@ def decode_basis(encoded: NDArray[np.uint8], shape: tuple[int, int, int, int]) -
     tiled = colored.reshape(down, height, across, width, 3).transpose(4, 0, 2, 1, 3)
     codes = tiled.reshape(3, across * down, height, width)[:, :components]
     rooted = (np.arange(256, dtype=np.float32) - 128) / 127
-    return np.ascontiguousarray((np.sign(rooted) * rooted**2).astype(np.float16)[codes])
+    table = (np.sign(rooted) * rooted**2).astype(np.float16)
+    pictures = np.empty(codes.shape, np.float16)
+    for channel, component in np.ndindex(3, components):  # NumPy makes indices of 64 bits of what it looks up at once
+        pictures[channel, component] = table[codes[channel, component]]
+    return pictures
 
 
 def _header_has_size(data: bytes, size: tuple[int, int]) -> bool:
     """Whether a picture file's header gives this size, and decoders accept it."""
     try:
-        return image_size_from_bytes(data) == size and size[0] * size[1] <= MAX_IMAGE_PIXELS
+        return image_header(data).size == size and size[0] * size[1] <= MAX_IMAGE_PIXELS
     except ValueError:
         return False
 

@@ -31,7 +31,7 @@ def get_film_capture(api: ApiContextDep) -> FilmCaptureStatus:
 @router.post(
     "",
     status_code=HTTPStatus.ACCEPTED,
-    responses=error_responses(409, 413, 415, 422, 507),
+    responses=error_responses(409, 413, 415, 422, 503, 507),
     openapi_extra=form_description(FilmCaptureForm, "The film: .mp4, .mov, .m4v, .mkv, .webm or .avi."),
 )
 async def start_film_capture(api: ApiContextDep, request: Request) -> FilmCaptureStatus:

@@ -39,7 +39,7 @@ def list_replays(api: ApiContextDep) -> list[ReplayStatus]:
 @router.post(
     "",
     status_code=HTTPStatus.ACCEPTED,
-    responses=error_responses(409, 413, 415, 422, 507),
+    responses=error_responses(409, 413, 415, 422, 503, 507),
     openapi_extra=form_description(NameForm, "The video: .mp4, .mov, .m4v, .mkv, .webm or .avi."),
 )
 async def start_replay(api: ApiContextDep, request: Request) -> ReplayStatus:
