@@ -42,6 +42,7 @@ from relit_camera.light.environments.environment_panorama import MAX_PANORAMA_PI
 from relit_camera.live.scene.background_store import MAX_SIDE_PX as MAX_BACKGROUND_SIDE_PX
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject import subject_file
+from relit_camera.subject.expression_stills import STILL_TENSORS
 from relit_camera.subject.subject import MAX_SIDE_PX
 from tests.doc_tables import DOCS, ROOT, imports_between_parts, layers, updated
 
@@ -193,7 +194,8 @@ def test_the_table_of_tensors_is_that_of_the_subject_file() -> None:
     local = {subject_file.LOCAL_BASIS_PREFIX + name for name in subject_file.LOCAL_BASIS_TENSORS}
     documented = {row[0].strip("`"): row[2] for row in rows("formats.md", "## Subject: `.relit`")}
     landmarks = subject_file.LANDMARKS_PREFIX + "SCHEME"
-    assert set(documented) == {*local, *subject_file.REQUIRED_TENSORS, *subject_file.OPTIONAL_TENSORS, landmarks}
+    optional = {*subject_file.OPTIONAL_TENSORS, *STILL_TENSORS, landmarks}
+    assert set(documented) == {*local, *subject_file.REQUIRED_TENSORS, *optional}
     for name, written in documented.items():
         allowed = {kind.__name__ for kind in subject_file.DTYPES.get(name, ())} or {"float32"}
         assert set(written.split(" or ")) <= allowed, name

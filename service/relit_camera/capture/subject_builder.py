@@ -123,6 +123,7 @@ def subject_from_field(
         matte=samples.matte,
         neutral=neutral,
         landmarks=find_landmarks(neutral) if landmarks is None else landmarks,
+        stills=(),
         **(quantize_geometry(samples.geometry) if with_geometry else {}),
     )
 

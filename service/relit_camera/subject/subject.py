@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from relit_camera.base.images.image_types import DisplayImage, Mask, Points
 from relit_camera.subject.compression.local_basis import LocalBasis
+from relit_camera.subject.expression_stills import ExpressionStill
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.rungs import Rung
 
@@ -83,6 +84,7 @@ class Subject:
         depth: (height, width) float32 in pixels toward the camera, mean 0, 0 outside; or None.
         horizons: (height, width, sectors) uint8, heights of the horizons (`capture.geometry.horizon_map`), in
             steps of `HORIZON_STEP_RAD`; or None.
+        stills: of expressions and turns that the source image does not show; may be none.
     """
 
     metadata: SubjectMetadata
@@ -97,6 +99,7 @@ class Subject:
     albedo: NDArray[np.float16] | NDArray[np.float32] | None = None
     depth: NDArray[np.float32] | None = None
     horizons: NDArray[np.uint8] | None = None
+    stills: tuple[ExpressionStill, ...] = ()
 
     def __post_init__(self) -> None:
         """Check every shape against the header.

@@ -21,6 +21,8 @@ from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import write_atomic, write_tensors
 from relit_camera.subject.compression.local_basis import LocalBasis, global_basis
 from relit_camera.subject.compression.webp_packing import decode_basis, encode_basis
+from relit_camera.subject.expression_stills import TYPES as STILL_TYPES
+from relit_camera.subject.expression_stills import still_tensors, stills_of_tensors
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
 
 log = logging.getLogger(__name__)
@@ -54,6 +56,7 @@ DTYPES: dict[str, tuple[type[np.generic], ...]] = {
     LOCAL_BASIS_PREFIX + "first": (np.int32,),
     LOCAL_BASIS_PREFIX + "values": (np.int8, np.float16),
     LOCAL_BASIS_PREFIX + "mixes": (np.float16,),
+    **STILL_TYPES,
 }
 """Allowed types of the tensors; every tensor not named here is float32."""
 SAFETENSORS_DTYPES: dict[str, type[np.generic]] = {
@@ -83,6 +86,7 @@ def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
     tensors: dict[str, NDArray] = {name: getattr(subject, name) for name in REQUIRED_TENSORS}
     tensors |= {name: getattr(subject, name) for name in OPTIONAL_TENSORS if getattr(subject, name) is not None}
     tensors |= {LANDMARKS_PREFIX + scheme: points for scheme, points in subject.landmarks.items()}
+    tensors |= still_tensors(subject.stills)
     if small:
         tensors[GLOBAL_BASIS_WEBP] = encode_basis(
             subject.pictures(np.eye(meta.components, dtype=np.float32)).transpose(3, 0, 1, 2)
@@ -115,7 +119,8 @@ def read_subject(path: Path, copied: bool = False) -> Subject:
     landmarks = {n.removeprefix(LANDMARKS_PREFIX): t for n, t in tensors.items() if n.startswith(LANDMARKS_PREFIX)}
     arrays = {name: tensors[name] for name in (*REQUIRED_TENSORS, *OPTIONAL_TENSORS) if name in tensors}
     try:
-        return Subject(metadata=metadata, basis=_basis(tensors, metadata), landmarks=landmarks, **arrays)
+        stills = stills_of_tensors(tensors)
+        return Subject(metadata=metadata, basis=_basis(tensors, metadata), landmarks=landmarks, stills=stills, **arrays)
     except (ValueError, SubjectError) as error:
         raise _damaged_file_error(path, error.what if isinstance(error, SubjectError) else str(error)) from error
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.live.modes.light_multiplication import light_of_root, root_of_light
+from relit_camera.base.images.light_multiplication import light_of_root, root_of_light
 from relit_camera.live.modes.live_detail import CellBlend, SourceCells, blend_cells, live_cells
 
 ROWS, COLUMNS, UNIT = 60, 80, 20.0

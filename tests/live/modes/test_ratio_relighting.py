@@ -8,6 +8,7 @@ import pytest
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Points
+from relit_camera.base.images.light_multiplication import light_of_root, root_of_light
 from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.base.rotations import Rotation
@@ -15,7 +16,6 @@ from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
-from relit_camera.live.modes.light_multiplication import light_of_root, root_of_light
 from relit_camera.live.modes.ratio_relighting import (
     RatioPlan,
     RatioRelighting,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from relit_camera.base.rotations import Rotation, angles_from_rotation, rotation_from_angles
 from relit_camera.face.head_pose import project
 from relit_camera.live.reenactment.control_points import (
+    EARS_AND_JAW,
     NECK_PIVOT,
     ControlPoints,
     control_points,
@@ -18,6 +20,7 @@ from relit_camera.live.reenactment.motion_transfer import (
     MAX_ROTATION_IN_PLACE_DEG,
     MAX_SHIFT_CM,
     SCALE_RANGE,
+    keep_beside_face,
     rotate_about,
     soft_limit_rotation,
     split_body_motion,
@@ -143,3 +146,25 @@ def test_turning_about_a_point_leaves_it_where_it_is(face: SourceFace) -> None:
     for pose in (turned, face.pose):
         place = pose.rotation.apply(NECK_PIVOT) + pose.translation
         np.testing.assert_allclose(place, face.pose.rotation.apply(NECK_PIVOT) + face.pose.translation)
+
+
+@pytest.mark.parametrize("yaw", [-30, -10, 0, 10, 30])
+def test_what_is_beside_the_face_stays_beside_it(face: SourceFace, yaw: float) -> None:
+    """Ears and jaw of a turned head are no further inside its outline than at rest; at rest they do not move."""
+    before = project(EARS_AND_JAW, face.pose, face.size).astype(np.float64)
+    landmarks = face.landmarks.astype(np.float64)
+    turned = rotate_about(NECK_PIVOT, face.pose, rotation_from_angles(yaw))
+    anchors = project(EARS_AND_JAW, turned, face.size).astype(np.float64)
+    seen = project(face.head_points, turned, face.size)
+    kept = keep_beside_face(anchors, seen.astype(np.float64), before, landmarks)
+    side = np.sign(EARS_AND_JAW[:, 0])
+    assert (side * (kept - anchors)[:, 0] >= 0).all()
+    assert (kept[:, 1] == anchors[:, 1]).all()
+    if yaw == 0:
+        np.testing.assert_allclose(kept, before, atol=0.05)
+
+    def depth(points: np.ndarray, outline: np.ndarray) -> list[float]:
+        hull = cv2.convexHull(outline.astype(np.float32))
+        return [cv2.pointPolygonTest(hull, (float(x), float(y)), True) for x, y in points]
+
+    assert (np.array(depth(kept, seen)) <= np.array(depth(before, landmarks)) + 0.5).all()

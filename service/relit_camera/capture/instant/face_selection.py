@@ -104,7 +104,7 @@ def select_faces(frames: Sequence[DisplayImage], source: str) -> list[SeenFace]:
     frontal = [face for face in seen if face.turn_deg <= least + TUNABLES.turn_spread_deg]
     opening = float(np.median([face.eyes for face in seen]))
     awake = [face for face in frontal if face.eyes >= TUNABLES.min_eye_opening * opening] or frontal
-    sharpness = [_sharpness(face) for face in awake]
+    sharpness = [face_sharpness(face.image, face.landmarks) for face in awake]
     sharp = [
         face
         for face, value in zip(awake, sharpness, strict=True)
@@ -156,13 +156,13 @@ def _mouth_width(face: SeenFace) -> float:
     return width + scheme.mouth_opening(face.landmarks)
 
 
-def _sharpness(face: SeenFace) -> float:
+def face_sharpness(image: DisplayImage, landmarks: Points) -> float:
     """Mean square of the Laplacian over the face's box, by that of its brightness."""
-    x, y, width, height = bounding_box(face.landmarks)
-    rows, columns = face.image.shape[:2]
+    x, y, width, height = bounding_box(landmarks)
+    rows, columns = image.shape[:2]
     left, right = max(int(x), 0), min(int(x + width) + 1, columns)
     top, bottom = max(int(y), 0), min(int(y + height) + 1, rows)
-    gray = cv2.cvtColor(np.ascontiguousarray(face.image[top:bottom, left:right]), cv2.COLOR_RGB2GRAY)
+    gray = cv2.cvtColor(np.ascontiguousarray(image[top:bottom, left:right]), cv2.COLOR_RGB2GRAY)
     if gray.size == 0:
         return 0.0
     return float(cv2.Laplacian(gray, cv2.CV_32F).var() / max(float(gray.astype(np.float32).var()), 1.0))

@@ -221,6 +221,7 @@ def _subject(picture: MedianPicture, shape: HeadShape, field: GenericField, room
         matte=picture.matte,
         neutral=picture.image,
         landmarks={SCHEME: picture.landmarks},
+        stills=(),
         **quantize_geometry(_whole_geometry(shape.geometry, field.albedo)),
     )
 

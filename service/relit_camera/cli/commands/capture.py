@@ -126,6 +126,41 @@ def instant(
     )
 
 
+@app.command("expressions")
+def expressions(
+    context: typer.Context,
+    video: Annotated[
+        Path, typer.Argument(help="A film of the subject's person, who talks and turns: see docs/stills.md.")
+    ],
+    subject: Annotated[Path, typer.Option(help="The subject file (.relit) that the stills are added to.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Write the subject with its stills here and leave the other as it is.")
+    ] = None,
+    pull: Pull = None,
+) -> None:
+    """Add stills of expressions and turns to a subject: any half-minute film of that person in constant, soft light."""
+    from relit_camera.app.captures.expression_capture import capture_expressions
+    from relit_camera.base.concurrency.threads import limit_threads
+    from relit_camera.base.storage.atomic_files import atomic_path
+    from relit_camera.cli.arguments import load_command_settings
+    from relit_camera.cli.model_offer import offer_models
+    from relit_camera.cli.progress import progress_bar, stage_reporter
+    from relit_camera.subject.subject_file import read_subject, write_subject
+
+    settings = load_command_settings(context)
+    offer_models("mesh", "none", pull, settings.pull_models)
+    limit_threads()
+    person = read_subject(subject)
+    path = out or subject
+    with atomic_path(path) as subject_file:
+        with progress_bar() as progress:
+            captured = capture_expressions(video, person, stage_reporter(progress))
+        write_subject(subject_file, captured.subject, small=person.metadata.format_version == 1)
+    typer.echo(f"{path}: {len(captured.subject.stills)} stills: {', '.join(captured.covered)}")
+    if captured.missing:
+        typer.echo(f"not shown yet; for more, film again and {', '.join(captured.missing)}", err=True)
+
+
 @app.command("build")
 def build(
     video: Annotated[

@@ -34,6 +34,7 @@ def info(
     shown = {"name": name, **opened.metadata.model_dump(mode="json")}
     shown["landmarks"] = {scheme: len(points) for scheme, points in opened.landmarks.items()}
     shown["geometry"] = [name for name in GEOMETRY if getattr(opened, name) is not None]
+    shown["stills"] = len(opened.stills)
     shown["bytes"] = opened.basis.nbytes + opened.coefficients.nbytes + opened.light_coefficients.nbytes
     if as_json:
         typer.echo(json.dumps(shown, indent=2))

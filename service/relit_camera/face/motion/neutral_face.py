@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +49,16 @@ class NeutralFace:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sample:
+class NeutralSample:
+    """A face that may be neutral.
+
+    Attributes:
+        time_s: of the frame.
+        neutral: its points and pose.
+        eyes: mean opening of the eyes.
+        mouth: opening of the mouth.
+    """
+
     time_s: float
     neutral: NeutralFace
     eyes: float
@@ -71,7 +81,7 @@ class NeutralFaceFinder:
     def __init__(self, any_pose: bool = False) -> None:
         """`any_pose`: accept the next ten frames however the head is turned, because the user chose this pose."""
         self._any_pose = any_pose
-        self._samples: list[_Sample] = []
+        self._samples: list[NeutralSample] = []
         self._first_seen_s: float | None = None
 
     def add(self, state: FaceState, points: NDArray[np.float64], time_s: float) -> NeutralFace | None:
@@ -85,21 +95,28 @@ class NeutralFaceFinder:
             self._first_seen_s = time_s
         waited = time_s - self._first_seen_s
         if self._any_pose or waited > TUNABLES.frontal_timeout_s or is_frontal(state.pose):
-            self._samples.append(_Sample(time_s, NeutralFace(points, state.pose), sum(state.eyes) / 2, state.mouth))
+            self._samples.append(
+                NeutralSample(time_s, NeutralFace(points, state.pose), sum(state.eyes) / 2, state.mouth)
+            )
         if len(self._samples) < TUNABLES.frames:
             return None
         if not self._any_pose and time_s - self._samples[0].time_s < TUNABLES.window_s:
             return None
-        return _median([sample.neutral for sample in _least_active(self._samples)])
+        return neutral_face_of(self._samples)
 
 
-def _least_active(samples: list[_Sample]) -> list[_Sample]:
+def neutral_face_of(samples: Sequence[NeutralSample]) -> NeutralFace:
+    """The median of the ten faces that do least, their eyes open."""
+    return _median([sample.neutral for sample in _least_active(samples)])
+
+
+def _least_active(samples: Sequence[NeutralSample]) -> list[NeutralSample]:
     typical = float(np.median([sample.eyes for sample in samples]))
     open_eyed = [sample for sample in samples if sample.eyes >= TUNABLES.open_eye_fraction * typical]
     return sorted(open_eyed, key=_activity)[: TUNABLES.frames]
 
 
-def _activity(sample: _Sample) -> float:
+def _activity(sample: NeutralSample) -> float:
     # Ten degrees weigh as much as a speaking mouth. Pitch does not count: cameras stand above or below the eyes.
     yaw, _, roll = angles_from_rotation(sample.neutral.pose.rotation)
     return sample.mouth + (abs(yaw) + abs(roll)) / 100

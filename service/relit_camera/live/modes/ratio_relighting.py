@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask, Points
+from relit_camera.base.images.light_multiplication import POWER, light_of_root, multiply_light, root_of_light
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.live.modes.light_multiplication import POWER, light_of_root, multiply_light, root_of_light
 from relit_camera.live.modes.live_detail import SourceCells, blend_cells, live_cells
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors

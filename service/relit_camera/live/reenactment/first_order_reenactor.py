@@ -25,6 +25,7 @@ from relit_camera.live.reenactment.motion_transfer import transfer_motion, trans
 from relit_camera.live.reenactment.mouth_interior import MouthInterior
 from relit_camera.live.reenactment.reenactor import ReenactorContext, WarpedLayer, WarpTask
 from relit_camera.live.reenactment.source_image import Cutout
+from relit_camera.live.reenactment.stills.still_drawing import StillDrawing
 from relit_camera.live.reenactment.warp import (
     Patch,
     StillBorder,
@@ -35,6 +36,7 @@ from relit_camera.live.reenactment.warp import (
     visible_box,
 )
 from relit_camera.live.render_quality import RenderQuality
+from relit_camera.subject.expression_stills import STILL_SCHEME
 
 NODE_SPACING = 0.0145
 """Eye distances between computed positions. With 0.02 the outline of a turned nose is seen as a staircase."""
@@ -56,6 +58,8 @@ class FirstOrderReenactor:
         self._mesh = triangulate_face(context.face)
         self._motion = DenseMotion(context.session)
         self._mouth = MouthInterior(context.face, context.subject.neutral)
+        with_stills = context.subject.stills and context.face.scheme.name == STILL_SCHEME
+        self._stills = StillDrawing(context.subject, context.face) if with_stills else None
         self._placed = source_from_output(context.subject.size, context.size)
         # Of the body at rest: a step that changed as the body grows would be seen.
         self._step = max(round(NODE_SPACING * self._points.unit / self._placed[0, 0]), 1)
@@ -74,10 +78,17 @@ class FirstOrderReenactor:
         grid = Warp(placed, patches).grid(box, 2 * self._step if quality.half_size else self._step)
         to_box = inverse_affine(placed)
         to_box[:, 2] -= box[:2]
+        size = (box[2] - box[0], box[3] - box[1])
+        stills = self._stills and self._stills.plan(
+            target.landmarks, target.pose, motion.expression, frame.time_s, to_box, size, self._step
+        )
 
         def warp(relit: LinearImage) -> WarpedLayer:
             image = self._person.warped(relit, grid, quality.half_size)
-            self._mouth.draw(image, relit, target.landmarks, target.pose, to_box)
+            if not (stills and stills.has_mouth):
+                self._mouth.draw(image, relit, target.landmarks, target.pose, to_box)
+            if stills:
+                stills.draw(image, relit)
             return WarpedLayer(image, box[:2])
 
         return warp

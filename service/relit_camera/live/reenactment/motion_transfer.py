@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +12,7 @@ from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.reenactment.control_points import (
+    EARS_AND_JAW,
     NECK_PIVOT,
     SHOULDER_ANCHORS_CM,
     ControlPoints,
@@ -83,8 +85,48 @@ def transfer_motion(face: SourceFace, points: ControlPoints, motion: FaceMotion)
     body = split_body_motion(face, motion)
     landmarks = project(face.head_points + motion.expression, body.turned, face.size).astype(np.float64)
     shoulders = points.source[-len(SHOULDER_ANCHORS_CM) :]  # they stay
-    moved = np.vstack([landmarks[points.chosen], rigid_head_anchors(body.turned, face.size), shoulders])
+    head = rigid_head_anchors(body.turned, face.size)
+    ears = np.s_[-len(EARS_AND_JAW) :]
+    still = points.source[: -len(SHOULDER_ANCHORS_CM)][ears]
+    head[ears] = keep_beside_face(head[ears], landmarks, still, face.landmarks.astype(np.float64))
+    moved = np.vstack([landmarks[points.chosen], head, shoulders])
     return TransferredPose(moved, landmarks, body.turned, body.shift, body.scale, body.pivot)
+
+
+def keep_beside_face(
+    anchors: NDArray[np.float64],
+    landmarks: NDArray[np.float64],
+    anchors_before: NDArray[np.float64],
+    landmarks_before: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Anchors of `EARS_AND_JAW` that a turned face would hide, moved to its outline: what is beside the face stays so.
+
+    Else the skin between outline and ear of the source image would lie beside the far cheek, which it widens.
+
+    Args:
+        anchors: (count, 2) where they went.
+        landmarks: (landmarks, 2) where the face went.
+        anchors_before: as `anchors`, in the source image.
+        landmarks_before: as `landmarks`, in the source image.
+    """
+    side = np.sign(EARS_AND_JAW[:, 0])
+    beside = side * (anchors[:, 0] - _outline(landmarks, anchors[:, 1], side))
+    beside_before = side * (anchors_before[:, 0] - _outline(landmarks_before, anchors_before[:, 1], side))
+    return np.asarray(anchors + np.column_stack([side * np.maximum(beside_before - beside, 0), np.zeros(len(side))]))
+
+
+def _outline(
+    landmarks: NDArray[np.float64], rows: NDArray[np.float64], side: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Columns (count,) at which the hull of a face ends in some rows: at its left where `side` is −1, else right."""
+    hull = cv2.convexHull(landmarks.astype(np.float32))[:, 0].astype(np.float64)
+    top, bottom = int(hull[:, 1].argmin()), int(hull[:, 1].argmax())
+    # OpenCV's hulls run clockwise as seen: from the top over the right side to the bottom.
+    around = np.roll(hull, -top, axis=0)
+    last = (bottom - top) % len(hull)
+    right, left = around[: last + 1], np.vstack([around[last:], around[:1]])[::-1]
+    ends = np.interp(rows, right[:, 1], right[:, 0]), np.interp(rows, left[:, 1], left[:, 0])
+    return np.asarray(np.where(side > 0, *ends))
 
 
 def transfer_motion_in_place(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> TransferredPose:

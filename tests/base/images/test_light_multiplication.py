@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from relit_camera.base.images import light_multiplication
 from relit_camera.base.images.color import WIDE_TABLES, linear_from_uint8
+from relit_camera.base.images.light_multiplication import light_of_root, multiply_light, root_of_light
 from relit_camera.base.images.tone_mapping import display_from_linear
-from relit_camera.live.modes import light_multiplication
-from relit_camera.live.modes.light_multiplication import light_of_root, multiply_light, root_of_light
 
 STEP = 4
 CODES = np.arange(256, dtype=np.uint8).reshape(16, 16)[..., None].repeat(3, axis=2)

@@ -1,0 +1,132 @@
+"""Expression stills for a subject from a film of that person: from the file to the subject with its stills."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from relit_camera.base.errors import CaptureError
+from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.capture.expressions.film_tracking import TrackedFilm, track_film
+from relit_camera.capture.expressions.still_crops import crop_stills
+from relit_camera.capture.expressions.still_selection import select_stills
+from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
+from relit_camera.light.light_map import LightMap
+from relit_camera.light.light_map_rotation import rotate_light_map
+from relit_camera.live.modes.identity_check import IdentityTunables, shape_distance_cm
+from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
+from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
+from relit_camera.subject.expression_stills import ExpressionStill
+from relit_camera.subject.subject import Subject
+
+LIGHT_FRAMES, LIGHT_TIME_S = 40, 1.0
+"""Frames that the room's light is estimated from, spread over the film, and the time between them that the estimator is
+told, so that it fits the light to each."""
+STAGE = "Estimating the light of the room"
+Progress = Callable[[str, int, int | None], None]
+
+
+@dataclass(frozen=True)
+class ExpressionCapture:
+    """A subject with stills, and what they show.
+
+    Attributes:
+        subject: the person, older stills replaced.
+        covered: names of what the stills show.
+        missing: what to do in another film for the rest.
+    """
+
+    subject: Subject
+    covered: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def capture_expressions(
+    video: Path, subject: Subject, progress: Progress = lambda stage, done, total: None
+) -> ExpressionCapture:
+    """Take expression stills of a subject from a film of that person in constant light.
+
+    Args:
+        video: the film; two minutes of it are looked at.
+        subject: the person.
+        progress: called with a stage's name, what is done, and the total.
+
+    Raises:
+        VideoError: the film cannot be read.
+        CaptureError: no face is in it, another person's, or one that is too small, too dark or does too little.
+        SubjectError: no face is found in the subject.
+        ModelError: the networks are not there.
+    """
+    face = find_source_face(subject, open_tracker("mesh", TrackerOptions(blendshapes=False)))
+    film = track_film(video, progress)
+    selection = select_stills(film)
+    chosen = {each.index for each in selection.faces}
+    spread = np.unique(np.linspace(0, len(film.faces) - 1, LIGHT_FRAMES).astype(int))
+    probed = {film.faces[i].index for i in spread}
+    last = max(chosen | probed)
+    images: dict[int, DisplayImage] = {}
+    room = _RoomLight(subject, face, film)
+    with VideoReader(video, threads=2) as reader:
+        for frame in reader:
+            progress(STAGE, frame.index, last)
+            if frame.index in probed:
+                room.add(frame.image, frame.index)
+            if frame.index in chosen:
+                images[frame.index] = frame.image
+            if frame.index >= last:
+                break
+    _require_same_person(film, face, room.residual)
+    crops = crop_stills(images, selection.faces, film.scheme, face.scheme.eye_span(face.landmarks))
+    stills = [
+        ExpressionStill(
+            image,
+            landmarks,
+            film.expression(each).astype(np.float32),
+            film.rotation(each).as_rotvec().astype(np.float32),
+            rotate_light_map(room.light_map, film.rotation(each)),
+        )
+        for each, (image, landmarks) in zip(selection.faces, crops, strict=True)
+    ]
+    return ExpressionCapture(replace(subject, stills=tuple(stills)), selection.covered, selection.missing)
+
+
+class _RoomLight:
+    """The light of the room of a film, with the subject's field as probe.
+
+    Attributes:
+        light_map: (32, 64, 3) float32, after the frames so far.
+        residual: how badly it explains the face, see `RoomLightEstimate`.
+    """
+
+    def __init__(self, subject: Subject, face: SourceFace, film: TrackedFilm) -> None:
+        self._estimator = RoomLightEstimator(subject, face)
+        self._faces = {each.index: each for each in film.faces}
+        self._film = film
+        self._frames = 0
+        self.light_map: LightMap = np.zeros((0, 0, 3), np.float32)
+        self.residual = 0.0
+
+    def add(self, image: DisplayImage, index: int) -> None:
+        """Fit the light to one more frame."""
+        face = self._faces[index]
+        estimate = self._estimator.update(image, face.landmarks, self._film.rotation(face), LIGHT_TIME_S * self._frames)
+        self._frames += 1
+        self.light_map, self.residual = estimate.light_map, estimate.residual
+
+
+def _require_same_person(film: TrackedFilm, face: SourceFace, residual: float) -> None:
+    """Raise CaptureError where shape and skin of the film's face are not the subject's."""
+    limits = IdentityTunables()
+    shape_cm = min(
+        shape_distance_cm(points, face) for points in (film.neutral.points, *(each.points for each in film.faces[::10]))
+    )
+    if (shape_cm / limits.shape_cm) * (residual / limits.residual) > 1:
+        raise CaptureError(
+            f"the face in {film.path.name} is not the subject's: it has another shape ({10 * shape_cm:.1f} mm) and "
+            f"looks so under no light (deviation {residual:.2f})",
+            "film the person whose subject it is, in soft light from the front",
+        )

@@ -1,0 +1,1 @@
+"""Expression stills from a film of a person who talks and turns."""

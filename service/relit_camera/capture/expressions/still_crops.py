@@ -1,0 +1,65 @@
+"""Crops of chosen frames: the pictures of expression stills, all of one size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.affine import opencv_affine
+from relit_camera.base.images.image_types import DisplayImage, Points
+from relit_camera.capture.expressions.film_tracking import TrackedFace
+from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
+from relit_camera.subject.expression_stills import MAX_STILL_SIDE_PX
+
+MARGIN = 0.08
+"""Round the face, in parts of the larger side of its box; half of it is shown."""
+MAX_ENLARGEMENT = 2.0
+"""Largest distance of the eyes in a still, in parts of that in the source image: more would not be seen."""
+
+
+def crop_stills(
+    images: Mapping[int, DisplayImage], faces: Sequence[TrackedFace], scheme: LandmarkScheme, source_span: float
+) -> list[tuple[DisplayImage, Points]]:
+    """A square picture of each face alone, and the landmarks in it.
+
+    Args:
+        images: the frames by their index.
+        faces: those of the stills.
+        scheme: of the landmarks.
+        source_span: distance of the outer eye corners in the source image, in pixels.
+    """
+    span = float(np.median([scheme.eye_span(face.landmarks) for face in faces]))
+    scale = min(1.0, MAX_ENLARGEMENT * source_span / span)
+    boxes = [(face.landmarks.min(axis=0), face.landmarks.max(axis=0)) for face in faces]
+    widest = max(float((high - low).max()) for low, high in boxes) * (1 + 2 * MARGIN)
+    side = min(round(widest * scale), MAX_STILL_SIDE_PX)
+    scale = side / widest
+    result = []
+    for face, (low, high) in zip(faces, boxes, strict=True):
+        affine = np.column_stack([np.eye(2) * scale, side / 2 - scale * (low + high) / 2])
+        moved = (face.landmarks @ affine[:, :2].T + affine[:, 2]).astype(np.float32)
+        result.append((_face_alone(_resampled(images[face.index], affine, side, scale), moved), moved))
+    return result
+
+
+def _face_alone(image: DisplayImage, landmarks: Points) -> DisplayImage:
+    """A picture with one color instead of what is not the face: the room is nobody's business, and takes space."""
+    shown = np.zeros(image.shape[:2], np.uint8)
+    cv2.fillConvexPoly(shown, cv2.convexHull(np.round(landmarks).astype(np.int32)), 1)
+    reach = max(round(MARGIN / 2 * len(image)), 1)
+    shown = cv2.dilate(shown, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
+    alone = image.copy()
+    alone[shown == 0] = np.round(cv2.mean(image, shown)[:3]).astype(np.uint8)
+    return alone
+
+
+def _resampled(image: DisplayImage, affine: NDArray[np.float64], side: int, scale: float) -> DisplayImage:
+    """The part of a picture that an affine map (2, 3), which does not enlarge, brings into a square."""
+    soft = image if scale > 0.7 else cv2.GaussianBlur(image, (0, 0), 0.4 / scale)
+    cropped: DisplayImage = cv2.warpAffine(
+        soft, opencv_affine(affine), (side, side), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    )
+    return cropped

@@ -1,0 +1,190 @@
+"""Which frames of a film become expression stills: those that together show most of what a face does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.errors import CaptureError
+from relit_camera.base.rotations import angles_from_rotation
+from relit_camera.capture.expressions.film_tracking import TrackedFace, TrackedFilm
+from relit_camera.face.landmarks.expression_features import (
+    CLOSURE,
+    WIDTH_CM,
+    eye_closure,
+    eye_features,
+    mouth_features,
+    mouth_gap_cm,
+)
+
+
+@dataclass(frozen=True)
+class SelectionTunables:
+    """How stills are chosen.
+
+    Attributes:
+        min_sharpness: of that of a sharp frame (the 90th percentile).
+        mouths, shut_eyes, gazes, turns: most stills of each kind.
+        least_distance: from what is chosen, in units of the features, below which a frame shows nothing new.
+        frontal_deg: largest turn in stills of mouth and eyes.
+        turned_deg: least turn in stills of a turned head.
+        shut: closure from which an eye is shut, and up to which it is open.
+        min_stills: fewer show too little.
+    """
+
+    min_sharpness: float = 0.35
+    mouths: int = 10
+    shut_eyes: int = 2
+    gazes: int = 2
+    turns: int = 5
+    least_distance: float = 0.5
+    frontal_deg: float = 14.0
+    turned_deg: float = 10.0
+    shut: tuple[float, float] = (0.6, 0.35)
+    min_stills: int = 4
+
+
+TUNABLES = SelectionTunables()
+TURN_UNIT_DEG = 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class ShownFace:
+    """What a tracked face does, as it is chosen by.
+
+    Attributes:
+        face: the tracked face.
+        yaw, pitch: since neutral, in degrees.
+        mouth: see `mouth_features`, minus those of the neutral face.
+        gap_cm: between the lips, beyond the neutral face's.
+        closure: of the eye that is less shut, see `eye_closure`.
+        gaze: (2,) mean over both eyes, minus the neutral face's.
+        quality: 0..1, by sharpness.
+    """
+
+    face: TrackedFace
+    yaw: float
+    pitch: float
+    mouth: NDArray[np.float64]
+    gap_cm: float
+    closure: float
+    gaze: NDArray[np.float64]
+    quality: float
+
+    @property
+    def turn_deg(self) -> float:
+        """Larger of yaw and pitch."""
+        return max(abs(self.yaw), abs(self.pitch))
+
+
+COVERAGE: tuple[tuple[str, str, Callable[[ShownFace], bool]], ...] = (
+    ("lips apart", "talk", lambda shown: shown.gap_cm > 0.3),
+    ("wide mouth", "smile with your teeth showing", lambda shown: shown.mouth[2] > 0.25 / WIDTH_CM),
+    ("round mouth", "say 'oo'", lambda shown: shown.mouth[2] < -0.25 / WIDTH_CM),
+    ("jaw dropped", "open your mouth wide", lambda shown: shown.gap_cm > 1.2),
+    ("eyes shut", "shut your eyes for a second", lambda shown: shown.closure > TUNABLES.shut[0]),
+    ("gaze aside", "look to the sides without turning", lambda shown: abs(float(shown.gaze[0])) > 0.8),
+    ("turned left", "turn your head to the picture's left", lambda shown: shown.yaw < -15),
+    ("turned right", "turn your head to the picture's right", lambda shown: shown.yaw > 15),
+    ("turned far left", "turn it further left", lambda shown: shown.yaw < -25),
+    ("turned far right", "turn it further right", lambda shown: shown.yaw > 25),
+)
+"""What stills may show: its name, what a person does for it, and how it is known."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The chosen frames.
+
+    Attributes:
+        faces: in order of time.
+        covered: names of what they show, as in `COVERAGE`.
+        missing: what to do for the rest.
+    """
+
+    faces: tuple[TrackedFace, ...]
+    covered: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def select_stills(film: TrackedFilm) -> Selection:
+    """Choose the frames of a film that become stills, by farthest-point selection in what the face does.
+
+    Raises:
+        CaptureError: the face does too little.
+    """
+    shown = [each for each in _shown_faces(film) if each.quality >= TUNABLES.min_sharpness]
+    frontal = [each for each in shown if each.turn_deg < TUNABLES.frontal_deg]
+    awake = [each for each in frontal if each.closure < TUNABLES.shut[1]]
+    shut = [each for each in frontal if each.closure > TUNABLES.shut[0]]
+    turned = [each for each in shown if each.turn_deg > TUNABLES.turned_deg and each.closure < TUNABLES.shut[1]]
+    chosen = [
+        *sorted(shut, key=lambda each: -each.closure * each.quality)[:1],
+        *_farthest(frontal, lambda each: each.mouth, TUNABLES.mouths),
+        *_farthest(frontal, lambda each: np.array([each.closure / CLOSURE]), TUNABLES.shut_eyes),
+        *_farthest(awake, lambda each: each.gaze, TUNABLES.gazes),
+        *_farthest(turned, _turn, TUNABLES.turns, lambda each: float(np.exp(-0.1 * (each.mouth**2).sum()))),
+    ]
+    faces = sorted({each.face.index: each.face for each in chosen}.values(), key=lambda face: face.index)
+    covered = tuple(name for name, _, shows in COVERAGE if any(shows(each) for each in chosen))
+    missing = tuple(cure for name, cure, _ in COVERAGE if name not in covered)
+    if len(faces) < TUNABLES.min_stills:
+        raise CaptureError(
+            f"the face in {film.path.name} does too little: {len(faces)} frames differ from the neutral face",
+            f"film again, and {', '.join(missing)}",
+        )
+    return Selection(tuple(faces), covered, missing)
+
+
+def _turn(shown: ShownFace) -> NDArray[np.float64]:
+    return np.array([shown.yaw, shown.pitch]) / TURN_UNIT_DEG
+
+
+def _farthest(
+    candidates: Sequence[ShownFace],
+    features: Callable[[ShownFace], NDArray[np.float64]],
+    most: int,
+    worth: Callable[[ShownFace], float] = lambda each: 1.0,
+) -> list[ShownFace]:
+    """Candidates far from neutral (0) and from each other, each time the farthest; good ones count as farther."""
+    if not candidates:
+        return []
+    places = np.stack([features(each) for each in candidates])
+    value = np.array([each.quality**0.5 * worth(each) for each in candidates])
+    distance = np.linalg.norm(places, axis=1)
+    chosen: list[ShownFace] = []
+    while len(chosen) < most:
+        best = int((distance * value).argmax())
+        if distance[best] < TUNABLES.least_distance:
+            break
+        chosen.append(candidates[best])
+        distance = np.minimum(distance, np.linalg.norm(places - places[best], axis=1))
+    return chosen
+
+
+def _shown_faces(film: TrackedFilm) -> list[ShownFace]:
+    scheme, neutral = film.scheme, film.neutral.points
+    sharp = float(np.percentile([face.sharpness for face in film.faces], 90))
+    mouth, gap = mouth_features(neutral, scheme), mouth_gap_cm(neutral, scheme)
+    eyes = (scheme.right_eye, scheme.left_eye)
+    gaze = np.mean([eye_features(neutral, eye, 0.0)[1:] for eye in eyes], axis=0)
+    result = []
+    for face in film.faces:
+        yaw, pitch, _ = angles_from_rotation(film.rotation(face))
+        closure = min(eye_closure(face.points, neutral, eye) for eye in eyes)
+        result.append(
+            ShownFace(
+                face,
+                yaw,
+                pitch,
+                mouth_features(face.points, scheme) - mouth,
+                mouth_gap_cm(face.points, scheme) - gap,
+                closure,
+                np.mean([eye_features(face.points, eye, closure)[1:] for eye in eyes], axis=0) - gaze,
+                float(np.clip(face.sharpness / max(sharp, 1e-9), 0, 1)),
+            )
+        )
+    return result

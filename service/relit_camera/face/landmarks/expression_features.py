@@ -1,0 +1,61 @@
+"""What mouth and eyes do, as a few numbers from head-space points, so that expressions can be compared.
+
+They are in units of a difference that is clearly seen, so that a distance of 1 is another expression.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks, LandmarkScheme
+
+LIP_CM, WIDTH_CM, CORNER_CM = 0.25, 0.45, 0.25
+"""Units of the mouth: height of upper and lower lip, width, height of the corners."""
+CLOSURE, GAZE_CM = 0.25, 0.2
+"""Units of an eye: share of the neutral opening by which it is shut, and movement of the iris."""
+
+
+def mouth_features(points: NDArray[np.floating], scheme: LandmarkScheme) -> NDArray[np.float64]:
+    """Heights of the inner edges of upper and lower lip, width, and height of the corners: (4,).
+
+    Args:
+        points: (count, 3) head-space centimetres.
+        scheme: what they are.
+    """
+    upper, lower = (points[list(side), 1].mean() for side in scheme.lip_gap)
+    right, left = points[scheme.upper_lip_outer[0]], points[scheme.upper_lip_outer[-1]]
+    width = np.linalg.norm(left - right)
+    return np.array([upper / LIP_CM, lower / LIP_CM, width / WIDTH_CM, (right[1] + left[1]) / 2 / CORNER_CM])
+
+
+def mouth_gap_cm(points: NDArray[np.floating], scheme: LandmarkScheme) -> float:
+    """Distance of the inner edges of the lips, in the middle; points as in `mouth_features`."""
+    upper, lower = (points[list(side)].mean(axis=0) for side in scheme.lip_gap)
+    return float(np.linalg.norm(upper - lower))
+
+
+def eye_closure(points: NDArray[np.floating], neutral: NDArray[np.floating], eye: EyeLandmarks) -> float:
+    """How far an eye is shut: 0 as wide open as on the neutral face, 1 shut; below 0 wider."""
+
+    def gap(face: NDArray[np.floating]) -> float:
+        upper, lower = (face[list(side)] for side in eye.gap)
+        return float(np.linalg.norm(upper - lower, axis=1).mean())
+
+    return 1 - gap(points) / max(gap(neutral), 1e-6)
+
+
+def eye_features(points: NDArray[np.floating], eye: EyeLandmarks, closure: float) -> NDArray[np.float64]:
+    """Closure and the place of the iris between the corners: (3,), the iris 0 for schemes without one.
+
+    The iris of an eye that shuts counts less: it is not seen.
+
+    Args:
+        points: (count, 3) head-space centimetres.
+        eye: which eye.
+        closure: of that eye, see `eye_closure`.
+    """
+    gaze = np.zeros(2)
+    if eye.iris:
+        gaze = (points[eye.iris[0]] - points[[eye.inner, eye.outer]].mean(axis=0))[:2] / GAZE_CM
+    return np.array([closure / CLOSURE, *(gaze * np.clip(1.5 - 1.5 * closure, 0, 1))])

@@ -1,0 +1,239 @@
+"""Drawing expression stills into the moved picture: mouth, eyes and far cheek as they really look, relit.
+
+Each part of the face is a mesh of landmarks, which is moved from the stills to where the driver's face has it. It fades
+out at its rim.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.image_types import LinearImage, RgbaImage
+from relit_camera.base.images.light_multiplication import multiply_light
+from relit_camera.face.head_pose import HeadPose
+from relit_camera.live.reenactment.face_mesh import draw_triangles
+from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.reenactment.stills.still_light import StillLight
+from relit_camera.live.reenactment.stills.still_regions import (
+    BEHIND_CM,
+    StillRegion,
+    facing,
+    shown_landmarks,
+    still_regions,
+)
+from relit_camera.live.reenactment.stills.still_weights import StillWeights
+from relit_camera.live.reenactment.warp import Box, PositionGrid
+from relit_camera.subject.expression_stills import ExpressionStill
+from relit_camera.subject.subject import Subject
+
+SIDE_STEPS = 2
+"""The sides of the face are large and smooth: their positions are computed so many times as far apart."""
+HALVED_FROM = 1.5
+"""By how much a face in the picture must be larger than in the stills for them to be drawn at half its resolution."""
+WHOLE_MOUTH = 0.98
+"""Weight of the stills of a mouth from which nothing else shows there."""
+LEAST_SIDE_PX = 4
+"""Smaller parts of the picture are not drawn."""
+
+
+@dataclass(frozen=True)
+class _Layer:
+    """One still in one region of the output.
+
+    Attributes:
+        still: its index.
+        grid: where the region's pixels look in the still.
+        cover: (height, width) float32 how far it shows.
+    """
+
+    still: int
+    grid: PositionGrid
+    cover: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class _PlannedRegion:
+    """What shows in one region of the output.
+
+    Attributes:
+        box: left, top, right, bottom in output pixels.
+        layers: stills, of one size: the box's, or half of it.
+        source: (rows, columns, 2) float32 where the middles of the cells of their grids lie in the source image.
+    """
+
+    box: Box
+    layers: tuple[_Layer, ...]
+    source: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class StillTask:
+    """What is drawn into one moved picture.
+
+    Attributes:
+        light: of the subject's stills.
+        regions: what shows where.
+        has_mouth: whether stills show all of the mouth.
+    """
+
+    light: StillLight
+    regions: tuple[_PlannedRegion, ...]
+    has_mouth: bool
+
+    def draw(self, image: RgbaImage, relit: LinearImage) -> None:
+        """Draw into the moved picture, in place, from the relit source image; its alpha stays."""
+        if self.regions:
+            roots = self.light.relit_roots(relit)
+            for region in self.regions:
+                self._draw(image, region, roots)
+
+    def _draw(self, image: RgbaImage, region: _PlannedRegion, relit: NDArray[np.float32]) -> None:
+        shown, cover = None, None
+        for layer in region.layers:
+            picture = layer.grid.sample(self.light.unlit[layer.still])
+            if shown is None or cover is None:
+                shown, cover = picture, layer.cover
+            else:
+                shown = cv2.blendLinear(shown, picture, cover, layer.cover)
+                cover = cv2.add(cover, layer.cover)
+        assert shown is not None
+        assert cover is not None
+        shown = multiply_light(shown, self.light.at(relit, region.source), region.layers[0].grid.step)
+        left, top, right, bottom = region.box
+        area = image[top:bottom, left:right]
+        if shown.shape[:2] != area.shape[:2]:
+            shown, cover = (_doubled(each, area.shape) for each in (shown, cover))
+        below = cv2.cvtColor(area, cv2.COLOR_RGBA2RGB)
+        area[..., :3] = cv2.blendLinear(shown, below, cover, cv2.subtract(1.0, cover))
+
+
+class StillDrawing:
+    """Draws the stills of one subject."""
+
+    def __init__(self, subject: Subject, face: SourceFace) -> None:
+        """`face` is the source image's, in the scheme of the stills."""
+        self._face = face
+        self._meshes = [_RegionMesh(region, face, subject.stills) for region in still_regions(face.scheme)]
+        self._weights = StillWeights(subject.stills, face)
+        self._light = StillLight(subject, face)
+
+    def plan(
+        self,
+        landmarks: NDArray[np.float64],
+        pose: HeadPose,
+        expression: NDArray[np.float64],
+        time_s: float,
+        to_picture: NDArray[np.float64],
+        size: tuple[int, int],
+        step: int,
+    ) -> StillTask:
+        """Find out what shows where; the task draws it.
+
+        Args:
+            landmarks: (count, 2) where all landmarks of the moved face are, source pixels.
+            pose: of the moved head.
+            expression: (count, 3) centimetres since neutral.
+            time_s: of the frame.
+            to_picture: (2, 3) source pixels → pixels of the moved picture.
+            size: (width, height) of that.
+            step: pixels between computed positions.
+        """
+        rotation = pose.rotation * self._face.pose.rotation.inv()
+        chosen = self._weights.update(self._weights.doing(expression, rotation), time_s)
+        seen = landmarks @ to_picture[:, :2].T + to_picture[:, 2]
+        depth = pose.rotation.as_matrix()[2]
+        drawn = [
+            mesh.plan(chosen[mesh.region.name], seen, depth, size, step * SIDE_STEPS if mesh.is_side else step)
+            for mesh in self._meshes
+        ]
+        mouth = sum(weight for _, weight in chosen["mouth"])
+        return StillTask(self._light, tuple(region for region in drawn if region is not None), mouth >= WHOLE_MOUTH)
+
+
+def _doubled(picture: NDArray, shape: tuple[int, ...]) -> NDArray:
+    """A picture of twice the size, its last row and column left out where `shape` (height, width, …) is odd."""
+    large = cv2.resize(picture, None, fx=2, fy=2, interpolation=cv2.INTER_LINEAR)
+    return np.ascontiguousarray(large[: shape[0], : shape[1]])
+
+
+class _RegionMesh:
+    """A region's mesh with its places in the stills.
+
+    Attributes:
+        region: the region.
+        is_side: whether it is a side of the face.
+    """
+
+    def __init__(self, region: StillRegion, face: SourceFace, stills: Sequence[ExpressionStill]) -> None:
+        self.region = region
+        self.is_side = region.name in ("right_side", "left_side")
+        triangles = region.triangles
+        # A still shows up to the far corners of the outermost triangles.
+        self._members = np.unique(triangles[(region.trust[triangles] > 0).any(axis=1)])
+        self._source = face.landmarks[triangles].astype(np.float64)
+        self._scheme = face.scheme
+        self._spans = [face.scheme.eye_span(still.landmarks) for still in stills]
+        self._places = []
+        for still in stills:
+            corners = still.landmarks[triangles].astype(np.float64)
+            shown = facing(corners) | region.between  # the others are turned away in the still
+            trust = (region.trust * shown_landmarks(still, face))[triangles] * shown[:, None]
+            self._places.append(np.concatenate([corners, trust[..., None]], axis=2))
+
+    def plan(
+        self,
+        chosen: Sequence[tuple[int, float]],
+        seen: NDArray[np.float64],
+        depth: NDArray[np.float64],
+        size: tuple[int, int],
+        step: int,
+    ) -> _PlannedRegion | None:
+        """What shows in the picture; None where nothing does.
+
+        Args:
+            chosen: stills and their weights.
+            seen: (count, 2) landmarks in the picture.
+            depth: (3,) direction in the head toward the camera.
+            size: (width, height) of the picture.
+            step: pixels between computed positions.
+        """
+        if not chosen:
+            return None
+        inside = seen[self._members]
+        low = np.maximum(np.floor(inside.min(axis=0)).astype(int), 0)
+        high = np.minimum(np.ceil(inside.max(axis=0)).astype(int), size)
+        if (high - low < LEAST_SIDE_PX).any():
+            return None
+        width, height = (int(side) for side in high - low)
+        finest = max(self._spans[still] for still, _ in chosen)
+        halved = self._scheme.eye_span(seen.astype(np.float32)) > HALVED_FROM * finest
+        step += step % 2  # so that it can be halved
+        # Positions are those of the middles of cells, one more round the box: see `PositionGrid`.
+        corners = ((seen - low) / step + 0.5).take(self.region.triangles, axis=0)
+        front = np.flatnonzero(facing(corners) | self.region.between)
+        nearness = self.region.middles @ depth - BEHIND_CM * self.region.between
+        order = front[np.argsort(nearness[front])]
+        values = [
+            places.take(order, axis=0) for places in (self._source, *(self._places[still] for still, _ in chosen))
+        ]
+        shape = (-(-height // step) + 2, -(-width // step) + 2)
+        drawn = draw_triangles(corners.take(order, axis=0), np.concatenate(values, axis=2), shape)
+        box = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+        # Between a cell of the mesh and one beside it positions mean nothing.
+        within = cv2.erode((drawn[0] > 0).astype(np.float32), np.ones((3, 3), np.uint8))
+        layers = []
+        for index, (still, weight) in enumerate(chosen):
+            x, y, trust = drawn[2 + 3 * index : 5 + 3 * index]
+            grid = PositionGrid(cv2.merge([x, y]), box, step)
+            grid = grid.halved() if halved else grid
+            fine = cv2.resize(trust * within * np.float32(weight), None, fx=grid.step, fy=grid.step)
+            left, top, right, bottom = grid.box
+            part = fine[grid.step : grid.step + bottom - top, grid.step : grid.step + right - left]
+            layers.append(_Layer(still, grid, np.ascontiguousarray(part)))
+        source = np.ascontiguousarray(cv2.merge([drawn[0], drawn[1]])[1:-1, 1:-1])
+        return _PlannedRegion(box, tuple(layers), source)

@@ -1,0 +1,213 @@
+"""Light on expression stills: the stills with their own light divided out, and the light that they are shown in.
+
+A still is shown times (relit source image) / (source image under the still's own light), looked up where the landmarks
+lead in the source image's face. The divisor does not change: the stills are kept divided. A smooth factor corrects them
+so that, blurred and relit, they have the colors of the relit source image: then no seam shows, whatever the light,
+exposure and white balance of the film were taken for. Eyes and mouth get the light of the skin round them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
+from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
+from relit_camera.base.images.light_multiplication import root_of_light
+from relit_camera.face.landmarks.canonical_face import canonical_face
+from relit_camera.light.directions import texel_solid_angles
+from relit_camera.live.reenactment.face_mesh import draw_triangles
+from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.reenactment.stills.still_regions import face_in_still, facing, shown_landmarks
+from relit_camera.subject.expression_stills import ExpressionStill
+from relit_camera.subject.subject import Subject
+
+CELLS_PER_SPAN = 32
+"""Cells of the grid in the distance of the outer eye corners."""
+MARGIN_SPANS = 0.15
+"""Round the face, that the grid takes in."""
+MATCHED_SPANS = 0.16
+"""Sigma of the blur in which still and source image agree."""
+FILL_CELLS = (1.5, 5.0)
+"""Sigmas of the blurs that lead the light of the skin into eyes and mouth."""
+MAX_ROOT = 3.9
+"""Limit of a factor's root: the tables of `multiply_light` end there."""
+FLOOR = 0.02
+"""Share of the mean that is added to both sides of a quotient: shadows stay bounded."""
+UNLIT_SKIN = 0.25
+"""Largest channel of the mean skin in unlit stills: teeth, which are some times as bright, are not white yet."""
+
+
+class StillLight:
+    """The grid over the source image's face, and the unlit stills of one subject.
+
+    Attributes:
+        unlit: each still divided by the source image under the still's own light, uint8 sRGB, times the color of skin.
+    """
+
+    def __init__(self, subject: Subject, face: SourceFace) -> None:
+        self._grid = _Grid.over(subject, face)
+        under_own = _relit_on_grid(subject, self._grid, [still.light for still in subject.stills])
+        skin = np.array(cv2.mean(np.mean(under_own, axis=0), (self._grid.skin > 0.5).astype(np.uint8))[:3])
+        self._skin = np.maximum(skin / max(float(skin.max()), 1e-6), 0.1).astype(np.float32) * np.float32(UNLIT_SKIN)
+        self.unlit = [
+            _unlit(still, face, self._grid, _filled(own, self._grid.skin), self._skin)
+            for still, own in zip(subject.stills, under_own, strict=True)
+        ]
+
+    def relit_roots(self, relit: LinearImage) -> NDArray[np.float32]:
+        """Roots (rows, columns, 3) of what unlit stills are multiplied with, on the grid.
+
+        Args:
+            relit: (height, width, 3) the relit source image.
+        """
+        left, top, right, bottom = self._grid.box
+        part = cv2.resize(relit[top:bottom, left:right], self._grid.size, interpolation=cv2.INTER_AREA)
+        light = _filled(np.maximum(part, 0), self._grid.skin)
+        roots = root_of_light(np.asarray(light / self._skin, np.float32))
+        return np.minimum(roots, MAX_ROOT, out=roots)
+
+    def at(self, picture: NDArray[np.float32], positions: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values of a picture of the grid at source pixels (rows, columns, 2)."""
+        return np.asarray(
+            cv2.remap(picture, self._grid.cells(positions), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        )
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """Square cells over the source image's face.
+
+    Attributes:
+        box: left, top, right, bottom in source pixels.
+        cell: side of a cell in source pixels.
+        skin: (rows, columns) float32, the share of a cell that is skin of the face, no eye and no lip.
+        span: distance of the outer eye corners, in cells.
+    """
+
+    box: tuple[int, int, int, int]
+    cell: int
+    skin: Mask
+    span: float
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(columns, rows)."""
+        return self.skin.shape[1], self.skin.shape[0]
+
+    def cells(self, positions: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Where source pixels (..., 2) lie in pictures of the grid, as OpenCV counts."""
+        return (positions - np.array(self.box[:2], np.float32)) / np.float32(self.cell) - np.float32(0.5)
+
+    @classmethod
+    def over(cls, subject: Subject, face: SourceFace) -> _Grid:
+        """The grid over a source image's face."""
+        span = face.scheme.eye_span(face.landmarks)
+        cell = max(round(span / CELLS_PER_SPAN), 1)
+        low = np.floor(face.landmarks.min(axis=0) - MARGIN_SPANS * span).astype(int)
+        high = np.ceil(face.landmarks.max(axis=0) + MARGIN_SPANS * span).astype(int)
+        low, high = np.maximum(low, 0), np.minimum(high, subject.size)
+        columns, rows = np.maximum((high - low) // cell, 2)
+        box = (int(low[0]), int(low[1]), int(low[0] + columns * cell), int(low[1] + rows * cell))
+        scheme = face.scheme
+        skin = np.zeros((box[3] - box[1], box[2] - box[0]), np.uint8)
+        shifted = np.round(face.landmarks - low).astype(np.int32)
+        cv2.fillPoly(skin, [shifted[list(scheme.oval)]], 255)
+        for hole in (scheme.right_eye.lids, scheme.left_eye.lids, scheme.lips):
+            cv2.fillConvexPoly(skin, cv2.convexHull(shifted[list(hole)]), 0)
+        share = cv2.resize(skin, (int(columns), int(rows)), interpolation=cv2.INTER_AREA)
+        return cls(box, cell, np.asarray(cv2.erode(share, np.ones((2, 2))) / np.float32(255), np.float32), span / cell)
+
+
+def _relit_on_grid(subject: Subject, grid: _Grid, lights: list[NDArray[np.float32]]) -> list[LinearImage]:
+    """The source image under each light (32, 64, 3), on the grid: (rows, columns, 3) float32."""
+    left, top, _, _ = grid.box
+    columns, rows = grid.size
+    width = subject.size[0]
+    offsets = np.arange(grid.cell)
+    y = top + (np.arange(rows)[:, None] * grid.cell + offsets).reshape(rows, 1, grid.cell, 1)
+    x = left + (np.arange(columns)[:, None] * grid.cell + offsets).reshape(1, columns, 1, grid.cell)
+    pixels = (y * width + x).reshape(rows * columns, -1)
+    sampled = subject.basis.rows(pixels, np.full(pixels.shape, 1 / grid.cell**2, np.float32))
+    omega = texel_solid_angles().astype(np.float32).reshape(-1, 1)
+    amounts = [subject.coefficients @ (light.reshape(-1, 3) * omega) for light in lights]
+    return [
+        np.maximum(np.stack([sampled[c] @ amount[:, c] for c in range(3)], axis=1), 0)
+        .reshape(rows, columns, 3)
+        .astype(np.float32)
+        for amount in amounts
+    ]
+
+
+def _unlit(
+    still: ExpressionStill,
+    face: SourceFace,
+    grid: _Grid,
+    under_own: NDArray[np.float32],
+    skin: NDArray[np.float32],
+) -> DisplayImage:
+    """A still, corrected, by the source image under its own light, times a color (3,): see `StillLight.unlit`."""
+    seen, valid = _on_source(still, face, grid)
+    weight = valid * grid.skin
+    sigma = MATCHED_SPANS * grid.span
+    theirs, ours = _blurred(seen, weight, sigma), _blurred(under_own, weight, sigma)
+    sure = (weight > 0.5).astype(np.uint8)
+    mean, still_mean = (max(float(cv2.mean(each, sure)[1]), 1e-4) for each in (under_own, seen))
+    correction = (ours + FLOOR * mean) / (theirs + FLOOR * still_mean)
+    factor = np.asarray(correction / (under_own + np.float32(FLOOR * mean)), np.float32)
+    cells = grid.cells(_source_of_still(still, face))
+    onto = cv2.remap(factor, cells, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return uint8_from_linear(np.asarray(linear_from_uint8(still.image) * onto * skin, np.float32))
+
+
+def _source_of_still(still: ExpressionStill, face: SourceFace) -> NDArray[np.float32]:
+    """Where each pixel of a still lies in the source image: (height, width, 2); beyond the face, the nearest place."""
+    x, y, drawn = face_in_still(still, face)
+    _, labels = cv2.distanceTransformWithLabels(
+        (drawn < 0.5).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    known = drawn >= 0.5
+    place = np.zeros(int(labels.max()) + 1, np.intp)
+    place[labels[known]] = np.flatnonzero(known)
+    return np.asarray(np.dstack([x.ravel()[place[labels]], y.ravel()[place[labels]]]), np.float32)
+
+
+def _on_source(still: ExpressionStill, face: SourceFace, grid: _Grid) -> tuple[NDArray[np.float32], Mask]:
+    """A still as it lies on the source image's face, linear (rows, columns, 3), and how far it shows the face."""
+    triangles = canonical_face().triangles
+    triangles = triangles[facing(still.landmarks[triangles].astype(np.float64))]
+    corners = (face.landmarks - grid.box[:2]) / grid.cell - 0.5
+    values = np.column_stack([still.landmarks, shown_landmarks(still, face)])
+    columns, rows = grid.size
+    x, y, valid = draw_triangles(
+        corners[triangles].astype(np.float64), values[triangles].astype(np.float64), (rows, columns)
+    )
+    # A cell is as many pixels of the still as the eyes are wider there.
+    reach = max(face.scheme.eye_span(still.landmarks) / grid.span, 1.0)
+    light = cv2.GaussianBlur(linear_from_uint8(still.image), (0, 0), reach / 2)
+    seen = cv2.remap(light, x - np.float32(0.5), y - np.float32(0.5), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(seen, np.float32), valid
+
+
+def _blurred(picture: NDArray[np.float32], weight: Mask, sigma: float) -> NDArray[np.float32]:
+    """A picture blurred where it has weight (normalized convolution), and from there on smoothly beyond."""
+    total, shares = np.zeros_like(picture), np.zeros_like(weight)
+    weighted = picture * weight[..., None]
+    for reach, share in ((sigma, 1.0), (4 * sigma, 1e-3)):
+        total += share * cv2.GaussianBlur(weighted, (0, 0), reach)
+        shares += share * cv2.GaussianBlur(weight, (0, 0), reach)
+    return np.asarray(total / (shares + np.float32(1e-9))[..., None], np.float32)
+
+
+def _filled(picture: NDArray[np.float32], skin: Mask) -> NDArray[np.float32]:
+    """A picture of the grid, eyes and mouth filled with the skin round them."""
+    weighted = picture * skin[..., None]
+    total, shares = np.zeros_like(picture), np.full_like(skin, 1e-9)
+    for sigma, share in zip(FILL_CELLS, (1.0, 0.02), strict=True):
+        total += np.float32(share) * cv2.GaussianBlur(weighted, (0, 0), sigma)
+        shares += np.float32(share) * cv2.GaussianBlur(skin, (0, 0), sigma)
+    around = total / shares[..., None]
+    return np.asarray(around + skin[..., None] * (picture - around), np.float32)

@@ -1,0 +1,186 @@
+"""How much each expression still shows in each part of the face, from what the driver's face does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.easing import smoothstep
+from relit_camera.base.rotations import Rotation, angles_from_rotation
+from relit_camera.face.landmarks.expression_features import (
+    eye_closure,
+    eye_features,
+    mouth_features,
+    mouth_gap_cm,
+)
+from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.subject.expression_stills import ExpressionStill
+
+REACH = 0.8
+"""By how many units one still may be nearer than another until it alone shows."""
+FAR = 1e6
+TURN_UNIT_DEG = 15.0
+"""Turn that is another view of a side of the face."""
+FEATURE_TURN_UNIT_DEG = 45.0
+"""The same for mouth and eyes, which are moved to any turn."""
+PARTED_LIPS_CM = (0.05, 0.3)
+"""Further parted than in the source image: from where on the mouth is a still's, and up to where wholly."""
+SIDEWAYS_DEG = 20.0
+"""Yaw at which the width of a mouth counts half."""
+PARTED_UNITS = 3.0
+"""By how many units a mouth with parted lips differs from one with shut lips, beside all else: it has an inside."""
+CLOSING_LID = (0.4, 0.7)
+"""The same for an eye, by how far it is shut."""
+TURNED_DEG = (9.0, 18.0)
+"""The same for a side that turns away, by the yaw."""
+SMOOTHING_S = {"mouth": 0.05, "right_eye": 0.025, "left_eye": 0.025, "right_side": 0.12, "left_side": 0.12}
+"""Time in which weights follow, by region."""
+MOST_AT_ONCE = 2
+NEGLIGIBLE = 0.03
+"""Weight below which nothing shows."""
+NEARER = (0.5, 0.75)
+"""The source image's distance from the driver's mouth by that and the nearest still's: from where on, with shut lips,
+stills show, and up to where wholly."""
+
+
+@dataclass(frozen=True)
+class Doing:
+    """What a face does, as stills and driver are compared.
+
+    Attributes:
+        features: by region, (count,) float64.
+        certain: by region how sure each feature is, 0..1, (count,).
+        needed: by region 0..1: how far a still is needed because the source image does not show such a thing.
+    """
+
+    features: dict[str, NDArray[np.float64]]
+    certain: dict[str, NDArray[np.float64]]
+    needed: dict[str, float]
+
+
+class StillWeights:
+    """Weights of the stills of one subject, frame by frame."""
+
+    def __init__(self, stills: Sequence[ExpressionStill], face: SourceFace) -> None:
+        self._face = face
+        self._neutral = self.doing(np.zeros_like(face.head_points), Rotation.identity())
+        self._stills = [
+            self.doing(still.expression.astype(np.float64), Rotation.from_rotvec(still.rotation.astype(np.float64)))
+            for still in stills
+        ]
+        self._features = {
+            region: np.stack([still.features[region] for still in self._stills]) for region in SMOOTHING_S
+        }
+        self._yaws = np.array([_angles(still.rotation)[0] for still in stills])
+        self._shown: dict[str, NDArray[np.float64]] = {}
+        self._time_s: float | None = None
+
+    def doing(self, expression: NDArray[np.float64], rotation: Rotation) -> Doing:
+        """What a face does.
+
+        Args:
+            expression: (count, 3) head-space centimetres, since neutral.
+            rotation: of the head, since neutral.
+        """
+        scheme, neutral = self._face.scheme, self._face.head_points
+        points = neutral + expression
+        yaw, pitch, _ = angles_from_rotation(rotation)
+        turn = np.array([yaw, pitch])
+        parted = float(smoothstep(mouth_gap_cm(points, scheme) - mouth_gap_cm(neutral, scheme), *PARTED_LIPS_CM))
+        mouth = [*mouth_features(points, scheme), PARTED_UNITS * parted]
+        features = {"mouth": np.append(mouth, turn / FEATURE_TURN_UNIT_DEG)}
+        needed = {"mouth": parted}
+        # Seen from the side, width and corners are confused with the depth of the lips, which landmarks do not tell.
+        sideways = 1 / (1 + (yaw / SIDEWAYS_DEG) ** 2)
+        certain = {"mouth": np.array([1, 1, sideways, sideways, 1, 1, 1])}
+        eyes = (scheme.right_eye, scheme.left_eye)
+        closures = [eye_closure(points, neutral, eye) for eye in eyes]
+        for name, eye, own, other, sign in zip(
+            ("right_eye", "left_eye"), eyes, closures, closures[::-1], (-1.0, 1.0), strict=True
+        ):
+            # The lids of the eye that turns away are seen too flat: the other one tells.
+            closure = own + float(smoothstep(sign * yaw, *TURNED_DEG)) * (other - own)
+            features[name] = np.append(eye_features(points, eye, closure), turn / FEATURE_TURN_UNIT_DEG)
+            needed[name] = float(smoothstep(closure, *CLOSING_LID))
+        # The person's right is at the picture's left: that side turns away while the nose turns there.
+        for name, sign in (("right_side", -1.0), ("left_side", 1.0)):
+            features[name] = turn / TURN_UNIT_DEG
+            needed[name] = float(smoothstep(sign * yaw, *TURNED_DEG))
+        return Doing(features, certain, needed)
+
+    def update(self, doing: Doing, time_s: float) -> dict[str, list[tuple[int, float]]]:
+        """By region the stills that show and their weights 0..1, summing to at most 1.
+
+        Args:
+            doing: of the driver.
+            time_s: of the frame.
+        """
+        passed = np.inf if self._time_s is None or time_s < self._time_s else time_s - self._time_s
+        self._time_s = time_s
+        chosen = {}
+        for region, smoothing_s in SMOOTHING_S.items():
+            wanted = self._wanted(region, doing)
+            before = self._shown.get(region, wanted)
+            shown = before + (1 - np.exp(-passed / smoothing_s)) * (wanted - before)
+            self._shown[region] = shown
+            chosen[region] = _strongest(shown)
+        return chosen
+
+    def _wanted(self, region: str, doing: Doing) -> NDArray[np.float64]:
+        """The weight (stills,) of each still where time plays no role."""
+        total = self._total(region, doing)
+        usable = np.ones(len(self._stills), bool)
+        if region.endswith("side"):
+            usable = self._yaws * (-1 if region == "right_side" else 1) > TURNED_DEG[0]
+        if total <= 0 or not usable.any():
+            return np.zeros(len(usable))
+        offset = (self._features[region] - doing.features[region]) * doing.certain.get(region, 1.0)
+        distance = np.where(usable, np.linalg.norm(offset, axis=1), FAR)
+        return np.asarray(total * sparsemax(-distance / REACH))
+
+    def _total(self, region: str, doing: Doing) -> float:
+        """How far stills show at all."""
+        needed = doing.needed[region]
+        if region != "mouth":
+            return needed
+        # The turn does not make a mouth another one.
+        shape, certain = doing.features[region][:-2], doing.certain[region][:-2]
+        neutral = float(np.linalg.norm((self._neutral.features[region][:-2] - shape) * certain))
+        nearest = float(np.linalg.norm((self._features[region][:, :-2] - shape) * certain, axis=1).min())
+        nearer = neutral / max(neutral + nearest, 1e-6)
+        return max(needed, float(smoothstep(nearer, *NEARER)))
+
+
+def sparsemax(scores: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Shares that sum to 1: the point of the simplex next to the scores (Martins and Astudillo, ICML 2016).
+
+    As softmax, but those far below the best are exactly 0, and no share changes faster than the scores.
+    """
+    falling = np.sort(scores)[::-1]
+    above = np.cumsum(falling) - 1
+    count = np.arange(1, len(scores) + 1)
+    kept = int(np.flatnonzero(falling * count > above)[-1])
+    return np.asarray(np.maximum(scores - above[kept] / (kept + 1), 0))
+
+
+def _strongest(weights: NDArray[np.float64]) -> list[tuple[int, float]]:
+    """The strongest few with their weights, so that one that joins or leaves them does so at weight 0."""
+    total = float(weights.sum())
+    if total < NEGLIGIBLE:
+        return []
+    order = np.argsort(-weights)
+    left_out = float(weights[order[MOST_AT_ONCE]]) if len(order) > MOST_AT_ONCE else 0.0
+    above = np.maximum(weights[order[:MOST_AT_ONCE]] - left_out - NEGLIGIBLE * total, 0) + 1e-9
+    return [
+        (int(index), float(share * total / above.sum()))
+        for index, share in zip(order, above, strict=False)
+        if share > 1e-6
+    ]
+
+
+def _angles(rotation: NDArray[np.float32]) -> tuple[float, float]:
+    yaw, pitch, _ = angles_from_rotation(Rotation.from_rotvec(rotation.astype(np.float64)))
+    return yaw, pitch

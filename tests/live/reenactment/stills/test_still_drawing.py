@@ -1,0 +1,92 @@
+"""Expression stills in the moved picture: they show the person in the wanted light, and nothing without stills."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.face.head_pose import project
+from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
+from relit_camera.live.reenactment.motion_transfer import rotate_about
+from relit_camera.live.reenactment.stills.still_drawing import StillDrawing
+from relit_camera.subject.subject import Subject
+from tests.live.people import close_up, context_of, live_frame, motion, moved_by
+from tests.live.reenactment.stills.made_stills import expression, relit, soft_light, still, with_stills
+
+SIZE = (288, 384)
+
+
+def shown(subject: Subject, moved: np.ndarray, picture: np.ndarray, turn: float = 0.0) -> np.ndarray:
+    """The moved picture, (height, width, 3) uint8."""
+    reenactor = FirstOrderReenactor(context_of(subject, SIZE))
+    driver = motion(rotation_from_angles(turn), expression=moved.astype(np.float64))
+    return moved_by(reenactor, picture, driver, live_frame()).image[..., :3].copy()
+
+
+def test_at_rest_a_subject_with_stills_looks_as_one_without() -> None:
+    picture = relit(close_up(), soft_light())
+    np.testing.assert_array_equal(shown(with_stills(), expression(), picture), shown(close_up(), expression(), picture))
+
+
+@pytest.mark.parametrize("exposure", [1.0, 0.4])
+def test_a_still_in_another_light_is_shown_in_the_wanted_one(exposure: float) -> None:
+    """The still is the source image in another light: relit, the skin is the relit source image's."""
+    own, wanted = soft_light((-1.0, 0.2, 0.7)), soft_light((0.8, 0.5, 0.6), 0.7)
+    subject = with_stills(still(own, expression(open_cm=0.3), rotation_from_angles(25), exposure))
+    picture = relit(close_up(), wanted)
+    plain, drawn = (shown(each, expression(), picture, turn=24) for each in (close_up(), subject))
+    assert np.abs(drawn.astype(int) - plain).max() > 3, "nothing was drawn"
+    soft = [cv2.GaussianBlur(each.astype(np.float32), (0, 0), 6) for each in (plain, drawn)]
+    changed = np.abs(soft[1] - soft[0])
+    assert np.percentile(changed, 99) < 7
+    assert changed.mean() < 1.0
+
+
+def test_what_a_still_shows_between_the_lips_is_in_the_picture() -> None:
+    """A white spot between the lips of the still appears in the open mouth, where there is none without stills."""
+    own = soft_light()
+    opened = still(own, expression(open_cm=1.0))
+    face = context_of(close_up(), SIZE).face
+    landmarks = opened.landmarks.copy()
+    lower = sorted({*face.scheme.lower_lip_inner[1:-1], *face.scheme.lower_lip_outer[1:-1]})
+    landmarks[lower, 1] += 8
+    image = opened.image.copy()
+    middle = landmarks[[13, 14]].mean(axis=0)
+    cv2.circle(image, tuple(int(each) for each in middle), 2, (255, 255, 255), -1)
+    subject = with_stills(replace(opened, image=image, landmarks=landmarks))
+    picture = relit(close_up(), own)
+    with_spot, without = (shown(each, expression(open_cm=1.0), picture) for each in (subject, close_up()))
+    assert with_spot.astype(int).sum(axis=2).max() > without.astype(int).sum(axis=2).max() + 60
+
+
+def test_a_driver_in_a_scheme_that_stills_do_not_have_sees_none() -> None:
+    """Stills are of one scheme: with other landmarks the source image alone is moved."""
+    from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+
+    scheme = landmark_scheme("openseeface66")
+    face = context_of(with_stills(), SIZE).face
+    other = replace(face, scheme=scheme, landmarks=face.landmarks[:66], head_points=scheme.canonical.copy())
+    reenactor = FirstOrderReenactor(replace(context_of(with_stills(), SIZE), face=other))
+    assert reenactor._stills is None
+
+
+def test_no_region_ends_at_the_border_of_its_box() -> None:
+    """What stills show fades out inside the rectangle that is drawn: on all sides nothing of them is left."""
+    subject = with_stills()
+    face = context_of(subject, SIZE).face
+    turned = rotate_about(np.zeros(3), face.pose, rotation_from_angles(22))
+    moved = (expression(open_cm=1.0) + expression(shut=1.0)).astype(np.float64)
+    landmarks = project(face.head_points + moved, turned, face.size).astype(np.float64)
+    enlarged = np.array([[4.0, 0, 0], [0, 4.0, 0]])
+    size = (4 * face.size[0], 4 * face.size[1])
+    task = StillDrawing(subject, face).plan(landmarks, turned, moved, 0.0, enlarged, size, 3)
+    assert len(task.regions) == 4  # mouth, both eyes, one side
+    for region in task.regions:
+        for layer in region.layers:
+            rim = np.concatenate([layer.cover[0], layer.cover[-1], layer.cover[:, 0], layer.cover[:, -1]])
+            assert rim.max() < 0.15
+            assert layer.cover.max() > 0.4

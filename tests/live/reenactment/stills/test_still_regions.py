@@ -1,0 +1,60 @@
+"""Regions of the face for expression stills: what they hold, and where they end."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.face.head_pose import project
+from relit_camera.live.reenactment.stills.still_regions import facing, shown_landmarks, still_regions
+from tests.live.people import SCHEME, close_up, face_of
+from tests.live.reenactment.stills.made_stills import expression, soft_light, still
+
+REGIONS = {region.name: region for region in still_regions(SCHEME)}
+
+
+def test_the_mouth_holds_its_inside() -> None:
+    inner = {*SCHEME.upper_lip_inner, *SCHEME.lower_lip_inner}
+    inside = [triangle for triangle in REGIONS["mouth"].triangles if set(map(int, triangle)) <= inner]
+    upper, lower = set(SCHEME.upper_lip_inner[1:-1]), set(SCHEME.lower_lip_inner[1:-1])
+    assert sum(bool(set(map(int, t)) & upper and set(map(int, t)) & lower) for t in inside) == 18
+
+
+def test_all_of_a_face_from_the_front_faces_the_camera_and_nothing_from_behind() -> None:
+    for region in REGIONS.values():
+        corners = SCHEME.canonical[region.triangles, :2]
+        assert facing(corners * [10, -10]).mean() > 0.97
+        assert facing(corners * [-10, -10]).mean() < 0.03
+
+
+def test_each_region_fades_out_and_leaves_the_rest_alone() -> None:
+    for name, features in {
+        "mouth": SCHEME.lips, "right_eye": SCHEME.right_eye.lids, "left_eye": SCHEME.left_eye.lids
+    }.items():  # fmt: skip
+        trust = REGIONS[name].trust
+        assert trust[list(features)].min() > 0.99
+        assert (trust > 0).mean() < 0.35
+    assert REGIONS["left_side"].trust[SCHEME.right_eye.outer] == 0
+    assert REGIONS["left_side"].trust[SCHEME.left_eye.outer] == 1
+    assert max(REGIONS[side].trust[list(SCHEME.oval)].max() for side in ("left_side", "right_side")) == 0
+
+
+def test_a_still_does_not_show_at_the_outline_of_its_face() -> None:
+    shown = shown_landmarks(still(soft_light(), expression()), face_of(close_up()))
+    assert shown[list(SCHEME.oval)].max() < 0.5
+    assert shown[list(SCHEME.lips)].min() == 1
+
+
+def test_what_a_turned_nose_hides_is_not_shown() -> None:
+    """Of a head that is turned by 50 degrees the cheek beside the nose is hidden, the cheek on the near side is not."""
+    face = face_of(close_up())
+    turn = rotation_from_angles(50)
+    turned = replace(
+        still(soft_light(), expression(), turn),
+        landmarks=project(SCHEME.canonical.copy(), replace(face.pose, rotation=turn * face.pose.rotation), face.size),
+    )
+    shown = shown_landmarks(turned, face)
+    beside_nose, mirrored = 358, 129
+    assert SCHEME.canonical[beside_nose, 0] == -SCHEME.canonical[mirrored, 0] > 0
+    assert shown[beside_nose] < 0.2
+    assert shown[mirrored] > 0.8

@@ -1,0 +1,103 @@
+"""Weights of expression stills: none at rest, the right one in an expression, and never a jump."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relit_camera.base.rotations import Rotation, rotation_from_angles
+from relit_camera.live.reenactment.stills.still_weights import MOST_AT_ONCE, SMOOTHING_S, StillWeights
+from tests.live.people import close_up, face_of
+from tests.live.reenactment.stills.made_stills import expression, soft_light, still, with_stills
+
+OPEN, SHUT, RIGHT, LEFT = range(4)
+
+
+@pytest.fixture
+def weights() -> StillWeights:
+    return StillWeights(with_stills().stills, face_of(close_up()))
+
+
+def settled(weights: StillWeights, moved: np.ndarray, turn: Rotation | None = None) -> dict[str, dict[int, float]]:
+    """What shows after a second of the same."""
+    doing = weights.doing(moved.astype(np.float64), turn or Rotation.identity())
+    for index in range(31):
+        shown = weights.update(doing, index / 30)
+    return {region: dict(chosen) for region, chosen in shown.items()}
+
+
+def test_at_rest_the_source_image_shows(weights: StillWeights) -> None:
+    assert settled(weights, expression()) == {region: {} for region in SMOOTHING_S}
+
+
+def test_an_open_mouth_is_the_open_stills(weights: StillWeights) -> None:
+    shown = settled(weights, expression(open_cm=0.9))
+    assert shown["mouth"][OPEN] > 0.98
+    assert not shown["right_eye"]
+    assert not shown["left_side"]
+
+
+def test_shut_eyes_are_the_shut_stills_and_one_eye_may_wink(weights: StillWeights) -> None:
+    moved = expression(shut=1.0)
+    assert settled(weights, moved)["right_eye"][SHUT] > 0.98
+    moved[:, 0] *= 1
+    wink = np.where((face_of(close_up()).head_points[:, :1] > 0), 0, moved)
+    shown = settled(weights, wink)
+    assert shown["right_eye"][SHUT] > 0.98
+    assert not shown["left_eye"]
+
+
+@pytest.mark.parametrize(("yaw", "region", "turned", "other"), [(25, "left_side", RIGHT, "right_side"),
+                                                               (-25, "right_side", LEFT, "left_side")])  # fmt: skip
+def test_the_side_that_turns_away_is_the_turned_stills(
+    weights: StillWeights, yaw: float, region: str, turned: int, other: str
+) -> None:
+    shown = settled(weights, expression(), rotation_from_angles(yaw))
+    assert shown[region][turned] > 0.98
+    assert not shown[other]
+
+
+def test_a_side_without_a_still_that_is_turned_there_stays() -> None:
+    only = with_stills(still(soft_light(), expression(), rotation_from_angles(25)))
+    shown = settled(StillWeights(only.stills, face_of(only)), expression(), rotation_from_angles(-25))
+    assert not shown["right_side"]
+
+
+def test_no_weight_jumps_and_few_stills_show_at_once() -> None:
+    """A mouth that opens slowly past many stills: the shown weights change little from step to step."""
+    light = soft_light()
+    subject = with_stills(*(still(light, expression(open_cm=cm)) for cm in (0.4, 0.6, 0.8, 1.0, 1.6)))
+    weights = StillWeights(subject.stills, face_of(subject))
+    before = np.zeros(5)
+    for step, cm in enumerate(np.linspace(0, 1.8, 400)):
+        chosen = dict(weights.update(weights.doing(expression(open_cm=cm).astype(float), Rotation.identity()), step))[
+            "mouth"
+        ]
+        assert len(chosen) <= MOST_AT_ONCE
+        shown = np.zeros(5)
+        for index, weight in chosen:
+            shown[index] = weight
+        assert np.abs(shown - before).max() < 0.12, cm
+        assert shown.sum() <= 1 + 1e-9
+        before = shown
+    assert before.sum() > 0.99
+
+
+def test_weights_follow_time_and_not_the_number_of_frames(weights: StillWeights) -> None:
+    rest, opened = (weights.doing(expression(open_cm=cm).astype(float), Rotation.identity()) for cm in (0.0, 1.0))
+
+    def after(frames: int) -> float:
+        fresh = StillWeights(with_stills().stills, face_of(close_up()))
+        fresh.update(rest, 0.0)
+        for index in range(frames):
+            shown = fresh.update(opened, 0.1 * (index + 1) / frames)
+        return sum(weight for _, weight in shown["mouth"])
+
+    assert 0.5 < after(3) < 0.95
+    assert after(3) == pytest.approx(after(12), abs=0.01)
+
+
+def test_a_clock_that_begins_anew_shows_what_is_wanted_at_once(weights: StillWeights) -> None:
+    rest, opened = (weights.doing(expression(open_cm=cm).astype(float), Rotation.identity()) for cm in (0.0, 1.0))
+    weights.update(rest, 100.0)
+    assert sum(weight for _, weight in weights.update(opened, 0.0)["mouth"]) > 0.98
