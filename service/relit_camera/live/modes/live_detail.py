@@ -44,8 +44,8 @@ class LiveDetailTunables:
     needed: float = 0.3
     range: tuple[float, float] = (0.2, 5.0)
     floor: float = 0.02
-    full_code: float = 235.0
-    clipped_code: float = 250.0
+    full_code: float = 232.0
+    clipped_code: float = 252.0
     noise: float = 3.5
     mismatch: float = 0.5
     mismatch_face: float = 1.2
@@ -101,12 +101,13 @@ def blend_cells(live: Cells, brightest: Cells, source: SourceCells, unit: float)
     clipped = np.clip((brightest - tuning.full_code) / (tuning.clipped_code - tuning.full_code), 0, 1)
     seen = source.skin * source.confidence * (1 - clipped)
     match = _match(live, clipped, source, seen, unit)
-    confidence = np.maximum(source.confidence * match, _LEAST)
-    ratio = cv2.divide(source.relit, np.maximum(source.under_room, _LEAST))
+    confidence = source.confidence * match
+    ratio = np.clip(cv2.divide(source.relit, np.maximum(source.under_room, _LEAST)), *_RATIO_ROOTS)
     ratio *= _correction(source.relit, live * ratio, seen * match, tuning.coarse * unit)
     amplified = (_largest(ratio) / np.float32(tuning.noise)) ** 2
     trust = (1 - clipped) / (1 + amplified * amplified)
-    trust = 1 - (1 - trust) * np.minimum(_SURE * confidence, 1)
+    # Eyes and lips are the live picture's in any case; and each cell stands on few pixels, whose noise would flicker.
+    trust = cv2.blur(1 - (1 - trust) * source.skin * np.minimum(_SURE * confidence, 1), (3, 3))
     weighted = cv2.merge([*(cv2.multiply(each, confidence) for each in cv2.split(ratio)), confidence])
     return CellBlend(np.asarray(weighted, np.float32), np.asarray(trust, np.float32))
 
@@ -124,9 +125,13 @@ def live_cells(image: DisplayImage, step: int, cells: tuple[int, ...]) -> tuple[
 
 
 _ROOTS_OF_CODES = root_of_light(linear_from_uint8(np.arange(256, dtype=np.uint8)[None]))[0]
+_RATIO_ROOTS = (0.02 ** (1 / POWER), 12 ** (1 / POWER))
+"""Limits of the ratio: the source image is extrapolated while the head turns, and may have no light somewhere."""
 _LEAST, _SURE = np.float32(1e-4), np.float32(1.5)
 """A least divisor; and what makes a confidence of two thirds count as certainty, since it is soft at the rim."""
 _GRAY = np.full((1, 3), 1 / 3, np.float32)
+_NEAR = np.float32(0.02)
+"""Mean weight in the neighborhood below which nobody knows what is expected."""
 _ROBUST_ROUNDS, _REDUCTION = 2, 4
 """Of the expectation, which is so wide that it is computed for fewer cells, by a factor on each side."""
 
@@ -138,7 +143,8 @@ def _match(live: Cells, clipped: Cells, source: SourceCells, seen: Cells, unit: 
     """
     tuning = TUNABLES
     bright, known = cv2.transform(live, _GRAY), cv2.transform(source.under_room, _GRAY)
-    least = np.float32(tuning.mismatch_floor * float((known * seen).sum()) / max(float(seen.sum()), 1e-6))
+    mean = float((known * seen).sum()) / max(float(seen.sum()), 1e-6)
+    least = np.float32(max(tuning.mismatch_floor * mean, 1e-3))
     apart = cv2.log((bright + least) / (known + least)) * np.float32(POWER)
     limit = tuning.mismatch + np.float32(tuning.mismatch_face - tuning.mismatch) * source.face
     rows, columns = apart.shape
@@ -148,10 +154,11 @@ def _match(live: Cells, clipped: Cells, source: SourceCells, seen: Cells, unit: 
     for _ in range(_ROBUST_ROUNDS):
         counted = weight / (1 + (error / few) ** 2)
         sums = cv2.GaussianBlur(cv2.merge([goal * counted, counted]), (0, 0), tuning.wide * unit / _REDUCTION)
-        expected = sums[..., 0] / (sums[..., 1] + np.float32(1e-6))
-        error = goal - expected
-    error = apart - cv2.resize(expected, (columns, rows), interpolation=cv2.INTER_LINEAR)
-    error *= 1 - clipped  # how bright an overexposed cell is nobody knows
+        error = goal - sums[..., 0] / (sums[..., 1] + np.float32(1e-6))
+    expected, near = cv2.split(cv2.resize(sums, (columns, rows), interpolation=cv2.INTER_LINEAR))
+    error = (apart - expected / (near + np.float32(1e-6))) * (near / (near + _NEAR))
+    # An overexposed cell may be brighter than it seems.
+    error = np.where(error < 0, error * (1 - clipped), error)
     return np.asarray(1 / (1 + (error / limit) ** 2), np.float32)
 
 

@@ -104,7 +104,7 @@ class RatioRelighting:
         """The source image under the scene's light and, below it, under the room's: (2 · height, width, 3) float32.
 
         As roots (`light_multiplication`), because the step between two of them is about as visible anywhere. Both have
-        a little light added, so that their ratio is bounded in shadows.
+        a little light added, so that their ratio is moderate in shadows.
 
         Args:
             relit: (height, width, 3) float32 linear, the source image under the scene's light.

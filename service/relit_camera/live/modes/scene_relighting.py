@@ -120,7 +120,7 @@ class SceneRelighting:
             time_s: of the frame.
             room: the room's light map; another object for another light.
             room_in_head_frame: the same as the head sees it.
-            combine: makes an array (height, width, 3 or 4) of non-negative values.
+            combine: makes an array (rows, columns, channels) of non-negative values.
             every: as in `relight`; the comparison is made less often.
         """
         with self._timer.stage("light"):

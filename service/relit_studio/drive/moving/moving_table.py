@@ -27,7 +27,7 @@ from relit_camera.subject.subject import Subject
 LIVE = "live"
 """The row of the live picture itself."""
 FIRST_FRAME = 2
-"""From here on frames count: before, mode ratio shows the subject while it looks for the face."""
+"""From here on frames count: before, mode ratio eases in from the picture as filmed."""
 SHEET_FRAMES = 6
 
 
