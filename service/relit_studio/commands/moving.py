@@ -36,12 +36,14 @@ def moving(
     tracker: Annotated[str, typer.Option(help="Name of the tracker.")] = "mesh",
     samples: Annotated[int, typer.Option(min=1, max=65536, help="A pixel.")] = 10,
     every: Annotated[int, typer.Option(min=1, max=24, help="Render only every N-th frame.")] = 6,
+    field_size: Annotated[int, typer.Option(min=32, max=4096, help="Of the subject, pixels.")] = 256,
+    field_lights: Annotated[int, typer.Option(min=4, max=9999, help="That the subject is made of.")] = 96,
 ) -> None:
     """Render people who talk and turn before webcams and in the light that is wanted, and compare; it can be resumed.
 
     DIR/moving.json and a table on stdout have the PSNR of each part of the person, DIR/PERSON/*.png the pictures.
     """
-    settings = MovingSettings(samples=samples, every=every)
+    settings = MovingSettings(samples=samples, every=every, field_size=field_size, field_lights=field_lights)
     figures: list[tuple[str, PartFigures]] = []
     for name in people.split(","):
         files = MovingTruth(out / name)

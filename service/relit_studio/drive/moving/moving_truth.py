@@ -37,7 +37,7 @@ class MovingSettings:
         every: render only every N-th frame of the performance.
         frames: of the performance, from its beginning.
         samples: a pixel.
-        lights: of the field.
+        field_lights: lights of the field.
         field_size: of its pictures, pixels.
     """
 
@@ -45,7 +45,7 @@ class MovingSettings:
     every: int = 6
     frames: int = MEETING.frames
     samples: int = 10
-    lights: int = 96
+    field_lights: int = 96
     field_size: int = 256
 
 
@@ -85,7 +85,7 @@ def render_field_subject(person: Person, files: MovingTruth, settings: MovingSet
         return
     field = files.folder / "field"
     quality = Quality(settings.samples)
-    render_field(person, field, FieldSettings(settings.lights, settings.field_size, quality=quality), progress)
+    render_field(person, field, FieldSettings(settings.field_lights, settings.field_size, quality=quality), progress)
     lights = field / "lights.lp"
     points = read_landmarks(field / "landmarks.json", required=True)
     write_subject(files.subject, build_subject(import_samples(lights), "default", lights.name, "srgb", points))
