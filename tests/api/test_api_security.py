@@ -128,5 +128,7 @@ def test_the_panel_asks_nobody_else_and_fits_its_policy(client: Client, path: st
     assert not re.search(r"(?:https?:)?//[a-z0-9.-]+\.[a-z]{2,}", text)
     if path.endswith(".html"):
         assert not re.search(r"<script(?![^>]*\ssrc=)|<style|\sstyle=|\son[a-z]+=", text)
-    for module in re.findall(r'^(?:import|export) [^;]*"(\.[^"]+)"|import\("(\.[^"]+)"\)', text, re.MULTILINE):
+    for module in re.findall(
+        r'^(?:import|export)[^;"]*(?:from|import) "(\.[^"]+)"|import\("(\.[^"]+)"\)', text, re.MULTILINE
+    ):
         assert posixpath.normpath(posixpath.join(posixpath.dirname(path), "".join(module))) in PAGES

@@ -78,7 +78,7 @@ def test_a_film_is_sent_read_reported_and_shown(tmp_path: Path, monkeypatch: pyt
         camera.put("subject", name=None)
         assert camera.http.delete("subjects/me").status_code == 204
         assert camera.http.get("captures/film").json()["stage"] == "idle"
-        assert not (tmp_path / "data" / "captures" / "film").exists()
+        assert list((tmp_path / "data" / "captures" / "film").iterdir()) == []
 
 
 def test_what_is_no_film_is_told_and_can_be_forgotten(tmp_path: Path) -> None:
@@ -91,4 +91,4 @@ def test_what_is_no_film_is_told_and_can_be_forgotten(tmp_path: Path) -> None:
         assert failed["cure"]
         assert failed["can_resume"]
         assert camera.http.delete("captures/film?forget=true").json()["stage"] == "idle"
-        assert not (tmp_path / "data" / "captures" / "film").exists()
+        assert list((tmp_path / "data" / "captures" / "film").iterdir()) == []

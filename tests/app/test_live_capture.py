@@ -96,7 +96,7 @@ def test_a_captured_subject_is_stored_and_shown(studio: Callable[[SubjectBuilder
     status = camera.capture.status()
     assert (status.stage, status.subject) == (CaptureStage.DONE, "me")
     assert "turn toward the window" in status.what
-    assert camera.stages() == ["filming", "building", "done"]
+    wait_until(lambda: camera.stages() == ["filming", "building", "done"])
     assert camera.scenes.scene.subject_name == "me"
     assert camera.scenes.scene.look.mode is Mode.RATIO
     assert camera.scenes.subjects.names() == ["me"]

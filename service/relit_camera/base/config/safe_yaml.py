@@ -43,7 +43,11 @@ def parse_yaml(text: str) -> Any:
         return _Document(yaml.parse(text, _PARSER)).value()
     except yaml.YAMLError as error:
         reason = getattr(error, "problem", None) or str(error)
-        raise ValueError(f"{_line(getattr(error, 'problem_mark', None))}: {' '.join(reason.split())}") from error
+        mark = getattr(error, "problem_mark", None)
+        # The end of a text lies in a line of its own, which nobody sees.
+        last = max(len(text.splitlines()), 1)
+        line = f" line {min(mark.line + 1, last)}" if mark else ""
+        raise ValueError(f"{line}: {' '.join(reason.split())}") from error
 
 
 def yaml_text(value: Any) -> str:
