@@ -14,9 +14,19 @@ from numpy.typing import NDArray
 
 from relit_camera.base.config.look import Lamp, Lighting, Look, Preset
 from relit_camera.base.config.preset_store import preset_text
+from relit_camera.subject.compression.webp_packing import pack_subject
 from relit_camera.subject.subject_file import write_subject
 from tests import bad_pictures as bad
-from tests.fuzz.lying_files import FINDS, exr_of_channels, gif_of_size, sound_matte, sound_video, subject
+from tests.fuzz.lying_files import (
+    FINDS,
+    exr_of_channels,
+    gif_of_size,
+    sound_matte,
+    sound_video,
+    subject,
+    subject_with_still,
+    webp_of_side,
+)
 
 MAX_BYTES = 1 << 16
 """Larger finds are not changed: each change would take as long as they do."""
@@ -57,7 +67,14 @@ def corpus() -> dict[str, tuple[tuple[str, bytes], ...]]:
             (".exr", exr_of_channels({"R": (1, 1), "G": (1, 1), "B": (1, 1)})),
             (".exr", exr_of_channels({"Y": (1, 1)})),
         ],
-        "subject": [(".relit", subject()), (".relit", _packed_subject())],
+        "subject": [
+            (".relit", subject()),
+            (".relit", _packed_subject()),
+            (".relit", subject_with_still(webp_of_side(24))),
+            (".relit", subject_with_still(webp_of_side(641))),
+            (".relit", subject_with_still(coded(".tif", noise))),
+            (".relit", subject_with_still(webp_of_side(24), (8.0, 1e7))),
+        ],
         "matte": [(".npz", sound_matte())],
         "video": [(suffix, sound_video(suffix)) for suffix in (".mp4", ".mkv", ".avi", ".mov")]
         + [(".gif", bad.gif()), (".gif", gif_of_size(64, 32, 2))],
@@ -77,7 +94,7 @@ def _packed_subject() -> bytes:
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "a.relit"
-        write_subject(path, small_subject(), small=True)
+        write_subject(path, pack_subject(small_subject(), 4), small=True)
         return path.read_bytes()
 
 

@@ -266,6 +266,33 @@ def subject_of_much_metadata(size: int = 95 * MIB) -> bytes:
     return safetensors(header, sound[8 + length :])
 
 
+def subject_with_still(webp: bytes, landmarks: tuple[float, float] = (8.0, 16.0)) -> bytes:
+    """A sound subject with one expression still, its landmarks at two places by turns, the eyes' corners apart."""
+    points = np.full((1, 478, 2), landmarks[0], np.float32)
+    points[:, 200:] = landmarks[1]
+    tensors: dict[str, np.ndarray] = {
+        "stills.webp": np.frombuffer(webp, np.uint8),
+        "stills.landmarks": points,
+        "stills.expressions": np.zeros((1, 478, 3), np.float32),
+        "stills.rotations": np.zeros((1, 3), np.float32),
+        "stills.lights": np.zeros((1, 32, 64, 3), np.float16),
+    }
+    kinds = {"uint8": "U8", "float32": "F32", "float16": "F16"}
+    sound = subject()
+    length = int.from_bytes(sound[:8], "little")
+    header, content = json.loads(sound[8 : 8 + length]), sound[8 + length :]
+    for name, values in tensors.items():
+        place = [len(content), len(content) + values.nbytes]
+        header[name] = {"dtype": kinds[values.dtype.name], "shape": list(values.shape), "data_offsets": place}
+        content += values.tobytes()
+    return safetensors(header, content)
+
+
+def webp_of_side(side: int) -> bytes:
+    """A square WebP picture."""
+    return bytes(cv2.imencode(".webp", np.zeros((side, side, 3), np.uint8))[1])
+
+
 # Mattes
 
 

@@ -26,6 +26,12 @@ MAX_STILLS = 20
 MAX_STILL_SIDE_PX = 640
 """Largest side of a still's picture: twenty of them, on top of each other, stay within a WebP picture's limits."""
 WEBP_QUALITY = 92
+OUTSIDE = 0.25
+"""Share of the larger side of a still's picture by which a landmark may lie outside it."""
+EYE_CORNERS, MIN_EYE_SPAN_PX = (33, 263), 2.0
+"""The outer corners of the eyes in `STILL_SCHEME`, and their least distance."""
+MAX_EXPRESSION_CM, MAX_ROTATION_RAD = 20.0, 2 * np.pi
+"""Largest movement of a point, and largest turn: no face does more."""
 PREFIX = "stills."
 STILL_TENSORS = tuple(PREFIX + name for name in ("webp", "landmarks", "expressions", "rotations", "lights"))
 """Tensors of a subject file that hold the stills: all of them, or none."""
@@ -101,7 +107,7 @@ def stills_of_tensors(tensors: Mapping[str, NDArray]) -> tuple[ExpressionStill, 
 
     Raises:
         SubjectError: a tensor of the stills is missing, or the picture cannot be decoded.
-        ValueError: their shapes do not fit together.
+        ValueError: their shapes do not fit together, or no face has such values.
     """
     if not any(name in tensors for name in STILL_TENSORS):
         return ()
@@ -112,24 +118,62 @@ def stills_of_tensors(tensors: Mapping[str, NDArray]) -> tuple[ExpressionStill, 
     count = len(rest[0])
     if not 1 <= count <= MAX_STILLS or any(len(each) != count for each in rest):
         raise ValueError(f"the stills' tensors hold {[len(each) for each in rest]} stills")
-    pictures = np.split(_decoded(encoded, count), count)
+    size = _size(encoded, count)
+    _require_plausible(size, *rest)
+    pictures = np.split(_decoded(encoded, (size[0], count * size[1])), count)
     return tuple(
         ExpressionStill(np.ascontiguousarray(picture), landmarks, expression, rotation, light.astype(np.float32))
         for picture, landmarks, expression, rotation, light in zip(pictures, *rest, strict=True)
     )
 
 
-def _decoded(encoded: NDArray[np.uint8], count: int) -> DisplayImage:
-    """The pictures of `count` stills, on top of each other."""
-    broken = SubjectError("its expression stills cannot be decoded", "restore the file from a copy")
+def _broken() -> SubjectError:
+    return SubjectError("its expression stills cannot be decoded", "restore the file from a copy")
+
+
+def _size(encoded: NDArray[np.uint8], count: int) -> tuple[int, int]:
+    """Width and height of each of `count` stills that lie on top of each other in one WebP picture."""
+    data = encoded.tobytes() if encoded.ndim == 1 else b""
+    if not data.startswith(b"RIFF") or data[8:12] != b"WEBP":  # OpenCV would decode any other kind of picture too
+        raise _broken()
     try:
-        width, height = image_header(encoded.tobytes()).size
+        width, height = image_header(data).size
     except ValueError as error:
-        raise broken from error
+        raise _broken() from error
     if width > MAX_STILL_SIDE_PX or height > count * MAX_STILL_SIDE_PX or height % count:
-        raise broken
+        raise _broken()
+    return width, height // count
+
+
+def _require_plausible(
+    size: tuple[int, int],
+    landmarks: NDArray[np.float32],
+    expressions: NDArray[np.float32],
+    rotations: NDArray[np.float32],
+    lights: NDArray[np.float16],
+) -> None:
+    """Raise ValueError where the stills' arrays, hold values that would cost minutes or crash."""
+    margin = OUTSIDE * max(size)
+    if landmarks.shape[1:] == (STILL_POINTS, 2):
+        if (landmarks < -margin).any() or (landmarks > np.array(size) + margin).any():
+            raise ValueError("landmarks of a still lie far outside its picture")
+        right, left = (landmarks[:, corner].astype(np.float64) for corner in EYE_CORNERS)
+        if (np.linalg.norm(left - right, axis=1) < MIN_EYE_SPAN_PX).any():
+            raise ValueError(f"the eyes in a still are less than {MIN_EYE_SPAN_PX:.0f} pixels apart")
+    for values, limit, name in (
+        (expressions, MAX_EXPRESSION_CM, "expression"),
+        (rotations, MAX_ROTATION_RAD, "rotation"),
+    ):
+        if (np.linalg.norm(values.astype(np.float64), axis=-1) > limit).any():
+            raise ValueError(f"a still's {name} is larger than {limit:.1f}")
+    if (lights < 0).any():
+        raise ValueError("a still's light is negative")
+
+
+def _decoded(encoded: NDArray[np.uint8], size: tuple[int, int]) -> DisplayImage:
+    """The picture, which states this width and height."""
     with suppress_decoder_messages():
         column = cv2.imdecode(np.array(encoded), cv2.IMREAD_COLOR)
-    if column is None or column.shape != (height, width, 3):
-        raise broken
+    if column is None or column.shape != (size[1], size[0], 3):
+        raise _broken()
     return np.asarray(cv2.cvtColor(column, cv2.COLOR_BGR2RGB), np.uint8)

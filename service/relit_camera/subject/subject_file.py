@@ -6,7 +6,7 @@ import json
 import logging
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,8 @@ from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import write_atomic, write_tensors
 from relit_camera.subject.compression.local_basis import LocalBasis, global_basis
 from relit_camera.subject.compression.webp_packing import decode_basis, encode_basis
+from relit_camera.subject.expression_stills import STILL_TENSORS, ExpressionStill, still_tensors, stills_of_tensors
 from relit_camera.subject.expression_stills import TYPES as STILL_TYPES
-from relit_camera.subject.expression_stills import still_tensors, stills_of_tensors
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
 
 log = logging.getLogger(__name__)
@@ -81,6 +81,7 @@ def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
     Raises:
         StorageError: the file cannot be written.
         InputError: `small`, and the pictures are larger than a WebP picture may be.
+        ValueError: `small`, and the subject is not packed: its pictures go beyond −1..1.
     """
     meta = subject.metadata.model_copy(update={"format_version": 1 if small else FORMAT_VERSION})
     tensors: dict[str, NDArray] = {name: getattr(subject, name) for name in REQUIRED_TENSORS}
@@ -99,7 +100,7 @@ def write_subject(path: Path, subject: Subject, small: bool = False) -> None:
 def read_subject(path: Path, copied: bool = False) -> Subject:
     """Open a subject; its arrays are read-only views of the mapped file, which the system may drop and read again.
 
-    The basis of a file of version 1 is not: it is decoded into memory.
+    The basis of a file of version 1 and the pictures of expression stills are not: they are decoded into memory.
 
     Args:
         path: the file.
@@ -107,7 +108,8 @@ def read_subject(path: Path, copied: bool = False) -> Subject:
             the system kills a process that reads a mapped file which was truncated meanwhile.
 
     Raises:
-        SubjectError: missing, too large, damaged, of another version, or with values that are not finite.
+        SubjectError: missing, too large, damaged, of another version, or with values that are not finite or, in
+            expression stills, impossible.
     """
     with _open_safetensors(path, MAX_COPIED_BYTES if copied else MAX_BYTES) as file:
         metadata = _metadata(path, file.metadata() or {})
@@ -150,6 +152,19 @@ def copy_subject(source: Path, target: Path, **noted: object) -> None:
     header = json.dumps(layout, separators=(",", ":")).encode()
     header += b" " * (-len(header) % 8)  # tensors begin at a multiple of 8
     write_atomic(target, len(header).to_bytes(8, "little") + header + tensors)
+
+
+def write_stills(source: Path, target: Path, stills: Sequence[ExpressionStill]) -> None:
+    """Copy a subject file with these expression stills instead of its own; the other tensors are copied as they are.
+
+    Raises:
+        SubjectError: `source` is no subject.
+        StorageError: `target` cannot be written.
+    """
+    with _open_safetensors(source, MAX_BYTES) as file:
+        metadata = _metadata(source, file.metadata() or {})
+        tensors = _tensor_views(source, list(set(file.keys()) - set(STILL_TENSORS)), copied=False)
+    write_tensors(target, tensors | still_tensors(stills), {HEADER_KEY: metadata.model_dump_json()})
 
 
 def read_neutral(path: Path) -> DisplayImage:

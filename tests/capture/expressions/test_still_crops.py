@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.capture.expressions.still_crops import MAX_ENLARGEMENT, crop_stills
+from relit_camera.capture.expressions.still_crops import MAX_ENLARGEMENT, StillCropper
 from relit_camera.subject.expression_stills import MAX_STILL_SIDE_PX
 from tests.capture.expressions.talking_film import SCHEME, SIZE, moved_points, tracked
 
@@ -14,20 +14,20 @@ from tests.capture.expressions.talking_film import SCHEME, SIZE, moved_points, t
 @pytest.mark.parametrize("source_span", [20.0, 1000.0])
 def test_a_landmark_is_where_it_was(source_span: float) -> None:
     faces = [tracked(0, moved_points()), tracked(1, moved_points(open_cm=1.5), yaw=30)]
-    images = {}
+    cropper = StillCropper(faces, SCHEME, source_span)
     for face in faces:
-        images[face.index] = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+        frame = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
         dot = [round(16 * (float(each) - 0.5)) for each in face.landmarks[1]]
-        cv2.circle(images[face.index], dot, 16 * 6, (255, 255, 255), -1, shift=4)
-    for image, landmarks in crop_stills(images, faces, SCHEME, source_span):
+        cv2.circle(frame, dot, 16 * 6, (255, 255, 255), -1, shift=4)
+        image, landmarks = cropper.crop(frame, face)
         y, x = np.nonzero(image[..., 0] > 127)
         assert (x.mean() + 0.5, y.mean() + 0.5) == pytest.approx(landmarks[1], abs=0.5)
 
 
 def test_all_are_of_one_size_and_hold_the_face() -> None:
     faces = [tracked(0, moved_points()), tracked(1, moved_points(open_cm=2), yaw=30, pitch=15)]
-    images = {index: np.zeros((SIZE[1], SIZE[0], 3), np.uint8) for index in (0, 1)}
-    crops = crop_stills(images, faces, SCHEME, 50.0)
+    cropper = StillCropper(faces, SCHEME, 50.0)
+    crops = [cropper.crop(np.zeros((SIZE[1], SIZE[0], 3), np.uint8), face) for face in faces]
     sides = {image.shape for image, _ in crops}
     assert len(sides) == 1
     side = sides.pop()[0]
@@ -42,7 +42,7 @@ def test_all_are_of_one_size_and_hold_the_face() -> None:
 def test_the_room_behind_is_not_kept() -> None:
     face = tracked(0, moved_points())
     room = np.random.default_rng(0).integers(0, 256, (SIZE[1], SIZE[0], 3)).astype(np.uint8)
-    ((image, landmarks),) = crop_stills({0: room}, [face], SCHEME, 1000.0)
+    image, landmarks = StillCropper([face], SCHEME, 1000.0).crop(room, face)
     corners = image[[0, 0, -1, -1], [0, -1, 0, -1]]
     assert (corners == corners[0]).all()
     x, y = landmarks[1].astype(int)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from relit_camera.live.reenactment.warp import Box, FlowPatch, StillBorder, Warp
+from relit_camera.live.reenactment.warp import Box, FixedBorder, FlowPatch, Warp
 
 SIMILARITY = np.array([[0.7 * np.cos(0.3), -0.7 * np.sin(0.3), 36.0], [0.7 * np.sin(0.3), 0.7 * np.cos(0.3), -16.0]])
 WHOLE = (0, 0, 320, 240)
@@ -179,7 +179,7 @@ def test_pictures_of_either_type_and_any_channels_are_sampled_alike(
 def test_a_still_border_holds_what_lies_there_and_leaves_the_middle_alone() -> None:
     patch = FlowPatch(np.full((41, 31, 2), 3, np.float32), np.array([-40.0, -30, 140, 180]))
     box, affine = (0, 0, 120, 170), np.array([[1.0, 0, -10], [0, 1, -10]])
-    moved = map_of(Warp(affine, (patch, StillBorder((100, 150)))), box, 1) - looked_at(affine, box)
+    moved = map_of(Warp(affine, (patch, FixedBorder((100, 150)))), box, 1) - looked_at(affine, box)
     x, y = np.moveaxis(looked_at(affine, box), 2, 0)
     outside = (x <= 0) | (x >= 100) | (y <= 0) | (y >= 150)
     np.testing.assert_allclose(moved[outside], 0, atol=1e-5)

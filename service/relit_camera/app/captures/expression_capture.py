@@ -1,18 +1,18 @@
-"""Expression stills for a subject from a film of that person: from the file to the subject with its stills."""
+"""Expression stills for a subject from a film of that person: from the file to the stills."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from relit_camera.base.errors import CaptureError
-from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.images.image_types import DisplayImage, Points
 from relit_camera.base.video.video_readers import VideoReader
-from relit_camera.capture.expressions.film_tracking import TrackedFilm, track_film
-from relit_camera.capture.expressions.still_crops import crop_stills
+from relit_camera.capture.expressions.film_tracking import TrackedFace, TrackedFilm, track_film
+from relit_camera.capture.expressions.still_crops import StillCropper
 from relit_camera.capture.expressions.still_selection import select_stills
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
 from relit_camera.light.light_map import LightMap
@@ -26,21 +26,23 @@ from relit_camera.subject.subject import Subject
 LIGHT_FRAMES, LIGHT_TIME_S = 40, 1.0
 """Frames that the room's light is estimated from, spread over the film, and the time between them that the estimator is
 told, so that it fits the light to each."""
+SAME_PERSON_S = 2.0
+"""A face may not be another person's within this time of a still, before or after it."""
 STAGE = "Estimating the light of the room"
 Progress = Callable[[str, int, int | None], None]
 
 
 @dataclass(frozen=True)
 class ExpressionCapture:
-    """A subject with stills, and what they show.
+    """Stills for a subject, and what they show.
 
     Attributes:
-        subject: the person, older stills replaced.
+        stills: in order of time.
         covered: names of what the stills show.
         missing: what to do in another film for the rest.
     """
 
-    subject: Subject
+    stills: tuple[ExpressionStill, ...]
     covered: tuple[str, ...]
     missing: tuple[str, ...]
 
@@ -64,34 +66,34 @@ def capture_expressions(
     face = find_source_face(subject, open_tracker("mesh", TrackerOptions(blendshapes=False)))
     film = track_film(video, progress)
     selection = select_stills(film)
-    chosen = {each.index for each in selection.faces}
+    chosen = {each.index: each for each in selection.faces}
     spread = np.unique(np.linspace(0, len(film.faces) - 1, LIGHT_FRAMES).astype(int))
     probed = {film.faces[i].index for i in spread}
-    last = max(chosen | probed)
-    images: dict[int, DisplayImage] = {}
+    last = max(chosen.keys() | probed)
+    cropper = StillCropper(selection.faces, film.scheme, face.scheme.eye_span(face.landmarks))
+    crops: dict[int, tuple[DisplayImage, Points]] = {}
     room = _RoomLight(subject, face, film)
-    with VideoReader(video, threads=2) as reader:
+    with VideoReader(video, threads=2, only=chosen.keys() | probed) as reader:
         for frame in reader:
             progress(STAGE, frame.index, last)
             if frame.index in probed:
                 room.add(frame.image, frame.index)
             if frame.index in chosen:
-                images[frame.index] = frame.image
+                crops[frame.index] = cropper.crop(frame.image, chosen[frame.index])
             if frame.index >= last:
                 break
-    _require_same_person(film, face, room.residual)
-    crops = crop_stills(images, selection.faces, film.scheme, face.scheme.eye_span(face.landmarks))
-    stills = [
+    _require_same_person(film, selection.faces, face, room.residual)
+    stills = tuple(
         ExpressionStill(
             image,
             landmarks,
-            film.expression(each).astype(np.float32),
-            film.rotation(each).as_rotvec().astype(np.float32),
-            rotate_light_map(room.light_map, film.rotation(each)),
+            film.expression(chosen[index]).astype(np.float32),
+            film.rotation(chosen[index]).as_rotvec().astype(np.float32),
+            rotate_light_map(room.light_map, film.rotation(chosen[index])),
         )
-        for each, (image, landmarks) in zip(selection.faces, crops, strict=True)
-    ]
-    return ExpressionCapture(replace(subject, stills=tuple(stills)), selection.covered, selection.missing)
+        for index, (image, landmarks) in crops.items()
+    )
+    return ExpressionCapture(stills, selection.covered, selection.missing)
 
 
 class _RoomLight:
@@ -99,7 +101,6 @@ class _RoomLight:
 
     Attributes:
         light_map: (32, 64, 3) float32, after the frames so far.
-        residual: how badly it explains the face, see `RoomLightEstimate`.
     """
 
     def __init__(self, subject: Subject, face: SourceFace, film: TrackedFilm) -> None:
@@ -108,22 +109,34 @@ class _RoomLight:
         self._film = film
         self._frames = 0
         self.light_map: LightMap = np.zeros((0, 0, 3), np.float32)
-        self.residual = 0.0
+        self._residuals: list[float] = []
 
     def add(self, image: DisplayImage, index: int) -> None:
         """Fit the light to one more frame."""
         face = self._faces[index]
         estimate = self._estimator.update(image, face.landmarks, self._film.rotation(face), LIGHT_TIME_S * self._frames)
         self._frames += 1
-        self.light_map, self.residual = estimate.light_map, estimate.residual
+        self.light_map = estimate.light_map
+        self._residuals.append(estimate.residual)
+
+    @property
+    def residual(self) -> float:
+        """How badly the light explains the face, see `RoomLightEstimate`: the median of the frames so far."""
+        return float(np.median(self._residuals))
 
 
-def _require_same_person(film: TrackedFilm, face: SourceFace, residual: float) -> None:
-    """Raise CaptureError where shape and skin of the film's face are not the subject's."""
+def _require_same_person(film: TrackedFilm, chosen: Sequence[TrackedFace], face: SourceFace, residual: float) -> None:
+    """Raise CaptureError where shape and skin of the neutral face, or of a chosen one, are not the subject's.
+
+    A grimace and a turn change the shape: of the frames round a chosen one the least distance counts.
+    """
     limits = IdentityTunables()
-    shape_cm = min(
-        shape_distance_cm(points, face) for points in (film.neutral.points, *(each.points for each in film.faces[::10]))
-    )
+    times = np.array([each.time_s for each in film.faces])
+    distances_cm = np.array([shape_distance_cm(each.points, face) for each in film.faces])
+    shape_cm = shape_distance_cm(film.neutral.points, face)
+    for each in chosen:
+        near = np.abs(times - each.time_s) <= SAME_PERSON_S
+        shape_cm = max(shape_cm, float(distances_cm[near].min()))
     if (shape_cm / limits.shape_cm) * (residual / limits.residual) > 1:
         raise CaptureError(
             f"the face in {film.path.name} is not the subject's: it has another shape ({10 * shape_cm:.1f} mm) and "

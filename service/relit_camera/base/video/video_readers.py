@@ -199,7 +199,9 @@ class VideoReader(FrameReader[Frame]):
             iterating if the size changes, or, after all frames that can be read, if there were damaged ones.
     """
 
-    def __init__(self, path: Path, *, accurate: bool = True, threads: int = 1) -> None:
+    def __init__(
+        self, path: Path, *, accurate: bool = True, threads: int = 1, only: Collection[int] | None = None
+    ) -> None:
         """Open a file.
 
         Args:
@@ -207,10 +209,11 @@ class VideoReader(FrameReader[Frame]):
             accurate: convert colors to within half a code value; otherwise faster, about one code value too dark, or
                 Motion JPEG as `jpeg_packets` does.
             threads: of the decoder.
+            only: indices of the frames to return; all if None.
         """
         self._accurate, self._plain_jpeg = accurate, False
         self._convert = PixelConverter(accurate=accurate)
-        super().__init__(path, threads)
+        super().__init__(path, threads, only)
 
     def _decode_packet(self, packet: Any) -> list[Any] | None:
         if self._plain_jpeg and is_cut_short(packet):

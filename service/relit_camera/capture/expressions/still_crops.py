@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -20,29 +20,29 @@ MAX_ENLARGEMENT = 2.0
 """Largest distance of the eyes in a still, in parts of that in the source image: more would not be seen."""
 
 
-def crop_stills(
-    images: Mapping[int, DisplayImage], faces: Sequence[TrackedFace], scheme: LandmarkScheme, source_span: float
-) -> list[tuple[DisplayImage, Points]]:
-    """A square picture of each face alone, and the landmarks in it.
+class StillCropper:
+    """Makes a square picture of each face alone, all of one size."""
 
-    Args:
-        images: the frames by their index.
-        faces: those of the stills.
-        scheme: of the landmarks.
-        source_span: distance of the outer eye corners in the source image, in pixels.
-    """
-    span = float(np.median([scheme.eye_span(face.landmarks) for face in faces]))
-    scale = min(1.0, MAX_ENLARGEMENT * source_span / span)
-    boxes = [(face.landmarks.min(axis=0), face.landmarks.max(axis=0)) for face in faces]
-    widest = max(float((high - low).max()) for low, high in boxes) * (1 + 2 * MARGIN)
-    side = min(round(widest * scale), MAX_STILL_SIDE_PX)
-    scale = side / widest
-    result = []
-    for face, (low, high) in zip(faces, boxes, strict=True):
-        affine = np.column_stack([np.eye(2) * scale, side / 2 - scale * (low + high) / 2])
+    def __init__(self, faces: Sequence[TrackedFace], scheme: LandmarkScheme, source_span: float) -> None:
+        """Find the size.
+
+        Args:
+            faces: those of all stills.
+            scheme: of the landmarks.
+            source_span: distance of the outer eye corners in the source image, in pixels.
+        """
+        span = float(np.median([scheme.eye_span(face.landmarks) for face in faces]))
+        scale = min(1.0, MAX_ENLARGEMENT * source_span / span)
+        widest = max(float(np.ptp(face.landmarks, axis=0).max()) for face in faces) * (1 + 2 * MARGIN)
+        self._side = min(round(widest * scale), MAX_STILL_SIDE_PX)
+        self._scale = self._side / widest
+
+    def crop(self, image: DisplayImage, face: TrackedFace) -> tuple[DisplayImage, Points]:
+        """The picture of a face in a frame, and the landmarks in it."""
+        middle = (face.landmarks.min(axis=0) + face.landmarks.max(axis=0)) / 2
+        affine = np.column_stack([np.eye(2) * self._scale, self._side / 2 - self._scale * middle])
         moved = (face.landmarks @ affine[:, :2].T + affine[:, 2]).astype(np.float32)
-        result.append((_face_alone(_resampled(images[face.index], affine, side, scale), moved), moved))
-    return result
+        return _face_alone(_resampled(image, affine, self._side, self._scale), moved), moved
 
 
 def _face_alone(image: DisplayImage, landmarks: Points) -> DisplayImage:

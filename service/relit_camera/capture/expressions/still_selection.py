@@ -15,7 +15,6 @@ from relit_camera.face.landmarks.expression_features import (
     CLOSURE,
     WIDTH_CM,
     eye_closure,
-    eye_features,
     mouth_features,
     mouth_gap_cm,
 )
@@ -27,7 +26,7 @@ class SelectionTunables:
 
     Attributes:
         min_sharpness: of that of a sharp frame (the 90th percentile).
-        mouths, shut_eyes, gazes, turns: most stills of each kind.
+        mouths, shut_eyes, turns: most stills of each kind.
         least_distance: from what is chosen, in units of the features, below which a frame shows nothing new.
         frontal_deg: largest turn in stills of mouth and eyes.
         turned_deg: least turn in stills of a turned head.
@@ -38,7 +37,6 @@ class SelectionTunables:
     min_sharpness: float = 0.35
     mouths: int = 10
     shut_eyes: int = 2
-    gazes: int = 2
     turns: int = 5
     least_distance: float = 0.5
     frontal_deg: float = 14.0
@@ -61,7 +59,6 @@ class ShownFace:
         mouth: see `mouth_features`, minus those of the neutral face.
         gap_cm: between the lips, beyond the neutral face's.
         closure: of the eye that is less shut, see `eye_closure`.
-        gaze: (2,) mean over both eyes, minus the neutral face's.
         quality: 0..1, by sharpness.
     """
 
@@ -71,7 +68,6 @@ class ShownFace:
     mouth: NDArray[np.float64]
     gap_cm: float
     closure: float
-    gaze: NDArray[np.float64]
     quality: float
 
     @property
@@ -86,7 +82,6 @@ COVERAGE: tuple[tuple[str, str, Callable[[ShownFace], bool]], ...] = (
     ("round mouth", "say 'oo'", lambda shown: shown.mouth[2] < -0.25 / WIDTH_CM),
     ("jaw dropped", "open your mouth wide", lambda shown: shown.gap_cm > 1.2),
     ("eyes shut", "shut your eyes for a second", lambda shown: shown.closure > TUNABLES.shut[0]),
-    ("gaze aside", "look to the sides without turning", lambda shown: abs(float(shown.gaze[0])) > 0.8),
     ("turned left", "turn your head to the picture's left", lambda shown: shown.yaw < -15),
     ("turned right", "turn your head to the picture's right", lambda shown: shown.yaw > 15),
     ("turned far left", "turn it further left", lambda shown: shown.yaw < -25),
@@ -118,14 +113,12 @@ def select_stills(film: TrackedFilm) -> Selection:
     """
     shown = [each for each in _shown_faces(film) if each.quality >= TUNABLES.min_sharpness]
     frontal = [each for each in shown if each.turn_deg < TUNABLES.frontal_deg]
-    awake = [each for each in frontal if each.closure < TUNABLES.shut[1]]
     shut = [each for each in frontal if each.closure > TUNABLES.shut[0]]
     turned = [each for each in shown if each.turn_deg > TUNABLES.turned_deg and each.closure < TUNABLES.shut[1]]
     chosen = [
         *sorted(shut, key=lambda each: -each.closure * each.quality)[:1],
         *_farthest(frontal, lambda each: each.mouth, TUNABLES.mouths),
         *_farthest(frontal, lambda each: np.array([each.closure / CLOSURE]), TUNABLES.shut_eyes),
-        *_farthest(awake, lambda each: each.gaze, TUNABLES.gazes),
         *_farthest(turned, _turn, TUNABLES.turns, lambda each: float(np.exp(-0.1 * (each.mouth**2).sum()))),
     ]
     faces = sorted({each.face.index: each.face for each in chosen}.values(), key=lambda face: face.index)
@@ -170,7 +163,6 @@ def _shown_faces(film: TrackedFilm) -> list[ShownFace]:
     sharp = float(np.percentile([face.sharpness for face in film.faces], 90))
     mouth, gap = mouth_features(neutral, scheme), mouth_gap_cm(neutral, scheme)
     eyes = (scheme.right_eye, scheme.left_eye)
-    gaze = np.mean([eye_features(neutral, eye, 0.0)[1:] for eye in eyes], axis=0)
     result = []
     for face in film.faces:
         yaw, pitch, _ = angles_from_rotation(film.rotation(face))
@@ -183,7 +175,6 @@ def _shown_faces(film: TrackedFilm) -> list[ShownFace]:
                 mouth_features(face.points, scheme) - mouth,
                 mouth_gap_cm(face.points, scheme) - gap,
                 closure,
-                np.mean([eye_features(face.points, eye, closure)[1:] for eye in eyes], axis=0) - gaze,
                 float(np.clip(face.sharpness / max(sharp, 1e-9), 0, 1)),
             )
         )

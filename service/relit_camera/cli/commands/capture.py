@@ -145,7 +145,7 @@ def expressions(
     from relit_camera.cli.arguments import load_command_settings
     from relit_camera.cli.model_offer import offer_models
     from relit_camera.cli.progress import progress_bar, stage_reporter
-    from relit_camera.subject.subject_file import read_subject, write_subject
+    from relit_camera.subject.subject_file import read_subject, write_stills
 
     settings = load_command_settings(context)
     offer_models("mesh", "none", pull, settings.pull_models)
@@ -155,8 +155,8 @@ def expressions(
     with atomic_path(path) as subject_file:
         with progress_bar() as progress:
             captured = capture_expressions(video, person, stage_reporter(progress))
-        write_subject(subject_file, captured.subject, small=person.metadata.format_version == 1)
-    typer.echo(f"{path}: {len(captured.subject.stills)} stills: {', '.join(captured.covered)}")
+        write_stills(subject, subject_file, captured.stills)
+    typer.echo(f"{path}: {len(captured.stills)} stills: {', '.join(captured.covered)}")
     if captured.missing:
         typer.echo(f"not shown yet; for more, film again and {', '.join(captured.missing)}", err=True)
 

@@ -12,8 +12,8 @@ from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks, LandmarkS
 
 LIP_CM, WIDTH_CM, CORNER_CM = 0.25, 0.45, 0.25
 """Units of the mouth: height of upper and lower lip, width, height of the corners."""
-CLOSURE, GAZE_CM = 0.25, 0.2
-"""Units of an eye: share of the neutral opening by which it is shut, and movement of the iris."""
+CLOSURE = 0.25
+"""Unit of an eye: share of the neutral opening by which it is shut."""
 
 
 def mouth_features(points: NDArray[np.floating], scheme: LandmarkScheme) -> NDArray[np.float64]:
@@ -43,19 +43,3 @@ def eye_closure(points: NDArray[np.floating], neutral: NDArray[np.floating], eye
         return float(np.linalg.norm(upper - lower, axis=1).mean())
 
     return 1 - gap(points) / max(gap(neutral), 1e-6)
-
-
-def eye_features(points: NDArray[np.floating], eye: EyeLandmarks, closure: float) -> NDArray[np.float64]:
-    """Closure and the place of the iris between the corners: (3,), the iris 0 for schemes without one.
-
-    The iris of an eye that shuts counts less: it is not seen.
-
-    Args:
-        points: (count, 3) head-space centimetres.
-        eye: which eye.
-        closure: of that eye, see `eye_closure`.
-    """
-    gaze = np.zeros(2)
-    if eye.iris:
-        gaze = (points[eye.iris[0]] - points[[eye.inner, eye.outer]].mean(axis=0))[:2] / GAZE_CM
-    return np.array([closure / CLOSURE, *(gaze * np.clip(1.5 - 1.5 * closure, 0, 1))])

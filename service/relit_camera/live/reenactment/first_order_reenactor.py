@@ -27,8 +27,8 @@ from relit_camera.live.reenactment.reenactor import ReenactorContext, WarpedLaye
 from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.stills.still_drawing import StillDrawing
 from relit_camera.live.reenactment.warp import (
+    FixedBorder,
     Patch,
-    StillBorder,
     Warp,
     inverse_affine,
     move_body,
@@ -72,7 +72,7 @@ class FirstOrderReenactor:
             self._motion, self._mesh, self._points, target.points, target.landmarks, target.pose
         )
         if not self._person.whole:
-            patches = (*patches, StillBorder(face.size))
+            patches = (*patches, FixedBorder(face.size))
         placed = move_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
         box = visible_box(placed, face.size, self._size)
         grid = Warp(placed, patches).grid(box, 2 * self._step if quality.half_size else self._step)
@@ -80,7 +80,14 @@ class FirstOrderReenactor:
         to_box[:, 2] -= box[:2]
         size = (box[2] - box[0], box[3] - box[1])
         stills = self._stills and self._stills.plan(
-            target.landmarks, target.pose, motion.expression, frame.time_s, to_box, size, self._step
+            target.landmarks,
+            target.pose,
+            motion.expression,
+            frame.time_s,
+            to_box,
+            size,
+            self._step,
+            quality.half_size,
         )
 
         def warp(relit: LinearImage) -> WarpedLayer:

@@ -67,13 +67,13 @@ class BodyMotion:
 
 def split_body_motion(face: SourceFace, motion: FaceMotion) -> BodyMotion:
     """Split the head's displacement: what turning on the neck explains bends the neck, the rest moves the body."""
-    still = face.pose
-    turned = rotate_about(NECK_PIVOT, still, soft_limit_rotation(motion.rotation, MAX_ROTATION_DEG))
-    body = still.translation + motion.translation - turned.translation
-    depth = still.depth_of(NECK_PIVOT)
+    unmoving = face.pose
+    turned = rotate_about(NECK_PIVOT, unmoving, soft_limit_rotation(motion.rotation, MAX_ROTATION_DEG))
+    body = unmoving.translation + motion.translation - turned.translation
+    depth = unmoving.depth_of(NECK_PIVOT)
     scale = float(np.clip(depth / max(depth - body[2], 1.0), *SCALE_RANGE))
-    shift = np.clip(body[:2], -MAX_SHIFT_CM, MAX_SHIFT_CM) * [1, -1] * still.focal_px / depth
-    return BodyMotion(turned, shift, scale, project(NECK_PIVOT[None], still, face.size)[0])
+    shift = np.clip(body[:2], -MAX_SHIFT_CM, MAX_SHIFT_CM) * [1, -1] * unmoving.focal_px / depth
+    return BodyMotion(turned, shift, scale, project(NECK_PIVOT[None], unmoving, face.size)[0])
 
 
 def transfer_motion(face: SourceFace, points: ControlPoints, motion: FaceMotion) -> TransferredPose:
@@ -87,8 +87,8 @@ def transfer_motion(face: SourceFace, points: ControlPoints, motion: FaceMotion)
     shoulders = points.source[-len(SHOULDER_ANCHORS_CM) :]  # they stay
     head = rigid_head_anchors(body.turned, face.size)
     ears = np.s_[-len(EARS_AND_JAW) :]
-    still = points.source[: -len(SHOULDER_ANCHORS_CM)][ears]
-    head[ears] = keep_beside_face(head[ears], landmarks, still, face.landmarks.astype(np.float64))
+    unmoving = points.source[: -len(SHOULDER_ANCHORS_CM)][ears]
+    head[ears] = keep_beside_face(head[ears], landmarks, unmoving, face.landmarks.astype(np.float64))
     moved = np.vstack([landmarks[points.chosen], head, shoulders])
     return TransferredPose(moved, landmarks, body.turned, body.shift, body.scale, body.pivot)
 

@@ -229,7 +229,7 @@ BORDER_FADE = 0.08
 
 
 @dataclass(frozen=True)
-class StillBorder:
+class FixedBorder:
     """Holds the border of the source image where it is: what lies beyond was not captured and must not come into view.
 
     Attributes:

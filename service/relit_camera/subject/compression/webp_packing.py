@@ -87,6 +87,7 @@ def encode_basis(basis: NDArray) -> NDArray[np.uint8]:
 
     Raises:
         InputError: they are too many or too large for one WebP picture.
+        ValueError: a value is beyond −1..1, which would come back as another.
     """
     _, components, height, width = basis.shape
     across, down = _grid(components)
@@ -95,6 +96,8 @@ def encode_basis(basis: NDArray) -> NDArray[np.uint8]:
         raise InputError(
             f"{components} pictures of {width}x{height} do not fit into one WebP picture", "keep fewer components"
         )
+    if not np.abs(basis).max() <= 1.001:  # rounding
+        raise ValueError("principal pictures beyond -1..1 cannot be stored as one picture")
     rooted = np.sign(basis) * np.sqrt(np.abs(basis.astype(np.float32)))
     codes = np.full((3, across * down, height, width), 128, np.uint8)
     codes[:, :components] = np.rint(rooted * 127 + 128).astype(np.uint8)

@@ -12,7 +12,11 @@ from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.head_pose import project
 from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
 from relit_camera.live.reenactment.motion_transfer import rotate_about
+from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.reenactment.stills import still_light, still_regions
 from relit_camera.live.reenactment.stills.still_drawing import StillDrawing
+from relit_camera.live.reenactment.stills.still_regions import face_in_still
+from relit_camera.subject.expression_stills import ExpressionStill
 from relit_camera.subject.subject import Subject
 from tests.live.people import close_up, context_of, live_frame, motion, moved_by
 from tests.live.reenactment.stills.made_stills import expression, relit, soft_light, still, with_stills
@@ -72,6 +76,47 @@ def test_a_driver_in_a_scheme_that_stills_do_not_have_sees_none() -> None:
     other = replace(face, scheme=scheme, landmarks=face.landmarks[:66], head_points=scheme.canonical.copy())
     reenactor = FirstOrderReenactor(replace(context_of(with_stills(), SIZE), face=other))
     assert reenactor._stills is None
+
+
+def test_each_still_is_placed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing all of the face into a still is what takes the time when a subject is chosen."""
+    placed = []
+
+    def counted(made: ExpressionStill, face: SourceFace) -> np.ndarray:
+        placed.append(made)
+        return face_in_still(made, face)
+
+    for module in (still_light, still_regions):
+        monkeypatch.setattr(module, "face_in_still", counted)
+    subject = with_stills()
+    StillDrawing(subject, context_of(subject, SIZE).face)
+    assert len(placed) == len(subject.stills)
+
+
+def test_the_light_on_the_face_is_computed_once_for_one_relit_picture() -> None:
+    subject = with_stills()
+    light = still_light.StillLight(subject, context_of(subject, SIZE).face)
+    first, second = (relit(subject, soft_light(color=color)) for color in (1.0, 0.5))
+    roots = light.relit_roots(first)
+    assert light.relit_roots(first) is roots
+    assert light.relit_roots(second).mean() < roots.mean()
+    np.testing.assert_array_equal(light.relit_roots(first), roots)
+
+
+def test_at_half_the_size_a_quarter_of_the_pixels_is_drawn() -> None:
+    subject = with_stills()
+    face = context_of(subject, SIZE).face
+    moved = expression(open_cm=1.0).astype(np.float64)
+    landmarks = project(face.head_points + moved, face.pose, face.size).astype(np.float64)
+
+    def pixels(half_size: bool) -> int:
+        as_it_is = np.eye(2, 3)
+        task = StillDrawing(subject, face).plan(
+            landmarks, face.pose, moved, 0.0, as_it_is, face.size, 2, half_size=half_size
+        )
+        return sum(layer.cover.size for region in task.regions for layer in region.layers)
+
+    assert pixels(half_size=True) < 0.35 * pixels(half_size=False)
 
 
 def test_no_region_ends_at_the_border_of_its_box() -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.head_pose import project
-from relit_camera.live.reenactment.stills.still_regions import facing, shown_landmarks, still_regions
+from relit_camera.live.reenactment.stills.still_regions import face_in_still, facing, shown_landmarks, still_regions
 from tests.live.people import SCHEME, close_up, face_of
 from tests.live.reenactment.stills.made_stills import expression, soft_light, still
 
@@ -40,7 +40,8 @@ def test_each_region_fades_out_and_leaves_the_rest_alone() -> None:
 
 
 def test_a_still_does_not_show_at_the_outline_of_its_face() -> None:
-    shown = shown_landmarks(still(soft_light(), expression()), face_of(close_up()))
+    face, made = face_of(close_up()), still(soft_light(), expression())
+    shown = shown_landmarks(made, face, face_in_still(made, face))
     assert shown[list(SCHEME.oval)].max() < 0.5
     assert shown[list(SCHEME.lips)].min() == 1
 
@@ -53,7 +54,7 @@ def test_what_a_turned_nose_hides_is_not_shown() -> None:
         still(soft_light(), expression(), turn),
         landmarks=project(SCHEME.canonical.copy(), replace(face.pose, rotation=turn * face.pose.rotation), face.size),
     )
-    shown = shown_landmarks(turned, face)
+    shown = shown_landmarks(turned, face, face_in_still(turned, face))
     beside_nose, mirrored = 358, 129
     assert SCHEME.canonical[beside_nose, 0] == -SCHEME.canonical[mirrored, 0] > 0
     assert shown[beside_nose] < 0.2

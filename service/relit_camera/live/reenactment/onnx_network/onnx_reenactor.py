@@ -27,9 +27,9 @@ from relit_camera.live.reenactment.reenactor import ReenactorContext, WarpedLaye
 from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.warp import (
     Box,
+    FixedBorder,
     FlowPatch,
     Patch,
-    StillBorder,
     Warp,
     inverse_affine,
     move_body,
@@ -102,7 +102,7 @@ class OnnxReenactor:
         displacement = (flow - identity_grid(*flow.shape[:2])) * np.float32(half * share)
         middle = np.array(self._crop.center)
         patch = FlowPatch(displacement, np.concatenate([middle - half, middle + half]))
-        return (patch,) if self._person.whole else (patch, StillBorder(self._face.size))
+        return (patch,) if self._person.whole else (patch, FixedBorder(self._face.size))
 
 
 def output_from_crop(crop: Crop, shape: tuple[int, ...], placed: NDArray[np.float64], box: Box) -> NDArray[np.float64]:

@@ -23,7 +23,6 @@ from relit_camera.live.reenactment.stills.still_regions import (
     BEHIND_CM,
     StillRegion,
     facing,
-    shown_landmarks,
     still_regions,
 )
 from relit_camera.live.reenactment.stills.still_weights import StillWeights
@@ -118,9 +117,11 @@ class StillDrawing:
     def __init__(self, subject: Subject, face: SourceFace) -> None:
         """`face` is the source image's, in the scheme of the stills."""
         self._face = face
-        self._meshes = [_RegionMesh(region, face, subject.stills) for region in still_regions(face.scheme)]
-        self._weights = StillWeights(subject.stills, face)
         self._light = StillLight(subject, face)
+        self._meshes = [
+            _RegionMesh(region, face, subject.stills, self._light.shown) for region in still_regions(face.scheme)
+        ]
+        self._weights = StillWeights(subject.stills, face)
 
     def plan(
         self,
@@ -131,6 +132,7 @@ class StillDrawing:
         to_picture: NDArray[np.float64],
         size: tuple[int, int],
         step: int,
+        half_size: bool = False,
     ) -> StillTask:
         """Find out what shows where; the task draws it.
 
@@ -142,13 +144,17 @@ class StillDrawing:
             to_picture: (2, 3) source pixels → pixels of the moved picture.
             size: (width, height) of that.
             step: pixels between computed positions.
+            half_size: draw at half the picture's resolution at most, positions twice as far apart.
         """
         rotation = pose.rotation * self._face.pose.rotation.inv()
         chosen = self._weights.update(self._weights.doing(expression, rotation), time_s)
         seen = landmarks @ to_picture[:, :2].T + to_picture[:, 2]
         depth = pose.rotation.as_matrix()[2]
+        step = 2 * step if half_size else step
         drawn = [
-            mesh.plan(chosen[mesh.region.name], seen, depth, size, step * SIDE_STEPS if mesh.is_side else step)
+            mesh.plan(
+                chosen[mesh.region.name], seen, depth, size, step * SIDE_STEPS if mesh.is_side else step, half_size
+            )
             for mesh in self._meshes
         ]
         mouth = sum(weight for _, weight in chosen["mouth"])
@@ -169,7 +175,10 @@ class _RegionMesh:
         is_side: whether it is a side of the face.
     """
 
-    def __init__(self, region: StillRegion, face: SourceFace, stills: Sequence[ExpressionStill]) -> None:
+    def __init__(
+        self, region: StillRegion, face: SourceFace, stills: Sequence[ExpressionStill], shown: NDArray[np.float64]
+    ) -> None:
+        """`shown` (stills, landmarks) is how far each still shows each landmark."""
         self.region = region
         self.is_side = region.name in ("right_side", "left_side")
         triangles = region.triangles
@@ -179,10 +188,10 @@ class _RegionMesh:
         self._scheme = face.scheme
         self._spans = [face.scheme.eye_span(still.landmarks) for still in stills]
         self._places = []
-        for still in stills:
+        for still, seen in zip(stills, shown, strict=True):
             corners = still.landmarks[triangles].astype(np.float64)
-            shown = facing(corners) | region.between  # the others are turned away in the still
-            trust = (region.trust * shown_landmarks(still, face))[triangles] * shown[:, None]
+            front = facing(corners) | region.between  # the others are turned away in the still
+            trust = (region.trust * seen)[triangles] * front[:, None]
             self._places.append(np.concatenate([corners, trust[..., None]], axis=2))
 
     def plan(
@@ -192,6 +201,7 @@ class _RegionMesh:
         depth: NDArray[np.float64],
         size: tuple[int, int],
         step: int,
+        half_size: bool,
     ) -> _PlannedRegion | None:
         """What shows in the picture; None where nothing does.
 
@@ -201,6 +211,7 @@ class _RegionMesh:
             depth: (3,) direction in the head toward the camera.
             size: (width, height) of the picture.
             step: pixels between computed positions.
+            half_size: draw at half the picture's resolution, however fine the stills are.
         """
         if not chosen:
             return None
@@ -211,7 +222,7 @@ class _RegionMesh:
             return None
         width, height = (int(side) for side in high - low)
         finest = max(self._spans[still] for still, _ in chosen)
-        halved = self._scheme.eye_span(seen.astype(np.float32)) > HALVED_FROM * finest
+        halved = half_size or self._scheme.eye_span(seen.astype(np.float32)) > HALVED_FROM * finest
         step += step % 2  # so that it can be halved
         # Positions are those of the middles of cells, one more round the box: see `PositionGrid`.
         corners = ((seen - low) / step + 0.5).take(self.region.triangles, axis=0)

@@ -35,6 +35,8 @@ FILL_CELLS = (1.5, 5.0)
 """Sigmas of the blurs that lead the light of the skin into eyes and mouth."""
 MAX_ROOT = 3.9
 """Limit of a factor's root: the tables of `multiply_light` end there."""
+MAX_PIXELS_PER_CELL = 32.0
+"""Of a still in a cell of the grid, side by side: more are not averaged, it would take seconds."""
 FLOOR = 0.02
 """Share of the mean that is added to both sides of a quotient: shadows stay bounded."""
 UNLIT_SKIN = 0.25
@@ -46,6 +48,7 @@ class StillLight:
 
     Attributes:
         unlit: each still divided by the source image under the still's own light, uint8 sRGB, times the color of skin.
+        shown: (stills, landmarks) float64, see `shown_landmarks`.
     """
 
     def __init__(self, subject: Subject, face: SourceFace) -> None:
@@ -53,22 +56,33 @@ class StillLight:
         under_own = _relit_on_grid(subject, self._grid, [still.light for still in subject.stills])
         skin = np.array(cv2.mean(np.mean(under_own, axis=0), (self._grid.skin > 0.5).astype(np.uint8))[:3])
         self._skin = np.maximum(skin / max(float(skin.max()), 1e-6), 0.1).astype(np.float32) * np.float32(UNLIT_SKIN)
-        self.unlit = [
-            _unlit(still, face, self._grid, _filled(own, self._grid.skin), self._skin)
-            for still, own in zip(subject.stills, under_own, strict=True)
-        ]
+        self.unlit: list[DisplayImage] = []
+        shown = []
+        for still, own in zip(subject.stills, under_own, strict=True):
+            placed = face_in_still(still, face)
+            shown.append(shown_landmarks(still, face, placed))
+            seen = _on_source(still, face, self._grid, shown[-1])
+            self.unlit.append(_unlit(still, placed, self._grid, seen, _filled(own, self._grid.skin), self._skin))
+        self.shown = np.stack(shown)
+        self._last: tuple[LinearImage, NDArray[np.float32]] | None = None
 
     def relit_roots(self, relit: LinearImage) -> NDArray[np.float32]:
         """Roots (rows, columns, 3) of what unlit stills are multiplied with, on the grid.
 
         Args:
-            relit: (height, width, 3) the relit source image.
+            relit: (height, width, 3) the relit source image, which is not written to; for the same one again what was
+                computed is kept.
         """
+        last = self._last  # replaced as a whole: tasks run in other threads
+        if last is not None and last[0] is relit:
+            return last[1]
         left, top, right, bottom = self._grid.box
         part = cv2.resize(relit[top:bottom, left:right], self._grid.size, interpolation=cv2.INTER_AREA)
         light = _filled(np.maximum(part, 0), self._grid.skin)
         roots = root_of_light(np.asarray(light / self._skin, np.float32))
-        return np.minimum(roots, MAX_ROOT, out=roots)
+        np.minimum(roots, MAX_ROOT, out=roots)
+        self._last = (relit, roots)
+        return roots
 
     def at(self, picture: NDArray[np.float32], positions: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values of a picture of the grid at source pixels (rows, columns, 2)."""
@@ -144,13 +158,17 @@ def _relit_on_grid(subject: Subject, grid: _Grid, lights: list[NDArray[np.float3
 
 def _unlit(
     still: ExpressionStill,
-    face: SourceFace,
+    placed: NDArray[np.float32],
     grid: _Grid,
+    on_source: tuple[NDArray[np.float32], Mask],
     under_own: NDArray[np.float32],
     skin: NDArray[np.float32],
 ) -> DisplayImage:
-    """A still, corrected, by the source image under its own light, times a color (3,): see `StillLight.unlit`."""
-    seen, valid = _on_source(still, face, grid)
+    """A still, corrected, by the source image under its own light, times a color (3,): see `StillLight.unlit`.
+
+    `placed` and `on_source` are what `face_in_still` and `_on_source` give for it.
+    """
+    seen, valid = on_source
     weight = valid * grid.skin
     sigma = MATCHED_SPANS * grid.span
     theirs, ours = _blurred(seen, weight, sigma), _blurred(under_own, weight, sigma)
@@ -158,14 +176,17 @@ def _unlit(
     mean, still_mean = (max(float(cv2.mean(each, sure)[1]), 1e-4) for each in (under_own, seen))
     correction = (ours + FLOOR * mean) / (theirs + FLOOR * still_mean)
     factor = np.asarray(correction / (under_own + np.float32(FLOOR * mean)), np.float32)
-    cells = grid.cells(_source_of_still(still, face))
+    cells = grid.cells(_source_of_still(placed))
     onto = cv2.remap(factor, cells, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return uint8_from_linear(np.asarray(linear_from_uint8(still.image) * onto * skin, np.float32))
 
 
-def _source_of_still(still: ExpressionStill, face: SourceFace) -> NDArray[np.float32]:
-    """Where each pixel of a still lies in the source image: (height, width, 2); beyond the face, the nearest place."""
-    x, y, drawn = face_in_still(still, face)
+def _source_of_still(placed: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Where each pixel of a still lies in the source image: (height, width, 2); beyond the face, the nearest place.
+
+    `placed` is what `face_in_still` gives.
+    """
+    x, y, drawn = placed
     _, labels = cv2.distanceTransformWithLabels(
         (drawn < 0.5).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
@@ -175,18 +196,23 @@ def _source_of_still(still: ExpressionStill, face: SourceFace) -> NDArray[np.flo
     return np.asarray(np.dstack([x.ravel()[place[labels]], y.ravel()[place[labels]]]), np.float32)
 
 
-def _on_source(still: ExpressionStill, face: SourceFace, grid: _Grid) -> tuple[NDArray[np.float32], Mask]:
-    """A still as it lies on the source image's face, linear (rows, columns, 3), and how far it shows the face."""
+def _on_source(
+    still: ExpressionStill, face: SourceFace, grid: _Grid, shown: NDArray[np.float64]
+) -> tuple[NDArray[np.float32], Mask]:
+    """A still as it lies on the source image's face, linear (rows, columns, 3), and how far it shows the face.
+
+    `shown` is what `shown_landmarks` gives.
+    """
     triangles = canonical_face().triangles
     triangles = triangles[facing(still.landmarks[triangles].astype(np.float64))]
     corners = (face.landmarks - grid.box[:2]) / grid.cell - 0.5
-    values = np.column_stack([still.landmarks, shown_landmarks(still, face)])
+    values = np.column_stack([still.landmarks, shown])
     columns, rows = grid.size
     x, y, valid = draw_triangles(
         corners[triangles].astype(np.float64), values[triangles].astype(np.float64), (rows, columns)
     )
     # A cell is as many pixels of the still as the eyes are wider there.
-    reach = max(face.scheme.eye_span(still.landmarks) / grid.span, 1.0)
+    reach = np.clip(face.scheme.eye_span(still.landmarks) / grid.span, 1.0, MAX_PIXELS_PER_CELL)
     light = cv2.GaussianBlur(linear_from_uint8(still.image), (0, 0), reach / 2)
     seen = cv2.remap(light, x - np.float32(0.5), y - np.float32(0.5), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(seen, np.float32), valid

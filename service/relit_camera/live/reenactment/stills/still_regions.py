@@ -86,14 +86,14 @@ def facing(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(ax * by < ay * bx)  # counter-clockwise where y goes up
 
 
-def shown_landmarks(still: ExpressionStill, face: SourceFace) -> NDArray[np.float64]:
+def shown_landmarks(still: ExpressionStill, face: SourceFace, placed: NDArray[np.float32]) -> NDArray[np.float64]:
     """How far each landmark's surroundings are seen in a still, 0..1 (count,).
 
     Not where a nearer part of the face hides them, and less toward the outline of the face in the still: landmarks err
-    by a pixel or two, and behind the outline is the room.
+    by a pixel or two, and behind the outline is the room. `placed` is what `face_in_still` gives for the same still.
     """
     scheme, span = face.scheme, face.scheme.eye_span(face.landmarks)
-    x, y, drawn = face_in_still(still, face)
+    x, y, drawn = placed
     column, row = np.clip(still.landmarks.astype(int), 0, np.array(drawn.shape[::-1]) - 1).T
     aside = np.hypot(x[row, column] - face.landmarks[:, 0], y[row, column] - face.landmarks[:, 1]) / span
     seen = smoothstep(aside.astype(np.float64), *HIDDEN_SPANS)

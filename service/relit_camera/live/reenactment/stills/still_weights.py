@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Rotation, angles_from_rotation
 from relit_camera.face.landmarks.expression_features import (
+    CLOSURE,
     eye_closure,
-    eye_features,
     mouth_features,
     mouth_gap_cm,
 )
@@ -38,12 +38,17 @@ TURNED_DEG = (9.0, 18.0)
 """The same for a side that turns away, by the yaw."""
 SMOOTHING_S = {"mouth": 0.05, "right_eye": 0.025, "left_eye": 0.025, "right_side": 0.12, "left_side": 0.12}
 """Time in which weights follow, by region."""
-MOST_AT_ONCE = 2
+RIVAL, FADED = 0.35, 0.1
+"""Share of the largest weight up to which another still does not show: of the wanted weights, so that few are mixed,
+and of those that follow them."""
 NEGLIGIBLE = 0.03
-"""Weight below which nothing shows."""
+"""Sum of the weights up to which nothing shows."""
 NEARER = (0.5, 0.75)
 """The source image's distance from the driver's mouth by that and the nearest still's: from where on, with shut lips,
 stills show, and up to where wholly."""
+NEUTRAL_MOUTH = (0.4, 0.8)
+"""Distance of a mouth from the neutral one up to which it is neutral, and from where on it is another: nearer to it,
+noise decides which is nearest. A still of a neutral mouth is no reason to show stills."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +76,13 @@ class StillWeights:
             self.doing(still.expression.astype(np.float64), Rotation.from_rotvec(still.rotation.astype(np.float64)))
             for still in stills
         ]
+        offset = np.stack([still.features["mouth"] for still in self._stills]) - self._neutral.features["mouth"]
+        self._other_mouths = np.linalg.norm(offset[:, :-2], axis=1) > NEUTRAL_MOUTH[0]
         self._features = {
             region: np.stack([still.features[region] for still in self._stills]) for region in SMOOTHING_S
         }
         self._yaws = np.array([_angles(still.rotation)[0] for still in stills])
-        self._shown: dict[str, NDArray[np.float64]] = {}
+        self._followed: dict[str, NDArray[np.float64]] = {}
         self._time_s: float | None = None
 
     def doing(self, expression: NDArray[np.float64], rotation: Rotation) -> Doing:
@@ -96,14 +103,13 @@ class StillWeights:
         # Seen from the side, width and corners are confused with the depth of the lips, which landmarks do not tell.
         sideways = 1 / (1 + (yaw / SIDEWAYS_DEG) ** 2)
         certain = {"mouth": np.array([1, 1, sideways, sideways, 1, 1, 1])}
-        eyes = (scheme.right_eye, scheme.left_eye)
-        closures = [eye_closure(points, neutral, eye) for eye in eyes]
-        for name, eye, own, other, sign in zip(
-            ("right_eye", "left_eye"), eyes, closures, closures[::-1], (-1.0, 1.0), strict=True
+        closures = [eye_closure(points, neutral, eye) for eye in (scheme.right_eye, scheme.left_eye)]
+        for name, own, other, sign in zip(
+            ("right_eye", "left_eye"), closures, closures[::-1], (-1.0, 1.0), strict=True
         ):
             # The lids of the eye that turns away are seen too flat: the other one tells.
             closure = own + float(smoothstep(sign * yaw, *TURNED_DEG)) * (other - own)
-            features[name] = np.append(eye_features(points, eye, closure), turn / FEATURE_TURN_UNIT_DEG)
+            features[name] = np.append(closure / CLOSURE, turn / FEATURE_TURN_UNIT_DEG)
             needed[name] = float(smoothstep(closure, *CLOSING_LID))
         # The person's right is at the picture's left: that side turns away while the nose turns there.
         for name, sign in (("right_side", -1.0), ("left_side", 1.0)):
@@ -123,10 +129,10 @@ class StillWeights:
         chosen = {}
         for region, smoothing_s in SMOOTHING_S.items():
             wanted = self._wanted(region, doing)
-            before = self._shown.get(region, wanted)
-            shown = before + (1 - np.exp(-passed / smoothing_s)) * (wanted - before)
-            self._shown[region] = shown
-            chosen[region] = _strongest(shown)
+            before = self._followed.get(region, wanted)
+            followed = before + (1 - np.exp(-passed / smoothing_s)) * (wanted - before)
+            self._followed[region] = followed
+            chosen[region] = _drawn(followed)
         return chosen
 
     def _wanted(self, region: str, doing: Doing) -> NDArray[np.float64]:
@@ -139,19 +145,22 @@ class StillWeights:
             return np.zeros(len(usable))
         offset = (self._features[region] - doing.features[region]) * doing.certain.get(region, 1.0)
         distance = np.where(usable, np.linalg.norm(offset, axis=1), FAR)
-        return np.asarray(total * sparsemax(-distance / REACH))
+        return total * _without_faint(sparsemax(-distance / REACH), RIVAL)
 
     def _total(self, region: str, doing: Doing) -> float:
         """How far stills show at all."""
         needed = doing.needed[region]
         if region != "mouth":
             return needed
+        if not self._other_mouths.any():
+            return needed
         # The turn does not make a mouth another one.
         shape, certain = doing.features[region][:-2], doing.certain[region][:-2]
         neutral = float(np.linalg.norm((self._neutral.features[region][:-2] - shape) * certain))
-        nearest = float(np.linalg.norm((self._features[region][:, :-2] - shape) * certain, axis=1).min())
-        nearer = neutral / max(neutral + nearest, 1e-6)
-        return max(needed, float(smoothstep(nearer, *NEARER)))
+        others = self._features[region][self._other_mouths, :-2]
+        nearest = float(np.linalg.norm((others - shape) * certain, axis=1).min())
+        nearer = smoothstep(neutral / max(neutral + nearest, 1e-6), *NEARER)
+        return max(needed, float(nearer * smoothstep(neutral, *NEUTRAL_MOUTH)))
 
 
 def sparsemax(scores: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -166,19 +175,19 @@ def sparsemax(scores: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.maximum(scores - above[kept] / (kept + 1), 0))
 
 
-def _strongest(weights: NDArray[np.float64]) -> list[tuple[int, float]]:
-    """The strongest few with their weights, so that one that joins or leaves them does so at weight 0."""
+def _without_faint(weights: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    """Weights of the same sum without those below a share of the largest; what is near that share gets nearly 0."""
+    left = np.maximum(weights - share * weights.max(), 0)
+    return np.asarray(left * (weights.sum() / max(float(left.sum()), 1e-12)))
+
+
+def _drawn(weights: NDArray[np.float64]) -> list[tuple[int, float]]:
+    """The stills that show and their weights, the strongest first. They join and leave at weight 0."""
     total = float(weights.sum())
-    if total < NEGLIGIBLE:
+    if total <= NEGLIGIBLE:
         return []
-    order = np.argsort(-weights)
-    left_out = float(weights[order[MOST_AT_ONCE]]) if len(order) > MOST_AT_ONCE else 0.0
-    above = np.maximum(weights[order[:MOST_AT_ONCE]] - left_out - NEGLIGIBLE * total, 0) + 1e-9
-    return [
-        (int(index), float(share * total / above.sum()))
-        for index, share in zip(order, above, strict=False)
-        if share > 1e-6
-    ]
+    shown = _without_faint(weights, FADED) * ((total - NEGLIGIBLE) / ((1 - NEGLIGIBLE) * total))
+    return [(int(index), float(shown[index])) for index in np.argsort(-shown) if shown[index] > 0]
 
 
 def _angles(rotation: NDArray[np.float32]) -> tuple[float, float]:

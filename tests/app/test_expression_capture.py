@@ -1,0 +1,45 @@
+"""Expression stills from a film: whoever else is in it, for however short, is not taken for the subject."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from relit_camera.app.captures.expression_capture import _require_same_person
+from relit_camera.base.errors import CaptureError
+from relit_camera.capture.expressions.film_tracking import TrackedFilm
+from relit_camera.live.reenactment.source_image import SourceFace
+from tests.capture.expressions.talking_film import SCHEME, film, moved_points, tracked
+from tests.live.people import close_up, face_of
+
+SUBJECT = face_of(close_up())
+OTHER = SUBJECT.head_points * [1.0, 1.12, 1.0]
+"""A longer face."""
+UNLIKE, ALIKE = 0.2, 0.05
+"""Residuals of the room's light."""
+
+
+def visit(start: int, end: int) -> TrackedFilm:
+    """Ten seconds of the subject, another person between two frames."""
+    return film(
+        *(tracked(i, OTHER if start <= i < end else SUBJECT.head_points) for i in range(300)),
+    )
+
+
+def check(seen: TrackedFilm, chosen: int, residual: float, face: SourceFace = SUBJECT) -> None:
+    _require_same_person(seen, [seen.faces[0], seen.faces[chosen]], face, residual)
+
+
+def test_a_still_of_somebody_who_visits_for_five_seconds_is_refused() -> None:
+    seen = visit(120, 270)
+    check(seen, 40, UNLIKE)
+    with pytest.raises(CaptureError, match="is not the subject's"):
+        check(seen, 195, UNLIKE)
+
+
+def test_a_grimace_and_a_face_that_light_explains_pass() -> None:
+    check(visit(120, 270), 195, ALIKE)
+    faces = [tracked(i, moved_points(open_cm=1.5) if i % 30 == 0 else SCHEME.canonical) for i in range(120)]
+    neutral = film(*faces)
+    own = SourceFace(SCHEME, SUBJECT.landmarks, SUBJECT.pose, np.array(SCHEME.canonical), SUBJECT.size)
+    check(neutral, 60, UNLIKE, own)
