@@ -153,6 +153,24 @@ def test_a_body_without_end_is_cut_off(server: ApiServer, monkeypatch: pytest.Mo
     assert sent < 32 << 20  # buffers of the system hold some
 
 
+@pytest.mark.parametrize(("path", "is_told"), [("/api/v1/replays", True), ("/api/v1/backgrounds", False)])
+def test_who_sends_a_large_form_that_is_refused_early_hears_why(
+    server: ApiServer, monkeypatch: pytest.MonkeyPatch, path: str, is_told: bool
+) -> None:
+    """Most clients send all before they read."""
+    monkeypatch.setattr(connection_timeouts, "READ_TIMEOUT_S", 60.0)
+    monkeypatch.setattr(connection_timeouts, "MAX_UNREAD_BODY_BYTES", 1 << 20)
+    body = bytes(48 << 20)
+    answer = b""
+    with connect(server) as client, suppress(ConnectionError):
+        headers = f"Content-Length: {len(body)}", "Content-Type: text/plain"
+        client.sendall(question(server, f"POST {path}", *headers))
+        time.sleep(0.5)  # so that the answer comes before the body
+        client.sendall(body)
+        answer = client.recv(1 << 16)
+    assert answer.startswith(b"HTTP/1.1 4") is is_told
+
+
 def test_malformed_requests_do_not_fill_the_log(server: ApiServer, caplog: pytest.LogCaptureFixture) -> None:
     for _ in range(20):
         with connect(server) as client:

@@ -66,6 +66,26 @@ def test_an_upload_that_is_canceled_ends_at_the_next_piece(client: Client, camer
     assert camera.film_capture.written < 6 * streamed_forms.CHUNK_BYTES
 
 
+def test_an_upload_that_comes_slowly_ends_soon_after_it_is_canceled(client: Client, camera: FakeCamera) -> None:
+    sent: list[int] = []
+
+    async def body() -> AsyncIterator[bytes]:
+        yield (
+            b'--limit\r\nContent-Disposition: form-data; name="name"\r\n\r\nme\r\n'
+            b'--limit\r\nContent-Disposition: form-data; name="file"; filename="evening.mp4"\r\n\r\n'
+        ) + bytes(streamed_forms.CHUNK_BYTES)
+        for index in range(30):
+            sent.append(index)
+            if index == 3:
+                camera.film_capture.canceled.set()
+            yield bytes(1000)
+        yield b"\r\n--limit--\r\n"
+
+    headers = {"content-type": "multipart/form-data; boundary=limit"}
+    check_problem(client.post(PATH, content=body(), headers=headers), 409)
+    assert len(sent) < 8
+
+
 def test_the_report_is_given_whole(client: Client, camera: FakeCamera) -> None:
     report = FilmReport("usable", "the lamp was never low", 120, 0.4, 33.0, 900, 280, (DroppedFrames(12, "weak"),))
     camera.film_capture.current = replace(camera.film_capture.current, stage=FilmStage.DONE, report=report)

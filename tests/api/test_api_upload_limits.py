@@ -127,3 +127,23 @@ def test_another_error_of_the_system_is_a_fault_of_the_program(
 
     monkeypatch.setattr(camera.scene_controller.backgrounds, "remove", fail)
     check_problem(client.delete("/api/v1/backgrounds/room"), 500)
+
+
+def test_beyond_the_quota_presets_are_still_shown_and_renamed(camera: FakeCamera, settings: RelitSettings) -> None:
+    """What stores nothing is not refused, nor is an empty body."""
+    client = small(camera, settings, 4e-6)
+    assert client.request("PUT", "/api/v1/presets/look").status_code in (200, 201)
+    settings.storage.data_dir.mkdir(parents=True, exist_ok=True)
+    (settings.storage.data_dir / "old").write_bytes(bytes(5000))
+    assert client.post("/api/v1/presets/look/apply").status_code == 200
+    assert client.patch("/api/v1/presets/look", {"name": "other"}).status_code == 200
+    assert client.request("PUT", "/api/v1/presets/third").status_code in (200, 201)
+    answer = client.post("/api/v1/backgrounds", content=b"x" * 100, headers={"content-type": FORM.upper()})
+    check_problem(answer, 507)
+
+
+def test_a_body_that_grows_beyond_the_quota_is_told_its_cure(camera: FakeCamera, settings: RelitSettings) -> None:
+    client = small(camera, settings, 1e-5)
+    body = form("room", bytes(20_000))
+    answer = client.post("/api/v1/backgrounds", content=in_parts(body), headers={"content-type": FORM})
+    assert "storage.quota_gb" in check_problem(answer, 507)["cure"]

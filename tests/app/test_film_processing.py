@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import stat
 import threading
 from collections.abc import Callable, Iterator
@@ -275,6 +276,41 @@ def test_a_damaged_record_is_no_reason_not_to_start(studio: Opener, content: byt
     assert again.files() == set()
     again.send()
     assert again.end().stage is FilmStage.DONE
+
+
+def test_a_record_that_cannot_be_read_now_deletes_nothing(studio: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+    there = studio(refuse_film)
+    there.send()
+    there.end()
+    kept = there.files()
+    with monkeypatch.context() as patched:
+
+        def fail(path: Path) -> bytes:
+            raise PermissionError(errno.EACCES, "Permission denied")
+
+        patched.setattr(Path, "read_bytes", fail)
+        again = studio(build_film)
+        assert again.capture.status() == FilmCaptureStatus()
+        with pytest.raises(StorageError, match="Permission denied"):
+            again.send()
+    assert again.files() == kept
+    assert studio(refuse_film).capture.status().can_resume
+
+
+def test_what_a_killed_camera_left_beside_its_record_is_deleted(studio: Opener) -> None:
+    there = studio(refuse_film)
+    there.send()
+    there.end()
+    kept = there.files()
+    (there.folder / "film-0.mp4").write_bytes(FILM)
+    assert studio(build_film).files() == kept
+    done = studio(build_film)
+    done.send()
+    done.end()
+    kept = done.files()
+    (done.folder / "film-0.mp4").write_bytes(FILM)
+    (done.folder / "stage.npz").write_bytes(FILM)
+    assert studio(build_film).files() == kept
 
 
 def test_a_film_that_is_gone_cannot_be_resumed(studio: Opener) -> None:

@@ -278,6 +278,21 @@ def test_attempts_pause_while_another_capture_needs_the_webcam(studio: Callable[
     wait_until(lambda: "filming" in camera.stages())
 
 
+def test_who_asks_during_a_pause_while_the_webcam_is_taken_ends_nothing(tmp_path: Path) -> None:
+    camera = Studio(tmp_path, refuse, replace(TIMINGS, retry_s=600.0))
+    try:
+        camera.capture.start("me", until_done=True)
+        wait_until(lambda: camera.capture.status().stage is CaptureStage.FAILED)
+        assert camera.webcam.acquire(timeout=5)
+        with pytest.raises(ConflictError, match="another capture runs"):
+            camera.capture.start("you")
+        assert camera.capture._job.is_running
+        camera.webcam.release()
+        assert camera.capture.start("you").stage is CaptureStage.FILMING
+    finally:
+        camera.close()
+
+
 def test_who_asks_during_a_pause_begins_at_once(tmp_path: Path) -> None:
     camera = Studio(tmp_path, refuse, replace(TIMINGS, retry_s=600.0))
     try:

@@ -127,6 +127,17 @@ def test_one_at_a_time_and_removed_while_it_runs(room: Opener) -> None:
         there.jobs.status("talk")
 
 
+def test_another_replay_that_has_begun_meanwhile_is_not_canceled(room: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
+    there = room(write_half_and_wait)
+    there.send("other")
+    wait_until(lambda: there.jobs.status("other").progress == 0.5)
+    monkeypatch.setattr(there.jobs, "status", lambda name: ReplayStatus(name, ReplayStage.WORKING))  # told before
+    there.jobs.remove("talk")
+    assert [each.stage for each in there.jobs.all()] == [ReplayStage.WORKING]
+    there.jobs.remove("other")
+    assert there.jobs.all() == []
+
+
 def test_a_camera_that_ends_leaves_nothing_of_it(room: Opener) -> None:
     there = room(write_half_and_wait)
     there.send()

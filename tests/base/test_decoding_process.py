@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from multiprocessing.context import SpawnProcess
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +15,7 @@ import psutil
 import pytest
 
 from relit_camera.base.concurrency.decoding_process import Decoded, DecodingProcess
-from relit_camera.base.errors import ImageError, InputError
+from relit_camera.base.errors import ImageError, InputError, NotReadyError
 
 
 def numbered(start: int) -> Decoded:
@@ -23,6 +25,10 @@ def numbered(start: int) -> Decoded:
 
 def refuse() -> Decoded:
     raise ImageError("the file is no picture", "choose another")
+
+
+def refuse_for_memory() -> Decoded:
+    raise ImageError("the file is too large", "choose another") from MemoryError()
 
 
 def fail() -> Decoded:
@@ -110,10 +116,75 @@ def test_a_program_that_stops_does_not_wait_for_a_file(process: DecodingProcess)
     stopping = threading.Timer(0.3, process.interrupt)
     stopping.start()
     began = time.monotonic()
-    with pytest.raises(InputError):
+    with pytest.raises(NotReadyError, match="the program stops"):
         process.decode(sleep)
     assert time.monotonic() - began < 10
     assert process.decode(numbered, 4).arrays[0][0, 0] == 4
+
+
+def test_a_program_that_stops_starts_no_worker_for_those_who_wait(process: DecodingProcess) -> None:
+    process.decode(numbered, 0)
+    told: list[str] = []
+
+    def ask(work: Callable[[], Decoded]) -> None:
+        with pytest.raises(NotReadyError) as caught:
+            process.decode(work)
+        told.append(caught.value.what)
+
+    threads = [threading.Thread(target=ask, args=(work,)) for work in (sleep, spin, spin)]
+    for thread in threads:
+        thread.start()
+    time.sleep(0.5)
+    process.interrupt()
+    for thread in threads:
+        thread.join(10)
+    assert told == ["the program stops"] * 3
+
+
+def test_a_stop_while_the_worker_starts_ends_it(process: DecodingProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    start = SpawnProcess.start
+
+    def interrupted(self: SpawnProcess) -> None:
+        process.interrupt()
+        start(self)
+        process.interrupt()
+
+    with monkeypatch.context() as patched:
+        patched.setattr(SpawnProcess, "start", interrupted)
+        with pytest.raises(NotReadyError, match="the program stops"):
+            process.decode(numbered, 0)
+    assert process.decode(numbered, 4).arrays[0][0, 0] == 4
+
+
+def test_the_wait_for_other_files_is_bounded() -> None:
+    process = DecodingProcess(timeout_s=20, wait_s=0.1)
+    process.decode(numbered, 0)
+
+    def keep_busy() -> None:
+        with pytest.raises(NotReadyError):
+            process.decode(sleep)
+
+    busy = threading.Thread(target=keep_busy)
+    busy.start()
+    time.sleep(0.3)
+    with pytest.raises(NotReadyError, match="other files are being decoded"):
+        process.decode(numbered, 0)
+    process.interrupt()
+    busy.join(10)
+    process.close()
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is limited on Linux")
+@pytest.mark.parametrize("harm", ["numpy", "cause", "death"])
+def test_little_free_memory_is_not_told_as_a_harmful_file(harm: str) -> None:
+    process = DecodingProcess(most_bytes=1 << 60)  # more than is free
+    harms = {"numpy": (take_memory, 1 << 50), "cause": (refuse_for_memory,), "death": (die,)}
+    with pytest.raises(NotReadyError, match="too little free memory") as caught:
+        process.decode(*harms[harm])  # type: ignore[arg-type]
+    assert "close other programs" in caught.value.cure
+    with pytest.raises(ImageError):
+        process.decode(refuse)
+    process.close()
 
 
 def test_callers_wait_for_each_other(process: DecodingProcess) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from relit_camera.subject.subject_file import write_subject
 from tests.app.subject_builders import captured
@@ -68,6 +68,36 @@ def test_a_face_that_is_gone_does_not_keep_the_unlit_picture(fake: FakeServer, o
     panel.page.locator("#unlit-stop").click()
     fake.wait_for("scene", unlit_allowed=False, subject=None)
     expect(panel.doors).to_be_visible()
+
+
+def test_the_unlit_picture_is_stopped_though_another_change_hangs_and_the_first_request_fails(
+    fake: FakeServer, open_page: OpenPage
+) -> None:
+    panel = open_panel(open_page, fake.url)
+    show_unlit(fake, panel)
+    held: list[Route] = []
+    failed: list[Route] = []
+
+    def answer(route: Route) -> None:
+        if "frozen" in (route.request.post_data or ""):
+            held.append(route)
+        elif not failed:
+            failed.append(route)
+            route.abort()
+        else:
+            route.continue_()
+
+    panel.page.route("**/api/v1/scene", answer)
+    panel.page.locator("#freeze").click()
+    panel.page.locator("#unlit-stop").click()
+    panel.page.wait_for_timeout(1500)  # the requests pass through this thread
+    assert fake.get("scene")["unlit_allowed"] is False
+    assert (len(held), len(failed)) == (1, 1)
+    assert fake.get("scene")["frozen"] is False
+    held[0].continue_()
+    panel.page.wait_for_timeout(1500)
+    now = fake.get("scene")
+    assert (now["frozen"], now["unlit_allowed"], now["subject"]) == (True, False, SUBJECT)
 
 
 def test_who_chose_nobody_is_nobody_after_being_unlit(fake: FakeServer, open_page: OpenPage) -> None:

@@ -69,6 +69,7 @@ async def receive_form(request: Request, open_file: FileOpener, most_bytes: int)
         parser = MultipartParser(parameters[b"boundary"], form.callbacks())
         waiting = bytearray()
         async for chunk in request.stream():
+            form.require_wanted()
             waiting += chunk
             if len(waiting) >= CHUNK_BYTES:
                 await run_in_threadpool(parser.write, bytes(waiting))
@@ -132,6 +133,11 @@ class _Form:
             "on_end": self._ends,
         }
 
+    def require_wanted(self) -> None:
+        """Check that the file is not canceled; with each chunk, for one that comes slowly is written seldom."""
+        if self._upload is not None:
+            self._upload.require_wanted()
+
     def require_whole(self) -> None:
         if self._file is None:
             raise _field_error("file", "field required", "missing")
@@ -190,7 +196,7 @@ class _Form:
             return
         assert self._file is not None
         assert self._upload is not None
-        self._upload.require_wanted()
+        self.require_wanted()
         self._written += end - start
         if self._written > self._most_bytes:
             raise body_too_large(self._written, self._most_bytes)

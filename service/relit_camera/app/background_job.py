@@ -68,8 +68,7 @@ class BackgroundJob:
         with self.lock:
             if self._turn is not None:
                 raise ConflictError(self._busy, self._cure)
-            if not self.take_shared():
-                raise ConflictError("another capture runs", "wait for its end, or cancel it")
+            self.require_shared()
             turn, self._handed_over = threading.Event(), False
             self._turn = turn
         try:
@@ -97,11 +96,14 @@ class BackgroundJob:
             threading.Thread(target=run, name=self._thread_name, daemon=True).start()
             self._handed_over = True
 
-    def cancel(self, timeout_s: float = CANCEL_TIMEOUT_S) -> None:
-        """Cancel the work of whoever has the turn, if somebody has, and wait for its end."""
+    def cancel(self, timeout_s: float = CANCEL_TIMEOUT_S, only: Callable[[], bool] = lambda: True) -> None:
+        """Cancel the work of whoever has the turn, if somebody has, and wait for its end.
+
+        With `only` it is canceled where that answers True: it is called while nobody else can take the turn.
+        """
         with self.lock:
             turn = self._turn
-            if turn is not None:
+            if turn is not None and only():
                 turn.set()
                 self._ended.wait_for(lambda: self._turn is not turn, timeout_s)
 
@@ -110,6 +112,15 @@ class BackgroundJob:
         with self.lock:
             self._has_shared = self._has_shared or self._shared.acquire(blocking=False)
             return self._has_shared
+
+    def require_shared(self) -> None:
+        """Take what other jobs need as well.
+
+        Raises:
+            ConflictError: a job runs that has it.
+        """
+        if not self.take_shared():
+            raise ConflictError("another capture runs", "wait for its end, or cancel it")
 
     def leave_shared(self) -> None:
         """Let other jobs have what they need as well, during a pause of the work."""

@@ -59,7 +59,8 @@ def test_nan_is_a_number() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("a: 1\nb: !!str 2", " line 2: tags"),
+        ("a: 1\nb: !!int 2", " line 2: tags"),
+        ("a: !!str [2]", " line 1: tags"),
         ("!x {}", " line 1: tags"),
         ("- &a 1\n- *a", " line 2: aliases"),
         ("a: 1\na: 2", " line 2: a is given twice"),
@@ -100,3 +101,7 @@ VALUES = st.recursive(
 @given(st.dictionaries(WORDS, VALUES, max_size=4))
 def test_what_is_written_is_read(value: dict[str, Any]) -> None:
     assert parse_yaml(yaml_text(value)) == value
+
+
+def test_text_may_be_marked_as_that_and_numbers_may_have_an_exponent() -> None:
+    assert parse_yaml("a: !!str 2\nb: 1e5\n!!str c: !!str no") == {"a": "2", "b": 1e5, "c": "no"}

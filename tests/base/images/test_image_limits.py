@@ -8,7 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.base.images.image_limits import image_header
+from relit_camera.base.errors import ImageError
+from relit_camera.base.images.image_limits import (
+    MAX_EXR_HEADER_BYTES,
+    MAX_FILE_BYTES,
+    ImageHeader,
+    image_header,
+    require_readable_header,
+)
 from tests.bad_pictures import encoded
 
 WIDTH, HEIGHT = 517, 300
@@ -62,3 +69,29 @@ def test_a_side_of_a_tiff_file_stands_in_its_entry() -> None:
     """64 bits (type 16) do not fit: the entry would hold the place where the side is."""
     with pytest.raises(ValueError, match="size"):
         image_header(tiff([(256, 16, 1, 64), (257, 4, 1, 64)]))
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "pixel_bytes", "allowed"),
+    [
+        (8192, 4096, 8, True),
+        (8256, 5504, 6, True),
+        (9504, 6336, 6, True),
+        (8000, 8000, 4, True),
+        (8000, 8000, 6, False),
+    ],
+    ids=["panorama with alpha", "45 MP", "61 MP", "8 bits", "64 MP of 16 bits"],
+)
+def test_what_cameras_and_programs_write_may_be_decoded(
+    width: int, height: int, pixel_bytes: int, allowed: bool
+) -> None:
+    header = ImageHeader(width, height, pixel_bytes)
+    if allowed:
+        assert require_readable_header(lambda: header, "a.png") is header
+    else:
+        with pytest.raises(ImageError, match="8 bits a channel"):
+            require_readable_header(lambda: header, "a.png")
+
+
+def test_the_largest_panorama_of_four_float_channels_may_be_a_file() -> None:
+    assert MAX_FILE_BYTES > 8192 * 4096 * 4 * 4 + MAX_EXR_HEADER_BYTES

@@ -12,7 +12,7 @@ import pytest
 from relit_camera.base.config.look import ColorBackground, Lighting, Look, Mode, Preset
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, StorageSettings
-from relit_camera.base.errors import StorageError
+from relit_camera.base.errors import NotReadyError, StorageError
 from relit_camera.live.scene.kept_scene import (
     GivenOptions,
     KeptScene,
@@ -279,3 +279,20 @@ def test_a_disk_that_takes_nothing_is_said_once(
     assert caplog.text.count("the disk is full") == 1
     keeper.check()
     assert kept_scene_path(StorageSettings(data_dir=folder)).exists()
+
+
+def test_a_place_that_cannot_be_decoded_now_does_not_end_the_program(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fail(name: str) -> object:
+        raise NotReadyError("too little free memory to decode a file", "close other programs and try again")
+
+    controller = SceneController(StorageSettings(data_dir=folder))
+    monkeypatch.setattr(controller.environments, "load", fail)
+    monkeypatch.setattr(controller.environments, "resolve", fail)
+    show_first_scene(controller, settings(folder), environment="/somewhere/sunset.hdr")
+    assert controller.scene.environment is None
+    assert controller.scene.look.lighting.environment is None
+    assert "sunset.hdr" in caplog.text
+    assert "too little free memory" in caplog.text
+    assert "/somewhere" not in caplog.text

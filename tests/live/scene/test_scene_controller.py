@@ -283,3 +283,64 @@ def test_background_names(scene_controller: SceneController) -> None:
         "beach", io.BytesIO(cv2.imencode(".png", np.zeros((8, 8, 3), np.uint8))[1].tobytes())
     )
     assert {"beach", "studio"} <= set(scene_controller.background_names())
+
+
+def test_what_needs_no_file_does_not_wait_for_one_that_is_read(
+    scene_controller: SceneController, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene_controller.set_look(Look())
+    scene_controller.set_unlit_allowed(True)
+    begun, go_on = threading.Event(), threading.Event()
+    load = scene_controller.environments.load
+
+    def slow(name: str) -> object:
+        begun.set()
+        assert go_on.wait(20)
+        return load(name)
+
+    monkeypatch.setattr(scene_controller.environments, "load", slow)
+    lit = Lighting(environment="window", yaw_deg=3)
+    chosen = threading.Thread(
+        target=scene_controller.update_look,
+        args=(lambda look: look.model_copy(update={"lighting": lit.model_copy(update={"exposure_ev": 1.0})}),),
+    )
+    chosen.start()
+    assert begun.wait(20)
+    others = [
+        lambda: scene_controller.set_unlit_allowed(False),
+        lambda: scene_controller.set_frozen(True),
+        scene_controller.undo,
+    ]
+    for other in others:
+        changing = threading.Thread(target=other, daemon=True)
+        changing.start()
+        changing.join(5)
+        waits = changing.is_alive()
+        if waits:
+            go_on.set()
+        assert not waits
+    assert not scene_controller.scene.unlit_allowed
+    go_on.set()
+    chosen.join(20)
+    scene = scene_controller.scene
+    assert scene.environment is not None
+    assert (scene.environment.name, scene.look.lighting.environment) == ("window", "window")
+    assert (scene.frozen, scene.unlit_allowed) == (True, False)
+
+
+def test_a_file_that_fails_to_be_read_is_dropped_from_the_steps_once(
+    scene_controller: SceneController, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene_controller.set_look(Look())
+    scene_controller.set_look(Look(lighting=Lighting(environment="window")))
+    reads = []
+
+    def fail(name: str) -> object:
+        reads.append(name)
+        raise NotFoundError("it is deleted")
+
+    monkeypatch.setattr(scene_controller.environments, "load", fail)
+    with pytest.raises(NotFoundError, match="deleted"):
+        scene_controller.undo()
+    assert reads == ["studio"]
+    assert not scene_controller.scene.can_undo

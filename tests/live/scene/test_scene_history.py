@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from relit_camera.base.config.look import Lighting, Look, Mode
+from relit_camera.base.errors import NotFoundError
 from relit_camera.live.scene.scene_history import MAX_STEPS, SAME_STEP_S, SceneHistory, ScenePoint, changed_fields
 from tests.virtual_clock import VirtualClock
 
@@ -62,11 +63,11 @@ def test_a_change_after_redo_is_a_step_of_its_own() -> None:
 
 def test_a_step_that_cannot_be_restored_is_dropped() -> None:
     def fail(before: ScenePoint) -> ScenePoint:
-        raise LookupError
+        raise NotFoundError("it is deleted")
 
     history = SceneHistory(VirtualClock())
     history.note(point(), point(yaw_deg=1))
-    with pytest.raises(LookupError):
+    with pytest.raises(NotFoundError):
         history.undo(point(yaw_deg=1), fail)
     assert (history.can_undo, history.can_redo) == (False, False)
 

@@ -48,7 +48,7 @@ class BodyLimitMiddleware:
             await self.app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        is_form = headers.get("content-type", "").startswith("multipart/form-data")
+        is_form = headers.get("content-type", "").lower().startswith("multipart/form-data")
         file_limit = STREAMED_FORMS.get(scope["path"], MAX_UPLOAD_BYTES)
         limit = file_limit + MAX_FORM_FIELDS_BYTES if is_form else MAX_JSON_BYTES
         announced = headers.get("content-length", "0")
@@ -63,7 +63,8 @@ class BodyLimitMiddleware:
             seen += len(message.get("body", b""))
             if seen > limit:
                 # The only type of exception that FastAPI passes on while it reads a body.
-                raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, body_too_large(seen, limit).what)
+                error = body_too_large(seen, limit)
+                raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, error.what) from error
             return message
 
         await self.app(scope, receive_counted, send)

@@ -87,6 +87,8 @@ def _field_problem(detail: Any, meant: str | None) -> FieldProblem:
 async def _http_error(request: Request, error: HTTPException) -> Response:
     if isinstance(error.__cause__, OSError):  # while Starlette wrote a form's file to the folder of temporary files
         return await _storage_error(request, error.__cause__)
+    if isinstance(error.__cause__, RelitError):  # of a middleware, while the body was read
+        return problem_response_from(error.__cause__)
     path = request.url.path
     headers = dict(error.headers or {})
     if error.status_code == HTTPStatus.NOT_FOUND:

@@ -22,7 +22,10 @@ PRESETS_PATH = "/api/v1/presets/"
 
 
 class UploadLimitMiddleware:
-    """ASGI middleware that answers 503 to an upload too many, and 507 to what would exceed the quota."""
+    """ASGI middleware that answers 503 to an upload too many, and 507 to one beyond the quota.
+
+    The folder is measured when an upload begins: those that are received at once may exceed it together.
+    """
 
     def __init__(self, app: ASGIApp, folder: Path, most_bytes: int) -> None:
         """Set up.
@@ -30,7 +33,7 @@ class UploadLimitMiddleware:
         Args:
             app: answers what may pass.
             folder: the data folder.
-            most_bytes: that it may hold.
+            most_bytes: above which uploads are refused.
         """
         self.app = app
         self._folder, self._most_bytes = folder, most_bytes
@@ -42,8 +45,9 @@ class UploadLimitMiddleware:
             await self.app(scope, receive, send)
             return
         headers = Headers(scope=scope)
-        is_form = headers.get("content-type", "").startswith("multipart/form-data")
-        if not is_form and not scope["path"].startswith(PRESETS_PATH):
+        is_form = headers.get("content-type", "").lower().startswith("multipart/form-data")
+        is_preset = scope["method"] == "PUT" and scope["path"].startswith(PRESETS_PATH)
+        if not is_form and not is_preset:
             await self.app(scope, receive, send)
             return
         if is_form and self._uploads == MAX_UPLOADS:
@@ -62,7 +66,7 @@ class UploadLimitMiddleware:
     async def _within_quota(self, headers: Headers, scope: Scope, receive: Receive, send: Send) -> None:
         room = self._most_bytes - await run_in_threadpool(_bytes_in, self._folder)
         announced = headers.get("content-length", "0")
-        if announced.isdecimal() and int(announced) > room:
+        if announced.isdecimal() and int(announced) > max(room, 0):
             await problem_response_from(_over_quota(self._most_bytes))(scope, receive, send)
             return
         seen = 0
@@ -71,9 +75,10 @@ class UploadLimitMiddleware:
             nonlocal seen
             message = await receive()
             seen += len(message.get("body", b""))
-            if seen > room:
+            if seen > max(room, 0):
                 # The only type of exception that FastAPI passes on while it reads a body.
-                raise HTTPException(HTTPStatus.INSUFFICIENT_STORAGE, _over_quota(self._most_bytes).what)
+                error = _over_quota(self._most_bytes)
+                raise HTTPException(HTTPStatus.INSUFFICIENT_STORAGE, error.what) from error
             return message
 
         await self.app(scope, receive_counted, send)
@@ -93,11 +98,15 @@ def _bytes_in(folder: Path) -> int:
 
 def _sizes(folder: str) -> Iterator[int]:
     try:
-        with os.scandir(folder) as entries:
-            for entry in entries:
+        entries = os.scandir(folder)
+    except OSError:  # there is none yet, or it is gone meanwhile
+        return
+    with entries:
+        for entry in entries:
+            try:
                 if entry.is_dir(follow_symlinks=False):
                     yield from _sizes(entry.path)
                 else:
                     yield entry.stat(follow_symlinks=False).st_size
-    except OSError:  # there is none yet, or what was in it is gone meanwhile
-        return
+            except OSError:  # gone meanwhile
+                continue

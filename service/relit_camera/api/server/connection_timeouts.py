@@ -12,6 +12,8 @@ from enum import Enum, auto
 
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from relit_camera.api.middleware.body_limits import STREAMED_FORMS
+
 WRITE_TIMEOUT_S = 10.0
 """A client that reads nothing of what is waiting for it is disconnected after this long."""
 READ_TIMEOUT_S = 10.0
@@ -22,6 +24,8 @@ MIN_BODY_BYTES_PER_TIMEOUT = 16 << 10
 MAX_UNREAD_BODY_BYTES = 128 << 20
 """Of a body that was answered before its end, so much is read and forgotten: most clients send all of it before they
 read the answer."""
+UNREAD_FORM_S = 10.0
+"""Of a form that may be larger, all that it may have is read and forgotten for this long."""
 
 
 class AwaitedInput(Enum):
@@ -37,6 +41,7 @@ class TimeoutHttpProtocol(H11Protocol):
     _read_timer: asyncio.TimerHandle | None = None
     _write_timer: asyncio.TimerHandle | None = None
     _awaited: AwaitedInput | None = None
+    _unread_since = 0.0
     _received = _unsent = _unread = 0
     """Bytes received since the read timer was started, bytes that the client had not read when it was, and bytes
     received of a body after its answer."""
@@ -57,14 +62,21 @@ class TimeoutHttpProtocol(H11Protocol):
         """Take what the client sent, and stop the read timer if that completes the request or its body."""
         self._received += len(data)
         if self.cycle is not None and self.cycle.response_complete and self.cycle.more_body:
+            self._unread_since = self._unread_since if self._unread else self.loop.time()
             self._unread += len(data)
-            if self._unread > MAX_UNREAD_BODY_BYTES:
+            if self._unread > self._most_unread():
                 self.transport.abort()
                 return
         else:
             self._unread = 0
         super().data_received(data)
         self._update_read_timer()
+
+    def _most_unread(self) -> int:
+        """Bytes of the body that may come now, after its answer."""
+        in_time = self.loop.time() < self._unread_since + UNREAD_FORM_S
+        of_form = STREAMED_FORMS.get(self.cycle.scope["path"], 0) if in_time else 0
+        return max(MAX_UNREAD_BODY_BYTES, of_form)
 
     def on_response_complete(self) -> None:
         """Start the read timer for the next request."""

@@ -127,6 +127,8 @@ class LiveCapture:
         require_instant_name(self._scene_controller.subjects, name)
         with self._job.lock:
             if self._pauses:
+                # One that is refused, since another kind of capture has the webcam, must not end the one that waits.
+                self._job.require_shared()
                 self._job.cancel()
         with self._job.taken() as canceled:
             self._set(CaptureStatus(CaptureStage.FILMING, name))

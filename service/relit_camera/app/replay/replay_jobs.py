@@ -131,12 +131,16 @@ class ReplayJobs:
         """End a replay that runs, or delete its video; see `ReplayControl.remove`."""
         last = self.status(name)
         if last.stage.is_running:
-            self._job.cancel()
+            self._job.cancel(only=lambda: self._runs(name))
         with self._job.lock:
             if self._last is not None and self._last.name == name and not self._last.stage.is_running:
                 self._last = None
         if name in self._results.names():
             self._results.remove(name)
+
+    def _runs(self, name: str) -> bool:
+        """Whether the last replay has that name, and runs."""
+        return self._last is not None and self._last.name == name and self._last.stage.is_running
 
     def close(self) -> None:
         """End the replay that runs, if one does."""

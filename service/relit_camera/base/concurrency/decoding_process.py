@@ -33,13 +33,18 @@ CPU_LIMIT_S = 30
 TIMEOUT_S = 90.0
 """Time for one file, however busy the computer is."""
 START_TIMEOUT_S = 30.0
+WAIT_S = 30.0
+"""For files that came before: a request must not be held up by all of them."""
 IDLE_S = 10.0
 """The worker is ended after this long without a file, or twice as long."""
 MAX_ANSWER_BYTES = 1 << 30
 PART_BYTES = 1 << 20
 """Arrays are sent in parts, each of which is held a second time for a moment."""
+TAKEN, TAKEN_WITH_LITTLE = b"taken", b"taken, with little memory"
+"""What the worker says to work that came; the latter where less memory is free than it may take."""
 DTYPES = ("uint8", "float32")
 _CURE = "it may be damaged, or made to do harm; save it again, or choose another"
+_LITTLE_MEMORY = "too little free memory to decode a file", "close other programs and try again"
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,11 +69,14 @@ class DecodingProcess:
         cpu_limit_s: int = CPU_LIMIT_S,
         timeout_s: float = TIMEOUT_S,
         idle_s: float = IDLE_S,
+        wait_s: float = WAIT_S,
     ) -> None:
         """Set up; no process is started. The limits are described at the constants of this module."""
         self._limits = most_bytes, cpu_limit_s
-        self._timeout_s, self._idle_s = timeout_s, idle_s
+        self._timeout_s, self._idle_s, self._wait_s = timeout_s, idle_s, wait_s
         self._used_at = 0.0
+        self._interrupts = 0
+        self._has_little_memory = False
         self._lock = threading.Lock()
         self._process: Any = None
         self._connection: Connection | None = None
@@ -83,16 +91,26 @@ class DecodingProcess:
         Raises:
             RelitError: what the function raised, if that is one.
             InputError: the worker died, or took too much memory or time: the file is at fault.
-            NotReadyError: no worker can be started.
+            NotReadyError: no worker can be started, files that came before take too long, there is too little free
+                memory, or `interrupt` was called.
         """
-        with self._lock:
-            connection = self._with_work((function, arguments))
+        interrupts = self._interrupts
+        if not self._lock.acquire(timeout=self._wait_s):
+            raise NotReadyError("other files are being decoded", "try again in a minute")
+        try:
+            connection = self._with_work((function, arguments), interrupts)
             try:
                 return _answer(connection, time.monotonic() + self._timeout_s)
+            except NotReadyError:
+                self._end()  # the next worker may have more memory
+                raise
             except RelitError:
                 raise
             except (EOFError, OSError, ValueError, KeyError, TypeError) as error:
                 self._end()
+                self._require_not_interrupted(interrupts)
+                if self._has_little_memory and not isinstance(error, TimeoutError):
+                    raise NotReadyError(*_LITTLE_MEMORY) from error
                 reason = "too much time" if isinstance(error, TimeoutError) else "too much memory or time"
                 raise InputError(f"the file takes {reason} to be decoded, or ends its decoder", _CURE) from error
             except BaseException:
@@ -100,6 +118,8 @@ class DecodingProcess:
                 raise
             finally:
                 self._used_at = time.monotonic()
+        finally:
+            self._lock.release()
 
     def close(self) -> None:
         """End the worker, if there is one."""
@@ -107,34 +127,49 @@ class DecodingProcess:
             self._end()
 
     def interrupt(self) -> None:
-        """End the worker at once, also in the midst of a file: for a program that stops. The next file starts one."""
+        """End the worker at once, also in the midst of a file, and refuse all who wait: for a program that stops.
+
+        Files that come later start a worker.
+        """
+        self._interrupts += 1
         process = self._process
         if process is not None:
             with suppress(ValueError):  # it has been ended meanwhile
                 process.kill()
 
-    def _with_work(self, work: object) -> Connection:
+    def _require_not_interrupted(self, interrupts: int) -> None:
+        """Raise NotReadyError where `interrupt` was called after the `interrupts`th time."""
+        if self._interrupts != interrupts:
+            raise NotReadyError("the program stops", "try again when it runs again")
+
+    def _with_work(self, work: object, interrupts: int) -> Connection:
         """The worker's connection, after it has taken the work."""
         for _ in range(2):  # one that the system has ended meanwhile takes none
+            self._require_not_interrupted(interrupts)
             try:
                 connection = self._connection or self._start()
+                if self._interrupts != interrupts:  # it came before there was a process to be ended
+                    self._end()
+                    continue
                 connection.send(work)
-                _receive(connection, time.monotonic() + START_TIMEOUT_S)
+                self._has_little_memory = _receive(connection, time.monotonic() + START_TIMEOUT_S) == TAKEN_WITH_LITTLE
                 return connection
             except (EOFError, OSError):
                 self._end()
+        self._require_not_interrupted(interrupts)
         raise NotReadyError("no process that decodes files can be started", "close other programs and try again")
 
     def _start(self) -> Connection:
         context = multiprocessing.get_context("spawn")
         self._connection, of_worker = context.Pipe()
-        self._process = context.Process(target=_work, args=(of_worker, *self._limits), daemon=True)
+        process = context.Process(target=_work, args=(of_worker, *self._limits), daemon=True)
         try:
             with interrupts_blocked():
-                self._process.start()
+                process.start()
         finally:
             of_worker.close()  # so that the end of the process ends the pipe
-        threading.Thread(target=self._end_when_idle, args=(self._process,), name="decoder-idle", daemon=True).start()
+        self._process = process  # not before it can be killed
+        threading.Thread(target=self._end_when_idle, args=(process,), name="decoder-idle", daemon=True).start()
         return self._connection
 
     def _end_when_idle(self, process: Any) -> None:
@@ -150,7 +185,7 @@ class DecodingProcess:
     def _end(self) -> None:
         if self._connection is not None:
             self._connection.close()
-        if self._process is not None and self._process.pid is not None:
+        if self._process is not None:
             end_process(self._process)
             with suppress(ValueError):  # one that cannot even be killed
                 self._process.close()
@@ -202,20 +237,25 @@ def _count(shape: list[int]) -> int:
 
 def _work(connection: Connection, most_bytes: int, cpu_limit_s: int) -> None:
     """Decode what comes, in the worker, until the other end is closed."""
-    become_worker(most_bytes)
+    limit = become_worker(most_bytes)
+    has_little_memory = limit is not None and limit < most_bytes
     while True:
         try:
             function, arguments = connection.recv()
         except EOFError:
             return
-        connection.send_bytes(b"taken")
+        connection.send_bytes(TAKEN_WITH_LITTLE if has_little_memory else TAKEN)
         _limit_processor_time(cpu_limit_s)
         try:
             decoded = function(*arguments)
         except RelitError as error:
+            if has_little_memory and _is_about_memory(error):
+                _send(connection, {"error": ["NotReadyError", *_LITTLE_MEMORY]})
+                continue
             _send(connection, {"error": [type(error).__name__, error.what, error.cure]})
         except MemoryError:
-            _send(connection, {"error": ["InputError", "the file takes too much memory to be decoded", _CURE]})
+            too_large = "InputError", "the file takes too much memory to be decoded", _CURE
+            _send(connection, {"error": ["NotReadyError", *_LITTLE_MEMORY] if has_little_memory else [*too_large]})
         else:
             contents = [np.ascontiguousarray(array) for array in decoded.arrays]
             described = [[array.dtype.name, array.shape] for array in contents]
@@ -225,6 +265,12 @@ def _work(connection: Connection, most_bytes: int, cpu_limit_s: int) -> None:
                 for start in range(0, len(content), PART_BYTES):
                     connection.send_bytes(content[start : start + PART_BYTES])
             del decoded, contents, array, content
+
+
+def _is_about_memory(error: BaseException | None) -> bool:
+    while error is not None and not isinstance(error, MemoryError):
+        error = error.__cause__
+    return error is not None
 
 
 def _send(connection: Connection, answer: Mapping[str, Any]) -> None:

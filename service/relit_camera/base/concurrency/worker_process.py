@@ -144,11 +144,14 @@ def end_process(process: Any) -> None:
     process.join(EXIT_TIMEOUT_S)
 
 
-def become_worker(most_bytes: int | None) -> None:
+def become_worker(most_bytes: int | None) -> int | None:
     """Make this process one that works for another: at low priority, ended with it, with a limit of memory.
 
     Args:
         most_bytes: as of `run_in_worker_process`.
+
+    Returns:
+        The limit of memory in bytes, which is less than `most_bytes` where little is free; None for none.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole terminal; the camera ends this process
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -157,8 +160,8 @@ def become_worker(most_bytes: int | None) -> None:
             os.nice(NICENESS)
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(KILLED_FIRST)
-    _limit_memory(most_bytes)
     limit_threads()
+    return _limit_memory(most_bytes)
 
 
 def _work(connection: Connection, tells_progress: bool, most_bytes: int | None) -> None:
@@ -181,16 +184,18 @@ def _work(connection: Connection, tells_progress: bool, most_bytes: int | None) 
     connection.close()
 
 
-def _limit_memory(most_bytes: int | None) -> None:
-    """Let this process take no more memory than that, and than a share of what is free."""
+def _limit_memory(most_bytes: int | None) -> int | None:
+    """Let this process take no more memory than that, and than a share of what is free; returns what it may take."""
     if most_bytes is None or not sys.platform.startswith("linux"):
-        return
+        return None
     import resource
 
     most = min(most_bytes, int(MEMORY_SHARE * psutil.virtual_memory().available))
     hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
     # Not the address space: networks and files that are mapped into it need no memory of their own.
-    resource.setrlimit(resource.RLIMIT_DATA, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+    return most
 
 
 def _end_with_parent() -> None:

@@ -1,8 +1,8 @@
 """Reads YAML from untrusted files (settings and presets) within limits, and writes it.
 
 What a plain value stands for is decided by the core schema of YAML 1.2 (yaml.org/spec/1.2.2, 10.3): null, true and
-false, whole numbers, fractions, and else text. There are no dates, no sexagesimal numbers and no tags. PyYAML's parser
-(libyaml's, where it is installed with it) finds the structure; none of its constructors is used.
+false, whole numbers, fractions, and else text. There are no dates, no sexagesimal numbers and no tags but !!str.
+PyYAML's parser (libyaml's, where it is installed with it) finds the structure; none of its constructors is used.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ MAX_NUMBER_LENGTH = 40
 """Characters of a number; those of the longest 64-bit number are half as many."""
 
 _PARSER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_TEXT_TAG = "tag:yaml.org,2002:str"
 _NULLS = frozenset({"", "~", "null", "Null", "NULL"})
 _BOOLS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
 _INTEGER = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
@@ -32,7 +33,8 @@ _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 def parse_yaml(text: str) -> Any:
     """Parse a text of up to `MAX_YAML_BYTES`: mappings with texts as keys, sequences, texts, numbers, booleans, None.
 
-    Tags and aliases are refused; by aliases a few lines can stand for billions of values ("billion laughs").
+    Tags (but !!str) and aliases are refused; by aliases a few lines can stand for billions of values ("billion
+    laughs").
 
     Raises:
         ValueError: it is not YAML, has tags, aliases, a key twice or another document, is nested too deeply, or has too
@@ -89,10 +91,10 @@ class _Document:
             raise _error(event, f"aliases (*{str(event.anchor)[:40]}) are not taken")
         if self._nodes > MAX_YAML_NODES:
             raise _error(event, f"more than {MAX_YAML_NODES} values")
-        if event.tag is not None:
+        if event.tag is not None and not (event.tag == _TEXT_TAG and isinstance(event, yaml.ScalarEvent)):
             raise _error(event, f"tags ({event.tag[:40]}) are not taken")
         if isinstance(event, yaml.ScalarEvent):
-            return _scalar(event) if event.implicit[0] else event.value
+            return _scalar(event) if event.implicit[0] and event.tag is None else event.value
         if depth == MAX_YAML_DEPTH:
             raise _error(event, f"nested more than {MAX_YAML_DEPTH} deep")
         if isinstance(event, yaml.SequenceStartEvent):

@@ -147,7 +147,7 @@ class StorageSettings(SettingsModel):
 
     data_dir: Path = Field(default_factory=lambda: user_data_path("relit-camera", appauthor=False))
     quota_gb: Annotated[float, Field(gt=0, le=100_000)] = 20.0
-    """Gigabytes that the data folder may hold: an upload that would not fit is refused."""
+    """Gigabytes: an upload that would not fit into the data folder, as it is when it begins, is refused."""
 
     @property
     def folders(self) -> tuple[Path, ...]:

@@ -158,14 +158,22 @@ def _decoded(data: bytes, name: object, header: ImageHeader, flags: int = _UPRIG
     try:
         with suppress_decoder_messages():
             coded = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except (cv2.error, MemoryError):
-        pass
+    except cv2.error as error:
+        if error.code == cv2.Error.STS_NO_MEM:
+            raise _memory_error(name) from MemoryError(str(error))
+    except MemoryError as error:
+        raise _memory_error(name) from error
     if coded is None or coded.dtype not in (np.uint8, np.uint16, np.float32):
         raise ImageError(f"{name} cannot be read as a picture", "it may be truncated; save or download it again")
     if coded.shape[:2] not in (header.size, header.size[::-1]):  # EXIF may turn it
         what = f"{name} states {header.width}x{header.height} pixels and holds {coded.shape[1]}x{coded.shape[0]}"
         raise ImageError(what, "save it again")
     return np.asarray(coded)
+
+
+def _memory_error(name: object) -> ImageError:
+    """What is to be raised from a MemoryError: whoever limits the memory knows by it whether the file is at fault."""
+    return ImageError(f"{name} takes more memory than there is to be decoded", "close other programs, or scale it down")
 
 
 def _by_table(coded: NDArray, gamma: Gamma) -> LinearImage:

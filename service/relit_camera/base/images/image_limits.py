@@ -20,10 +20,11 @@ from relit_camera.base.images.decoder_messages import suppress_decoder_messages
 MAX_IMAGE_PIXELS = 64_000_000
 """A picture of more pixels is refused: no camera or panorama in use has them, and they would fill the memory. OpenCV
 has the same limit (OPENCV_IO_MAX_IMAGE_PIXELS in `relit_camera/__init__.py`)."""
-MAX_DECODED_BYTES = 4 * MAX_IMAGE_PIXELS
-"""Of the pixels of a PNG, JPEG, WebP, BMP or TIFF file, as they are decoded: 64 million of 8 bits and four channels."""
-MAX_FILE_BYTES = 512 << 20
-"""Of a picture file: more than the largest panorama without compression."""
+MAX_DECODED_BYTES = 370_000_000
+"""Of the pixels of a PNG, JPEG, WebP, BMP or TIFF file, as they are decoded. With 16 bits a channel a camera's
+picture of 61 million pixels takes 361 MB, and the largest panorama with alpha 268 MB."""
+MAX_FILE_BYTES = 640 << 20
+"""Of a picture file: more than the largest panorama of four channels without compression, 512 MiB and a header."""
 MAX_PNG_CHUNKS = 100_000
 """A file of 64 million pixels in chunks of 8 KiB has a quarter of that."""
 MAX_JPEG_SCANS = 500

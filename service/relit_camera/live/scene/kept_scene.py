@@ -10,11 +10,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from relit_camera.base.config.look import Look, SettingsModel, merge_edits
+from relit_camera.base.config.look import EnvironmentBackground, Look, SettingsModel, merge_edits
 from relit_camera.base.config.preset_store import PresetStore
 from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml, yaml_text
 from relit_camera.base.config.settings import RelitSettings, StorageSettings
-from relit_camera.base.errors import RelitError
+from relit_camera.base.errors import NotReadyError, RelitError
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import ChosenSubject, SceneController
@@ -90,12 +90,22 @@ def show_first_scene(
     scene_controller.set_unlit_allowed(unlit_allowed)
     look = settings.look
     if environment is not None:
-        environment = scene_controller.register_temporary_environment(environment)
-        look = _in_environment(look, environment)
+        try:
+            environment = scene_controller.register_temporary_environment(environment)
+            look = _in_environment(look, environment)
+        except NotReadyError as error:
+            log.warning("'%s' lights nobody: %s", Path(environment).name, error)
+            environment = None
     if look.shows_filmed and not unlit_allowed:
         log.warning("all of the picture is relit: split and blend count where output.unlit_allowed is true (--unlit)")
         look = look.relit()
-    scene_controller.set_look(look)
+    try:
+        scene_controller.set_look(look)
+    except NotReadyError as error:
+        log.warning("the first look has no environment and no background picture: %s", error)
+        scene_controller.set_look(
+            _in_environment(look.model_copy(update={"background": EnvironmentBackground()}), None)
+        )
     scene_controller.load_configured_subject(None if instant else settings.subject)
     scene_controller.mark_start()
     if given is not None:

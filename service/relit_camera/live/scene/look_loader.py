@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,21 @@ class LookLoader:
         if image is None:
             image = self._background_image(look.background)
         environment = _unchanged_environment(look, before) or self._environment(look, image)
+        return {"look": look, "environment": environment, "background_image": image}
+
+    @staticmethod
+    def loaded(look: Look, scenes: Sequence[Scene]) -> dict[str, object] | None:
+        """The same, taken from scenes that have it already; None where something has to be loaded first."""
+        environment, image = None, None
+        if isinstance(look.background, ImageBackground):
+            image = next((each.background_image for each in scenes if each.look.background == look.background), None)
+            if image is None:
+                return None
+        if look.lighting.environment is not None:
+            found = (_unchanged_environment(look, each) for each in scenes)
+            environment = next((each for each in found if each is not None), None)
+            if environment is None:
+                return None
         return {"look": look, "environment": environment, "background_image": image}
 
     def register(self, name_or_path: str) -> str:

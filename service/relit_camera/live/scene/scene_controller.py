@@ -23,6 +23,7 @@ from relit_camera.base.errors import (
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.environments.environment_store import EnvironmentStore
 from relit_camera.live.scene.background_store import BackgroundStore
+from relit_camera.live.scene.loading_changes import Loaded, NotLoadedError, load_and_change
 from relit_camera.live.scene.look_loader import LookLoader
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_history import SceneHistory, ScenePoint, TakeStep
@@ -46,7 +47,8 @@ class ChosenSubject:
 class SceneController:
     """Holds the scene, and the stores of what it can show. Thread-safe: changes are made one at a time.
 
-    A change that names something unknown raises an error and leaves the scene as it was.
+    A change that names something unknown raises an error and leaves the scene as it was. Files are read while nobody
+    waits for the lock: what needs none, such as `unlit_allowed`, is never held up by a decoder.
 
     Attributes:
         scene: the present scene; reading it takes no lock.
@@ -79,7 +81,7 @@ class SceneController:
         Where `unlit_allowed` becomes false, nothing of the look stays that shows the picture as filmed.
 
         Args:
-            look: makes the next look of the present one. Other changes wait until it is shown.
+            look: makes the next look of the present one; it is called again where files had to be read first.
             subject: who is shown.
             frozen: whether the published picture is held.
             unlit_allowed: whether the picture as filmed may be published.
@@ -92,8 +94,10 @@ class SceneController:
             NotFoundError: an environment, background or subject of that name is not stored.
             InputError: `background` as environment while the background cannot light.
             SubjectError: the subject's file is damaged.
+            NotReadyError: the decoder of files is busy, or has too little memory.
         """
-        with self._change:
+
+        def made(loaded: Loaded) -> Scene:
             now = self.scene
             if if_revision is not None and now.revision not in if_revision:
                 raise PreconditionFailedError(
@@ -108,12 +112,14 @@ class SceneController:
                     "allow it with the same change (unlit_allowed), or leave split at 0 and blend at "
                     f"{LEAST_RELIT_BLEND} or more",
                 )
-            changes = {} if wanted is now.look else self._with_look(wanted)
+            changes = {} if wanted is now.look else self._with_look(wanted, loaded)
             if subject is not None:
-                changes |= {"subject_name": subject.name, "subject": self._loaded(subject)}
+                changes |= {"subject_name": subject.name, "subject": self._subject(subject, loaded)}
             if frozen is not None:
                 changes["frozen"] = frozen
             return self._show(self._next(unlit_allowed=allowed, **changes), recorded)
+
+        return load_and_change(self._change, made)
 
     def set_look(self, look: Look) -> Scene:
         """Show another lighting, background or mode.
@@ -124,7 +130,7 @@ class SceneController:
         return self.change(lambda _: look)
 
     def update_look(self, change: Callable[[Look], Look], recorded: bool = True) -> Scene:
-        """Show what `change` makes of the present look. Other changes wait until it is replaced.
+        """Show what `change` makes of the present look.
 
         Raises:
             RelitError: as `change`.
@@ -232,8 +238,7 @@ class SceneController:
             ConflictError: there is nothing to undo.
             RelitError: what was shown then is not stored any more; the step is dropped.
         """
-        with self._change:
-            return self._step(self._history.undo, ConflictError("there is nothing to undo", "change something first"))
+        return self._step(self._history.undo, ConflictError("there is nothing to undo", "change something first"))
 
     def redo(self) -> Scene:
         """Do the step again that was undone last. What may be published as filmed is never more after it.
@@ -242,8 +247,7 @@ class SceneController:
             ConflictError: there is nothing to do again.
             RelitError: what was shown then is not stored any more; the step is dropped.
         """
-        with self._change:
-            return self._step(self._history.redo, ConflictError("there is nothing to do again", "undo something first"))
+        return self._step(self._history.redo, ConflictError("there is nothing to do again", "undo something first"))
 
     def reset(self) -> Scene:
         """Show what the settings say, as at the first start; it can be undone.
@@ -253,37 +257,59 @@ class SceneController:
         Raises:
             RelitError: what the settings name is not stored any more.
         """
-        with self._change:
+
+        def made(loaded: Loaded) -> Scene:
             name = self._first.subject_name or self.scene.subject_name
-            first = self._restored(replace(self._first, subject_name=name))
+            first = self._restored(replace(self._first, subject_name=name), loaded)
             self._history.note(_point(self.scene), _point(first), own_step=True)
             return self._show(replace(first, frozen=False))
 
+        return load_and_change(self._change, made)
+
     def _step(self, take: TakeStep[Scene], nothing: ConflictError) -> Scene:
         """Show the scene that a step of the history leads to; raises `nothing` where there is no step."""
-        try:
-            restored = take(_point(self.scene), self._restored)
-        except RelitError:
-            self._show(self._next())  # the same, but the step was dropped: there may be none left
-            raise
-        if restored is None:
-            raise nothing
-        return self._show(restored)
 
-    def _restored(self, point: ScenePoint) -> Scene:
+        def made(loaded: Loaded) -> Scene:
+            try:
+                restored = take(_point(self.scene), lambda point: self._restored(point, loaded))
+            except RelitError:
+                self._show(self._next())  # the same, but the step was dropped: there may be none left
+                raise
+            if restored is None:
+                raise nothing
+            return self._show(restored)
+
+        return load_and_change(self._change, made)
+
+    def _restored(self, point: ScenePoint, loaded: Loaded) -> Scene:
         """The next scene, with what `point` says of it; what may be published as filmed is never more."""
         now = self.scene
         allowed = now.unlit_allowed and point.unlit_allowed
-        changes = self._with_look(point.look if allowed else point.look.relit())
+        changes = self._with_look(point.look if allowed else point.look.relit(), loaded)
         if point.subject_name != now.subject_name:
-            subject = self._loaded(ChosenSubject(point.subject_name))
+            subject = self._subject(ChosenSubject(point.subject_name), loaded)
             changes |= {"subject_name": point.subject_name, "subject": subject}
         return self._next(unlit_allowed=allowed, **changes)
 
-    def _loaded(self, chosen: ChosenSubject) -> Subject | None:
-        if chosen.name is None or chosen.subject is not None:
+    def _subject(self, chosen: ChosenSubject, loaded: Loaded) -> Subject | None:
+        """Who is chosen.
+
+        Raises:
+            NotLoadedError: their file must be read first.
+            RelitError: it cannot be.
+        """
+        name = chosen.name
+        if name is None or chosen.subject is not None:
             return chosen.subject
-        return self.subjects.load_file(self.subject_path(chosen.name))[1]
+        loaded.require_usable(name)
+        path = self.subject_path(name)
+        if name not in loaded.subjects:
+
+            def load(into: Loaded) -> None:
+                into.subjects[name] = self.subjects.load_file(path)[1]
+
+            raise NotLoadedError(name, load)
+        return loaded.subjects[name]
 
     def register_temporary_environment(self, name_or_path: str) -> str:
         """Make the environment of a file available under a name, for this run only; see `LookLoader.register`.
@@ -302,10 +328,23 @@ class SceneController:
         """The names that an `image` background may use: stored pictures and environments."""
         return self._looks.background_names()
 
-    def _with_look(self, look: Look) -> dict[str, object]:
-        """The fields of a scene with that look."""
+    def _with_look(self, look: Look, loaded: Loaded) -> dict[str, object]:
+        """The fields of a scene with that look.
+
+        Raises:
+            NotLoadedError: a file must be read first.
+            RelitError: it cannot be.
+        """
         before = self.scene
-        changes = self._looks.load(look, before)
+        wanted = look.lighting.environment, look.background
+        loaded.require_usable(wanted)
+        changes = self._looks.loaded(look, (before, *loaded.scenes))
+        if changes is None:
+
+            def load(into: Loaded) -> None:
+                into.scenes.append(replace(before, **self._looks.load(look, before)))  # type: ignore[arg-type]
+
+            raise NotLoadedError(wanted, load)
         return changes if look.mode is before.look.mode else changes | {"mode_revision": before.revision + 1}
 
     def _next(self, **changes: object) -> Scene:

@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from relit_camera.base.concurrency.clock import Clock
 from relit_camera.base.config.look import Look
+from relit_camera.base.errors import RelitError
 
 T = TypeVar("T")
 
@@ -93,11 +94,11 @@ class SceneHistory:
     def undo(self, now: ScenePoint, restore: Callable[[ScenePoint], T]) -> T | None:
         """What `restore` makes of the scene before the last step; None if there is none.
 
-        A step that cannot be restored is dropped: the error is passed on.
+        A step that cannot be restored (RelitError) is dropped: every error is passed on.
         """
         if not self._past:
             return None
-        restored = restore(self._past.pop().before)
+        restored = _restored(self._past, self._past[-1].before, restore)
         self._undone.append(now)
         return restored
 
@@ -105,7 +106,7 @@ class SceneHistory:
         """What `restore` makes of the scene after the last undone step; None if there is none, errors as in `undo`."""
         if not self._undone:
             return None
-        restored = restore(self._undone.pop())
+        restored = _restored(self._undone, self._undone[-1], restore)
         # No later change belongs to this step, whatever its fields are.
         self._past.append(_Step(now, frozenset(), self._clock.now()))
         return restored
@@ -116,6 +117,17 @@ class SceneHistory:
             (replace(step, before=step.before.with_renamed(name, new_name)) for step in self._past), maxlen=MAX_STEPS
         )
         self._undone = [point.with_renamed(name, new_name) for point in self._undone]
+
+
+def _restored(steps: deque[_Step] | list[ScenePoint], point: ScenePoint, restore: Callable[[ScenePoint], T]) -> T:
+    """What `restore` makes of the last of the steps, which is taken off, unless another error than RelitError came."""
+    try:
+        restored = restore(point)
+    except RelitError:
+        steps.pop()
+        raise
+    steps.pop()
+    return restored
 
 
 def changed_fields(before: ScenePoint, after: ScenePoint) -> frozenset[str]:

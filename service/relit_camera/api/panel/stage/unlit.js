@@ -1,6 +1,6 @@
 // Being shown unlit, and back: who was seen before is remembered, so that one switch leads back to the same face.
 
-import { call } from "../api.js";
+import { call, request } from "../api.js";
 import { accept, change, onScene, redraw, scene, settled } from "./scene.js";
 
 const KEY = "seen-before-unlit";
@@ -23,20 +23,25 @@ export async function showUnlit() {
 export async function hideUnlit() {
   const back = scene()?.subject ? null : before;
   coming = back !== null;
-  change({ unlit_allowed: false });
-  // By itself: a face that cannot be shown any more must not keep the webcam's picture published.
-  await settled();
-  if (back) change({ subject: back });
-  await settled();
-  coming = false;
-  redraw();
+  try {
+    // By itself, before what else is to be sent: nothing that cannot be shown may keep the webcam's picture published.
+    const stop = ["PATCH", "scene", { unlit_allowed: false }];
+    accept(await call(...stop).catch(() => request(...stop)));
+    if (back) change({ subject: back });
+    await settled();
+  } catch {
+    // The toast has said why the picture is still shown.
+  } finally {
+    coming = false;
+    redraw();
+  }
 }
 
 function remember(name) {
   before = name;
   try {
-    if (name) localStorage.setItem(KEY, name);
-    else localStorage.removeItem(KEY);
+    if (name) sessionStorage.setItem(KEY, name);
+    else sessionStorage.removeItem(KEY);
   } catch {
     // Kept until the page is closed.
   }
@@ -44,7 +49,7 @@ function remember(name) {
 
 function stored() {
   try {
-    return localStorage.getItem(KEY);
+    return sessionStorage.getItem(KEY);
   } catch {
     return null;
   }

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from relit_camera.base.errors import InputError, NotFoundError
+from relit_camera.base.errors import InputError, NotFoundError, StorageError
 from relit_camera.base.storage.atomic_files import atomic_path, make_folder, write_atomic
 from relit_camera.base.storage.folder_lock import FolderLock
 from relit_camera.base.storage.named_files import is_valid_name
@@ -104,7 +104,11 @@ class FilmFolder:
         self._clear(but=RECORD_NAME, and_but=record.film)
 
     def read(self) -> FilmRecord | None:
-        """The record; None where there is none that can be used."""
+        """The record; None where there is none, or a damaged one.
+
+        Raises:
+            StorageError: it cannot be read, though it may be sound.
+        """
         path = self.folder / RECORD_NAME
         try:
             if path.stat().st_size > MAX_RECORD_BYTES:
@@ -112,7 +116,10 @@ class FilmFolder:
             return FilmRecord.model_validate_json(path.read_bytes())
         except FileNotFoundError:
             return None
-        except (OSError, ValueError, ValidationError) as error:
+        except OSError as error:
+            what = f"cannot read {path}: {error.strerror}"
+            raise StorageError(what, "check your permission to read it, and the disk") from error
+        except (ValueError, ValidationError) as error:
             log.warning("%s cannot be used: %s", path, error)
             return None
 
@@ -142,6 +149,13 @@ class FilmFolder:
         except OSError as error:
             log.info("no picture %s: %s", name, error)
         raise NotFoundError(f"no picture '{name}'", "see the report")
+
+    def keep_film(self, record: FilmRecord) -> None:
+        """Delete every other film: one that was received when the camera was killed."""
+        for path in self.folder.glob("film-*"):
+            if path.name != record.film:
+                with suppress(OSError):
+                    path.unlink()
 
     def keep_result(self) -> None:
         """Delete the film and what was made of it, but for the record and the report's pictures."""

@@ -94,8 +94,11 @@ class FilmProcessing:
         self._closing = threading.Event()
         self._record: FilmRecord | None = None
         self._status = FilmCaptureStatus()
-        if self._files.take_if_there():
-            self._look_at_what_is_kept()
+        try:
+            if self._files.take_if_there():
+                self._look_at_what_is_kept()
+        except StorageError as error:
+            log.warning("the last film capture is not told: %s", error)
 
     def status(self) -> FilmCaptureStatus:
         """How far the last capture is."""
@@ -191,7 +194,7 @@ class FilmProcessing:
 
         Raises:
             ConflictError: another process has it.
-            StorageError: it cannot be created.
+            StorageError: it cannot be created, or what it keeps cannot be read.
         """
         owned = self._files.take()
         if not owned:
@@ -203,7 +206,11 @@ class FilmProcessing:
             self._look_at_what_is_kept()  # the other one may have left something
 
     def _look_at_what_is_kept(self) -> None:
-        """Read the record, and delete what belongs to none: a film that was received when the camera was killed."""
+        """Read the record, and delete what belongs to none: a film that was received when the camera was killed.
+
+        Raises:
+            StorageError: the record cannot be read; everything stays.
+        """
         record = self._files.read()
         if record is not None and record.state is RecordedState.DONE:
             try:
@@ -214,8 +221,12 @@ class FilmProcessing:
                 record = None  # deleted by other means: nothing of a person is kept beyond that
         if record is None:
             self._files.forget()
+            return
+        if record.state is RecordedState.DONE:
+            self._files.keep_result()
         else:
-            self._record, self._status = record, self._settled(record)
+            self._files.keep_film(record)
+        self._record, self._status = record, self._settled(record)
 
     def _begin(self, record: FilmRecord, canceled: threading.Event) -> None:
         progress = FilmProgress(self._clock)
