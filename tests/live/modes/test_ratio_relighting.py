@@ -182,4 +182,6 @@ def test_overexposed_skin_is_shown_as_the_source_image_has_it() -> None:
     image, scene = np.full_like(live_picture(WINDOW), 255), still_under(WINDOW) * np.float32(0.5)
     picture = relit_live(relighting(WINDOW), scene, before_the_camera(), live_frame(image, 0))
     truth = linear_from_uint8(live_picture(WINDOW)) / 2
-    assert psnr(inner(linear_from_uint8(picture)), inner(truth)) > 25
+    error = np.abs(inner(linear_from_uint8(picture)) - inner(truth)).max(axis=2)
+    assert np.mean(error < 0.05) > 0.75  # eyes and lips are the live picture's all the same
+    assert np.median(error) < 0.02
