@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NoReturn
 
 from relit_camera.base.errors import RelitError
 from relit_camera.live.scene.scene import Scene
@@ -31,8 +32,17 @@ class Loaded:
             if other == wanted:
                 raise error
 
+    def ask_for(self, wanted: object, load: Callable[[Loaded], object]) -> NoReturn:
+        """Break the change off until something is loaded; it is made anew then.
 
-class NotLoadedError(Exception):
+        Args:
+            wanted: what, as in `failed`.
+            load: loads it into a `Loaded`.
+        """
+        raise _NotLoadedError(wanted, load)
+
+
+class _NotLoadedError(Exception):
     """Something must be loaded before the change can be made.
 
     Attributes:
@@ -50,7 +60,7 @@ def load_and_change(lock: threading.Lock, change: Callable[[Loaded], Scene]) -> 
 
     Args:
         lock: held while `change` is called.
-        change: gives the scene that it made; it raises `NotLoadedError`, before it has changed anything, where
+        change: gives the scene that it made; it calls `Loaded.ask_for`, before it has changed anything, where
             something must be loaded first. What could not be loaded is in `Loaded.failed` at its next call.
 
     Raises:
@@ -61,7 +71,7 @@ def load_and_change(lock: threading.Lock, change: Callable[[Loaded], Scene]) -> 
         try:
             with lock:
                 return change(loaded)
-        except NotLoadedError as error:
+        except _NotLoadedError as error:
             missing = error
         try:
             missing.load(loaded)

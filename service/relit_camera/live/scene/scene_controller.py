@@ -23,7 +23,7 @@ from relit_camera.base.errors import (
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.environments.environment_store import EnvironmentStore
 from relit_camera.live.scene.background_store import BackgroundStore
-from relit_camera.live.scene.loading_changes import Loaded, NotLoadedError, load_and_change
+from relit_camera.live.scene.loading_changes import Loaded, load_and_change
 from relit_camera.live.scene.look_loader import LookLoader
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_history import SceneHistory, ScenePoint, TakeStep
@@ -292,10 +292,9 @@ class SceneController:
         return self._next(unlit_allowed=allowed, **changes)
 
     def _subject(self, chosen: ChosenSubject, loaded: Loaded) -> Subject | None:
-        """Who is chosen.
+        """Who is chosen; breaks off where their file must be read first (`Loaded.ask_for`).
 
         Raises:
-            NotLoadedError: their file must be read first.
             RelitError: it cannot be.
         """
         name = chosen.name
@@ -308,7 +307,7 @@ class SceneController:
             def load(into: Loaded) -> None:
                 into.subjects[name] = self.subjects.load_file(path)[1]
 
-            raise NotLoadedError(name, load)
+            loaded.ask_for(name, load)
         return loaded.subjects[name]
 
     def register_temporary_environment(self, name_or_path: str) -> str:
@@ -329,10 +328,9 @@ class SceneController:
         return self._looks.background_names()
 
     def _with_look(self, look: Look, loaded: Loaded) -> dict[str, object]:
-        """The fields of a scene with that look.
+        """The fields of a scene with that look; breaks off where a file must be read first (`Loaded.ask_for`).
 
         Raises:
-            NotLoadedError: a file must be read first.
             RelitError: it cannot be.
         """
         before = self.scene
@@ -344,7 +342,7 @@ class SceneController:
             def load(into: Loaded) -> None:
                 into.scenes.append(replace(before, **self._looks.load(look, before)))  # type: ignore[arg-type]
 
-            raise NotLoadedError(wanted, load)
+            loaded.ask_for(wanted, load)
         return changes if look.mode is before.look.mode else changes | {"mode_revision": before.revision + 1}
 
     def _next(self, **changes: object) -> Scene:
