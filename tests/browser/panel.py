@@ -149,6 +149,6 @@ class Panel:
 def open_panel(open_page: OpenPage, url: str, **options: object) -> Panel:
     """The panel, once it is connected to its camera."""
     panel = Panel(open_page(url, **options))
-    expect(panel.place("party")).to_be_attached()
+    expect(panel.place("party")).to_be_attached(timeout=20_000)
     expect(panel.page.locator("#state-text")).not_to_contain_text("Connecting")
     return panel

@@ -206,4 +206,4 @@ def test_the_look_is_kept_over_a_restart(tmp_path: Path, open_page: OpenPage) ->
         camera.wait_for("lighting", environment="night-street")
     with camera_on_clip(tmp_path) as camera:
         panel = open_panel(open_page, camera.url)
-        expect(panel.place("night-street")).to_have_attribute("aria-pressed", "true", timeout=20_000)
+        expect(panel.place("night-street")).to_have_attribute("aria-pressed", "true")
