@@ -19,7 +19,6 @@ from relit_camera.app.wiring import make_pipeline, make_tracker
 from relit_camera.base.concurrency.threads import limit_threads
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.config.settings import RelitSettings, TrackerSettings
-from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.images.resize import letterbox
@@ -29,6 +28,7 @@ from relit_camera.cli.arguments import parse_background, parse_lighting
 from relit_camera.face.face_state import FaceState
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 from relit_camera.face.tracking.trackers import open_tracker
+from relit_camera.lab.evaluate.video.moving_face_accuracy import codes_psnr, with_best_gain
 from relit_camera.live.modes.ratio_relighting import fit_similarity
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.subject.subject import Subject
@@ -135,11 +135,8 @@ def compare(truth: Run, today: Run, stills: Run) -> tuple[dict[tuple[str, str], 
             shown = [want]
             for way, run in (("today", today), ("stills", stills)):
                 got = crop(run.pictures[index], run.states[index].landmarks[members], onto, (width, height))
-                light, goal = linear_from_uint8(got), linear_from_uint8(want)
-                gain = (light[inside] * goal[inside]).sum() / max(float((light[inside] ** 2).sum()), 1e-9)
-                got = uint8_from_linear((light * np.float32(gain)).astype(np.float32))
-                error = float(((got[inside].astype(np.float64) - want[inside]) ** 2).mean())
-                found.setdefault((name, way), []).append(10 * np.log10(255**2 / max(error, 1e-9)))
+                got = with_best_gain(got, want, inside)
+                found.setdefault((name, way), []).append(codes_psnr(got, want, inside))
                 shown.append(got)
             if name != "face":
                 pieces = [letterbox(each, (240, 160), (0, 0, 0), cv2.INTER_CUBIC) for each in shown]

@@ -7,6 +7,7 @@ import stat
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -359,11 +360,8 @@ def test_a_film_whose_record_cannot_be_written_leaves_the_one_before(
 def test_work_that_cannot_begin_is_told_and_can_be_resumed(studio: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
     there = studio(build_film)
 
-    def refuse(thread: threading.Thread) -> None:
-        raise RuntimeError("can't start new thread")
-
     with monkeypatch.context() as patched:
-        patched.setattr(threading.Thread, "start", refuse)
+        patched.setattr(threading.Thread, "start", Mock(side_effect=RuntimeError("can't start new thread")))
         with pytest.raises(RuntimeError):
             there.send()
     assert (there.capture.status().stage, there.capture.status().can_resume) == (FilmStage.INTERRUPTED, True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -195,11 +196,8 @@ def test_an_upload_that_breaks_off_or_is_removed_is_not_begun(room: Opener) -> N
 def test_work_that_cannot_begin_leaves_nothing(room: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
     there = room(write_quickly)
 
-    def refuse(thread: threading.Thread) -> None:
-        raise RuntimeError("can't start new thread")
-
     with monkeypatch.context() as patched:
-        patched.setattr(threading.Thread, "start", refuse)
+        patched.setattr(threading.Thread, "start", Mock(side_effect=RuntimeError("can't start new thread")))
         with pytest.raises(RuntimeError):
             there.send()
     assert (there.files(), there.jobs.all()) == (set(), [])

@@ -32,7 +32,8 @@ def test_a_look_s_picture_is_lit_from_where_its_lamps_are_in_their_colours(
     fake: FakeServer, open_page: OpenPage
 ) -> None:
     page = open_panel(open_page, fake.url).page
-    wait_until(lambda: any(sides(page, "Neon")[0]))
+    # The ground is drawn first, the head once the picture of what is behind it has come.
+    wait_until(lambda: all(left != right for left, right in (sides(page, look) for look in ("Neon", "Rembrandt"))))
     left, right = sides(page, "Neon")
     assert left[0] > 2 * left[1], "magenta from azimuth -75, the picture's left"
     assert right[2] > 2 * right[0], "cyan from azimuth 75"

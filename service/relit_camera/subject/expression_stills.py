@@ -152,7 +152,7 @@ def _require_plausible(
     rotations: NDArray[np.float32],
     lights: NDArray[np.float16],
 ) -> None:
-    """Raise ValueError where the stills' arrays, hold values that would cost minutes or crash."""
+    """Raise ValueError where the stills' arrays hold values that would cost minutes or crash."""
     margin = OUTSIDE * max(size)
     if landmarks.shape[1:] == (STILL_POINTS, 2):
         if (landmarks < -margin).any() or (landmarks > np.array(size) + margin).any():

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from http import HTTPStatus
 from typing import BinaryIO
 
 from fastapi import UploadFile
 from starlette.datastructures import Headers
-from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from relit_camera.api.problem_details import problem_response_from
+from relit_camera.api.middleware.bounded_body import answer_within
 from relit_camera.base.errors import InputError, TooLargeError
 
 MAX_UPLOAD_BYTES = 64 << 20
@@ -51,23 +49,7 @@ class BodyLimitMiddleware:
         is_form = headers.get("content-type", "").lower().startswith("multipart/form-data")
         file_limit = STREAMED_FORMS.get(scope["path"], MAX_UPLOAD_BYTES)
         limit = file_limit + MAX_FORM_FIELDS_BYTES if is_form else MAX_JSON_BYTES
-        announced = headers.get("content-length", "0")
-        if announced.isdecimal() and int(announced) > limit:
-            await problem_response_from(body_too_large(int(announced), limit))(scope, receive, send)
-            return
-        seen = 0
-
-        async def receive_counted() -> Message:
-            nonlocal seen
-            message = await receive()
-            seen += len(message.get("body", b""))
-            if seen > limit:
-                # The only type of exception that FastAPI passes on while it reads a body.
-                error = body_too_large(seen, limit)
-                raise HTTPException(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, error.what) from error
-            return message
-
-        await self.app(scope, receive_counted, send)
+        await answer_within(limit, lambda size: body_too_large(size, limit), self.app, scope, receive, send)
 
 
 def body_too_large(size: int, limit: int) -> TooLargeError:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
-from starlette.exceptions import HTTPException
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
-from relit_camera.api.problem_details import problem_response, problem_response_from
+from relit_camera.api.middleware.bounded_body import answer_within
+from relit_camera.api.problem_details import problem_response
 from relit_camera.base.errors import StorageError
 
 MAX_UPLOADS = 4
@@ -59,29 +59,13 @@ class UploadLimitMiddleware:
             return
         self._uploads += is_form
         try:
-            await self._within_quota(headers, scope, receive, send)
+            await self._within_quota(scope, receive, send)
         finally:
             self._uploads -= is_form
 
-    async def _within_quota(self, headers: Headers, scope: Scope, receive: Receive, send: Send) -> None:
-        room = self._most_bytes - await run_in_threadpool(_bytes_in, self._folder)
-        announced = headers.get("content-length", "0")
-        if announced.isdecimal() and int(announced) > max(room, 0):
-            await problem_response_from(_over_quota(self._most_bytes))(scope, receive, send)
-            return
-        seen = 0
-
-        async def receive_counted() -> Message:
-            nonlocal seen
-            message = await receive()
-            seen += len(message.get("body", b""))
-            if seen > max(room, 0):
-                # The only type of exception that FastAPI passes on while it reads a body.
-                error = _over_quota(self._most_bytes)
-                raise HTTPException(HTTPStatus.INSUFFICIENT_STORAGE, error.what) from error
-            return message
-
-        await self.app(scope, receive_counted, send)
+    async def _within_quota(self, scope: Scope, receive: Receive, send: Send) -> None:
+        room = max(self._most_bytes - await run_in_threadpool(_bytes_in, self._folder), 0)
+        await answer_within(room, lambda size: _over_quota(self._most_bytes), self.app, scope, receive, send)
 
 
 def _over_quota(most_bytes: int) -> StorageError:

@@ -17,7 +17,7 @@ from relit_camera.capture.expressions.still_selection import select_stills
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
-from relit_camera.live.modes.identity_check import IdentityTunables, shape_distance_cm
+from relit_camera.live.modes.identity_check import IdentityTunables, shape_distance_cm, what_differs
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
 from relit_camera.subject.expression_stills import ExpressionStill
@@ -130,16 +130,15 @@ def _require_same_person(film: TrackedFilm, chosen: Sequence[TrackedFace], face:
 
     A grimace and a turn change the shape: of the frames round a chosen one the least distance counts.
     """
-    limits = IdentityTunables()
     times = np.array([each.time_s for each in film.faces])
     distances_cm = np.array([shape_distance_cm(each.points, face) for each in film.faces])
     shape_cm = shape_distance_cm(film.neutral.points, face)
     for each in chosen:
         near = np.abs(times - each.time_s) <= SAME_PERSON_S
         shape_cm = max(shape_cm, float(distances_cm[near].min()))
-    if (shape_cm / limits.shape_cm) * (residual / limits.residual) > 1:
+    differs = what_differs(shape_cm, residual, IdentityTunables())
+    if differs is not None:
         raise CaptureError(
-            f"the face in {film.path.name} is not the subject's: it has another shape ({10 * shape_cm:.1f} mm) and "
-            f"looks so under no light (deviation {residual:.2f})",
+            f"the face in {film.path.name} is not the subject's: {differs}",
             "film the person whose subject it is, in soft light from the front",
         )

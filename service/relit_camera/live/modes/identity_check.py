@@ -74,11 +74,11 @@ class IdentityCheck:
         if time_s - self._since_s < limits.delay_s:
             return None
         shape_cm = self._shape_cm
-        if (shape_cm / limits.shape_cm) * (residual / limits.residual) <= 1:
+        differs = what_differs(shape_cm, residual, limits)
+        if differs is None:
             return None
         return FaceMismatch(
-            "the live face is not the subject's: it has another shape "
-            f"({10 * shape_cm:.1f} mm) and looks so under no light (deviation {residual:.2f})",
+            f"the live face is not the subject's: {differs}",
             "choose your own subject, or mode reenact",
             partial(self._has_changed_into_the_subjects, shape_cm),
         )
@@ -90,6 +90,19 @@ class IdentityCheck:
             return False
         points = motion.neutral.points + motion.expression
         return shape_distance_cm(points, self._face) < limit_cm
+
+
+def what_differs(shape_cm: float, residual: float, limits: IdentityTunables) -> str | None:
+    """What tells a face from the subject's, in words; None where it passes for it.
+
+    Args:
+        shape_cm: its distance from the subject's, see `shape_distance_cm`.
+        residual: how badly any light explains it, see `RoomLightEstimate`.
+        limits: the thresholds.
+    """
+    if (shape_cm / limits.shape_cm) * (residual / limits.residual) <= 1:
+        return None
+    return f"it has another shape ({10 * shape_cm:.1f} mm) and looks so under no light (deviation {residual:.2f})"
 
 
 def shape_distance_cm(points: NDArray[np.float64], face: SourceFace) -> float:

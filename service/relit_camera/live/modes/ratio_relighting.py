@@ -20,7 +20,7 @@ from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.live_detail import SourceCells, blend_cells, live_cells
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
-from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
+from relit_camera.live.reenactment.control_points import control_points, feature_landmarks, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.face_mesh import triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
@@ -182,9 +182,9 @@ def ratio_confidence(matte: Mask) -> Mask:
 
 def still_skin(face: SourceFace) -> Mask:
     """Where the source image shows what the live picture shows too, 0..1: not eyes and lips, which open and close."""
-    scheme, skin = face.scheme, np.ones(face.size[::-1], np.float32)
-    for moving in (scheme.right_eye.lids, scheme.left_eye.lids, scheme.lips):
-        outline = cv2.convexHull(face.landmarks[list(moving)])[:, 0]
+    skin = np.ones(face.size[::-1], np.float32)
+    for feature in feature_landmarks(face.scheme):
+        outline = cv2.convexHull(face.landmarks[list(feature)])[:, 0]
         grown = outline.mean(axis=0) + MOVING_REACH * (outline - outline.mean(axis=0))
         cv2.fillConvexPoly(skin, np.round(grown).astype(np.int32), 0.0)
     return np.asarray(cv2.GaussianBlur(skin, (0, 0), SOFT_PX), np.float32)

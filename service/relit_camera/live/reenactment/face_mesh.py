@@ -59,7 +59,7 @@ class FaceMesh:
         """
         target = landmarks[self.members]
         corners = target.take(self.triangles, axis=0)
-        facing = np.flatnonzero(_doubled_areas(corners) * self.clockwise > 0)
+        facing = np.flatnonzero(doubled_areas(corners) * self.clockwise > 0)
         nearness = self.middles @ pose.rotation.as_matrix()[2]
         order = facing[np.argsort(nearness[facing])]
         return SurfacePatch(
@@ -193,9 +193,15 @@ def triangulate_face(face: SourceFace) -> FaceMesh:
     outline = corners[outline_edges(triangles)]
     span = face.scheme.eye_span(face.landmarks)
     trust = smoothstep(_distance(corners, outline), 0, OUTLINE_BLEND * span)
-    clockwise = np.sign(_doubled_areas(corners[triangles]))
+    clockwise = np.sign(doubled_areas(corners[triangles]))
     middles = face.scheme.canonical[members][triangles].mean(axis=1)
     return FaceMesh(face, members, triangles, clockwise, middles, np.column_stack([corners, trust])[triangles], span)
+
+
+def doubled_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Signed areas (count,) of triangles (count, 3, 2), doubled."""
+    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    return np.asarray(ax * by - ay * bx)
 
 
 def _distance(points: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -204,9 +210,3 @@ def _distance(points: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArra
     offset = points[:, None] - start
     share = np.clip((offset * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
     return np.asarray(np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1))
-
-
-def _doubled_areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Signed areas (count,) of triangles (count, 3, 2), doubled."""
-    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    return np.asarray(ax * by - ay * bx)

@@ -23,11 +23,9 @@ class PartFigures:
 
     Attributes:
         decibels: of each frame in which it applies, by part.
-        stillness: mean absolute change of a code from frame to frame inside the person; NaN for a single frame.
     """
 
     decibels: Mapping[str, Sequence[float]]
-    stillness: float = float("nan")
 
     def mean(self, part: str) -> float:
         """Mean over the frames in which the part applies; NaN where there are none."""
@@ -40,25 +38,17 @@ class PartAccuracy:
     """Collects the figures of a video, frame by frame."""
 
     _decibels: dict[str, list[float]] = field(default_factory=dict)
-    _changes: list[float] = field(default_factory=list)
-    _last: DisplayImage | None = None
 
     def add(self, shown: DisplayImage, truth: DisplayImage, parts: Mapping[str, Region]) -> DisplayImage:
         """Compare a frame (height, width, 3) with the truth; returns it with the gain that brings it nearest."""
-        person = parts["person"]
-        fitted = with_best_gain(shown, truth, person)
-        error = (fitted.astype(np.float32) - truth) ** 2
+        fitted = with_best_gain(shown, truth, parts["person"])
         for name, part in parts.items():
-            worst = float(error[part].mean()) / 255**2
-            self._decibels.setdefault(name, []).append(min(-10 * np.log10(max(worst, 1e-12)), MAX_DB))
-        if self._last is not None:
-            self._changes.append(float(np.abs(shown.astype(np.int16) - self._last)[person].mean()))
-        self._last = shown
+            self._decibels.setdefault(name, []).append(codes_psnr(fitted, truth, part))
         return fitted
 
     def figures(self) -> PartFigures:
         """What came of all frames."""
-        return PartFigures(self._decibels, float(np.mean(self._changes)) if self._changes else float("nan"))
+        return PartFigures(self._decibels)
 
 
 def with_best_gain(shown: DisplayImage, truth: DisplayImage, person: Region) -> DisplayImage:
@@ -67,6 +57,12 @@ def with_best_gain(shown: DisplayImage, truth: DisplayImage, person: Region) -> 
     seen = light[person]
     gain = float((seen * goal).sum(dtype=np.float64)) / max(float((seen * seen).sum(dtype=np.float64)), 1e-12)
     return display_from_linear(light * np.float32(gain))
+
+
+def codes_psnr(shown: DisplayImage, truth: DisplayImage, part: Region) -> float:
+    """PSNR in dB of a picture's sRGB codes inside a part, 255 the peak; at most `MAX_DB`."""
+    error = float(np.mean((shown[part].astype(np.float64) - truth[part]) ** 2)) / 255**2
+    return min(-10 * float(np.log10(max(error, 1e-12))), MAX_DB)
 
 
 def figures_table(rows: Iterable[tuple[str, PartFigures]]) -> str:

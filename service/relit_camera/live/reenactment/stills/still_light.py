@@ -8,6 +8,7 @@ exposure and white balance of the film were taken for. Eyes and mouth get the li
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import cv2
@@ -19,6 +20,7 @@ from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
 from relit_camera.base.images.light_multiplication import root_of_light
 from relit_camera.face.landmarks.canonical_face import canonical_face
 from relit_camera.light.directions import texel_solid_angles
+from relit_camera.live.reenactment.control_points import feature_landmarks
 from relit_camera.live.reenactment.face_mesh import draw_triangles
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.stills.still_regions import face_in_still, facing, shown_landmarks
@@ -31,8 +33,8 @@ MARGIN_SPANS = 0.15
 """Round the face, that the grid takes in."""
 MATCHED_SPANS = 0.16
 """Sigma of the blur in which still and source image agree."""
-FILL_CELLS = (1.5, 5.0)
-"""Sigmas of the blurs that lead the light of the skin into eyes and mouth."""
+FILL_SHARES = {1.5: 1.0, 5.0: 0.02}
+"""The Gaussians that lead the light of the skin into eyes and mouth: sigma in cells, and share."""
 MAX_ROOT = 3.9
 """Limit of a factor's root: the tables of `multiply_light` end there."""
 MAX_PIXELS_PER_CELL = 32.0
@@ -126,12 +128,11 @@ class _Grid:
         low, high = np.maximum(low, 0), np.minimum(high, subject.size)
         columns, rows = np.maximum((high - low) // cell, 2)
         box = (int(low[0]), int(low[1]), int(low[0] + columns * cell), int(low[1] + rows * cell))
-        scheme = face.scheme
         skin = np.zeros((box[3] - box[1], box[2] - box[0]), np.uint8)
         shifted = np.round(face.landmarks - low).astype(np.int32)
-        cv2.fillPoly(skin, [shifted[list(scheme.oval)]], 255)
-        for hole in (scheme.right_eye.lids, scheme.left_eye.lids, scheme.lips):
-            cv2.fillConvexPoly(skin, cv2.convexHull(shifted[list(hole)]), 0)
+        cv2.fillPoly(skin, [shifted[list(face.scheme.oval)]], 255)
+        for feature in feature_landmarks(face.scheme):
+            cv2.fillConvexPoly(skin, cv2.convexHull(shifted[list(feature)]), 0)
         share = cv2.resize(skin, (int(columns), int(rows)), interpolation=cv2.INTER_AREA)
         return cls(box, cell, np.asarray(cv2.erode(share, np.ones((2, 2))) / np.float32(255), np.float32), span / cell)
 
@@ -171,7 +172,8 @@ def _unlit(
     seen, valid = on_source
     weight = valid * grid.skin
     sigma = MATCHED_SPANS * grid.span
-    theirs, ours = _blurred(seen, weight, sigma), _blurred(under_own, weight, sigma)
+    shares = {sigma: 1.0, 4 * sigma: 1e-3}
+    theirs, ours = _blurred(seen, weight, shares), _blurred(under_own, weight, shares)
     sure = (weight > 0.5).astype(np.uint8)
     mean, still_mean = (max(float(cv2.mean(each, sure)[1]), 1e-4) for each in (under_own, seen))
     correction = (ours + FLOOR * mean) / (theirs + FLOOR * still_mean)
@@ -218,22 +220,20 @@ def _on_source(
     return np.asarray(seen, np.float32), valid
 
 
-def _blurred(picture: NDArray[np.float32], weight: Mask, sigma: float) -> NDArray[np.float32]:
-    """A picture blurred where it has weight (normalized convolution), and from there on smoothly beyond."""
-    total, shares = np.zeros_like(picture), np.zeros_like(weight)
+def _blurred(picture: NDArray[np.float32], weight: Mask, shares: Mapping[float, float]) -> NDArray[np.float32]:
+    """A picture blurred where it has weight (normalized convolution) with a sum of Gaussians, share by sigma.
+
+    A wide one of small share leads it on smoothly where there is no weight.
+    """
     weighted = picture * weight[..., None]
-    for reach, share in ((sigma, 1.0), (4 * sigma, 1e-3)):
-        total += share * cv2.GaussianBlur(weighted, (0, 0), reach)
-        shares += share * cv2.GaussianBlur(weight, (0, 0), reach)
-    return np.asarray(total / (shares + np.float32(1e-9))[..., None], np.float32)
+    total, weights = np.zeros_like(picture), np.full_like(weight, 1e-9)
+    for sigma, share in shares.items():
+        total += np.float32(share) * cv2.GaussianBlur(weighted, (0, 0), sigma)
+        weights += np.float32(share) * cv2.GaussianBlur(weight, (0, 0), sigma)
+    return np.asarray(total / weights[..., None], np.float32)
 
 
 def _filled(picture: NDArray[np.float32], skin: Mask) -> NDArray[np.float32]:
     """A picture of the grid, eyes and mouth filled with the skin round them."""
-    weighted = picture * skin[..., None]
-    total, shares = np.zeros_like(picture), np.full_like(skin, 1e-9)
-    for sigma, share in zip(FILL_CELLS, (1.0, 0.02), strict=True):
-        total += np.float32(share) * cv2.GaussianBlur(weighted, (0, 0), sigma)
-        shares += np.float32(share) * cv2.GaussianBlur(skin, (0, 0), sigma)
-    around = total / shares[..., None]
+    around = _blurred(picture, skin, FILL_SHARES)
     return np.asarray(around + skin[..., None] * (picture - around), np.float32)

@@ -12,7 +12,7 @@ from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.landmarks.canonical_face import canonical_face
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
-from relit_camera.live.reenactment.face_mesh import draw_triangles
+from relit_camera.live.reenactment.face_mesh import doubled_areas, draw_triangles
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.subject.expression_stills import ExpressionStill
 
@@ -82,8 +82,7 @@ def still_regions(scheme: LandmarkScheme) -> tuple[StillRegion, ...]:
 
 def facing(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which triangles (count, 3, 2), in pixels, turn their front to the camera: (count,)."""
-    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
-    return np.asarray(ax * by < ay * bx)  # counter-clockwise where y goes up
+    return doubled_areas(corners) < 0  # counter-clockwise where y goes up
 
 
 def shown_landmarks(still: ExpressionStill, face: SourceFace, placed: NDArray[np.float32]) -> NDArray[np.float64]:
