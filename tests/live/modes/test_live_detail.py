@@ -77,10 +77,10 @@ def test_something_else_before_the_face_is_not_painted_as_skin() -> None:
 
 def test_cells_are_the_live_pictures() -> None:
     image = np.arange(0, 240, 1, dtype=np.uint8)[None, :, None].repeat(60, 0).repeat(3, 2)
-    light, brightest = live_cells(image, 6, (10, 40))
+    light, brightest = live_cells(image, 6, (0, 0, 40, 10))
     assert light.shape == (10, 40, 3)
     np.testing.assert_allclose(brightest[0], np.arange(40) * 6 + 2.5, atol=0.6)
-    light, brightest = live_cells(image[:-1, :-1], 6, (10, 40))
+    light, brightest = live_cells(image[:-1, :-1], 6, (0, 0, 40, 10))
     assert light.shape == (10, 40, 3)
 
 

@@ -62,7 +62,7 @@ def relit_live(
     """The live frame in the light of a relit picture."""
     assert motion.pose is not None
     room = ours.room_light.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
-    pictures = ours.light_roots(relit, relighter().relight(room.in_head_frame[None])[0])
+    pictures = ours.raised_lights(relit, relighter().relight(room.in_head_frame[None])[0])
     positions = ours.positions(motion, motion.pose, frame.size)
     span = landmark_scheme("mesh478").eye_span(motion.landmarks)
     return ours.apply(RatioPlan(frame, motion.presence, room.gain, pictures, positions, span), blend)

@@ -67,15 +67,30 @@ def multiply_light(
         product = _roots_of(image[top:bottom], as_shown)
         inner = np.s_[step : step + bottom - top, :width]
         cv2.multiply(product, above[inner], dst=product, scale=1 / _ONE)
-        if more is not None and more[first : first + _BAND_CELLS + 2].any():
-            some = more[first : first + _BAND_CELLS + 2]
-            cv2.resize(some, (columns, step * len(some)), fine[: step * len(some)], interpolation=cv2.INTER_LINEAR)
-            cv2.add(product, fine[inner], dst=product)
+        if more is not None:
+            _add(product, more[first : first + _BAND_CELLS + 2], step, fine)
         if WIDE_TABLES:
             cv2.LUT(product, _codes_of_roots(), dst=shown[top:bottom])
         else:
             _codes_of_roots().take(product, out=shown[top:bottom], mode="clip")  # other modes would copy `out`
     return shown
+
+
+def _add(product: NDArray[np.uint16], cells: NDArray[np.uint16], step: int, buffer: NDArray[np.uint16]) -> None:
+    """Add roots in cells, the first and last row of them beyond the picture, where there are any.
+
+    `buffer` is overwritten; it has room for the cells in pixels.
+    """
+    some = np.flatnonzero(cells.any(axis=(0, 2)))
+    if some.size == 0:
+        return
+    # With one more column on each side, between which the roots come down to 0.
+    first, last = max(int(some[0]) - 1, 0), min(int(some[-1]) + 2, cells.shape[1])
+    size = (step * (last - first), step * len(cells))
+    fine = buffer[: size[1], : size[0]]
+    cv2.resize(cells[:, first:last], size, fine, interpolation=cv2.INTER_LINEAR)
+    onto = product[:, step * first : step * last]
+    cv2.add(onto, fine[step : step + onto.shape[0], : onto.shape[1]], dst=onto)
 
 
 def _bordered_codes(roots: NDArray[np.float32]) -> NDArray[np.uint16]:

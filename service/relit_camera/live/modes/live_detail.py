@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.images.light_multiplication import POWER, light_of_root, root_of_light
+from relit_camera.live.reenactment.warp import Box
 
 Cells = NDArray[np.float32]
 
@@ -112,15 +113,18 @@ def blend_cells(live: Cells, brightest: Cells, source: SourceCells, unit: float)
     return CellBlend(np.asarray(weighted, np.float32), np.asarray(trust, np.float32))
 
 
-def live_cells(image: DisplayImage, step: int, cells: tuple[int, ...]) -> tuple[Cells, Cells]:
+def live_cells(image: DisplayImage, step: int, box: Box) -> tuple[Cells, Cells]:
     """The live picture in cells of `step` pixels: roots of its light (rows, columns, 3), its brightest code there.
 
-    The middle of each cell stands for it: what is made of cells is blurred.
+    The middle of each cell stands for it: what is made of cells is blurred. `box` is left, top, right and bottom of the
+    cells that are wanted; what is of them beyond the picture repeats its border.
     """
-    rows, columns = (min(side // step, count) for side, count in zip(image.shape, cells, strict=False))
-    whole = image[: rows * step, : columns * step]
-    small = whole if step == 1 else cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_LINEAR)
-    small = cv2.copyMakeBorder(small, 0, cells[0] - rows, 0, cells[1] - columns, cv2.BORDER_REPLICATE)
+    left, top, right, bottom = box
+    whole_right, whole_bottom = min(right, image.shape[1] // step), min(bottom, image.shape[0] // step)
+    part = image[top * step : whole_bottom * step, left * step : whole_right * step]
+    size = (whole_right - left, whole_bottom - top)
+    small = part if step == 1 else cv2.resize(part, size, interpolation=cv2.INTER_LINEAR)
+    small = cv2.copyMakeBorder(small, 0, bottom - whole_bottom, 0, right - whole_right, cv2.BORDER_REPLICATE)
     return np.asarray(cv2.LUT(small, _ROOTS_OF_CODES), np.float32), _largest(small).astype(np.float32)
 
 

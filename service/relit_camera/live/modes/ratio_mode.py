@@ -111,7 +111,7 @@ class RatioMode:
             frame.time_s,
             room.light_map,
             room.in_head_frame,
-            relighting.light_roots,
+            relighting.raised_lights,
             quality.relight_every,
         )
         eye_distance = context.face.scheme.eye_span(motion.landmarks)

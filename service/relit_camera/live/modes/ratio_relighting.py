@@ -25,7 +25,7 @@ from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.face_mesh import triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
 from relit_camera.live.reenactment.source_image import SourceFace, feather_edges
-from relit_camera.live.reenactment.warp import PositionGrid, Warp
+from relit_camera.live.reenactment.warp import Box, PositionGrid, Warp
 from relit_camera.subject.subject import Subject
 
 RATIO_FLOOR = 0.03
@@ -42,6 +42,9 @@ SMALL_FRAME_PX = 300
 """Shorter side of frames below which each pixel is such a cell."""
 EXTRAPOLATION_CELLS, WIDE_REDUCTION = 45, 4
 """The extrapolation beyond the person is computed for so many there, and its wide blurs for fewer by a factor."""
+
+_NO_LIMIT = 1e9
+"""Source pixels, more than any picture has."""
 
 
 class RoomLight(Protocol):
@@ -60,7 +63,7 @@ class RatioPlan:
         frame: the live frame.
         presence: how far it is relit, 0..1: 0 shows it as it is.
         gain: (3,) float32 by which its exposure differs from that of the ratio, see `RoomLightEstimate`.
-        pictures: (2 · height, width, 3) float32, see `RatioRelighting.light_roots`.
+        pictures: (2 · height, width, 3) float32, see `RatioRelighting.raised_lights`.
         positions: where cells of some pixels of the frame lie in the source image.
         eye_distance: in the frame, pixels.
     """
@@ -76,7 +79,7 @@ class RatioPlan:
 class RatioRelighting:
     """Exchanges the light on the live face of one subject.
 
-    `positions`, `light_roots` and `apply` share nothing that changes: each may run in a thread of its own.
+    `positions`, `raised_lights` and `apply` share nothing that changes: each may run in a thread of its own.
 
     Attributes:
         room_light: estimates the room's light from the live face.
@@ -98,13 +101,13 @@ class RatioRelighting:
         self._mesh = triangulate_face(face)
         confidence = ratio_confidence(feather_edges(subject.matte))
         self._inside = (confidence > 0.5).astype(np.uint8)
+        self._person = _looked_at(confidence)
         self._parts = cv2.merge([confidence, still_skin(face), inside_face(face)])
 
-    def light_roots(self, relit: LinearImage, under_room: LinearImage) -> NDArray[np.float32]:
+    def raised_lights(self, relit: LinearImage, under_room: LinearImage) -> NDArray[np.float32]:
         """The source image under the scene's light and, below it, under the room's: (2 · height, width, 3) float32.
 
-        As roots (`light_multiplication`), because the step between two of them is about as visible anywhere. Both have
-        a little light added, so that their ratio is moderate in shadows.
+        Linear; both have a little light added, so that their ratio is moderate in shadows.
 
         Args:
             relit: (height, width, 3) float32 linear, the source image under the scene's light.
@@ -112,8 +115,10 @@ class RatioRelighting:
         """
         # A room may have no light at all of one colour; then the live picture has none of it either.
         floor = tuple(RATIO_FLOOR * max(mean, MIN_CHANNEL_MEAN) for mean in cv2.mean(under_room, self._inside))
-        both = cv2.add(np.concatenate([relit, np.maximum(under_room, 0)]), floor)
-        return root_of_light(np.maximum(both, 0, out=both))
+        both = np.empty((2 * relit.shape[0], *relit.shape[1:]), np.float32)
+        for picture, half in zip((relit, under_room), np.split(both, 2), strict=True):
+            cv2.threshold(picture, 0, 0, cv2.THRESH_TOZERO, dst=half)
+        return np.asarray(cv2.add(both, floor, dst=both), np.float32)
 
     def positions(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> PositionGrid:
         """Where a live frame of `size` (width, height) lies in the source image.
@@ -133,29 +138,49 @@ class RatioRelighting:
         sRGB says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
         first.
         """
+        step = plan.positions.step
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
         nodes = plan.positions.nodes() - np.float32(0.5)
+        box = self._cells_of_person(nodes) if blend >= 1 else (0, 0, nodes.shape[1], nodes.shape[0])
+        left, top, right, bottom = box
+        inside = np.s_[top:bottom, left:right]
         relit, under_room, parts = (
-            cv2.remap(each, nodes, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            cv2.remap(each, nodes[inside], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
             for each in (*np.split(plan.pictures, 2), self._parts)
         )
-        gain = tuple(map(float, root_of_light(plan.gain).ravel()))
-        under_room = cv2.multiply(under_room, (*gain, 1.0), dst=under_room)
-        step = plan.positions.step
-        live, brightest = live_cells(plan.frame.image, step, relit.shape[:2])
+        cv2.multiply(under_room, (*map(float, plan.gain), 1.0), dst=under_room)
+        # Roots, because the step between two of them is about as visible anywhere.
+        relit, under_room = root_of_light(relit), root_of_light(under_room)
+        live, brightest = live_cells(plan.frame.image, step, box)
         confidence, skin, face = cv2.split(parts)
         source = SourceCells(relit, under_room, confidence, skin, face)
         cells = blend_cells(live, brightest, source, plan.eye_distance / step)
-        factor = extrapolate_roots(cells.ratio) * cells.trust[..., None]
-        added = relit * (1 - cells.trust[..., None])
+        beside = (top, nodes.shape[0] - bottom, left, nodes.shape[1] - right)
+        factor = extrapolate_roots(cv2.copyMakeBorder(cells.ratio, *beside, cv2.BORDER_CONSTANT))
+        trust = cv2.cvtColor(cells.trust, cv2.COLOR_GRAY2RGB)
+        added = cv2.multiply(relit, 1 - trust)
+        factor[inside] *= trust
         if blend < 1:
             factor, added = blend_toward_live(factor, added, live, blend)
+        added = cv2.copyMakeBorder(added, *beside, cv2.BORDER_CONSTANT)
         shown = multiply_light(plan.frame.image, factor, step, as_shown=1 - blend, added=added)
         if plan.presence < 1:
             # Where nobody is tracked with confidence the picture eases back to the live one, as both are shown:
             # in linear light that guess would be in the mixture.
             shown = cv2.addWeighted(shown, plan.presence, plan.frame.image, 1 - plan.presence, 0)
         return np.asarray(shown, np.uint8)
+
+    def _cells_of_person(self, nodes: NDArray[np.float32]) -> Box:
+        """The box of those cells that look at the person, with one more round them; of all where none does.
+
+        `nodes` (rows, columns, 2) are where they look, as OpenCV counts.
+        """
+        low, high = self._person
+        left, top, width, height = cv2.boundingRect(cv2.inRange(nodes, (*low, 0, 0), (*high, 0, 0)))
+        rows, columns = nodes.shape[:2]
+        if width == 0:
+            return 0, 0, columns, rows
+        return max(left - 1, 0), max(top - 1, 0), min(left + width + 1, columns), min(top + height + 1, rows)
 
     def _warp(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> Warp:
         """The source image as it lies on the live face of a frame of `size`.
@@ -188,6 +213,18 @@ def still_skin(face: SourceFace) -> Mask:
         grown = outline.mean(axis=0) + MOVING_REACH * (outline - outline.mean(axis=0))
         cv2.fillConvexPoly(skin, np.round(grown).astype(np.int32), 0.0)
     return np.asarray(cv2.GaussianBlur(skin, (0, 0), SOFT_PX), np.float32)
+
+
+def _looked_at(confidence: Mask) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The least and the largest x and y, as OpenCV counts, whose surroundings have confidence.
+
+    Where that is at a border of the picture, which is repeated beyond, there is no limit.
+    """
+    left, top, width, height = cv2.boundingRect((confidence > 0).astype(np.uint8))
+    low, high = np.array([left, top]) - 1.0, np.array([left + width, top + height], np.float64)
+    low[low < 0] = -_NO_LIMIT
+    high[high >= confidence.shape[::-1]] = _NO_LIMIT
+    return tuple(low), tuple(high)
 
 
 def inside_face(face: SourceFace) -> Mask:
