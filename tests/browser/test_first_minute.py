@@ -6,6 +6,7 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -17,6 +18,7 @@ from relit_camera.app.demo import tour
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.devices.sources.playback_source import PlaybackSource
 from relit_camera.devices.sources.source import SourceInfo
+from relit_camera.live.status.camera_status import CameraState
 from relit_camera.subject.subject_file import write_subject
 from tests.app.subject_builders import captured
 from tests.browser.browser_pages import OpenPage
@@ -207,3 +209,13 @@ def test_the_look_is_kept_over_a_restart(tmp_path: Path, open_page: OpenPage) ->
     with camera_on_clip(tmp_path) as camera:
         panel = open_panel(open_page, camera.url)
         expect(panel.place("night-street")).to_have_attribute("aria-pressed", "true")
+
+
+def test_each_state_of_the_camera_is_told_in_words(fake: FakeServer, open_page: OpenPage) -> None:
+    """The program's own name of a state, `No-subject.`, was shown."""
+    panel = open_panel(open_page, fake.url)
+    for state in CameraState:
+        fake.camera.base = replace(fake.camera.base, state=state)
+        expect(panel.page.locator("#state")).to_have_attribute("data-state", state.value)
+        raw = re.compile(f"^{state.value}\\.$", re.IGNORECASE)  # a name without words is shown as a sentence
+        expect(panel.page.locator("#state-text")).not_to_have_text(raw)

@@ -12,11 +12,14 @@ const STATES = {
   waiting: "Waiting for the webcam",
   released: "Webcam released until somebody looks",
   capturing: "Nobody is shown yet",
+  "no-subject": "Nobody is shown yet",
   frozen: "Frozen",
   stopping: "Stopping…",
   lost: "Not connected",
 };
 const VEILED = ["waiting", "lost", "starting", "capturing"];
+/** Where a placeholder is shown, a rate of pictures would only worry. */
+const STILL = ["waiting", "released", "starting", "capturing", "no-subject"];
 const LOST_TEXT = "The camera does not answer. Start it again: relit run. This page finds it by itself.";
 const UNLIT_TEXT = "Others see your webcam’s picture as it is.";
 
@@ -78,7 +81,7 @@ function showStatus(status) {
   showNotes(status.degraded.filter(({ code }) => code !== "no-subject" && !(status.advice && code === "reduced-quality")));
   showAdvice(status.advice);
   const rate = (value) => (value ?? 0).toFixed(0);
-  setText(byId("figure-fps"), `${rate(status.fps.new)} pictures a second`);
+  setText(byId("figure-fps"), STILL.includes(status.state) ? "" : `${rate(status.fps.new)} pictures a second`);
   byId("figure-fps").title = `New ones; the webcam gives ${rate(status.fps.camera)}`;
   setText(byId("figure-latency"), `${Math.round(status.latency_ms.p50)} ms behind, mostly below ${Math.round(status.latency_ms.p95)} ms`);
   setText(byId("figure-tracker"), `Face ${status.tracker.state}`);

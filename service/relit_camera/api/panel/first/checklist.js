@@ -8,6 +8,7 @@ import { ModelPull } from "./models.js";
 const RELOAD_MS = 4000;
 const COPIED_MS = 2000;
 const NEEDED = ["source-failed", "sink-failed", "models-missing"];
+const MODELS_MISSING = "The small networks that find your face are not here yet: some 6 MB, or 36 from a package index.";
 const NUMBERS = ["Nothing is", "One thing is", "Two things are", "Three things are", "Four things are"];
 
 const section = document.getElementById("checklist");
@@ -72,7 +73,8 @@ function fold(title, checks) {
 }
 
 function item({ id, title, state, what, cure, commands }) {
-  const parts = [make("h3", {}, title), make("p", {}, sentence(what))];
+  const missing = id === "models" && state === "failed";
+  const parts = [make("h3", {}, title), make("p", {}, missing ? MODELS_MISSING : sentence(what))];
   if (state !== "ok") {
     if (id === "models") {
       models.look();

@@ -9,7 +9,7 @@ import { problemPlace, showProblem } from "./problem.js";
 
 const POLL_MS = 300;
 const WORDS = {
-  models: ["First, what finds your face", "Small networks find your face in the picture: some 6 MB, from their authors. Nothing of you is sent."],
+  models: ["First, what finds your face", "Small networks find your face in the picture: some 6 MB from their authors, or 36 from a package index. Nothing of you is sent."],
   framing: ["Your face now", ""],
   filming: ["Hold still", "Look at the camera, your mouth closed."],
   building: ["Working out your light", "A few seconds…"],

@@ -13,7 +13,7 @@ export class ModelPull {
   constructor(prefix, onDone) {
     this.onDone = onDone;
     this.button = make("button", { type: "button", className: "firm", id: `${prefix}-get` }, "Get the models");
-    this.cancel = make("button", { type: "button", className: "quiet", id: `${prefix}-cancel`, hidden: true }, "Cancel");
+    this.cancel = make("button", { type: "button", className: "quiet", id: `${prefix}-cancel`, hidden: true }, "Stop");
     this.bar = make("progress", { id: `${prefix}-progress`, max: 1, hidden: true, "aria-label": "Getting the models" });
     this.doing = make("p", { className: "hint", role: "status" });
     this.problem = problemPlace(`${prefix}-problem`);
