@@ -159,6 +159,10 @@ def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None
     assert [trouble.what for trouble in made.troubles] == ["mode reenact is shown in place of mode ratio"]
     still = made.process(frame(100, image), scene()).image
     assert difference(last, still) < 2
+    private = pipeline(LongFace())
+    first = [private.process(frame(index, image), replace(ratio, unlit_allowed=False)) for index in range(25)]
+    assert max(difference(each.image, still) for each in first) < 2, "of a stranger nothing is shown relit"
+    assert private.troubles == []
     other = replace(ratio, subject=replace(small_subject()))
     made.process(frame(101, image), other)
     assert made.troubles == []

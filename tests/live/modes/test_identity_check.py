@@ -76,9 +76,36 @@ def test_one_measure_alone_decides_only_when_it_is_far_off() -> None:
     check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
     shape = shape_distance_cm(stranger_points(), face_of(close_up())) / IdentityTunables().shape_cm
     limit = IdentityTunables().residual / shape
-    check.check(stranger, 0.0, 0.0)
+    check.check(stranger, limit, 0.0)
     assert check.check(stranger, 0.99 * limit, 5.0) is None
     assert check.check(stranger, 1.01 * limit, 5.0) is not None
+
+
+def test_the_subject_is_recognized_from_the_first_frame_and_a_stranger_never() -> None:
+    check, ease_s = IdentityCheck(face_of(close_up())), IdentityTunables().ease_s
+    assert check.recognized(0.0) == 0
+    check.check(before_the_camera(presence=0.1), NO_LIGHT_EXPLAINS, 0.0)
+    assert [check.recognized(share * ease_s) for share in (0.0, 0.5, 1.0, 9.0)] == [0, 0.5, 1, 1]
+    check.forget()
+    stranger = before_the_camera(points=stranger_points())
+    for time_s in np.arange(10, 20, 0.5):
+        check.check(stranger, NO_LIGHT_EXPLAINS, time_s)
+        assert check.recognized(time_s) == 0
+    check.check(before_the_camera(), NO_LIGHT_EXPLAINS, 20.0)
+    assert check.recognized(21.0) == 1
+    assert check.recognized(3.0) == 1, "the film begins anew"
+
+
+def test_a_face_that_passed_at_once_goes_on_to_pass_in_a_hard_room_and_no_further() -> None:
+    tunables = IdentityTunables()
+    shape = shape_distance_cm(stranger_points(), face_of(close_up())) / tunables.shape_cm
+    residual = tunables.residual / shape  # at which its unlikeness is 1
+    for first, later, passes in ((0.6, 1.5, True), (0.6, 1.7, False), (0.7, 1.1, False), (0.7, 0.9, True)):
+        check, person = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
+        check.check(person, first * residual, 0.0)
+        assert (check.recognized(1.0) > 0) is (first == 0.6)
+        assert (check.check(person, later * residual, 2.0) is None) is passes
+        assert (check.recognized(3.0) > 0) is passes
 
 
 def test_a_face_that_is_not_tracked_with_confidence_is_not_judged() -> None:

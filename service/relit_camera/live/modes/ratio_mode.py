@@ -24,9 +24,9 @@ from relit_camera.live.scene.scene import Scene
 class RatioMode:
     """See `RenderMode`.
 
-    Where no face is followed, or not yet, the live picture would be shown as it is. Unless the scene allows that, the
-    subject's relit picture at rest takes its place, as mode reenact shows it while it searches; between them it is
-    eased.
+    Where no face is followed, or not yet, the live picture would be shown as it is, and a stranger in the light of
+    another's face. Unless the scene allows that, the subject's relit picture at rest takes its place, as mode reenact
+    shows it while it searches, until the live face has passed for the subject's; between them it is eased.
     """
 
     def __init__(self, context: ModeContext, relighting: RatioRelighting) -> None:
@@ -51,8 +51,12 @@ class RatioMode:
         followed = None if motion.presence <= 0 else self._plan(motion, live, scene, quality)
         if isinstance(followed, FaceMismatch):
             return followed
-        if followed is not None and followed.presence >= 1:
-            return partial(self._render, followed, live, motion, scene)
+        if followed is None:
+            self._identity.forget()
+        else:
+            followed = replace(followed, presence=min(followed.presence, self._identity.recognized(frame.time_s)))
+            if followed.presence >= 1:
+                return partial(self._render, followed, live, motion, scene)
         at_rest = self._context.scene_relighting.relight(
             scene, Rotation.identity(), frame.time_s, quality.relight_every
         )
@@ -74,7 +78,7 @@ class RatioMode:
             layer = self._rest_layer(at_rest, scene.look.lighting.blend)
         with context.timer.stage("compose"):
             image = context.compositor.composite_source(layer, scene, live.time_s)
-        if plan is not None:
+        if plan is not None and plan.presence > 0:
             image = crossfade(image, self._relit_live(replace(plan, presence=1.0), live, scene), plan.presence)
         return RenderedFrame(image, motion, scene, scene.look.shows_filmed)
 
