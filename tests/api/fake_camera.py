@@ -32,6 +32,7 @@ from relit_camera.live.status.camera_status import (
 from relit_camera.live.status.capture_status import CaptureStage, CaptureStatus
 from relit_camera.live.status.desk_status import DeskCaptureStatus, DeskPlace, DeskStage
 from relit_camera.live.status.event_hub import EventHub
+from relit_camera.live.status.expression_status import ExpressionCaptureStatus, ExpressionStage
 from relit_camera.live.status.film_status import FilmCaptureStatus, FilmOptions, FilmStage, FilmStep
 from relit_camera.live.status.replay_status import ReplayStage, ReplayStatus
 from relit_camera.live.status.setup_status import (
@@ -112,6 +113,9 @@ class FakeDeskCapture:
         self.current = replace(self.current, stage=DeskStage.CANCELED, patches=())
         return self.current
 
+
+ITEMS = ("neutral", "wide mouth", "eyes shut", "turned right")
+"""Some of what stills may show."""
 
 GOOD = FramingItem(FramingState.GOOD)
 WEBCAM = WebcamItem("usb-cam", "A webcam", (FrameSize(1280, 720, (30.0, 15.0)),), ("firefox",), is_current=True)
@@ -249,6 +253,38 @@ class FakeFilmCapture:
         self.current = replace(self.current, stage=FilmStage.READING, stages=steps, progress=0.1, can_resume=False)
 
 
+class FakeExpressionCapture:
+    """Implements `live.camera_control.ExpressionCaptureControl`; it films, or builds, until it is canceled."""
+
+    def __init__(self, folder: Path) -> None:
+        self.current = ExpressionCaptureStatus()
+        self.video = folder / "video"
+        self.error: RelitError | None = None
+
+    def status(self) -> ExpressionCaptureStatus:
+        return self.current
+
+    def start(self, subject: str | None = None) -> ExpressionCaptureStatus:
+        if self.error is not None:
+            raise self.error
+        self.current = ExpressionCaptureStatus(
+            ExpressionStage.FILMING, subject or "ada", None, "neutral", "look into the camera", items=ITEMS
+        )
+        return self.current
+
+    @contextmanager
+    def receive(self, subject: str | None, file_name: str) -> Iterator[Upload]:
+        if self.error is not None:
+            raise self.error
+        self.video.parent.mkdir(parents=True, exist_ok=True)
+        yield Upload(self.video)
+        self.current = ExpressionCaptureStatus(ExpressionStage.BUILDING, subject or "ada", file_name, items=ITEMS)
+
+    def cancel(self) -> ExpressionCaptureStatus:
+        self.current = replace(self.current, stage=ExpressionStage.CANCELED)
+        return self.current
+
+
 class FakeReplays:
     """Implements `live.camera_control.ReplayControl`: a video that was sent is done when `finish` is called."""
 
@@ -301,6 +337,7 @@ class FakeCamera:
         self.desk_capture = FakeDeskCapture()
         self.setup = FakeSetup()
         self.film_capture = FakeFilmCapture(data_dir / "captures" / "film")
+        self.expression_capture = FakeExpressionCapture(data_dir / "captures" / "expressions")
         self.replays = FakeReplays(data_dir / "replays")
         self.image = picture() if image is None else image
         self.publishing = True

@@ -11,6 +11,7 @@ from unittest.mock import Mock
 
 import pytest
 
+from relit_camera.app.captures.film.film_coda import STAGE as CODA
 from relit_camera.app.captures.film.film_folder import RECORD_NAME
 from relit_camera.app.captures.film.film_processing import FilmBuilder, FilmLimits, FilmProcessing
 from relit_camera.app.captures.film.film_progress import SHARES, FilmProgress
@@ -428,7 +429,7 @@ def test_a_mode_that_was_chosen_meanwhile_stays_though_it_is_the_same_again(stud
 
 
 def test_the_steps_are_those_that_the_work_tells() -> None:
-    assert tuple(SHARES) == (*STAGES, BUILDING, DRAWING)
+    assert tuple(SHARES) == (*STAGES, BUILDING, CODA, DRAWING)
     assert sum(SHARES.values()) == pytest.approx(1)
 
 
@@ -447,8 +448,12 @@ def test_steps_are_timed_and_those_that_were_kept_are_passed_over() -> None:
     assert progress.note("Building the field", 0, None)
     clock.sleep(2)
     states = [step.state for step in progress.steps()]
-    assert states == ["done"] * 6 + ["running", "waiting"]
+    assert states == ["done"] * 6 + ["running", "waiting", "waiting"]
     assert progress.is_building
     progress.finish()
-    assert [(step.state, step.seconds) for step in progress.steps()][-2:] == [("done", 2.0), ("done", 0.0)]
+    assert [(step.state, step.seconds) for step in progress.steps()][-3:] == [
+        ("done", 2.0),
+        ("done", 0.0),
+        ("done", 0.0),
+    ]
     assert progress.share() == 1

@@ -86,6 +86,11 @@ def open_face_dialog(panel: Panel) -> None:
     expect(panel.page.locator("#face-dialog")).to_be_visible()
 
 
+def open_stills_dialog(panel: Panel) -> None:
+    panel.page.locator("#ladder-stills").click()
+    expect(panel.page.locator("#stills-dialog")).to_be_visible()
+
+
 def open_checklist(panel: Panel) -> None:
     expect(panel.page.locator("#checklist")).to_be_visible()
     panel.page.locator("#checklist summary").first.click()
@@ -98,6 +103,7 @@ OPENED: dict[str, Callable[[Panel], None]] = {
     "doors": open_doors,
     "unlit": open_unlit_dialog,
     "my face": open_face_dialog,
+    "expression stills": open_stills_dialog,
     "checklist": open_checklist,
 }
 """How dialogs, menus and parts that are not always there are opened."""

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.image_files import write_display
+from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.subject.subject_file import write_subject
 from tests.app.subject_builders import captured
 from tests.capture.instant.conftest import models, pulled_models
@@ -54,6 +56,23 @@ def test_a_person_comes_out_and_info_tells_the_rung(tmp_path: Path, shared: Path
     assert told.out.startswith("instant: captured from a few frames in the light of the room")
     header = json.loads(call("subject", "info", tmp_path / "me.relit", "--json").out)
     assert (header["rung"], header["measured_fraction"], header["source"]) == ("instant", 0.0, "adam_talk.mp4")
+    assert header["stills"] >= 4, "somebody who talks and turns shows expressions"
+    assert f"{header['stills']} expression stills: " in answer.out
+
+
+def test_somebody_who_keeps_still_gives_a_subject_without_expression_stills(
+    tmp_path: Path, shared: Path, models: Path
+) -> None:
+    with VideoReader(shared / "driving" / "adam_talk.mp4") as frames:
+        first = next(iter(frames)).image
+    write_display(tmp_path / "me.png", first)
+    with VideoWriter(tmp_path / "me.mp4", (first.shape[1], first.shape[0]), 24.0) as writer:
+        for index in range(48):
+            writer.write(first, index / 24)
+    for name in ("me.png", "me.mp4"):
+        answer = call("capture", "instant", tmp_path / name, "--out", tmp_path / "me.relit")
+        assert answer.code == 0, answer
+        assert "stills" not in answer.out + answer.err
 
 
 def test_a_picture_without_a_face_leaves_nothing(tmp_path: Path, shared: Path, models: Path) -> None:

@@ -30,7 +30,7 @@ from relit_camera.api.routes import (
     subjects,
     whole_scene,
 )
-from relit_camera.api.routes.jobs import captures, film_captures, replays
+from relit_camera.api.routes.jobs import captures, expression_captures, film_captures, replays
 from relit_camera.api.routes.setup import framing_help, model_pulling, source_and_tracker, system_checks
 from relit_camera.base.config.access_token import read_token
 from relit_camera.base.config.settings import RelitSettings
@@ -83,6 +83,7 @@ def create_app_without_camera() -> FastAPI:
         mode_and_freeze,
         subjects,
         captures,
+        expression_captures,
         film_captures,
         replays,
         presets,

@@ -15,6 +15,9 @@ from relit_camera import __version__
 from relit_camera.app.captures.desk.controls_note import ControlsNote
 from relit_camera.app.captures.desk.desk_filming import DeskFilming
 from relit_camera.app.captures.desk.desk_worker import write_desk_subject
+from relit_camera.app.captures.expressions.expression_job import ExpressionJob
+from relit_camera.app.captures.expressions.expression_worker import write_filmed_stills, write_video_stills
+from relit_camera.app.captures.expressions.guided_filming import GuidedFilming
 from relit_camera.app.captures.film.film_processing import FilmProcessing
 from relit_camera.app.captures.film.film_worker import write_film_subject
 from relit_camera.app.captures.live_capture import LiveCapture
@@ -161,6 +164,15 @@ class CameraService:
             webcam=webcam,
         )
         storage = settings.storage
+        self.expression_capture = ExpressionJob(
+            storage.expression_capture,
+            GuidedFilming(recorder, on_viewer),
+            scene_controller,
+            self.events,
+            write_filmed_stills,
+            write_video_stills,
+            webcam=webcam,
+        )
         self.film_capture = FilmProcessing(storage.film_capture, scene_controller, self.events, write_film_subject)
         self.replays = ReplayJobs(
             storage.replays, lambda: self.setup.settings, scene_controller, self.events, write_replay
@@ -232,6 +244,7 @@ class CameraService:
         jobs = (
             self.instant_capture.cancel,
             self.desk_capture.cancel,
+            self.expression_capture.close,
             self.film_capture.close,
             self.replays.close,
             self.setup.close,

@@ -14,6 +14,7 @@ from relit_camera.live.status.camera_status import CameraStatus
 from relit_camera.live.status.capture_status import CaptureStatus
 from relit_camera.live.status.desk_status import DeskCaptureStatus, DeskPlace
 from relit_camera.live.status.event_hub import EventHub
+from relit_camera.live.status.expression_status import ExpressionCaptureStatus
 from relit_camera.live.status.film_status import FilmCaptureStatus, FilmOptions
 from relit_camera.live.status.replay_status import ReplayStatus
 from relit_camera.live.status.setup_status import Check, DeviceList, ModelPullStatus, SourceStatus, TrackerChoice
@@ -184,6 +185,37 @@ class FilmCaptureControl(Protocol):
         ...
 
 
+class ExpressionCaptureControl(Protocol):
+    """Expression stills for a stored subject. `app.captures.expressions.expression_job.ExpressionJob` implements it."""
+
+    def status(self) -> ExpressionCaptureStatus:
+        """How far the last capture is."""
+        ...
+
+    def start(self, subject: str | None = None) -> ExpressionCaptureStatus:
+        """Begin to film the person before the webcam, for the subject that is shown, if none is named.
+
+        Raises:
+            NotFoundError: there is no stored subject of that name.
+            ConflictError: a capture runs, nobody is shown, or the subject is not stored.
+        """
+        ...
+
+    def receive(self, subject: str | None, file_name: str) -> AbstractContextManager[Upload]:
+        """Give where to write a video to; stills are made of it when the context ends.
+
+        Raises:
+            NotFoundError, ConflictError: as `start`; or the upload was canceled, or another process has the folder.
+            InputError: no video has such a file name.
+            StorageError: the video cannot be written.
+        """
+        ...
+
+    def cancel(self) -> ExpressionCaptureStatus:
+        """End the capture that runs, if one does; the subject is as before then."""
+        ...
+
+
 class ReplayControl(Protocol):
     """Videos that were sent to be relit, one at a time. `app.replay.replay_jobs.ReplayJobs` implements it."""
 
@@ -257,6 +289,11 @@ class CameraControl(Protocol):
     @property
     def film_capture(self) -> FilmCaptureControl:
         """The capture from a film that is sent."""
+        ...
+
+    @property
+    def expression_capture(self) -> ExpressionCaptureControl:
+        """The capture that adds expression stills to a subject."""
         ...
 
     @property

@@ -21,7 +21,15 @@ from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import write_atomic, write_tensors
 from relit_camera.subject.compression.local_basis import LocalBasis, global_basis
 from relit_camera.subject.compression.webp_packing import decode_basis, encode_basis
-from relit_camera.subject.expression_stills import STILL_TENSORS, ExpressionStill, still_tensors, stills_of_tensors
+from relit_camera.subject.expression_stills import (
+    PREFIX as STILL_PREFIX,
+)
+from relit_camera.subject.expression_stills import (
+    STILL_TENSORS,
+    ExpressionStill,
+    still_tensors,
+    stills_of_tensors,
+)
 from relit_camera.subject.expression_stills import TYPES as STILL_TYPES
 from relit_camera.subject.subject import FORMAT_VERSION, Subject, SubjectMetadata
 
@@ -165,6 +173,17 @@ def write_stills(source: Path, target: Path, stills: Sequence[ExpressionStill]) 
         metadata = _metadata(source, file.metadata() or {})
         tensors = _tensor_views(source, list(set(file.keys()) - set(STILL_TENSORS)), copied=False)
     write_tensors(target, tensors | still_tensors(stills), {HEADER_KEY: metadata.model_dump_json()})
+
+
+def count_stills(path: Path) -> int:
+    """Number of expression stills in a subject file, by its header alone.
+
+    Raises:
+        SubjectError: missing, too large, or no file of tensors.
+    """
+    landmarks = f"{STILL_PREFIX}landmarks"
+    with _open_safetensors(path, MAX_BYTES) as file:
+        return int(file.get_slice(landmarks).get_shape()[0]) if landmarks in list(file.keys()) else 0
 
 
 def read_neutral(path: Path) -> DisplayImage:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,4 +39,4 @@ def tracked(
 def film(*faces: TrackedFace) -> TrackedFilm:
     """A film of some faces, the canonical one neutral."""
     neutral = NeutralFace(SCHEME.canonical.copy(), tracked(0, SCHEME.canonical).pose)
-    return TrackedFilm(Path("talk.mp4"), SIZE, SCHEME, faces, neutral)
+    return TrackedFilm("talk.mp4", SIZE, SCHEME, faces, neutral)

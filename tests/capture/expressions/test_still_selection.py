@@ -14,8 +14,8 @@ DOING = {
     "lips apart": tracked(100, moved_points(open_cm=0.5)),
     "jaw dropped": tracked(101, moved_points(open_cm=1.6)),
     "eyes shut": tracked(102, moved_points(shut=1.0)),
-    "turned left": tracked(104, moved_points(), yaw=-18),
-    "turned far right": tracked(105, moved_points(), yaw=31),
+    "turned right": tracked(104, moved_points(), yaw=-18),
+    "turned far left": tracked(105, moved_points(), yaw=31),
 }
 
 
@@ -62,3 +62,10 @@ def test_a_face_that_does_nothing_is_refused_with_what_to_do() -> None:
         select_stills(film(*REST))
     assert "does too little" in caught.value.what
     assert "open your mouth wide" in caught.value.cure
+
+
+def test_what_only_a_blurred_frame_shows_is_shown_all_the_same() -> None:
+    """Sharper frames that turn nearly as far are not taken instead of it."""
+    near = [tracked(300 + index, moved_points(), yaw=-24.5, pitch=2 * index - 6) for index in range(7)]
+    far = tracked(400, moved_points(), yaw=-26, sharpness=0.4)
+    assert "turned far right" in select_stills(film(*REST, *DOING.values(), *near, far)).covered

@@ -1,4 +1,4 @@
-"""Fields of the forms by which films, videos and subjects are sent."""
+"""Fields of the forms by which films, videos and subjects are sent, and of bodies that begin such work."""
 
 from __future__ import annotations
 
@@ -46,6 +46,13 @@ class FilmCaptureForm(FilmOptionFields):
 
     name: StoredName
     """Under which the subject is stored; one of that name is replaced."""
+
+
+class ExpressionCaptureRequest(ApiModel):
+    """Whose expression stills are to be taken; also the field of the form that a video for them comes with."""
+
+    subject: StoredName | None = None
+    """Name of a stored subject; the one that is shown, if none is given."""
 
 
 class NameForm(ApiModel):

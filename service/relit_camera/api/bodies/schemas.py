@@ -58,6 +58,8 @@ class SubjectDetails(SubjectItem):
     """A stored subject and what its file says."""
 
     metadata: SubjectMetadata
+    stills: int
+    """Number of its expression stills."""
 
 
 class InstantCaptureRequest(ApiModel):

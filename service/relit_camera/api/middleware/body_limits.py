@@ -23,6 +23,7 @@ MAX_FILM_BYTES = 4 << 30
 STREAMED_FORMS = {
     "/api/v1/subjects": MAX_SUBJECT_BYTES,
     "/api/v1/captures/film": MAX_FILM_BYTES,
+    "/api/v1/captures/expressions/video": MAX_FILM_BYTES,
     "/api/v1/replays": MAX_FILM_BYTES,
 }
 """Path → bytes of the file, where a form's file is written to disk as it arrives (`api.streamed_forms`)."""

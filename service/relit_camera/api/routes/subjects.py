@@ -21,7 +21,7 @@ from relit_camera.api.streamed_forms import form_description, read_fields, recei
 from relit_camera.base.config.look import StoredName
 from relit_camera.base.errors import ConflictError
 from relit_camera.base.storage.upload import Upload
-from relit_camera.subject.subject_file import read_metadata, read_neutral
+from relit_camera.subject.subject_file import count_stills, read_metadata, read_neutral
 
 router = APIRouter(tags=["subjects"])
 
@@ -99,8 +99,9 @@ def rename_subject(api: ApiContextDep, name: StoredName, change: NewName) -> Sub
 def get_subject_details(api: ApiContextDep, name: StoredName) -> SubjectDetails:
     """One stored subject and what its file says of how it was made."""
     with api.exclusive_image_work():
-        metadata = read_metadata(api.camera.scene_controller.subject_path(name))
-    return SubjectDetails(**dict(_item(api, name)), metadata=metadata)
+        path = api.camera.scene_controller.subject_path(name)
+        metadata, stills = read_metadata(path), count_stills(path)
+    return SubjectDetails(**dict(_item(api, name)), metadata=metadata, stills=stills)
 
 
 @router.delete("/subjects/{name}", status_code=HTTPStatus.NO_CONTENT, responses=error_responses(404, 409, 422))

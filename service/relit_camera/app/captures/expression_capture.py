@@ -1,19 +1,20 @@
-"""Expression stills for a subject from a film of that person: from the file to the stills."""
+"""Expression stills for a subject from a film of that person: from the frames to the stills."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from relit_camera.base.errors import CaptureError
-from relit_camera.base.images.image_types import DisplayImage, Points
+from relit_camera.base.images.image_types import DisplayImage, Frame, Points
 from relit_camera.base.video.video_readers import VideoReader
-from relit_camera.capture.expressions.film_tracking import TrackedFace, TrackedFilm, track_film
+from relit_camera.capture.expressions.film_tracking import FaceCollection, TrackedFace, TrackedFilm, track_film
 from relit_camera.capture.expressions.still_crops import StillCropper
-from relit_camera.capture.expressions.still_selection import select_stills
+from relit_camera.capture.expressions.still_selection import Selection, select_stills
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
@@ -28,6 +29,8 @@ LIGHT_FRAMES, LIGHT_TIME_S = 40, 1.0
 told, so that it fits the light to each."""
 SAME_PERSON_S = 2.0
 """A face may not be another person's within this time of a still, before or after it."""
+FRAME_INTERVAL_S = 0.1
+"""Time between frames in memory that is told to the tracker."""
 STAGE = "Estimating the light of the room"
 Progress = Callable[[str, int, int | None], None]
 
@@ -38,17 +41,15 @@ class ExpressionCapture:
 
     Attributes:
         stills: in order of time.
-        covered: names of what the stills show.
-        missing: what to do in another film for the rest.
+        selection: of the frames that they were made of.
     """
 
     stills: tuple[ExpressionStill, ...]
-    covered: tuple[str, ...]
-    missing: tuple[str, ...]
+    selection: Selection
 
 
 def capture_expressions(
-    video: Path, subject: Subject, progress: Progress = lambda stage, done, total: None
+    video: Path, subject: Subject, progress: Progress = lambda stage, done, total: None, first: int = 0
 ) -> ExpressionCapture:
     """Take expression stills of a subject from a film of that person in constant light.
 
@@ -56,6 +57,7 @@ def capture_expressions(
         video: the film; two minutes of it are looked at.
         subject: the person.
         progress: called with a stage's name, what is done, and the total.
+        first: index of the first frame that is looked at.
 
     Raises:
         VideoError: the film cannot be read.
@@ -63,25 +65,86 @@ def capture_expressions(
         SubjectError: no face is found in the subject.
         ModelError: the networks are not there.
     """
-    face = find_source_face(subject, open_tracker("mesh", TrackerOptions(blendshapes=False)))
-    film = track_film(video, progress)
+    face = _source_face(subject)
+    film = track_film(video, progress, first)
     selection = select_stills(film)
-    chosen = {each.index: each for each in selection.faces}
+    with VideoReader(video, threads=2, only=frames_for_stills(film, selection)) as reader:
+        pictures = ((frame.index, frame.image) for frame in reader)
+        return _take_stills(subject, face, film, selection, pictures, progress)
+
+
+def frames_for_stills(film: TrackedFilm, selection: Selection) -> set[int]:
+    """Indices of the frames that stills are made of: the chosen ones, and those that the room's light is read from."""
+    return {face.index for face in selection.faces} | _light_frames(film)
+
+
+def take_stills(
+    subject: Subject, film: TrackedFilm, selection: Selection, pictures: Iterable[tuple[int, DisplayImage]]
+) -> ExpressionCapture:
+    """Make the stills of a film whose faces are tracked and chosen.
+
+    Args:
+        subject: the person.
+        film: its faces.
+        selection: those that become stills.
+        pictures: index and picture of the frames of `frames_for_stills`, in order of time.
+
+    Raises:
+        CaptureError: the face is another person's.
+        SubjectError: no face is found in the subject.
+        ModelError: the networks are not there.
+    """
+    return _take_stills(subject, _source_face(subject), film, selection, pictures)
+
+
+def stills_of_frames(subject: Subject, frames: Sequence[DisplayImage], called: str) -> ExpressionCapture:
+    """Take expression stills from frames in memory, some tenths of a second apart.
+
+    Args:
+        subject: the person.
+        frames: (height, width, 3) uint8, of one size, in order of time.
+        called: what they come from, for messages.
+
+    Raises:
+        CaptureError, SubjectError, ModelError: as `capture_expressions`.
+    """
+    faces = FaceCollection(open_tracker("mesh", TrackerOptions(blendshapes=False)), called)
+    for index, image in enumerate(frames):
+        faces.add(Frame(image, index, time.monotonic(), index * FRAME_INTERVAL_S))
+    film = faces.film()
+    return take_stills(subject, film, select_stills(film), enumerate(frames))
+
+
+def _source_face(subject: Subject) -> SourceFace:
+    return find_source_face(subject, open_tracker("mesh", TrackerOptions(blendshapes=False)))
+
+
+def _light_frames(film: TrackedFilm) -> set[int]:
     spread = np.unique(np.linspace(0, len(film.faces) - 1, LIGHT_FRAMES).astype(int))
-    probed = {film.faces[i].index for i in spread}
+    return {film.faces[i].index for i in spread}
+
+
+def _take_stills(
+    subject: Subject,
+    face: SourceFace,
+    film: TrackedFilm,
+    selection: Selection,
+    pictures: Iterable[tuple[int, DisplayImage]],
+    progress: Progress = lambda stage, done, total: None,
+) -> ExpressionCapture:
+    chosen, probed = {each.index: each for each in selection.faces}, _light_frames(film)
     last = max(chosen.keys() | probed)
     cropper = StillCropper(selection.faces, film.scheme, face.scheme.eye_span(face.landmarks))
     crops: dict[int, tuple[DisplayImage, Points]] = {}
     room = _RoomLight(subject, face, film)
-    with VideoReader(video, threads=2, only=chosen.keys() | probed) as reader:
-        for frame in reader:
-            progress(STAGE, frame.index, last)
-            if frame.index in probed:
-                room.add(frame.image, frame.index)
-            if frame.index in chosen:
-                crops[frame.index] = cropper.crop(frame.image, chosen[frame.index])
-            if frame.index >= last:
-                break
+    for index, picture in pictures:
+        progress(STAGE, index, last)
+        if index in probed:
+            room.add(picture, index)
+        if index in chosen:
+            crops[index] = cropper.crop(picture, chosen[index])
+        if index >= last:
+            break
     _require_same_person(film, selection.faces, face, room.residual)
     stills = tuple(
         ExpressionStill(
@@ -93,7 +156,7 @@ def capture_expressions(
         )
         for index, (image, landmarks) in crops.items()
     )
-    return ExpressionCapture(stills, selection.covered, selection.missing)
+    return ExpressionCapture(stills, selection)
 
 
 class _RoomLight:
@@ -139,6 +202,6 @@ def _require_same_person(film: TrackedFilm, chosen: Sequence[TrackedFace], face:
     differs = what_differs(shape_cm, residual, IdentityTunables())
     if differs is not None:
         raise CaptureError(
-            f"the face in {film.path.name} is not the subject's: {differs}",
+            f"the face in {film.name} is not the subject's: {differs}",
             "film the person whose subject it is, in soft light from the front",
         )

@@ -1,17 +1,19 @@
-"""The end of every capture beside the camera: a worker process makes the subject, it is stored, and shown."""
+"""The end of every capture beside the camera: a worker process makes or changes a subject, it is stored, and shown."""
 
 from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Collection
-from typing import TypeVar
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, TypeVar
 
 from relit_camera.base.concurrency.worker_process import Progress, run_in_worker_process
 from relit_camera.base.config.look import Mode
-from relit_camera.base.errors import ConflictError, RelitError, StorageError, WorkerError
+from relit_camera.base.errors import ConflictError, RelitError, StorageError, SubjectError, WorkerError
 from relit_camera.base.storage.atomic_files import remove_unfinished_files
 from relit_camera.base.storage.folder_redaction import redact_folders
+from relit_camera.base.storage.named_files import file_version
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.event_hub import EventHub
@@ -92,15 +94,7 @@ class SubjectMaker:
         """
         subjects = self._scene_controller.subjects
         limits = {"timeout_s": timeout_s, "canceled": canceled, "progress": progress, "most_bytes": most_bytes}
-        with subjects.replacing(name, SUFFIX) as path:
-            try:
-                result: T = run_in_worker_process(build, *arguments, path, **limits)  # type: ignore[arg-type]
-            except StorageError as error:  # names the temporary file
-                raise StorageError(error.what.replace(path.name, f"{name}{SUFFIX}"), error.cure) from error
-            finally:
-                remove_unfinished_files(subjects.folder, path)  # of a worker that was killed
-            if canceled.is_set():
-                raise WorkerError("the work was canceled", "start it again")
+        with self._written(name, build, arguments, limits) as result:
             require_replaceable(subjects, name, replaced, "rename or delete that one, then start again")
         self._events.publish("collection", name="subjects")
         now = self.shown()
@@ -112,3 +106,85 @@ class SubjectMaker:
                 log.warning("subject '%s' cannot be shown: %s", name, error)
                 return result, redact_folders(f"subject '{name}' is stored, but cannot be shown: {error}")
         return result, ""
+
+    def change(
+        self,
+        name: str,
+        build: Callable[..., T],
+        *arguments: object,
+        timeout_s: float,
+        canceled: threading.Event,
+        progress: Progress | None = None,
+        most_bytes: int | None = None,
+    ) -> tuple[T, str]:
+        """Replace the file of a stored subject by what `build` makes of it, and show it anew where it is shown.
+
+        The file stays as it is, and nothing unfinished is left, unless this returns.
+
+        Args:
+            name: of the subject.
+            build: as of `make`; the last argument but the path is the subject's file.
+            arguments: come before these two.
+            timeout_s: after which the worker is ended.
+            canceled: ends it when it is set.
+            progress: hears what `build` tells.
+            most_bytes: memory that the worker may take.
+
+        Returns:
+            As `make`.
+
+        Raises:
+            NotFoundError: there is no such stored subject.
+            ConflictError: it was replaced, renamed or deleted meanwhile.
+            RelitError, StorageError: as `make`.
+        """
+        subjects = self._scene_controller.subjects
+        limits = {"timeout_s": timeout_s, "canceled": canceled, "progress": progress, "most_bytes": most_bytes}
+        source = subjects.path(name)
+        version = file_version(source)
+
+        def is_same() -> bool:
+            try:
+                return file_version(source) == version
+            except OSError:
+                return False
+
+        changed = ConflictError(f"subject '{name}' was changed or deleted meanwhile", "start again")
+        try:
+            with self._written(name, build, (*arguments, source), limits) as result:
+                if not is_same():
+                    raise changed
+        except SubjectError as error:
+            if not is_same():  # perhaps it could not be read because of that
+                raise changed from error
+            raise
+        self._events.publish("collection", name="subjects")
+        if self.shown().subject_name == name:
+            try:
+                self._scene_controller.choose_stored_subject(name)
+            except RelitError as error:
+                log.warning("subject '%s' cannot be shown anew: %s", name, error)
+                return result, redact_folders(f"subject '{name}' is stored, but cannot be shown: {error}")
+        return result, ""
+
+    @contextmanager
+    def _written(
+        self, name: str, build: Callable[..., T], arguments: Sequence[object], limits: Mapping[str, Any]
+    ) -> Iterator[T]:
+        """Have a worker process write a subject's file, which replaces that of the name when the block ends.
+
+        Raises:
+            RelitError: of `build`, or of the worker.
+            StorageError: the file cannot be written.
+        """
+        subjects = self._scene_controller.subjects
+        with subjects.replacing(name, SUFFIX) as path:
+            try:
+                result = run_in_worker_process(build, *arguments, path, **limits)
+            except StorageError as error:  # names the temporary file
+                raise StorageError(error.what.replace(path.name, f"{name}{SUFFIX}"), error.cure) from error
+            finally:
+                remove_unfinished_files(subjects.folder, path)  # of a worker that was killed
+            if limits["canceled"].is_set():
+                raise WorkerError("the work was canceled", "start it again")
+            yield result

@@ -152,7 +152,8 @@ class StorageSettings(SettingsModel):
     @property
     def folders(self) -> tuple[Path, ...]:
         """All in which files are written."""
-        return self.environments, self.subjects, self.backgrounds, self.presets, self.film_capture, self.replays
+        captures = (self.film_capture, self.expression_capture)
+        return self.environments, self.subjects, self.backgrounds, self.presets, *captures, self.replays
 
     @property
     def environments(self) -> Path:
@@ -178,6 +179,11 @@ class StorageSettings(SettingsModel):
     def film_capture(self) -> Path:
         """Folder of the film that a subject is made of, and of what is made of it."""
         return self.data_dir / "captures" / "film"
+
+    @property
+    def expression_capture(self) -> Path:
+        """Folder of the video that expression stills are made of."""
+        return self.data_dir / "captures" / "expressions"
 
     @property
     def replays(self) -> Path:

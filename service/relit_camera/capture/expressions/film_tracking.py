@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,11 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.color import linear_from_uint8, luminance
-from relit_camera.base.images.image_types import DisplayImage, Points
+from relit_camera.base.images.image_types import DisplayImage, Frame, Points
 from relit_camera.base.rotations import Rotation
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.capture.instant.face_selection import TRACKER, face_sharpness
-from relit_camera.face.face_state import FaceState, FaceStatus
+from relit_camera.face.face_state import FaceState, FaceStatus, Tracker
 from relit_camera.face.head_pose import HeadPose, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 from relit_camera.face.motion.neutral_face import NeutralFace, NeutralSample, is_frontal, neutral_face_of
@@ -78,14 +79,14 @@ class TrackedFilm:
     """The faces in a film, and the neutral one.
 
     Attributes:
-        path: the film.
+        name: of the film, as people call it.
         size: (width, height) of its pictures.
         scheme: of the landmarks.
         faces: in order of time, the whole face in the picture.
         neutral: the least active face.
     """
 
-    path: Path
+    name: str
     size: tuple[int, int]
     scheme: LandmarkScheme
     faces: tuple[TrackedFace, ...]
@@ -100,40 +101,71 @@ class TrackedFilm:
         return face.pose.rotation * self.neutral.pose.rotation.inv()
 
 
-def track_film(path: Path, progress: Progress = lambda stage, done, total: None) -> TrackedFilm:
+class FaceCollection:
+    """The faces in the frames of a film, as they come: of a file, or of a webcam."""
+
+    def __init__(self, tracker: Tracker, name: str) -> None:
+        """`name` is what the film is called in messages."""
+        self._tracker, self._name = tracker, name
+        self._scheme = landmark_scheme(tracker.scheme)
+        self._faces: list[TrackedFace] = []
+        self._lights: list[float] = []
+        self._read = 0
+        self._size = (0, 0)
+
+    def add(self, frame: Frame) -> TrackedFace | None:
+        """Follow the face into the next frame, of the same size as those before; None where it is not seen whole."""
+        self._size = frame.size
+        self._read += 1
+        state = self._tracker.track(frame)
+        if state.status is not FaceStatus.FOUND or state.pose is None or not _is_inside(state.landmarks, frame.size):
+            return None
+        face = _tracked(state, state.pose, self._scheme, frame.image, frame.index, frame.time_s)
+        self._faces.append(face)
+        self._lights.append(_face_light(frame.image, state.landmarks))
+        return face
+
+    def film(self) -> TrackedFilm:
+        """The faces so far.
+
+        Raises:
+            CaptureError: too few frames show one, none from the front, or it is too small or in the dark.
+        """
+        _require_usable(self._faces, self._lights, self._read, self._name)
+        frontal = [face for face in self._faces if is_frontal(face.pose)]
+        if not frontal:
+            raise CaptureError(
+                f"the face in {self._name} never looks toward the camera", "look into the camera for a second or two"
+            )
+        neutral = neutral_face_of(
+            [NeutralSample(face.time_s, NeutralFace(face.points, face.pose), face.eyes, face.mouth) for face in frontal]
+        )
+        return TrackedFilm(self._name, self._size, self._scheme, tuple(self._faces), neutral)
+
+
+def track_film(path: Path, progress: Progress = lambda stage, done, total: None, first: int = 0) -> TrackedFilm:
     """Follow the face through a film, two minutes of it at most.
+
+    Args:
+        path: the film.
+        progress: called with the stage's name, what is done, and the total.
+        first: index of the first frame that is looked at.
 
     Raises:
         VideoError: the film cannot be read.
-        CaptureError: too few frames show a face, or it is too small or in the dark.
+        CaptureError: as `FaceCollection.film`.
         ModelError: the tracker's networks are not there.
     """
-    tracker = open_tracker(TRACKER, TrackerOptions(blendshapes=False))
-    scheme = landmark_scheme(tracker.scheme)
-    faces: list[TrackedFace] = []
-    lights: list[float] = []
-    read = 0
-    with VideoReader(path, threads=TUNABLES.threads) as reader:
-        size = (reader.info.width, reader.info.height)
+    faces = FaceCollection(open_tracker(TRACKER, TrackerOptions(blendshapes=False)), path.name)
+    begins_s: float | None = None
+    with VideoReader(path, threads=TUNABLES.threads, only=range(first, sys.maxsize)) as reader:
         for frame in reader:
-            if frame.time_s > TUNABLES.longest_s:
+            begins_s = frame.time_s if begins_s is None else begins_s
+            if frame.time_s - begins_s > TUNABLES.longest_s:
                 break
-            read += 1
-            progress(STAGE, read, reader.info.frames)
-            state = tracker.track(frame)
-            if state.status is FaceStatus.FOUND and state.pose is not None and _is_inside(state.landmarks, size):
-                faces.append(_tracked(state, state.pose, scheme, frame.image, frame.index, frame.time_s))
-                lights.append(_face_light(frame.image, state.landmarks))
-    _require_usable(faces, lights, read, path.name)
-    frontal = [face for face in faces if is_frontal(face.pose)]
-    if not frontal:
-        raise CaptureError(
-            f"the face in {path.name} never looks toward the camera", "look into the camera for a second or two"
-        )
-    neutral = neutral_face_of(
-        [NeutralSample(face.time_s, NeutralFace(face.points, face.pose), face.eyes, face.mouth) for face in frontal]
-    )
-    return TrackedFilm(path, size, scheme, tuple(faces), neutral)
+            progress(STAGE, frame.index + 1, reader.info.frames)
+            faces.add(frame)
+    return faces.film()
 
 
 def _tracked(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from relit_camera.face.landmarks.expression_features import (
     mouth_features,
     mouth_gap_cm,
 )
+from relit_camera.subject.expression_stills import MAX_STILLS
 
 
 @dataclass(frozen=True)
@@ -75,19 +76,51 @@ class ShownFace:
         """Larger of yaw and pitch."""
         return max(abs(self.yaw), abs(self.pitch))
 
+    @property
+    def is_frontal(self) -> bool:
+        """Whether it may be a still of mouth and eyes."""
+        return self.turn_deg < TUNABLES.frontal_deg
 
-COVERAGE: tuple[tuple[str, str, Callable[[ShownFace], bool]], ...] = (
-    ("lips apart", "talk", lambda shown: shown.gap_cm > 0.3),
-    ("wide mouth", "smile with your teeth showing", lambda shown: shown.mouth[2] > 0.25 / WIDTH_CM),
-    ("round mouth", "say 'oo'", lambda shown: shown.mouth[2] < -0.25 / WIDTH_CM),
-    ("jaw dropped", "open your mouth wide", lambda shown: shown.gap_cm > 1.2),
-    ("eyes shut", "shut your eyes for a second", lambda shown: shown.closure > TUNABLES.shut[0]),
-    ("turned left", "turn your head to the picture's left", lambda shown: shown.yaw < -15),
-    ("turned right", "turn your head to the picture's right", lambda shown: shown.yaw > 15),
-    ("turned far left", "turn it further left", lambda shown: shown.yaw < -25),
-    ("turned far right", "turn it further right", lambda shown: shown.yaw > 25),
+    @property
+    def is_turned(self) -> bool:
+        """Whether it may be a still of a turned head."""
+        return self.turn_deg > TUNABLES.turned_deg and self.closure < TUNABLES.shut[1]
+
+    @property
+    def may_be_still(self) -> bool:
+        """Whether it is sharp enough, and one of these."""
+        return self.quality >= TUNABLES.min_sharpness and (self.is_frontal or self.is_turned)
+
+
+@dataclass(frozen=True)
+class CoverageItem:
+    """Something that stills may show.
+
+    Attributes:
+        name: what it is called. Right and left are the person's own.
+        cure: what the person does for it, as a clause.
+        is_shown: whether a face does it.
+    """
+
+    name: str
+    cure: str
+    is_shown: Callable[[ShownFace], bool]
+
+
+COVERAGE = (
+    CoverageItem(
+        "wide mouth", "smile with your teeth showing: say 'cheese'", lambda shown: shown.mouth[2] > 0.25 / WIDTH_CM
+    ),
+    CoverageItem("lips apart", "talk: count from one to five", lambda shown: shown.gap_cm > 0.3),
+    CoverageItem("round mouth", "say 'oo'", lambda shown: shown.mouth[2] < -0.25 / WIDTH_CM),
+    CoverageItem("jaw dropped", "open your mouth wide", lambda shown: shown.gap_cm > 1.2),
+    CoverageItem("eyes shut", "shut your eyes for a second", lambda shown: shown.closure > TUNABLES.shut[0]),
+    CoverageItem("turned right", "turn your head slowly to your right", lambda shown: shown.yaw < -15),
+    CoverageItem("turned far right", "turn your head further to your right", lambda shown: shown.yaw < -25),
+    CoverageItem("turned left", "turn your head slowly to your left", lambda shown: shown.yaw > 15),
+    CoverageItem("turned far left", "turn your head further to your left", lambda shown: shown.yaw > 25),
 )
-"""What stills may show: its name, what a person does for it, and how it is known."""
+"""What stills may show, in the order in which a person is asked for it."""
 
 
 @dataclass(frozen=True)
@@ -96,13 +129,16 @@ class Selection:
 
     Attributes:
         faces: in order of time.
-        covered: names of what they show, as in `COVERAGE`.
-        missing: what to do for the rest.
+        covered: names of what they show, in the order of `COVERAGE`.
     """
 
     faces: tuple[TrackedFace, ...]
     covered: tuple[str, ...]
-    missing: tuple[str, ...]
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What to do in another film for what they do not show, a clause each."""
+        return tuple(item.cure for item in COVERAGE if item.name not in self.covered)
 
 
 def select_stills(film: TrackedFilm) -> Selection:
@@ -111,25 +147,34 @@ def select_stills(film: TrackedFilm) -> Selection:
     Raises:
         CaptureError: the face does too little.
     """
-    shown = [each for each in _shown_faces(film) if each.quality >= TUNABLES.min_sharpness]
-    frontal = [each for each in shown if each.turn_deg < TUNABLES.frontal_deg]
+    shown = [each for each in shown_faces(film) if each.may_be_still]
+    frontal = [each for each in shown if each.is_frontal]
     shut = [each for each in frontal if each.closure > TUNABLES.shut[0]]
-    turned = [each for each in shown if each.turn_deg > TUNABLES.turned_deg and each.closure < TUNABLES.shut[1]]
+    turned = [each for each in shown if each.is_turned]
     chosen = [
         *sorted(shut, key=lambda each: -each.closure * each.quality)[:1],
         *_farthest(frontal, lambda each: each.mouth, TUNABLES.mouths),
         *_farthest(frontal, lambda each: np.array([each.closure / CLOSURE]), TUNABLES.shut_eyes),
         *_farthest(turned, _turn, TUNABLES.turns, lambda each: float(np.exp(-0.1 * (each.mouth**2).sum()))),
     ]
-    faces = sorted({each.face.index: each.face for each in chosen}.values(), key=lambda face: face.index)
-    covered = tuple(name for name, _, shows in COVERAGE if any(shows(each) for each in chosen))
-    missing = tuple(cure for name, cure, _ in COVERAGE if name not in covered)
+    for item in COVERAGE:  # each thing that some frame shows, a still does too
+        doing = [each for each in shown if item.is_shown(each)]
+        if doing and not any(item.is_shown(each) for each in chosen):
+            chosen.append(max(doing, key=lambda each: each.quality))
+    kept = list({each.face.index: each for each in chosen}.values())[:MAX_STILLS]
+    faces = sorted((each.face for each in kept), key=lambda face: face.index)
+    selection = Selection(tuple(faces), what_is_shown(kept))
     if len(faces) < TUNABLES.min_stills:
         raise CaptureError(
-            f"the face in {film.path.name} does too little: {len(faces)} frames differ from the neutral face",
-            f"film again, and {', '.join(missing)}",
+            f"the face in {film.name} does too little: {len(faces)} frames differ from the neutral face",
+            f"film again, and {', '.join(selection.missing)}",
         )
-    return Selection(tuple(faces), covered, missing)
+    return selection
+
+
+def what_is_shown(faces: Collection[ShownFace]) -> tuple[str, ...]:
+    """Names of what some faces do, in the order of `COVERAGE`."""
+    return tuple(item.name for item in COVERAGE if any(item.is_shown(each) for each in faces))
 
 
 def _turn(shown: ShownFace) -> NDArray[np.float64]:
@@ -158,13 +203,14 @@ def _farthest(
     return chosen
 
 
-def _shown_faces(film: TrackedFilm) -> list[ShownFace]:
+def shown_faces(film: TrackedFilm, first: int = 0) -> list[ShownFace]:
+    """What the faces of a film do, from the one of number `first` on."""
     scheme, neutral = film.scheme, film.neutral.points
     sharp = float(np.percentile([face.sharpness for face in film.faces], 90))
     mouth, gap = mouth_features(neutral, scheme), mouth_gap_cm(neutral, scheme)
     eyes = (scheme.right_eye, scheme.left_eye)
     result = []
-    for face in film.faces:
+    for face in film.faces[first:]:
         yaw, pitch, _ = angles_from_rotation(film.rotation(face))
         closure = min(eye_closure(face.points, neutral, eye) for eye in eyes)
         result.append(

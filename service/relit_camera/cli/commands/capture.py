@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from relit_camera.cli.model_offer import Pull
+
+if TYPE_CHECKING:
+    from relit_camera.base.images.image_types import DisplayImage
+    from relit_camera.subject.subject import Subject
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -116,14 +121,32 @@ def instant(
             report_stage = stage_reporter(progress)
             read = read_frames(source, settings.source, report_stage)
             captured = capture_instant(read.frames, read.source, report_stage)
-        write_subject(subject_file, captured.subject)
+            report_stage("Looking for expressions", 0, None)
+            subject, shown = _with_stills(captured.subject, read.frames, read.source)
+        write_subject(subject_file, subject)
     for warning in captured.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    meta = captured.subject.metadata
+    meta = subject.metadata
     typer.echo(
         f"{out}: {meta.width}x{meta.height}, from {captured.frames} of {len(read.frames)} frames; "
         f"its picture in the estimated light of the room is right to {meta.psnr_db:.0f} dB"
     )
+    if shown:
+        typer.echo(f"{len(subject.stills)} expression stills: {shown}")
+
+
+def _with_stills(subject: Subject, frames: Sequence[DisplayImage], source: str) -> tuple[Subject, str]:
+    """The subject with expression stills where its frames show enough, and what they show; else as it is."""
+    from dataclasses import replace
+
+    from relit_camera.app.captures.expression_capture import stills_of_frames
+    from relit_camera.base.errors import RelitError
+
+    try:
+        captured = stills_of_frames(subject, frames, source)
+    except RelitError:  # somebody who keeps still, as one should: an instant subject needs no stills
+        return subject, ""
+    return replace(subject, stills=captured.stills), ", ".join(captured.selection.covered)
 
 
 @app.command("expressions")
@@ -156,9 +179,9 @@ def expressions(
         with progress_bar() as progress:
             captured = capture_expressions(video, person, stage_reporter(progress))
         write_stills(subject, subject_file, captured.stills)
-    typer.echo(f"{path}: {len(captured.stills)} stills: {', '.join(captured.covered)}")
-    if captured.missing:
-        typer.echo(f"not shown yet; for more, film again and {', '.join(captured.missing)}", err=True)
+    typer.echo(f"{path}: {len(captured.stills)} stills: {', '.join(captured.selection.covered)}")
+    if captured.selection.missing:
+        typer.echo(f"not shown yet; for more, film again and {', '.join(captured.selection.missing)}", err=True)
 
 
 @app.command("build")
@@ -219,6 +242,7 @@ def build(
     from contextlib import nullcontext
     from functools import partial
 
+    from relit_camera.app.captures.film.film_coda import with_coda_stills
     from relit_camera.base.images.color import parse_gamma
     from relit_camera.base.storage.atomic_files import atomic_path
     from relit_camera.capture.film.ball.sphere_projection import BallOutline
@@ -255,7 +279,9 @@ def build(
         if fresh:
             checkpoint_folder.remove()
         with progress_bar() as progress:
-            subject, told = build_film_subject(video, options, checkpoint_folder, stage_reporter(progress), method)
+            report_stage = stage_reporter(progress)
+            subject, told = build_film_subject(video, options, checkpoint_folder, report_stage, method)
+            subject, coda = with_coda_stills(video, told, subject, report_stage)
         write_subject(subject_file, subject)
         if report_file:
             report_file.write_text(json.dumps(told, indent=1), encoding="utf-8")
@@ -266,6 +292,8 @@ def build(
         f"{out}: {meta.width}x{meta.height}, {meta.lights} lights of {flashes} flashes' frames, "
         f"method {meta.method}, every light at {meta.psnr_db:.1f} dB or better"
     )
+    if coda:
+        typer.echo(coda, err=not subject.stills)
 
 
 @app.command("desk")

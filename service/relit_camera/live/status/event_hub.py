@@ -19,8 +19,8 @@ class Event:
 
     Attributes:
         kind: `state`, `tracking`, `neutral-pose`, `degraded`, `recovered`; `collection` where something is stored,
-            renamed or deleted; `capture`, `desk-capture`, `film-capture` and `replay` from these jobs; `models` and
-            `framing` from the set-up; `caption` from the demonstration's tour.
+            renamed or deleted; `capture`, `desk-capture`, `expression-capture`, `film-capture` and `replay` from these
+            jobs; `models` and `framing` from the set-up; `caption` from the demonstration's tour.
         data: JSON-ready details.
         at: seconds since the epoch.
     """

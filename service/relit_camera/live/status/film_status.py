@@ -91,6 +91,8 @@ class FilmReport:
     """What may have made the subject worse, and what to do about it, a sentence each."""
     pictures: tuple[str, ...] = ()
     """Paths of JPEG pictures of the subject, each in another light."""
+    coda: str = ""
+    """What the film's end, after the flashes, gave: expression stills, or why none; empty where it ends with them."""
     lights: tuple[tuple[float, float, float], ...] = ()
     """Where the lamp was in each frame that was used: unit vectors from the face, X right in the picture, Y up, and Z
     toward the camera."""

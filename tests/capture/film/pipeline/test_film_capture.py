@@ -109,3 +109,22 @@ def test_a_face_outside_of_the_picture_is_refused_before_a_frame_is_read(tmp_pat
     with pytest.raises(ConfigError, match=f"face at {SIZE[0] + 5}, 60 is outside of the picture, which is {SIZE[0]}x"):
         build_samples(video, options, lambda stage, done, total: messages.append(stage))
     assert not messages
+
+
+def test_what_follows_the_flashes_in_constant_light_is_no_part_of_the_capture(
+    built: CaptureResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "models"))
+    codes = Film().codes()
+    lit = codes[-60:].max(axis=0)
+    turning = np.stack([np.roll(lit, round(30 * np.sin(index / 20)), axis=1) for index in range(180)])
+    with_coda = build_samples(write_film(tmp_path / "film.mp4", np.concatenate([codes, turning])), OPTIONS)
+    report, alone = with_coda.findings.report(), built.findings.report()
+    assert alone["coda"] is None
+    assert report["coda"] == pytest.approx(len(codes), abs=24)
+    assert len(report["frames"]) == report["coda"]
+    assert with_coda.findings.lights > 0.9 * built.findings.lights
+    bright = [frame for frame in report["frames"] if frame["kind"] == "bright"]
+    error = [degrees_between(np.array(frame["direction"]), Film().lamp_cm(frame["index"])) for frame in bright]
+    assert np.mean(error) < 2
+    assert with_coda.findings.warnings == built.findings.warnings

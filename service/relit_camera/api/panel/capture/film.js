@@ -203,6 +203,7 @@ function showReport({ subject, report }) {
     ["Space before your face", covered],
     ["Expected quality", report.expected_db === null ? "not known" : `${Math.round(report.expected_db)} dB`],
     ["Frames used", `${report.used} of ${report.frames}`],
+    ...(report.coda ? [["Your own mouth and eyes", sentence(forPage(report.coda))]] : []),
   ];
   $("film-facts").replaceChildren(...facts.flatMap(([term, value]) => [make("dt", {}, term), make("dd", {}, value)]));
   $("coverage")?.remove();

@@ -4,12 +4,12 @@ import { call, sentence } from "../api.js";
 import { on } from "../stage/events.js";
 import { make } from "../widgets.js";
 import { FramingHelp } from "./framing.js";
-import { ModelPull } from "./models.js";
+import { MODELS_WORDS, ModelPull } from "./models.js";
 import { problemPlace, showProblem } from "./problem.js";
 
 const POLL_MS = 300;
 const WORDS = {
-  models: ["First, what finds your face", "Small networks find your face in the picture: some 6 MB from their authors, or 36 from a package index. Nothing of you is sent."],
+  models: MODELS_WORDS,
   framing: ["Your face now", ""],
   filming: ["Hold still", "Look at the camera, your mouth closed."],
   building: ["Working out your light", "A few seconds…"],

@@ -1,7 +1,8 @@
-// The ladder: how the present subject was captured, what may be trusted, and the next rung.
+// The ladder: how the present subject was captured, what may be trusted, the next rung, and its expression stills.
 
-import { call } from "../api.js";
-import { onScene } from "../stage/scene.js";
+import { call, toast } from "../api.js";
+import { on } from "../stage/events.js";
+import { onScene, scene } from "../stage/scene.js";
 import { make } from "../widgets.js";
 import { captureFace, openDoors } from "./doors.js";
 
@@ -32,6 +33,9 @@ const trust = make("p", { id: "ladder-trust", className: "hint" });
 const next = make("div", { className: "buttons" });
 ladder.append(line, trust, next);
 
+const stills = make("button", { type: "button", id: "ladder-stills", hidden: true });
+stills.onclick = takeStills;
+
 let known = "";
 
 function show(now) {
@@ -41,9 +45,10 @@ function show(now) {
   const rung = now.subject === DEMO_NAME ? DEMO : (RUNGS[now.rung] ?? OLD);
   line.textContent = now.subject === null ? "" : `“${now.subject}”: ${rung.line}.`;
   trust.textContent = now.subject === null ? "" : rung.trust;
-  if (now.subject !== null && now.rung !== "instant") tellMeasured(now.subject, rung.trust);
+  stills.hidden = true;
+  if (now.subject !== null) tellDetails(now, rung);
   const focused = ladder.contains(document.activeElement) ? document.activeElement.id : null;
-  next.replaceChildren(nextRung(now, rung), people());
+  next.replaceChildren(nextRung(now, rung), stills, people());
   if (focused) document.getElementById(focused)?.focus();
 }
 
@@ -63,17 +68,33 @@ function people() {
   return button;
 }
 
-/** Adds what the subject's file says of how much was measured. */
-async function tellMeasured(name, words) {
-  const stored = await call("GET", "subjects").catch(() => []);
-  if (!stored.some((item) => item.name === name)) return; // one of the command line, without details
+/** Adds what the subject's file says of how much was measured, and the way to its expression stills. */
+async function tellDetails({ subject: name, rung: kind }, rung) {
+  const item = (await call("GET", "subjects").catch(() => [])).find((each) => each.name === name);
+  if (!item) return;
   const details = await call("GET", `subjects/${encodeURIComponent(name)}`).catch(() => null);
   if (!details || !known.startsWith(`${name}|`)) return;
   const { measured_fraction: measured, expected_db: expected } = details.metadata;
-  const told = [words];
-  if (measured) told.push(`Measured from ${Math.round(100 * measured)} % of all directions.`);
-  if (expected) told.push(`Expected quality ${Math.round(expected)} dB.`);
+  const told = [rung.trust];
+  if (measured && kind !== "instant") told.push(`Measured from ${Math.round(100 * measured)} % of all directions.`);
+  if (expected && kind !== "instant") told.push(`Expected quality ${Math.round(expected)} dB.`);
+  if (details.stills) told.push(`${details.stills} pictures of your own mouth, eyes and cheeks.`);
   trust.textContent = told.join(" ");
+  stills.textContent = details.stills ? "Your mouth, eyes and cheeks anew…" : "Next: your own mouth, eyes and cheeks, half a minute";
+  stills.hidden = item.temporary || rung === DEMO; // others are not stored, or not you
+}
+
+async function takeStills() {
+  const { subject } = scene();
+  const dialog = await import("./stills.js").catch(() => null);
+  if (!dialog) return toast("This part of the panel could not be loaded", "Try again; if it does not help, load the page again");
+  await dialog.openStillsDialog(subject);
+  if (document.activeElement === document.body && !stills.hidden) stills.focus();
 }
 
 onScene(show);
+on("collection", ({ name }) => {
+  if (name !== "subjects" || !scene()) return;
+  known = ""; // perhaps its file has changed
+  show(scene());
+});

@@ -11,6 +11,7 @@ export const LIMITS = Object.freeze({
   backgrounds: { bytes: 64 * MIB, endings: null },
   subjects: { bytes: 1024 * MIB, endings: [".relit"] },
   "captures/film": { bytes: 4096 * MIB, endings: VIDEOS },
+  "captures/expressions/video": { bytes: 4096 * MIB, endings: VIDEOS },
 });
 
 /** Throws `Refused` where the camera would not take the file. */

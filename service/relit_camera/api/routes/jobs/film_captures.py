@@ -10,12 +10,12 @@ from fastapi import APIRouter, Request
 from starlette.responses import Response
 
 from relit_camera.api.bodies.job_schemas import FilmCaptureForm, FilmOptionFields
-from relit_camera.api.dependencies import ApiContext, ApiContextDep
+from relit_camera.api.dependencies import ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response
 from relit_camera.api.middleware.body_limits import MAX_FILM_BYTES
 from relit_camera.api.problem_details import error_responses
+from relit_camera.api.routes.jobs.busy_jobs import require_no_replay
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
-from relit_camera.base.errors import ConflictError
 from relit_camera.base.storage.upload import Upload
 from relit_camera.live.status.film_status import FilmCaptureStatus
 
@@ -43,7 +43,7 @@ async def start_film_capture(api: ApiContextDep, request: Request) -> FilmCaptur
     @contextmanager
     def open_file(fields: Mapping[str, str], file_name: str) -> Iterator[Upload]:
         form = read_fields(FilmCaptureForm, fields)
-        _require_no_replay(api)
+        require_no_replay(api)
         with api.camera.film_capture.receive(form.name, file_name, form.options()) as upload:
             yield upload
 
@@ -57,7 +57,7 @@ def resume_film_capture(api: ApiContextDep, options: FilmOptionFields | None = N
 
     With options in the body the film is read anew with these.
     """
-    _require_no_replay(api)
+    require_no_replay(api)
     return api.camera.film_capture.resume(None if options is None else options.options())
 
 
@@ -71,9 +71,3 @@ def cancel_film_capture(api: ApiContextDep, forget: bool = False) -> FilmCapture
 def get_film_picture(api: ApiContextDep, request: Request, name: str) -> Response:
     """One of the report's pictures."""
     return jpeg_response(request, api.camera.film_capture.picture(name))
-
-
-def _require_no_replay(api: ApiContext) -> None:
-    """Raise ConflictError while a video is relit: both take all of the processor that the camera leaves."""
-    if any(each.stage.is_running for each in api.camera.replays.all()):
-        raise ConflictError("a video is being relit", "wait for its end, or delete it")

@@ -12,11 +12,13 @@ SHARES = {
     "Looking at the light": 0.1,
     "Cutting out the flash's light": 0.06,
     "Finding the person": 0.04,
-    "Building the field": 0.5,
+    "Building the field": 0.46,
+    "Looking at the film's end": 0.04,
     "Drawing first pictures": 0.02,
 }
 """Name of each step in its order → share of the time, roughly: the field takes half of it (docs/capture.md). They are
-the names that `capture.film.pipeline.film_subject` and the worker tell; importing them would slow the camera's start.
+the names that `capture.film.pipeline.film_subject`, `film_coda` and the worker tell; importing them would slow the
+camera's start.
 """
 FIRST_OF_BUILDING = "Building the field"
 _NAMES = tuple(SHARES)

@@ -34,13 +34,16 @@ _TUNABLES = VerdictTunables()
 _PARTLY_LIT = "the lamp was on for a part of the exposure only, as it is at the edges of each flash"
 
 
-def film_report(told: Mapping[str, Any], metadata: SubjectMetadata, pictures: Sequence[str] = ()) -> FilmReport:
+def film_report(
+    told: Mapping[str, Any], metadata: SubjectMetadata, pictures: Sequence[str] = (), coda: str = ""
+) -> FilmReport:
     """The report of a subject.
 
     Args:
         told: the capture's report, `capture.film.pipeline.capture_report.CaptureFindings.report`.
         metadata: of the subject.
         pictures: paths of pictures of the subject.
+        coda: what the film's end gave.
     """
     frames, used = told["frames"], int(told["light"]["frames"])
     rejected = Counter(_kind_of_reason(frame["reason"]) for frame in frames if frame["kind"] == "rejected")
@@ -58,6 +61,7 @@ def film_report(told: Mapping[str, Any], metadata: SubjectMetadata, pictures: Se
         dropped=tuple(DroppedFrames(count, why) for why, count in (rejected + partly).most_common()),
         warnings=tuple(told["warnings"]),
         pictures=tuple(pictures),
+        coda=coda,
         lights=tuple(_rounded(frame["direction"]) for frame in frames if frame.get("direction")),
     )
 

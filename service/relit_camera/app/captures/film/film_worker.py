@@ -40,6 +40,7 @@ def write_film_subject(
         InputError: an option is impossible.
         StorageError: a file cannot be written.
     """
+    from relit_camera.app.captures.film.film_coda import with_coda_stills
     from relit_camera.app.captures.film.film_report import film_report
     from relit_camera.capture.film.pipeline.checkpoint import CheckpointFolder, input_fingerprint
     from relit_camera.capture.film.pipeline.film_subject import build_film_subject
@@ -49,9 +50,10 @@ def write_film_subject(
     checkpoints = CheckpointFolder(folder / "subject.relit", input_fingerprint(film, read), log.info)
     with checkpoints.keep_until_done():
         subject, told = build_film_subject(film, read, checkpoints, tell, source=file_name)
+        subject, coda = with_coda_stills(film, told, subject, tell)
         write_subject(path, subject)
     tell(DRAWING, 0, None)
-    return film_report(told, subject.metadata, draw_pictures(subject, folder / "pictures"))
+    return film_report(told, subject.metadata, draw_pictures(subject, folder / "pictures"), coda)
 
 
 def draw_pictures(subject: Subject, folder: Path) -> list[str]:

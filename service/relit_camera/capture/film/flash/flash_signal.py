@@ -79,14 +79,20 @@ class BrightnessGrid:
 
 
 def measure_brightness(
-    path: Path, gamma: Gamma = "srgb", *, threads: int = 1, progress: Callable[[int], None] = lambda frames: None
+    path: Path,
+    gamma: Gamma = "srgb",
+    *,
+    threads: int = 1,
+    most: int | None = None,
+    progress: Callable[[int], None] = lambda frames: None,
 ) -> BrightnessGrid:
-    """Read a whole film once at low resolution. Memory: 4 KB a frame.
+    """Read a film once at low resolution. Memory: 4 KB a frame.
 
     Args:
         path: the film.
         gamma: its transfer curve.
         threads: of the decoder.
+        most: frames that are read; all if None.
         progress: called with the number of frames read.
 
     Raises:
@@ -100,6 +106,8 @@ def measure_brightness(
             cells.append(cell_means(luminance(frame.image)))
             times_s.append(frame.time_s)
             progress(len(times_s))
+            if len(times_s) == most:
+                break
         size = (video.info.width, video.info.height)
     if brightest is None or len(times_s) < MIN_FRAMES:
         raise VideoError(f"{path} has {len(times_s)} frames only", "record at least ten seconds")

@@ -72,6 +72,7 @@ class CaptureFindings:
         misfit_if_far: median misfit of the strengths if the lamp were far away.
         good: (count,) rows of `kept` that were used.
         lights: number of pictures after merging.
+        coda: index of the first frame after the flashes, where some seconds in constant light follow; else None.
     """
 
     video: str
@@ -96,6 +97,7 @@ class CaptureFindings:
     misfit_if_far: float
     good: NDArray[np.intp]
     lights: int
+    coda: int | None = None
 
     @property
     def warnings(self) -> list[str]:
@@ -163,6 +165,7 @@ class CaptureFindings:
                 "side": self.crop.side,
                 "size": self.crop.size,
             },
+            "coda": self.coda,
             "warnings": self.warnings,
             "frames": [self._frame_entry(frame) for frame in self.flashes.frames],
         }

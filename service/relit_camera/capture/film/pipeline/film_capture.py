@@ -17,6 +17,7 @@ from relit_camera.base.video.video_readers import LinearVideoFrame, LinearVideoR
 from relit_camera.capture.film.ball.ball_detection import find_balls
 from relit_camera.capture.film.ball.frame_sample import MAX_FRAMES, FrameSample, sample_frames
 from relit_camera.capture.film.face_localization import LocatedFace, locate_face, require_face_in_picture
+from relit_camera.capture.film.flash.flash_end import count_flashing_frames
 from relit_camera.capture.film.flash.flash_signal import measure_brightness
 from relit_camera.capture.film.flash.frame_classification import Flashes, FrameClass, detect_flashes
 from relit_camera.capture.film.focal_length import known_focal_length
@@ -96,6 +97,10 @@ def build_samples(
     brightness = measure_brightness(
         video, options.gamma, threads=options.threads, progress=_reporter(progress, FLASHES)
     )
+    flashing = count_flashing_frames(brightness)
+    coda = flashing if flashing < len(brightness.times_s) else None
+    if coda is not None:
+        brightness = measure_brightness(video, options.gamma, threads=options.threads, most=coda)
     flashes = detect_flashes(brightness)
     total = len(flashes.frames)
 
@@ -199,6 +204,7 @@ def build_samples(
         misfit_if_far=misfit_if_far,
         good=good,
         lights=len(clusters),
+        coda=coda,
     )
     return CaptureResult(OlatSamples(pictures, means, matte), findings)
 
