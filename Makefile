@@ -8,7 +8,7 @@ PROCESSES ?= 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest fuzz coverage browser test-browser vm test-vm vm-picture clean
+.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest fuzz coverage browser test-browser pipewire test-pipewire vm test-vm vm-picture clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -43,7 +43,7 @@ generated: setup ## files that are built from code are what the code builds
 	cmp docs/openapi.json build/openapi.json
 
 scripts: setup ## shell scripts, Dockerfile and compose files
-	$(BIN)/shellcheck scripts/*.sh docker/*.sh tests/browser/*.sh tests/vm/*.sh tests/vm/guest/*.sh .ci/run
+	$(BIN)/shellcheck scripts/*.sh docker/*.sh tests/browser/*.sh tests/pipewire/*.sh tests/vm/*.sh tests/vm/guest/*.sh .ci/run
 	$(BIN)/hadolint docker/Dockerfile
 	$(BIN)/check-jsonschema --builtin-schema vendor.compose-spec docker/compose*.yaml
 
@@ -58,8 +58,9 @@ tool-install: setup ## the wheel as users install it, used from an empty home; m
 	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
 pytest: setup ## the tests alone, in two processes; make pytest PROCESSES=4
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire
 	# By themselves: browser and emulated machine take both cores, and tests that hold in real time would not.
+	$(BIN)/python -m pytest tests/pipewire
 	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup tests/browser
 	$(BIN)/python -m pytest tests/vm
 
@@ -67,7 +68,7 @@ fuzz: setup ## mutated files on every reader, for an hour; make fuzz FUZZ="--sec
 	$(BIN)/python -m tests.fuzz.fuzzing $(FUZZ)
 
 coverage: setup ## the first of these with the share of lines that they execute: build/coverage/index.html
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --cov --cov-report=
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire --cov --cov-report=
 	$(BIN)/python scripts/coverage_summary.py
 	$(BIN)/coverage html --quiet --directory build/coverage
 
@@ -76,6 +77,13 @@ browser: ## Debian's Chromium, in which the panel is tested (root on Debian)
 
 test-browser: setup ## the panel in a real browser
 	$(BIN)/python -m pytest tests/browser
+
+pipewire: ## PipeWire and its tools, unpacked into a folder, with which the camera in it is tested (Debian)
+	sh tests/pipewire/install.sh
+
+test-pipewire: setup pipewire ## the camera in a PipeWire session, of this machine's packages and of newer ones
+	sh tests/pipewire/install.sh bookworm-backports
+	PIPEWIRE_SUITES="own bookworm-backports" $(BIN)/python -m pytest tests/pipewire
 
 vm: ## build the virtual machine in which the camera is tried on a real kernel (root on Debian 12, two minutes)
 	sh tests/vm/build.sh

@@ -26,8 +26,11 @@ MACHINE = "virtual machine"
 
 
 def pytest_configure() -> None:
-    """Make the run's folder before the processes of pytest-xdist start, which share it."""
-    run_folder()
+    """Make the run's folder before the processes of pytest-xdist start, which share it; and keep out of the session.
+
+    No test but those of `tests/pipewire`, in a session of their own, may publish a camera.
+    """
+    os.environ["PIPEWIRE_RUNTIME_DIR"] = str(run_folder() / "no-session")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

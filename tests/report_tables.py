@@ -13,6 +13,7 @@ TABLES = {
     "steps in the browser": ("flow", "step", "took"),
     "what the panel costs": ("what", "measured", "at most"),
     "readers of the virtual camera": ("reader", "v4l2loopback", "saw"),
+    "readers of the camera in PipeWire": ("packages", "reader", "largest difference of 255"),
 }
 """Title and columns of every table."""
 

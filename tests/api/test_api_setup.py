@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from relit_camera.devices.on_demand.reader_list import Readers
+from relit_camera.devices.sinks.sink import Readers
 from relit_camera.live.status.setup_status import SpeedAdvice
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera

@@ -29,7 +29,18 @@ class FakeMachine:
         self.users: dict[str, list[DeviceUser]] = {}
         self.write("etc/os-release", DISTRIBUTIONS[distribution])
         self.add_kernel(RELEASE)
-        self.host = Host(root, self.tree, RELEASE, is_linux, lambda node: self.users.get(node, []))
+        self.processes: set[str] = set()
+        self.libraries: set[str] = set()
+        self.host = Host(
+            root,
+            self.tree,
+            RELEASE,
+            is_linux,
+            lambda node: self.users.get(node, []),
+            root / "run/pipewire-0",
+            lambda: self.processes,
+            lambda library: library in self.libraries,
+        )
 
     def write(self, path: str, text: str) -> Path:
         file = self.root / path
@@ -50,6 +61,12 @@ class FakeMachine:
     def load_at_boot(self, label: str = "Relit Camera", file: str = "relit-camera.conf") -> None:
         self.write(f"etc/modprobe.d/{file}", f"# ours\noptions v4l2loopback {OPTIONS.format(label)}\n")
         self.write(f"etc/modules-load.d/{file}", "v4l2loopback\n")
+
+    def run_session(self) -> None:
+        """Install PipeWire, and let a session run."""
+        self.libraries.add("libpipewire-0.3.so.0")
+        self.write("run/pipewire-0", "")
+        self.processes.add("wireplumber")
 
     def set_secure_boot(self, on: bool) -> None:
         file = self.root / SECURE_BOOT_VARIABLE

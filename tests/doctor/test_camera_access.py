@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from relit_camera.base.config.settings import OutputSettings, SourceSettings
 from relit_camera.base.plugin_groups import PluginGroup
-from relit_camera.doctor.camera_access import check_virtual_camera, check_webcam, groups_to_join
+from relit_camera.doctor.camera_access import check_pipewire, check_virtual_camera, check_webcam, groups_to_join
+from relit_camera.doctor.kernel_module import check_load_at_boot, check_module
 from relit_camera.doctor.report import Severity
 from tests.doctor.conftest import C920
 from tests.doctor.fake_host import FIREFOX, RELIT, FakeMachine, everybody_may, expect, nobody_may
@@ -159,3 +161,58 @@ def test_a_plug_in_source_needs_no_webcam(machine: FakeMachine, monkeypatch: pyt
 def test_a_webcam_may_be_named_by_the_plug_in_and_its_id(machine: FakeMachine) -> None:
     named = check_webcam(SourceSettings(source="webcam:nowhere"), machine.host)
     assert "'nowhere'" in named.seen
+
+
+# PipeWire.
+
+PIPEWIRE = OutputSettings(sink="pipewire")
+
+
+def test_a_session_with_its_manager_is_fine(bare: FakeMachine) -> None:
+    bare.run_session()
+    for settings in (OutputSettings(), PIPEWIRE):
+        expect(check_pipewire(settings, bare.host), Severity.OK, "'Relit Camera' can be published at", "pipewire-0")
+        expect(check_module(settings, bare.host), Severity.OK, "not needed: the camera is in PipeWire")
+        expect(check_load_at_boot(settings, bare.host), Severity.OK)
+    expect(check_virtual_camera(OutputSettings(), bare.host), Severity.OK, "in PipeWire, and no device")
+    expect(check_virtual_camera(PIPEWIRE, bare.host), Severity.OK, "not needed")
+
+
+@pytest.mark.parametrize(
+    ("distribution", "command"),
+    [("debian", "sudo apt install pipewire wireplumber"), ("fedora", "sudo dnf install"), ("arch", "sudo pacman -S")],
+)
+def test_pipewire_that_is_not_installed(tmp_path: Path, distribution: str, command: str) -> None:
+    machine = FakeMachine(tmp_path, distribution)
+    expect(check_pipewire(OutputSettings(), machine.host), Severity.PROBLEM, "not installed", command)
+    machine.tree.add_loopback(10, "Relit Camera")
+    expect(check_pipewire(OutputSettings(), machine.host), Severity.OK, "not installed", "'Relit Camera' is a device")
+    expect(check_pipewire(PIPEWIRE, machine.host), Severity.PROBLEM, command)
+
+
+def test_a_session_that_does_not_run(bare: FakeMachine) -> None:
+    bare.run_session()
+    (bare.root / "run/pipewire-0").unlink()
+    finding = check_pipewire(OutputSettings(), bare.host)
+    expect(finding, Severity.PROBLEM, "no session runs", "systemctl --user start pipewire wireplumber")
+    expect(check_module(OutputSettings(), bare.host), Severity.PROBLEM, "not installed")
+    nowhere = replace(bare.host, socket=None)
+    expect(check_pipewire(PIPEWIRE, nowhere), Severity.PROBLEM, "XDG_RUNTIME_DIR is not set")
+
+
+def test_a_session_without_manager_links_nobody(bare: FakeMachine) -> None:
+    bare.run_session()
+    bare.processes.clear()
+    expect(check_pipewire(OutputSettings(), bare.host), Severity.WARNING, "without a session manager", "wireplumber")
+
+
+def test_a_socket_alone_is_no_session(bare: FakeMachine) -> None:
+    bare.write("run/pipewire-0", "")
+    expect(check_pipewire(OutputSettings(), bare.host), Severity.PROBLEM, "not installed")
+    expect(check_module(OutputSettings(), bare.host), Severity.PROBLEM, "not installed")
+
+
+def test_pipewire_is_not_asked_for(bare: FakeMachine, tmp_path: Path) -> None:
+    expect(check_pipewire(OutputSettings(sink="null"), bare.host), Severity.OK, "not used")
+    elsewhere = FakeMachine(tmp_path / "mac", is_linux=False)
+    expect(check_pipewire(OutputSettings(), elsewhere.host), Severity.OK, "not used")

@@ -34,7 +34,7 @@ from relit_camera.base.errors import ModelError, StorageError
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.models.session_with_fallback import session_report
 from relit_camera.devices.device_discovery import find_webcam
-from relit_camera.devices.on_demand.reader_list import ReaderList
+from relit_camera.devices.on_demand.reader_list import ReaderList, all_readers
 from relit_camera.devices.sinks.sink import Sink
 from relit_camera.devices.sources.source import Source
 from relit_camera.devices.webcam_controls import open_controls
@@ -303,6 +303,16 @@ class CameraService:
             for session in sessions
             if session.why
         ]
+        unused = []
+        if sink.trouble is not None:
+            unused = [
+                Degradation(
+                    code=DegradationCode.ONE_CAMERA_FAILED,
+                    what="one of the virtual cameras is not used",
+                    why=sink.trouble.what,
+                    cure=sink.trouble.cure,
+                )
+            ]
         load = self._supervisor.load
         state = CameraState.FROZEN if scene.frozen else self._board.state
         reduced = [reduced_quality(load.latency_s or 0.0, self._pipelines.size)] if load.level else []
@@ -315,7 +325,7 @@ class CameraService:
         return CameraStatus(
             state=state,
             source=f"{source.kind} {source.id}".strip(),
-            sink=f"{sink.kind} {sink.id}".strip(),
+            sink=sink.name,
             subject=scene.subject_name,
             mode=str(scene.look.mode),
             tracker=TrackerStatus(self._pipelines.tracker_name, str(self._board.face)),
@@ -330,12 +340,13 @@ class CameraService:
             unlit=self._publisher.unlit,
             degraded=[
                 *self._board.degradations(),
+                *unused,
                 *subject_troubles(scene),
                 *(pipeline.troubles if pipeline else ()),
                 *slower,
                 *reduced,
             ],
-            readers=self._readers.readers(),
+            readers=all_readers(self._readers.readers(), sink),
             advice=self._advice(fps, state),
             version=__version__,
             uptime_s=self._clock.now() - self._started_at,

@@ -9,7 +9,11 @@ import contextlib
 import errno
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from relit_camera.base.images.color import rgb_to_i420
 from relit_camera.base.images.image_types import DisplayImage
@@ -35,17 +39,21 @@ class LoopbackDevice:
         size: width and height that the device has: those asked for, or those that a program still reading it has.
     """
 
-    def __init__(self, size: tuple[int, int], node: str) -> None:
+    def __init__(
+        self, size: tuple[int, int], node: str, convert: Callable[[DisplayImage], NDArray[np.uint8]] = rgb_to_i420
+    ) -> None:
         """Open the device and agree on a format.
 
         Args:
             size: width and height asked for, both even.
             node: such as /dev/video10.
+            convert: makes I420 of pictures.
 
         Raises:
             OSError: it cannot be opened, or is no V4L2 device. EBUSY: another program writes to it, or one still reads
                 it in another pixel format.
         """
+        self._convert = convert
         self._descriptor = os.open(node, os.O_RDWR)
         try:
             if not query_capabilities(self._descriptor) & CAP_VIDEO_OUTPUT:
@@ -65,7 +73,7 @@ class LoopbackDevice:
         Raises:
             OSError: the device did not take all of it.
         """
-        planes = rgb_to_i420(image)
+        planes = self._convert(image)
         written = os.write(self._descriptor, planes.data)
         if written != planes.size:
             raise OSError(errno.EIO, f"{written} of {planes.size} bytes were taken")

@@ -1,8 +1,7 @@
-"""Checks of access to cameras: the webcam, the virtual camera, and browsers whose sandbox hides cameras."""
+"""Checks of access to cameras: the webcam, the virtual camera, and the PipeWire session."""
 
 from __future__ import annotations
 
-import configparser
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -18,8 +17,10 @@ from relit_camera.devices.device_discovery import (
     list_webcams,
     modprobe_command,
 )
+from relit_camera.devices.sinks.pipewire.pipewire_library import LIBRARY
 from relit_camera.devices.sources.source_factory import SOURCES
 from relit_camera.doctor.host import Host
+from relit_camera.doctor.kernel_module import needs_module
 from relit_camera.doctor.report import Finding, ok, problem, problem_from_error, warning
 
 JOIN_GROUP_CURE = 'run: sudo usermod -aG {group} "$USER", and log in again'
@@ -63,6 +64,8 @@ def check_virtual_camera(settings: OutputSettings, host: Host, access: AccessChe
     topic, tree = "virtual camera", host.tree
     if settings.sink != "camera" and not settings.sink.startswith(str(tree.dev / "video")):
         return ok(topic, f"not needed: the sink is '{settings.sink}'")
+    if not needs_module(settings, host) and host.is_linux:
+        return ok(topic, f"'{settings.label}' in PipeWire, and no device")
     if not host.is_linux:
         cure = "if the camera does not start, install OBS Studio, and start and stop its virtual camera once"
         return ok(topic, f"OBS Studio's is used here; {cure}")
@@ -99,6 +102,41 @@ def check_virtual_camera(settings: OutputSettings, host: Host, access: AccessChe
     return ok(topic, f"'{camera.label}' at {camera.node}{use}")
 
 
+PIPEWIRE_PACKAGES = {
+    "debian": "sudo apt install pipewire wireplumber",
+    "fedora": "sudo dnf install pipewire wireplumber",
+    "arch": "sudo pacman -S pipewire wireplumber",
+}
+START_COMMAND = "systemctl --user start pipewire wireplumber"
+SESSION_MANAGERS = {"wireplumber", "pipewire-media-"}
+"""Names of processes, of which the kernel keeps fifteen characters."""
+
+
+def check_pipewire(settings: OutputSettings, host: Host) -> Finding:
+    """Check that the camera can be published in a PipeWire session: library, session, and a session manager.
+
+    It is a problem where the camera can be nowhere else.
+    """
+    topic = "pipewire"
+    if settings.sink not in ("camera", "pipewire") or not host.is_linux:
+        return ok(topic, f"not used: the sink is '{settings.sink}'")
+    loopback = settings.sink == "camera" and any(
+        camera.ours for camera in list_virtual_cameras(host.tree, settings.label)
+    )
+    install = PIPEWIRE_PACKAGES.get(host.family, "# install PipeWire 0.3.48 or newer, and WirePlumber")
+    if not host.can_load(LIBRARY):
+        seen, cure = "it is not installed: with it no kernel module is needed", f"run: {install}; then log in again"
+    elif host.socket is None or not host.socket.exists():
+        where = f"there is no {host.socket}" if host.socket else "XDG_RUNTIME_DIR is not set"
+        seen, cure = f"no session runs for this user: {where}", f"run: {START_COMMAND}; or log in to a desktop"
+    elif not any(name.startswith(tuple(SESSION_MANAGERS)) for name in host.find_processes()):
+        seen = f"a session runs at {host.socket}, without a session manager: programs that look for a camera get none"
+        return warning(topic, seen, f"run: {install} && {START_COMMAND}")
+    else:
+        return ok(topic, f"'{settings.label}' can be published at {host.socket}")
+    return ok(topic, f"{seen}; '{settings.label}' is a device alone") if loopback else problem(topic, seen, cure)
+
+
 def _exclusive_caps(tree: DeviceFolders) -> list[bool]:
     """The module's parameter for each of its devices, in their order; empty where the module does not show it."""
     text = tree.read(tree.sys / "module" / "v4l2loopback" / "parameters" / "exclusive_caps")
@@ -121,51 +159,3 @@ def groups_to_join(tree: DeviceFolders, access: AccessCheck = os.access) -> tupl
     nodes = [str(tree.dev / folder.name) for folder in tree.nodes]
     denied = [node for node in nodes if Path(node).exists() and not access(node, os.R_OK | os.W_OK)]
     return tuple(sorted({_owning_group(node) for node in denied}))
-
-
-FLATPAK_APPS = (
-    "org.mozilla.firefox",
-    "org.chromium.Chromium",
-    "com.google.Chrome",
-    "com.brave.Browser",
-    "com.microsoft.Edge",
-    "us.zoom.Zoom",
-)
-SNAP_APPS = ("firefox", "chromium", "brave", "zoom-client")
-FLATPAK_ROOTS = ("var/lib/flatpak", "{home}/.local/share/flatpak")
-
-
-def check_browsers(host: Host, home: Path | None = None) -> Finding:
-    """Check for Flatpak browsers without access to devices, and for Snap browsers that may have to be connected.
-
-    A Flatpak's own metadata and the overrides of user and system are read; a portal may still give it a camera.
-    """
-    topic, home = "browsers", home or Path.home()
-    installations = [host.root / path.format(home=str(home).lstrip("/")) for path in FLATPAK_ROOTS]
-    denied = [app for app in FLATPAK_APPS if _lacks_device_access(app, installations, host)]
-    if denied:
-        cure = " && ".join(f"flatpak override --user --device=all {app}" for app in denied)
-        return warning(topic, f"the Flatpak {', '.join(denied)} is given no devices", f"run: {cure}")
-    snaps = [name for name in SNAP_APPS if (host.root / "snap" / name).is_dir()]
-    if snaps:
-        lines = ", ".join(f"sudo snap connect {name}:camera" for name in snaps)
-        return ok(topic, f"Snaps need their camera connected (if one lists no camera: {lines})")
-    return ok(topic, "none in a sandbox that hides cameras")
-
-
-def _lacks_device_access(app: str, installations: list[Path], host: Host) -> bool:
-    """Whether a Flatpak is installed and neither it nor an override gives it all devices."""
-    metadata = [folder / "app" / app / "current/active/metadata" for folder in installations]
-    if not any(path.is_file() for path in metadata):
-        return False
-    overrides = [folder / "overrides" / name for folder in installations for name in (app, "global")]
-    return not any("all" in _devices(host.tree.read(path)) for path in metadata + overrides)
-
-
-def _devices(text: str) -> list[str]:
-    parser = configparser.ConfigParser(interpolation=None, strict=False)
-    try:
-        parser.read_string(text)
-    except configparser.Error:
-        return []
-    return parser.get("Context", "devices", fallback="").split(";")

@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
+import ctypes
 import platform
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import psutil
+
 from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, DeviceFolders
 from relit_camera.devices.device_users import DeviceUser, find_device_users
+from relit_camera.devices.sinks.pipewire.pipewire_sink import session_socket
 
 SECURE_BOOT_VARIABLE = "sys/firmware/efi/efivars/SecureBoot-8be4df61-93ca-11d2-aa0d-00e098032b8c"
 KERNEL_MODULE = "v4l2loopback"
+
+
+def running_programs() -> set[str]:
+    """Names of the processes that run, as far as this user may see them."""
+    return {process.info["name"] or "" for process in psutil.process_iter(["name"])}
+
+
+def can_load(library: str) -> bool:
+    """Whether a library of that file name can be loaded, wherever it is."""
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
 
 
 @dataclass(frozen=True)
@@ -25,6 +43,9 @@ class Host:
         release: of the kernel that runs, such as 6.1.0-56-amd64.
         is_linux: whether it has v4l2loopback at all.
         find_device_users: who else has a device node open.
+        socket: where this user's programs reach PipeWire; None where the environment does not say.
+        find_processes: names of the processes that run.
+        can_load: whether a library of that file name can be loaded.
     """
 
     root: Path = Path("/")
@@ -32,6 +53,9 @@ class Host:
     release: str = field(default_factory=platform.release)
     is_linux: bool = field(default_factory=lambda: platform.system() == "Linux")
     find_device_users: Callable[[str], list[DeviceUser]] = find_device_users
+    socket: Path | None = field(default_factory=session_socket)
+    find_processes: Callable[[], set[str]] = running_programs
+    can_load: Callable[[str], bool] = can_load
 
     def read(self, path: str) -> str:
         """Text of a file below the root; empty where it cannot be read."""

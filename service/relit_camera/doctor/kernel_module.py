@@ -9,6 +9,7 @@ import shlex
 
 from relit_camera.base.config.settings import OutputSettings
 from relit_camera.devices.device_discovery import list_virtual_cameras, modprobe_command, module_options
+from relit_camera.devices.sinks.pipewire.pipewire_library import LIBRARY
 from relit_camera.doctor.host import KERNEL_MODULE, Host
 from relit_camera.doctor.report import Finding, ok, problem, warning
 
@@ -83,17 +84,26 @@ def root_commands(settings: OutputSettings, host: Host, groups: tuple[str, ...] 
     return tuple(lines)
 
 
+def has_session(settings: OutputSettings, host: Host) -> bool:
+    """Whether the camera is in a PipeWire session, or will be when it runs: then it needs no kernel module."""
+    if settings.sink not in ("camera", "pipewire") or not host.is_linux or not host.can_load(LIBRARY):
+        return False
+    return host.socket is not None and host.socket.exists()
+
+
 def needs_module(settings: OutputSettings, host: Host) -> bool:
-    """Whether the sink in the settings is a virtual camera that the kernel module provides."""
-    is_camera = settings.sink == "camera" or settings.sink.startswith(str(host.tree.dev / "video"))
-    return is_camera and host.is_linux
+    """Whether the sink in the settings is a virtual camera that only the kernel module can provide, or does."""
+    if settings.sink == "camera":
+        return host.is_linux and (host.module_loaded or not has_session(settings, host))
+    return host.is_linux and settings.sink.startswith(str(host.tree.dev / "video"))
 
 
 def check_module(settings: OutputSettings, host: Host) -> Finding:
     """Check that the running kernel has loaded the module, and if not, which step of its installation is missing."""
     topic = "kernel module"
     if not needs_module(settings, host):
-        return ok(topic, "not needed")
+        through = ": the camera is in PipeWire (only programs that do not read that need it)"
+        return ok(topic, f"not needed{through if has_session(settings, host) else ''}")
     if host.module_loaded:
         return ok(topic, f"{KERNEL_MODULE} {host.module_version or '0.12 or older'} is loaded in {host.release}")
     having = host.kernels_with_module

@@ -12,7 +12,8 @@ from relit_camera.base.config.settings_loader import NON_SETTING_VARIABLES, conf
 from relit_camera.base.errors import ConfigError
 from relit_camera.base.models.model_store import FOLDER_VARIABLE, models_folder
 from relit_camera.devices.sinks.sink_factory import published_label
-from relit_camera.doctor.camera_access import AccessCheck, check_browsers, check_virtual_camera, check_webcam
+from relit_camera.doctor.browsers import check_browsers
+from relit_camera.doctor.camera_access import AccessCheck, check_pipewire, check_virtual_camera, check_webcam
 from relit_camera.doctor.fix import apply_fixes
 from relit_camera.doctor.host import Host
 from relit_camera.doctor.installation import check_cores, check_folder, check_packages, check_python
@@ -63,7 +64,8 @@ def checks_of(
         lambda: check_module(settings.output, host),
         lambda: check_load_at_boot(settings.output, host),
         lambda: check_virtual_camera(settings.output, host, access),
-        lambda: check_browsers(host),
+        lambda: check_pipewire(settings.output, host),
+        lambda: check_browsers(host, settings=settings.output),
         lambda: check_port(settings.server),
         check_running,
         lambda: check_service(host),

@@ -10,7 +10,8 @@ import pytest
 
 from relit_camera.base.errors import UnsupportedByDriverError
 from relit_camera.devices.device_users import DeviceUser
-from relit_camera.devices.on_demand.reader_list import ASKED_S, SCAN_S, UNKNOWN, ReaderList, Readers, list_readers
+from relit_camera.devices.on_demand.reader_list import ASKED_S, SCAN_S, ReaderList, list_readers
+from relit_camera.devices.sinks.sink import UNKNOWN, Readers
 from tests.virtual_clock import VirtualClock
 
 NODE = "/dev/video10"

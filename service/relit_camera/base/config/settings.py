@@ -45,9 +45,10 @@ class OutputSettings(SettingsModel):
     """Where relit pictures go."""
 
     sink: str = "camera"
-    """`camera` (the virtual camera), a video file to write, `null`, or a plug-in's `NAME` or `NAME:ARGUMENT`."""
+    """`camera` (what call apps can see: PipeWire and v4l2loopback, each where it is there), `pipewire`, a video file to
+    write, `null`, or a plug-in's `NAME` or `NAME:ARGUMENT`."""
     label: Annotated[str, Field(min_length=1, max_length=31)] = "Relit Camera"
-    """Name of the virtual camera device, as call apps show it."""
+    """Name of the virtual camera, as call apps show it."""
     width: EvenSize = 1280
     """Even, and fixed for the whole run: readers of the virtual camera break otherwise."""
     height: EvenSize = 720

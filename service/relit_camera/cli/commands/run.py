@@ -15,7 +15,7 @@ app = typer.Typer()
 def run(
     context: typer.Context,
     source: Annotated[str | None, typer.Option(help="webcam, a camera's id, a video or picture file, pattern.")] = None,
-    sink: Annotated[str | None, typer.Option(help="camera, a video file, or null.")] = None,
+    sink: Annotated[str | None, typer.Option(help="camera, pipewire, a video file, or null.")] = None,
     subject: Annotated[str | None, typer.Option(help="A stored subject's name, or a .relit file.")] = None,
     instant: Annotated[
         bool, typer.Option("--instant", help="Measure the face before the webcam first, for three seconds.")

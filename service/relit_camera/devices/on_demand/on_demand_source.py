@@ -177,8 +177,9 @@ class DemandWatch:
             raise ConfigError(f"source.on_demand: a sink of kind '{kind}' does not tell who reads it", "leave it out")
         if kind == "camera":
             require_known_readers()
-        self._readers = ReaderMonitor(lambda: sink.describe().id) if kind == "camera" else None
-        self._demand = DemandMonitor(self._readers.has_readers if self._readers else lambda: kind == "file")
+        self._sink, self._kind = sink, kind
+        self._device_readers = ReaderMonitor(lambda: sink.describe().id)
+        self._demand = DemandMonitor(self._has_readers)
 
     def wanted(self) -> bool:
         """Whether a source should be open now."""
@@ -190,5 +191,12 @@ class DemandWatch:
 
     def close(self) -> None:
         """Stop watching the sink."""
-        if self._readers is not None:
-            self._readers.close()
+        self._device_readers.close()
+
+    def _has_readers(self) -> bool:
+        """Whether anybody reads: PipeWire tells it by itself, the driver of a device is asked."""
+        if self._kind != "camera":
+            return self._kind == "file"
+        info = self._sink.describe()
+        through_pipewire = info.pipewire is not None and bool(info.pipewire.count)
+        return through_pipewire or (bool(info.id) and self._device_readers.has_readers())

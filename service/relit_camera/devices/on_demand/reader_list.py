@@ -6,12 +6,12 @@ import math
 import sys
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.base.errors import UnsupportedByDriverError
 from relit_camera.devices.device_users import DeviceUser, find_device_users, has_mapped_buffers
 from relit_camera.devices.on_demand.reader_detection import DEVICE_GONE_ERRNOS, driver_reader_count
+from relit_camera.devices.sinks.sink import UNKNOWN, Readers, SinkInfo
 
 SCAN_S = 1.0
 """Seconds between two scans."""
@@ -19,17 +19,12 @@ ASKED_S = 5.0
 """Scans end when nobody has asked for so many seconds."""
 
 
-@dataclass(frozen=True)
-class Readers:
-    """Programs that take pictures from the virtual camera now."""
-
-    count: int | None = None
-    """None where it cannot be known: no virtual camera is open, or the system does not tell."""
-    names: tuple[str, ...] = ()
-    """Of those of the same user, such as `firefox`; there may be fewer than `count`."""
-
-
-UNKNOWN = Readers()
+def all_readers(device: Readers, info: SinkInfo) -> Readers:
+    """The readers of a sink: those of its device, and those that come through PipeWire."""
+    if info.pipewire is None or not info.id:
+        return device if info.pipewire is None else info.pipewire
+    counts = [readers.count for readers in (device, info.pipewire) if readers.count is not None]
+    return Readers(sum(counts) if counts else None, tuple(dict.fromkeys(device.names + info.pipewire.names)))
 
 
 def list_readers(

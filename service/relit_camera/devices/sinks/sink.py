@@ -5,7 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from relit_camera.base.errors import DeviceError
 from relit_camera.base.images.image_types import DisplayImage
+
+
+@dataclass(frozen=True)
+class Readers:
+    """Programs that take pictures from the virtual camera now."""
+
+    count: int | None = None
+    """None where it cannot be known: no virtual camera is open, or the system does not tell."""
+    names: tuple[str, ...] = ()
+    """Of those of the same user, such as `firefox`; there may be fewer than `count`."""
+
+
+UNKNOWN = Readers()
 
 
 @dataclass(frozen=True)
@@ -16,11 +30,21 @@ class SinkInfo:
         kind: camera, file or null.
         id: device node, path, or empty.
         size: width and height in pixels of the pictures that it takes, fixed for its life.
+        pipewire: who reads it through PipeWire; None where it is not published there.
+        trouble: why a camera that is there is not used, while another one is; None where all is well.
     """
 
     kind: str
     id: str
     size: tuple[int, int]
+    pipewire: Readers | None = None
+    trouble: DeviceError | None = None
+
+    @property
+    def name(self) -> str:
+        """Kind and place in words, such as `camera /dev/video10 and PipeWire`."""
+        places = " and ".join(filter(None, (self.id, "PipeWire" if self.pipewire is not None else "")))
+        return f"{self.kind} {places}".strip()
 
 
 class Sink(Protocol):

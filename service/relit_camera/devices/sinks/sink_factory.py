@@ -6,6 +6,7 @@ A plug-in is an entry point of the group `relit_camera.sinks`: called with `Sink
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,8 +15,12 @@ from relit_camera.base.config.settings import OutputSettings
 from relit_camera.base.errors import InputError
 from relit_camera.base.plugin_groups import PluginGroup
 from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, DeviceFolders, list_virtual_cameras
+from relit_camera.devices.sinks.call_app_sink import CallAppSink, CameraPlace
+from relit_camera.devices.sinks.picture_conversion import I420Converter
+from relit_camera.devices.sinks.pipewire.pipewire_sink import PipeWireSink, session_socket
 from relit_camera.devices.sinks.sink import NullSink, Sink
 from relit_camera.devices.sinks.virtual_camera_sink import VirtualCameraSink
+from relit_camera.devices.v4l2loopback_output import LoopbackDevice
 
 
 @dataclass(frozen=True)
@@ -43,8 +48,8 @@ SINKS: PluginGroup[Callable[[SinkOptions], Sink]] = PluginGroup("relit_camera.si
 def open_sink(settings: OutputSettings, tree: DeviceFolders = SYSTEM_FOLDERS) -> Sink:
     """Open the sink that `settings.sink` names.
 
-    In this order: a plug-in (`NAME` or `NAME:ARGUMENT`; `camera` and `null` are of them), the node of a virtual camera
-    such as /dev/video10, a video file.
+    In this order: a plug-in (`NAME` or `NAME:ARGUMENT`; `camera`, `pipewire` and `null` are of them), the node of a
+    virtual camera such as /dev/video10, a video file.
 
     Raises:
         InputError: none of these, or the plug-in takes no such argument.
@@ -70,12 +75,45 @@ def open_sink(settings: OutputSettings, tree: DeviceFolders = SYSTEM_FOLDERS) ->
 
 
 def open_virtual_camera(options: SinkOptions) -> Sink:
-    """Open the virtual camera of the label.
+    """Open what call apps can see: the v4l2loopback device of the label, a camera in PipeWire, or both.
+
+    Elsewhere than on Linux it is the virtual camera that pyvirtualcam finds.
 
     Raises:
-        DeviceError: it is missing or in use.
+        DeviceError: there is neither, or it is in use.
     """
-    return VirtualCameraSink(options.size, options.fps, options.label, tree=options.tree)
+    size, fps, label, tree = options.size, options.fps, options.label, options.tree
+    if not sys.platform.startswith("linux"):
+        return VirtualCameraSink(size, fps, label, tree=tree)
+    convert = I420Converter()
+
+    def open_loopback() -> Sink:
+        def device(size: tuple[int, int], fps: float, node: str) -> LoopbackDevice:
+            return LoopbackDevice(size, node, convert)
+
+        return VirtualCameraSink(size, fps, label, tree=tree, open_output=device)
+
+    def loopback_is_there() -> bool:
+        return any(camera.ours for camera in list_virtual_cameras(tree, label))
+
+    def session_is_there() -> bool:
+        socket = session_socket()
+        return socket is not None and socket.exists()
+
+    places = (
+        CameraPlace("PipeWire", lambda: PipeWireSink(size, fps, label, convert=convert), session_is_there),
+        CameraPlace("v4l2loopback", open_loopback, loopback_is_there),
+    )
+    return CallAppSink(places, size)
+
+
+def open_pipewire(options: SinkOptions) -> Sink:
+    """Open a camera in PipeWire alone.
+
+    Raises:
+        DeviceError: PipeWire is not installed, or no session runs.
+    """
+    return PipeWireSink(options.size, options.fps, options.label)
 
 
 def open_null(options: SinkOptions) -> Sink:

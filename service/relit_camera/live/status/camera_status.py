@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from relit_camera.devices.on_demand.reader_list import Readers
+from relit_camera.devices.sinks.sink import Readers
 from relit_camera.live.status.setup_status import SpeedAdvice
 
 
@@ -41,6 +41,8 @@ class DegradationCode(StrEnum):
     """The pipeline fails or hangs: the fallback is shown."""
     SINK_FAILED = "sink-failed"
     """The sink takes no pictures; it is tried again."""
+    ONE_CAMERA_FAILED = "one-camera-failed"
+    """A virtual camera that is there takes no pictures, while another one does; it is tried again."""
     MODELS_MISSING = "models-missing"
     """Models that the tracker needs are not stored: no face is tracked until they are."""
     CONFIGURATION_FAILED = "configuration-failed"

@@ -76,6 +76,7 @@ function showAdvice(advice) {
 function showStatus(status) {
   showState(status.state);
   showReaders(status.readers);
+  byId("readers").title = status.sink.startsWith("camera ") ? `Apps find the camera here: ${status.sink.slice(7)}` : "";
   showUnlit(status.unlit);
   // The advice and the doors say the same, with the buttons that cure it.
   showNotes(status.degraded.filter(({ code }) => code !== "no-subject" && !(status.advice && code === "reduced-quality")));
