@@ -17,7 +17,14 @@ from pathlib import Path
 
 import pytest
 
-from relit_camera.app.systemd import STATUS_INTERVAL_S, SystemdNotifier, notify_systemd, report_until, status_line
+from relit_camera.app.systemd import (
+    STATUS_INTERVAL_S,
+    SystemdNotifier,
+    is_being_restarted,
+    notify_systemd,
+    report_until,
+    status_line,
+)
 from relit_camera.live.status.camera_status import CameraState, CameraStatus, Degradation, DegradationCode, FrameCounts
 from tests.api.fake_camera import STATUS
 from tests.cli.relit_command import Material, environment
@@ -272,3 +279,40 @@ def test_a_real_camera_is_ready_alive_silent_when_it_hangs_and_says_when_it_stop
         process.send_signal(signal.SIGTERM)
         listener.wait_for("STOPPING=1")
         assert process.wait(START_S) == 0
+
+
+USER_UNIT = "0::/user.slice/user-1000.slice/user@1000.service/app.slice/relit-camera.service"
+
+
+@pytest.mark.parametrize(
+    ("cgroup", "jobs", "restarted"),
+    [
+        (USER_UNIT, "  812 relit-camera.service restart running", True),
+        (USER_UNIT, "7 other.service restart running\n812 relit-camera.service restart running\n", True),
+        (USER_UNIT, "812 relit-camera.service stop running", False),
+        (USER_UNIT, "812 my-relit-camera.service restart running", False),
+        (USER_UNIT, "", False),
+        ("0::/user.slice/user-1000.slice/user@1000.service", "812 user@1000.service restart running", False),
+        ("0::/", "812 relit-camera.service restart running", False),
+    ],
+    ids=["restart", "beside another", "stop", "another's", "no job", "no unit", "no systemd"],
+)
+def test_a_restart_is_told_from_a_stop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cgroup: str, jobs: str, restarted: bool
+) -> None:
+    (tmp_path / "cgroup").write_text(cgroup + "\n")
+    (tmp_path / "jobs").write_text(jobs)
+    asks = tmp_path / "systemctl"
+    asks.write_text(f'#!/bin/sh\n[ "$*" = "--user list-jobs --no-legend --plain" ] && cat {tmp_path}/jobs\n')
+    asks.chmod(0o755)
+    monkeypatch.setenv("NOTIFY_SOCKET", "/run/user/1000/systemd/notify")
+    assert is_being_restarted(tmp_path / "cgroup", str(asks)) is restarted
+    monkeypatch.delenv("NOTIFY_SOCKET")
+    assert not is_being_restarted(tmp_path / "cgroup", str(asks))
+
+
+def test_a_manager_that_does_not_answer_is_a_stop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NOTIFY_SOCKET", "/run/user/1000/systemd/notify")
+    (tmp_path / "cgroup").write_text(USER_UNIT)
+    assert not is_being_restarted(tmp_path / "cgroup", str(tmp_path / "missing"))
+    assert not is_being_restarted(tmp_path / "missing", "true")

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from relit_camera.base.concurrency import resident_memory
+from tests.virtual_clock import VirtualClock
 
 pytestmark = pytest.mark.skipif(resident_memory._GLIBC is None, reason="another C library than glibc")
 
@@ -134,3 +135,24 @@ Swap:                  0 kB
 def test_nothing_that_was_written_is_dropped() -> None:
     found = resident_memory._unwritten_library_mappings(SMAPS)
     assert list(found) == [(0x7F10, 0x7F40)]
+
+
+def test_freed_memory_is_given_back_when_the_process_has_grown() -> None:
+    mib = resident_memory.GROWN_BYTES // 32
+    resident, given_back = [200 * mib], list[int]()
+
+    def give_back() -> None:
+        given_back.append(resident[0] // mib)
+        resident[0] -= 30 * mib
+
+    clock = VirtualClock()
+    returned = resident_memory.FreedMemoryReturn(lambda: resident[0], give_back, clock)
+    for grown_to in (200, 190, 201, 203, 200, 204, 150, 175, 183):
+        resident[0] = grown_to * mib
+        clock.sleep(resident_memory.GIVEN_BACK_S)
+        returned.check()
+    # At first; 202 is 32 above the 170 after that; 205 would be 32 above 173; it fell to 150 by itself.
+    assert given_back == [200, 203, 183]
+    resident[0] = 300 * mib
+    returned.check()
+    assert len(given_back) == 3, "not so soon again: it holds every thread up"

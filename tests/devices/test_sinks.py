@@ -15,7 +15,7 @@ from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.devices import v4l2, v4l2loopback_output
 from relit_camera.devices.device_discovery import DeviceFolders
 from relit_camera.devices.device_users import DeviceUser
-from relit_camera.devices.sinks import sink_factory
+from relit_camera.devices.sinks import camera_device, sink_factory
 from relit_camera.devices.sinks import virtual_camera_sink as camera_module
 from relit_camera.devices.sinks.sink import NullSink, SinkInfo
 from relit_camera.devices.sinks.sink_factory import open_sink, published_label
@@ -129,7 +129,7 @@ def test_faults_of_ours_are_not_explained_away(tree):
 
 
 def test_no_permission_is_told_with_its_cure(tree, monkeypatch):
-    monkeypatch.setattr(camera_module.os, "access", lambda *_: False)
+    monkeypatch.setattr(camera_device.os, "access", lambda *_: False)
     with pytest.raises(DeviceError, match=r"no permission .*usermod -aG video"):
         VirtualCameraSink(SIZE, 30, tree=tree, open_output=Opener())
 
@@ -184,7 +184,7 @@ def test_elsewhere_pyvirtualcam_is_the_camera(monkeypatch):
 
     assert {"width", "height", "fps", "device"} <= set(inspect.signature(pyvirtualcam.Camera).parameters)
     monkeypatch.setattr(pyvirtualcam, "Camera", Camera)
-    monkeypatch.setattr(camera_module.sys, "platform", "darwin")
+    monkeypatch.setattr(camera_device.sys, "platform", "darwin")
     sink = VirtualCameraSink(SIZE, 30)
     image = draw_pattern(SIZE, 1)
     sink.write(image)
@@ -234,7 +234,7 @@ CAPTURE, OUTPUT, NEITHER = 0x05200001, 0x05200002, 0x05200000
 def test_a_device_is_written_to_as_i420(tree, monkeypatch):
     FakeDevice(monkeypatch, OUTPUT)
     node = str(tree.dev / "video10")
-    device = v4l2loopback_output.LoopbackDevice(SIZE, node)
+    device = camera_module.LoopbackCamera(SIZE, node)
     image = draw_pattern(SIZE, 5)
     device.send(image)
     device.close()
@@ -249,7 +249,7 @@ def test_a_device_is_written_to_as_i420(tree, monkeypatch):
 @pytest.mark.parametrize("refuses", [False, True])
 def test_a_device_says_which_size_it_kept(tree, monkeypatch, refuses):
     FakeDevice(monkeypatch, OUTPUT, kept=(640, 360, b"YU12"), refuses=refuses)
-    with contextlib.closing(v4l2loopback_output.LoopbackDevice(SIZE, str(tree.dev / "video10"))) as device:
+    with contextlib.closing(camera_module.LoopbackCamera(SIZE, str(tree.dev / "video10"))) as device:
         assert device.size == (640, 360)
 
 
@@ -264,7 +264,7 @@ def test_a_device_that_is_not_free_is_let_go_at_once(tree, monkeypatch, capabili
     FakeDevice(monkeypatch, capabilities, kept)
     before = len(list(Path("/proc/self/fd").iterdir()))
     with pytest.raises(OSError, match=message) as raised:
-        v4l2loopback_output.LoopbackDevice(SIZE, str(tree.dev / "video10"))
+        camera_module.LoopbackCamera(SIZE, str(tree.dev / "video10"))
     assert raised.value.errno == errno.EBUSY
     assert len(list(Path("/proc/self/fd").iterdir())) == before
 
@@ -386,8 +386,8 @@ def settings(sink):
 
 def test_sinks_are_opened_by_name(tmp_path, tree, monkeypatch):
     opener = Opener()
-    monkeypatch.setattr(camera_module, "_open_loopback", opener)
-    monkeypatch.setattr(sink_factory, "LoopbackDevice", lambda size, node, convert: opener(size, 30, node))
+    monkeypatch.setattr(camera_module, "_open_output", opener)
+    monkeypatch.setattr(sink_factory, "LoopbackCamera", lambda size, node, convert: opener(size, 30, node))
     assert isinstance(open_sink(settings("null")), NullSink)
     assert open_sink(settings("camera"), tree).describe().id == str(tree.dev / "video10")
     (tree.dev / "mine").symlink_to("video3")

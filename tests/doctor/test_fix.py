@@ -246,7 +246,7 @@ def test_groups_are_those_of_the_nodes(machine: FakeMachine, settings: RelitSett
 def test_a_stamp_tells_a_changed_unit() -> None:
     text = unit_text(Path("/home/me/.local/bin/relit"))
     assert is_unmodified(text)
-    assert not is_unmodified(text.replace("RestartSec=10", "RestartSec=4"))
+    assert not is_unmodified(text.replace("RestartSec=2", "RestartSec=4"))
     assert not is_unmodified("[Unit]\n")
     assert not is_unmodified("")
 
@@ -255,7 +255,7 @@ def test_systemd_never_gives_up_starting_it() -> None:
     unit, service = unit_text(Path("/usr/bin/relit")).split("[Service]")
     assert "StartLimitIntervalSec=0\n" in unit
     assert "Burst" not in unit
-    assert "Restart=on-failure\nRestartSec=10\n" in service
+    assert "Restart=on-failure\nRestartSec=2\nKillMode=process\n" in service
 
 
 def test_odd_paths_are_quoted_for_systemd() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -30,7 +32,8 @@ from relit_camera.live.reenactment.rest_layer import RestLayer
 from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import DegradationCode
-from relit_camera.subject.relighting.relighter import open_relighter
+from relit_camera.subject.relighting.relighter import Relighter, open_relighter
+from relit_camera.subject.subject import Subject
 from tests.small_camera import SIZE, SteadyTracker, difference, grey, small_subject
 
 CPU = RelitSettings(inference=InferenceSettings(provider="cpu"))
@@ -442,3 +445,27 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
     made.close()
     assert asked == [FULL_QUALITY, *[QUALITY_LEVELS[-1]] * 8]
     assert tracker.measured - before == 4
+
+
+@pytest.mark.parametrize("mode", list(Mode))
+def test_a_closed_pipeline_holds_no_models_though_nobody_looks_for_cycles(mode: Mode) -> None:
+    made, opened = pipeline(), list[weakref.ref[object]]()
+
+    def open_and_note(subject: Subject) -> Relighter:
+        relighter = open_relighter("basis", subject)
+        opened.append(weakref.ref(relighter))
+        return relighter
+
+    made._open_relighter = open_and_note
+    made.process(frame(), scene(mode=mode))
+    compositor = weakref.ref(made._compositor)
+    assert [each() is not None for each in opened] == [True]
+    gc.disable()
+    try:
+        made.close()
+        made.close()
+        assert [each() for each in opened] == [None]
+        assert compositor() is None
+    finally:
+        gc.enable()
+    assert made.providers == {}

@@ -33,7 +33,7 @@ class Camera:
         """Start it with these arguments; of its output the end is kept."""
         self.machine = machine
         limits = f"export RELIT_SOURCE__WIDTH={SIZE[0]} RELIT_SOURCE__HEIGHT={SIZE[1]} RELIT_SOURCE__FPS={FPS} "
-        limits += f"RELIT_OUTPUT__FPS={FPS}; "
+        limits += f"RELIT_OUTPUT__FPS={FPS} RELIT_OUTPUT__KEEP_S=900; "  # a start takes minutes on a busy machine
         self.command = started(machine, f"{limits}exec relit run {arguments}", timeout_s=1800.0)
 
     def status(self) -> dict[str, Any]:

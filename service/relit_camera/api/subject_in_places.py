@@ -11,6 +11,7 @@ from hashlib import sha256
 
 import numpy as np
 
+from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.config.look import EnvironmentBackground, Lighting, Look
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.light.environments.environment_panorama import Environment
@@ -53,24 +54,28 @@ class SubjectInPlaces:
 
     def _jpeg(self, subject: Subject, name: str, load: Callable[[], Environment]) -> bytes:
         try:
-            environment = load()
-            if subject is not self._subject:
-                self._subject, self._renderer = subject, None
-                self._made.clear()
-            found, light = self._made.pop(name, None), sha256(environment.light_map.tobytes()).digest()
-            if found is None or found[0] != light:
-                if self._renderer is None:
-                    self._renderer = _SubjectRenderer(subject)
-                found = light, encode_display(self._renderer.picture(environment))
-            self._made[name] = found
-            if len(self._made) > MOST_KEPT:
-                del self._made[next(iter(self._made))]
-            return found[1]
+            with large_allocations_apart(tidied=False):
+                return self._kept_or_made(subject, name, load)
         finally:
             with self._lock:
                 self._waiting -= 1
                 if not self._waiting:
                     self._renderer = None  # as large as the subject; nobody waits for more
+
+    def _kept_or_made(self, subject: Subject, name: str, load: Callable[[], Environment]) -> bytes:
+        environment = load()
+        if subject is not self._subject:
+            self._subject, self._renderer = subject, None
+            self._made.clear()
+        found, light = self._made.pop(name, None), sha256(environment.light_map.tobytes()).digest()
+        if found is None or found[0] != light:
+            if self._renderer is None:
+                self._renderer = _SubjectRenderer(subject)
+            found = light, encode_display(self._renderer.picture(environment))
+        self._made[name] = found
+        if len(self._made) > MOST_KEPT:
+            del self._made[next(iter(self._made))]
+        return found[1]
 
 
 class _SubjectRenderer:

@@ -16,6 +16,7 @@ from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 
+import psutil
 import typer
 
 from relit_camera.api.server.listener import open_listener
@@ -26,15 +27,17 @@ from relit_camera.app.config_reload import apply_edited_settings
 from relit_camera.app.setup.check_runner import Checks, no_checks
 from relit_camera.app.setup.needed_models import missing_models
 from relit_camera.app.setup.startup_checks import check_before_devices
-from relit_camera.app.systemd import notify_systemd
+from relit_camera.app.systemd import is_being_restarted, notify_systemd
 from relit_camera.app.wiring import make_tracker
 from relit_camera.base.concurrency.regular_checks import checking_regularly
-from relit_camera.base.concurrency.resident_memory import large_allocations_apart
+from relit_camera.base.concurrency.resident_memory import FreedMemoryReturn, large_allocations_apart
 from relit_camera.base.concurrency.threads import freeze_gc, limit_threads
 from relit_camera.base.config.config_watcher import ConfigWatcher
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
 from relit_camera.base.errors import ModelError, RelitError
 from relit_camera.base.storage.atomic_files import remove_unfinished_files
+from relit_camera.devices.keeper.kept_sink import KeeperParts, KeptSink, keeper_for
+from relit_camera.devices.keeper.sink_keeper import SinkKeeper
 from relit_camera.devices.on_demand.on_demand_source import DemandWatch
 from relit_camera.devices.sinks.reopening_sink import ReopeningSink
 from relit_camera.devices.sinks.sink import Sink
@@ -43,6 +46,7 @@ from relit_camera.devices.sources.changeable_source import ChangeableSource
 from relit_camera.devices.sources.source import Source
 from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.face.face_state import Tracker
+from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.scene.kept_scene import GivenOptions, SceneKeeper, show_first_scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import DegradationCode
@@ -53,6 +57,8 @@ INSTANT_SUBJECT = "instant"
 """Name under which the subject that `instant` asks for is stored."""
 CompanionTask = Callable[[CameraService, str], AbstractContextManager[None]]
 """Makes a context that is entered while the camera runs, from the camera and the panel's address."""
+AWAY_MESSAGE = "the camera is starting"
+"""What the placeholder says that the keeper shows when the last picture no longer is."""
 SourceOpener = Callable[[SourceSettings, str], Source]
 """Opens the source of the settings, given the label of the virtual camera that must not be taken as source."""
 
@@ -106,13 +112,17 @@ def run_camera(
     check_before_devices(settings)
     restore_noted_controls(settings.storage.data_dir)
     stop = threading.Event()
-    for number in (signal.SIGTERM, signal.SIGINT):
+    told_to_end = [signal.SIGTERM, signal.SIGINT]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # not under nohup
+        told_to_end.append(signal.SIGHUP)
+    for number in told_to_end:
         signal.signal(number, lambda *_: stop.set())
     with contextlib.ExitStack() as cleanup:
         cleanup.push(opening)
         listener = cleanup.enter_context(open_listener(settings.server))
         tracker, models_error = _open_tracker(settings, strict)
-        sink = ReopeningSink(partial(sink_for, settings.output), (settings.output.width, settings.output.height))
+        sink_keeper = keeper_for(settings.output) if sink_for is open_sink else None
+        sink = _open_sink(settings, sink_keeper, scene_controller, sink_for)
         until_owned = cleanup.enter_context(contextlib.ExitStack())
         until_owned.callback(sink.close)
         demand = None
@@ -140,6 +150,10 @@ def run_camera(
             demand.note_viewer if demand else lambda: None,
             checks=checks,
         )
+        if sink_keeper is not None:
+            sink_keeper.on_trouble = partial(camera_service.report_degradation, DegradationCode.KEEPER_FAILED)
+            if sink_keeper.trouble is not None:
+                sink_keeper.on_trouble(sink_keeper.trouble)
         if models_error is not None:
             camera_service.setup.wait_for_models(models_error)
         until_owned.pop_all()  # from here on the camera service closes the sink, unless a driver hangs in it
@@ -165,6 +179,8 @@ def run_camera(
         if given is not None:
             keeper = SceneKeeper(scene_controller, settings, given)
             cleanup.enter_context(checking_regularly("scene-keeper", keeper.check, at_end=True))
+        memory = FreedMemoryReturn(lambda: psutil.Process().memory_info().rss)
+        cleanup.enter_context(checking_regularly("memory", memory.check))
         if reload is not None:
             apply, report_degradation = (
                 partial(apply_edited_settings, scene_controller, settings),
@@ -177,6 +193,29 @@ def run_camera(
         while not stop.is_set() and (left := ends_at - time.monotonic()) > 0:
             stop.wait(min(left, 0.5))
         camera_service.request_stop()
+        if sink_keeper is not None:
+            sink_keeper.hands_over = is_being_restarted()
+
+
+def _open_sink(
+    settings: RelitSettings,
+    keeper: SinkKeeper | None,
+    scene_controller: SceneController,
+    sink_for: Callable[[OutputSettings], Sink],
+) -> ReopeningSink:
+    """The sink that the settings name, whose virtual camera a keeper holds if there is one."""
+    output = settings.output
+    open_directly = partial(sink_for, output)
+    parts = KeeperParts(
+        placeholder=lambda size: placeholder(size, AWAY_MESSAGE, output.placeholder),
+        may_repeat=lambda: not scene_controller.scene.unlit_allowed,
+    )
+    opener: Callable[[], Sink] = open_directly
+    if keeper is not None:
+        hold = partial(KeptSink, keeper, parts)
+        # `camera` may be in PipeWire too: the keeper holds the device alone.
+        opener = partial(open_sink, output, hold=hold) if output.sink == "camera" else partial(hold, open_directly)
+    return ReopeningSink(opener, (output.width, output.height))
 
 
 def _open_tracker(settings: RelitSettings, strict: bool) -> tuple[Tracker | None, ModelError | None]:

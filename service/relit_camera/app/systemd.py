@@ -1,4 +1,4 @@
-"""Reports to systemd whether the camera is ready, alive or stopping (`Type=notify`, sd_notify(3)).
+"""Reports to systemd whether the camera is ready, alive or stopping (`Type=notify`, sd_notify(3)); asks if it restarts.
 
 The protocol is one datagram of text. It is written here because the one package for it in plain Python (sdnotify) has
 had no release since 2017, and the others (cysystemd, systemd-python) bind libsystemd, a compiled part for a few lines.
@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import socket
+import subprocess
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 
 from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 from relit_camera.live.status.camera_status import CameraStatus, DegradationCode
@@ -20,6 +23,8 @@ log = logging.getLogger(__name__)
 
 FIRST_PICTURE_POLL_S = 0.05
 """How often the status is read until the first picture was published, in seconds."""
+JOBS_S = 0.5
+"""How long the manager may take to tell its jobs."""
 STATUS_INTERVAL_S = 5.0
 """How often the status line is renewed where no watchdog asks for more, in seconds."""
 
@@ -113,3 +118,34 @@ def status_line(status: CameraStatus) -> str:
     """One line for `systemctl status`: state, source, sink, and the first degradation."""
     degraded = f"; {status.degraded[0].what}: {status.degraded[0].why}" if status.degraded else ""
     return f"{status.state}: {status.source} to {status.sink}{degraded}".replace("\n", " ")
+
+
+def is_being_restarted(cgroup: Path = Path("/proc/self/cgroup"), command: str = "systemctl") -> bool:
+    """Whether the service manager stops this process to start it anew, and not to stop it for good.
+
+    The manager tells a service nothing of that: it is asked for its list of jobs. Where it does not answer, this is a
+    stop for good.
+
+    Args:
+        cgroup: names the unit that this process belongs to (cgroups(7)).
+        command: asks the manager.
+    """
+    if "NOTIFY_SOCKET" not in os.environ:
+        return False  # it has not started this process
+    try:
+        groups = cgroup.read_text(encoding="utf-8").split()
+    except OSError:
+        return False
+    units = [part for group in groups for part in group.split("/") if part.endswith(".service")]
+    if not units or units[-1].startswith("user@"):
+        return False
+    manager = ["--user"] if any(unit.startswith("user@") for unit in units) else []
+    ask = [command, *manager, "list-jobs", "--no-legend", "--plain"]
+    try:
+        jobs = subprocess.run(  # noqa: S603 - fixed words
+            ask, capture_output=True, text=True, timeout=JOBS_S, check=True
+        ).stdout
+    except (OSError, subprocess.SubprocessError) as error:
+        log.warning("the service manager does not tell its jobs: %s", error)
+        return False
+    return re.search(rf"^\s*\d+\s+{re.escape(units[-1])}\s+restart\s", jobs, re.MULTILINE) is not None

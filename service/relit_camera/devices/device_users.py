@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 PROC = Path("/proc")
+KEEPER_MODULE = "relit_camera.devices.keeper.keeper_process"
+"""What a keeper's command line names."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +28,13 @@ class DeviceUser:
 
     @property
     def is_relit_camera(self) -> bool:
-        """Whether it is the command `relit`."""
-        return any(Path(part).name == "relit" for part in self.command[:2])
+        """Whether it is the command `relit`, or its keeper."""
+        return self.is_keeper or any(Path(part).name == "relit" for part in self.command[:2])
+
+    @property
+    def is_keeper(self) -> bool:
+        """Whether it is a keeper: it has the virtual camera open to write to it."""
+        return KEEPER_MODULE in self.command
 
     def __str__(self) -> str:
         return f"{'relit' if self.is_relit_camera else self.name} (process {self.pid})"

@@ -1,6 +1,7 @@
 """A v4l2loopback device as output: pictures are written to its node, and a stuck device is reset.
 
-pyvirtualcam, which serves the other systems, reports neither which format the device took nor that a write failed.
+It needs no library beyond Python's own: the keeper, which is to stay small, writes by it too. pyvirtualcam, which
+serves the other systems, reports neither which format the device took nor that a write failed.
 """
 
 from __future__ import annotations
@@ -9,14 +10,8 @@ import contextlib
 import errno
 import os
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from relit_camera.base.images.color import rgb_to_i420
-from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.devices.device_discovery import DeviceFolders
 from relit_camera.devices.device_users import find_device_users, has_mapped_buffers
 from relit_camera.devices.v4l2 import (
@@ -39,21 +34,17 @@ class LoopbackDevice:
         size: width and height that the device has: those asked for, or those that a program still reading it has.
     """
 
-    def __init__(
-        self, size: tuple[int, int], node: str, convert: Callable[[DisplayImage], NDArray[np.uint8]] = rgb_to_i420
-    ) -> None:
+    def __init__(self, size: tuple[int, int], node: str) -> None:
         """Open the device and agree on a format.
 
         Args:
             size: width and height asked for, both even.
             node: such as /dev/video10.
-            convert: makes I420 of pictures.
 
         Raises:
             OSError: it cannot be opened, or is no V4L2 device. EBUSY: another program writes to it, or one still reads
                 it in another pixel format.
         """
-        self._convert = convert
         self._descriptor = os.open(node, os.O_RDWR)
         try:
             if not query_capabilities(self._descriptor) & CAP_VIDEO_OUTPUT:
@@ -67,16 +58,15 @@ class LoopbackDevice:
             raise
         self.node, self.size = node, actual
 
-    def send(self, image: DisplayImage) -> None:
-        """Show a picture of `size`, uint8 sRGB RGB.
+    def send_planes(self, planes: memoryview) -> None:
+        """Show a picture of `size` in I420: as bytes, its planes Y, U and V.
 
         Raises:
             OSError: the device did not take all of it.
         """
-        planes = self._convert(image)
-        written = os.write(self._descriptor, planes.data)
-        if written != planes.size:
-            raise OSError(errno.EIO, f"{written} of {planes.size} bytes were taken")
+        written = os.write(self._descriptor, planes)
+        if written != planes.nbytes:
+            raise OSError(errno.EIO, f"{written} of {planes.nbytes} bytes were taken")
 
     def close(self) -> None:
         """Close the device. Harmless when repeated."""

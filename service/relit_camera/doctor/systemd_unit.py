@@ -24,6 +24,8 @@ FIX_CURE = "run: relit doctor --fix"
 
 # No mount namespaces (PrivateTmp, ProtectHome …): the user's manager would need user namespaces for them, in which the
 # groups that own the cameras are lost. No MemoryDenyWriteExecute: CUDA and OpenVINO make code while they run.
+# KillMode=process: the keeper goes on while the camera is restarted, and ends by itself when nobody comes for it; the
+# camera's other workers end with it. RestartSec: the camera should be back while the keeper shows the last picture.
 # No limit of starts: whatever ends the camera, it must start when that is mended hours later.
 UNIT_TEMPLATE = """\
 [Unit]
@@ -37,7 +39,8 @@ TimeoutStartSec=120
 TimeoutStopSec=10
 WatchdogSec=30
 Restart=on-failure
-RestartSec=10
+RestartSec=2
+KillMode=process
 UMask=0077
 NoNewPrivileges=yes
 LockPersonality=yes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart
@@ -130,8 +131,16 @@ class Pipeline:
         self._follower.reset_neutral()
 
     def close(self) -> None:
-        """End the thread that plans warps, after the plan that it is at. No frame can be begun afterwards."""
+        """End the thread that plans warps, after the plan that it is at, and let go of models and pictures.
+
+        No frame can be begun afterwards. What holds this object, and is held by it, would else keep them until Python
+        looks for such cycles: hours in a running camera, and never those of its start (`freeze_gc`).
+        """
         self._executor.shutdown()
+        self._active = None
+        self.on_opening = lambda: None
+        with suppress(AttributeError):  # closed before
+            del self._compositor
 
     def process(self, frame: Frame, scene: Scene) -> RenderedFrame:
         """Make the picture of one live frame: begin it, and finish it at once.

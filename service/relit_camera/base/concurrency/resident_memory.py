@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from relit_camera.base.concurrency.clock import SYSTEM_CLOCK, Clock
 
 _GLIBC = ctypes.CDLL(None) if "CS_GNU_LIBC_VERSION" in getattr(os, "confstr_names", ()) else None
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8
@@ -17,11 +20,15 @@ _MADV_DONTNEED = 4
 """Of madvise(2)."""
 RETAINED_BYTES = 32 << 20
 """More than any array of a frame, and the most that glibc takes."""
+GROWN_BYTES = 32 << 20
+"""More than the arrays of the frames in work take again after they were given back."""
+GIVEN_BACK_S = 30.0
 APART_BYTES = 128 << 10
 """What glibc begins with. Smaller blocks would waste much of their last page."""
 
 _apart_lock = threading.Lock()
 _contexts_apart = 0
+_to_be_tidied = False
 
 
 def retain_large_allocations() -> None:
@@ -34,14 +41,18 @@ def retain_large_allocations() -> None:
 
 
 @contextmanager
-def large_allocations_apart() -> Iterator[None]:
+def large_allocations_apart(tidied: bool = True) -> Iterator[None]:
     """While the context lasts, keep large blocks outside of the heap, and return freed ones at once. Only with glibc.
 
     For what is opened: files are unpacked and networks loaded in large blocks, most of them for a moment. In the heap
     they would leave gaps between what stays, which the arrays of frames then spread over. At the end of the last such
-    context, whichever thread it is in, blocks are retained again, and `drop_library_pages` is called.
+    context, whichever thread it is in, blocks are retained again.
+
+    Args:
+        tidied: whether freed memory and the pages of libraries are given back at its end, which takes some
+            milliseconds: for what is opened seldom.
     """
-    global _contexts_apart
+    global _contexts_apart, _to_be_tidied
     with _apart_lock:
         _contexts_apart += 1
         _set_thresholds(APART_BYTES, APART_BYTES)
@@ -50,10 +61,14 @@ def large_allocations_apart() -> Iterator[None]:
     finally:
         with _apart_lock:
             _contexts_apart -= 1
+            _to_be_tidied |= tidied
             if not _contexts_apart:
-                return_freed_memory()
+                if _to_be_tidied:
+                    return_freed_memory()
                 retain_large_allocations()
-                drop_library_pages()
+                if _to_be_tidied:
+                    drop_library_pages()
+                _to_be_tidied = False
 
 
 def _set_thresholds(apart_bytes: int, trimmed_bytes: int) -> None:
@@ -77,6 +92,49 @@ def return_freed_memory() -> None:
     """Give freed memory back to the system, after work that needed much for a moment. Only with glibc."""
     if _GLIBC is not None:
         _GLIBC.malloc_trim(0)
+
+
+def return_unused_memory() -> None:
+    """Collect what only reference cycles hold, such as the networks of a pipeline that was replaced, and give it back.
+
+    Python itself looks for old objects only when many new ones have come, which takes a running camera hours.
+    """
+    gc.collect()
+    return_freed_memory()
+
+
+class FreedMemoryReturn:
+    """Gives unused memory back to the system when the process has grown; `check` is to be called regularly.
+
+    What files and pictures took for a moment leaves gaps between what stays, which the process would keep. To give them
+    back holds every thread up for some milliseconds, so it is done only where there may be much of it.
+    """
+
+    def __init__(
+        self,
+        resident: Callable[[], int],
+        give_back: Callable[[], object] = return_unused_memory,
+        clock: Clock = SYSTEM_CLOCK,
+    ) -> None:
+        """Set up.
+
+        Args:
+            resident: tells the process's resident memory in bytes.
+            give_back: gives unused memory back; not more often than every `GIVEN_BACK_S`.
+            clock: to measure by.
+        """
+        self._resident, self._give_back, self._clock = resident, give_back, clock
+        self._least_since = 0
+        self._not_before = -float("inf")
+
+    def check(self) -> None:
+        """Give unused memory back where `GROWN_BYTES` more are resident than at some time since it was done last."""
+        now = self._resident()
+        if now - self._least_since >= GROWN_BYTES and self._clock.now() >= self._not_before:
+            self._not_before = self._clock.now() + GIVEN_BACK_S
+            self._give_back()
+            now = self._least_since = self._resident()
+        self._least_since = min(now, self._least_since)
 
 
 def drop_library_pages() -> None:

@@ -53,6 +53,9 @@ class OutputSettings(SettingsModel):
     """Even, and fixed for the whole run: readers of the virtual camera break otherwise."""
     height: EvenSize = 720
     fps: Annotated[float, Field(ge=1, le=120)] = 30.0
+    keep_s: Annotated[float, Field(ge=0, le=3600)] = 60.0
+    """The virtual camera goes on for so many seconds when the program is killed, upgraded or restarted: with the last
+    picture for ten seconds, then with the placeholder (Linux). 0 switches its keeper off."""
     placeholder: Path | None = None
     """Picture shown while there is nothing else to show; a built-in one if not given."""
     fallback: Fallback = Fallback.PLACEHOLDER

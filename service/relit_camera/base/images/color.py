@@ -153,14 +153,16 @@ def rgb_from_kelvin(kelvin: float) -> NDArray[np.float32]:
     return np.asarray(rgb / (rgb @ LUMINANCE), dtype=np.float32)
 
 
-def rgb_to_i420(image: DisplayImage) -> NDArray[np.uint8]:
+def rgb_to_i420(image: DisplayImage, onto: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
     """Convert uint8 sRGB RGB (height, width, 3), both even, to uint8 (height · width · 3/2,): planes Y, U, V.
+
+    With `onto`, uint8 (height · 3/2, width), they are written there.
 
     Chroma is the mean of each two by two pixels: OpenCV's own conversion takes that of every second pixel, which frays
     edges.
     """
     height, width = image.shape[:2]
-    planes: NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_RGB2YUV_I420).reshape(-1)
+    planes: NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_RGB2YUV_I420, onto).reshape(-1)
     half = cv2.resize(image, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
     chroma = cv2.transform(half, CHROMA_MATRIX)
     for channel, plane in enumerate(planes[height * width :].reshape(2, height // 2, width // 2)):

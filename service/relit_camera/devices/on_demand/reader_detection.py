@@ -56,8 +56,11 @@ def driver_reports_readers(node: str) -> bool:
 
 
 def is_open_elsewhere(node: str, proc: Path = PROC) -> bool:
-    """Whether another program of the same user (of any user, for root) has `node` open, to read pictures or not."""
-    return bool(find_device_users(node, proc))
+    """Whether another program of the same user (of any user, for root) has `node` open, to read pictures or not.
+
+    A keeper does not count.
+    """
+    return any(not user.is_keeper for user in find_device_users(node, proc))
 
 
 class ReaderMonitor:

@@ -52,7 +52,7 @@ def list_readers(
         return Readers(0) if error.errno in DEVICE_GONE_ERRNOS else UNKNOWN
     if counted == 0:
         return Readers(0)
-    having = users(node)
+    having = [user for user in users(node) if not user.is_keeper]
     reading = [user for user in having if maps(user, node)] or having
     names = tuple(dict.fromkeys(user.name for user in reading))
     return Readers(len(reading) if counted is None else counted, names)

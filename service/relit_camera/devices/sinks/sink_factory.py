@@ -5,22 +5,31 @@ A plug-in is an entry point of the group `relit_camera.sinks`: called with `Sink
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import call
 from pathlib import Path
 
 from relit_camera.base.config.settings import OutputSettings
 from relit_camera.base.errors import InputError
 from relit_camera.base.plugin_groups import PluginGroup
-from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, DeviceFolders, list_virtual_cameras
+from relit_camera.devices.device_discovery import (
+    SYSTEM_FOLDERS,
+    DeviceFolders,
+    find_virtual_camera,
+    list_virtual_cameras,
+)
 from relit_camera.devices.sinks.call_app_sink import CallAppSink, CameraPlace
 from relit_camera.devices.sinks.picture_conversion import I420Converter
 from relit_camera.devices.sinks.pipewire.pipewire_sink import PipeWireSink, session_socket
 from relit_camera.devices.sinks.sink import NullSink, Sink
-from relit_camera.devices.sinks.virtual_camera_sink import VirtualCameraSink
-from relit_camera.devices.v4l2loopback_output import LoopbackDevice
+from relit_camera.devices.sinks.virtual_camera_sink import LoopbackCamera, VirtualCameraSink
+
+Hold = Callable[[Callable[[], Sink]], Sink]
+"""Opens a v4l2loopback device, given what opens it in this process."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +42,7 @@ class SinkOptions:
         fps: pictures a second that it will get.
         label: name under which call apps shall show it.
         tree: where virtual cameras are looked for.
+        hold: so that a keeper may hold a v4l2loopback device.
     """
 
     argument: str
@@ -40,13 +50,14 @@ class SinkOptions:
     fps: float
     label: str
     tree: DeviceFolders = SYSTEM_FOLDERS
+    hold: Hold = call
 
 
 SINKS: PluginGroup[Callable[[SinkOptions], Sink]] = PluginGroup("relit_camera.sinks", "sink")
 
 
-def open_sink(settings: OutputSettings, tree: DeviceFolders = SYSTEM_FOLDERS) -> Sink:
-    """Open the sink that `settings.sink` names.
+def open_sink(settings: OutputSettings, tree: DeviceFolders = SYSTEM_FOLDERS, hold: Hold = call) -> Sink:
+    """Open the sink that `settings.sink` names; `hold` as in `SinkOptions`.
 
     In this order: a plug-in (`NAME` or `NAME:ARGUMENT`; `camera`, `pipewire` and `null` are of them), the node of a
     virtual camera such as /dev/video10, a video file.
@@ -60,8 +71,8 @@ def open_sink(settings: OutputSettings, tree: DeviceFolders = SYSTEM_FOLDERS) ->
     text, size, fps = settings.sink, (settings.width, settings.height), settings.fps
     if SINKS.has(text):
         factory, argument = SINKS.load(text)
-        return factory(SinkOptions(argument, size, fps, settings.label, tree))
-    if node := _node(text, tree):
+        return factory(SinkOptions(argument, size, fps, settings.label, tree, hold))
+    if node := device_node(text, tree):
         return VirtualCameraSink(size, fps, settings.label, device=node, tree=tree)
     # FFmpeg is loaded only where it is needed: it takes a fifth of a second, and 15 MB.
     from relit_camera.base.video.video_writer import VIDEO_SUFFIXES
@@ -88,17 +99,18 @@ def open_virtual_camera(options: SinkOptions) -> Sink:
     convert = I420Converter()
 
     def open_loopback() -> Sink:
-        def device(size: tuple[int, int], fps: float, node: str) -> LoopbackDevice:
-            return LoopbackDevice(size, node, convert)
+        def device(size: tuple[int, int], fps: float, node: str) -> LoopbackCamera:
+            return LoopbackCamera(size, node, convert)
 
-        return VirtualCameraSink(size, fps, label, tree=tree, open_output=device)
+        find_virtual_camera(tree, label)  # where there is none nothing is started to hold it
+        return options.hold(lambda: VirtualCameraSink(size, fps, label, tree=tree, open_output=device))
 
     def loopback_is_there() -> bool:
         return any(camera.ours for camera in list_virtual_cameras(tree, label))
 
     def session_is_there() -> bool:
         socket = session_socket()
-        return socket is not None and socket.exists()
+        return socket is not None and os.path.exists(socket)  # noqa: PTH110 - False where the folder may not be entered
 
     places = (
         CameraPlace("PipeWire", lambda: PipeWireSink(size, fps, label, convert=convert), session_is_there),
@@ -124,10 +136,10 @@ def open_null(options: SinkOptions) -> Sink:
 def published_label(settings: OutputSettings, tree: DeviceFolders = SYSTEM_FOLDERS) -> str:
     """Name the virtual camera that will be published to, which must not be taken as source: it would film itself."""
     labels = {camera.node: camera.label for camera in list_virtual_cameras(tree)}
-    return labels.get(_node(settings.sink, tree), settings.label)
+    return labels.get(device_node(settings.sink, tree), settings.label)
 
 
-def _node(text: str, tree: DeviceFolders) -> str:
-    """The device file that is named, itself or by a link of udev's; empty where none is."""
+def device_node(text: str, tree: DeviceFolders = SYSTEM_FOLDERS) -> str:
+    """The device file that a sink's text names, itself or by a link of udev's; empty where it names none."""
     path = Path(text).resolve()
     return str(path) if path.parent == tree.dev and re.fullmatch(r"video\d+", path.name) else ""

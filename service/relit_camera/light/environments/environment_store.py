@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import threading
 from functools import lru_cache
 from pathlib import Path
 from typing import BinaryIO
@@ -30,10 +31,14 @@ RESERVED_NAMES = frozenset({*BUILTIN_NAMES, "background"})
 """Names that no file may have: the built-in ones, and `background`, which means the light of the virtual background."""
 
 
+MOST_KEPT_BYTES = 64 << 20
+"""Memory for panoramas that were read from files: one of 2048x1024 takes 25 MB, of 8192x4096 400 MB."""
+
+
 class EnvironmentStore(NamedFiles):
     """A folder of panorama files, one an environment, named by its stem; the built-in ones are always there.
 
-    Files may be put there by hand. What was read is kept while the file stays as it is.
+    Files may be put there by hand. What was read last is kept while the file stays as it is.
     """
 
     def __init__(self, folder: Path | None = None, apart: bool = False) -> None:
@@ -62,7 +67,7 @@ class EnvironmentStore(NamedFiles):
         if name in BUILTIN_NAMES:
             return builtin_environment(name)
         path = self.path(name)
-        return _read_cached(path, file_version(path), self._apart)
+        return _RECENT.get(path, file_version(path), self._apart)
 
     def resolve(self, name_or_path: str) -> Environment:
         """The environment of a stored name, else of the panorama file at that path.
@@ -143,11 +148,37 @@ def _read(path: Path, apart: bool) -> Panorama:
     return read_panorama_apart(path) if apart else read_panorama(path)
 
 
-@lru_cache(maxsize=4)
-def _read_cached(path: Path, version: FileVersion, apart: bool) -> Environment:
-    return environment_from_panorama(path.stem, _read(path, apart))
+class _RecentEnvironments:
+    """The environments that were read last, in `MOST_KEPT_BYTES` of memory, and the very last one however large it is.
+
+    Thread-safe: a file may be read twice where two threads ask for it at once.
+    """
+
+    def __init__(self) -> None:
+        self._kept: dict[tuple[Path, FileVersion], Environment] = {}
+        self._lock = threading.Lock()
+
+    def get(self, path: Path, version: FileVersion, apart: bool) -> Environment:
+        with self._lock:
+            found = self._kept.pop((path, version), None)
+        if found is None:
+            found = environment_from_panorama(path.stem, _read(path, apart))
+        with self._lock:
+            for older in [key for key in self._kept if key[0] == path]:
+                del self._kept[older]  # of a file that was replaced
+            self._kept[path, version] = found
+            while len(self._kept) > 1 and sum(map(_bytes, self._kept.values())) > MOST_KEPT_BYTES:
+                del self._kept[next(iter(self._kept))]
+        return found
+
+
+_RECENT = _RecentEnvironments()
+
+
+def _bytes(environment: Environment) -> int:
+    return environment.panorama.radiance.nbytes
 
 
 @lru_cache(maxsize=256)
 def _thumbnail(path: Path, version: FileVersion, apart: bool) -> bytes:
-    return encode_display(thumbnail_image(_read_cached(path, version, apart).panorama))
+    return encode_display(thumbnail_image(_RECENT.get(path, version, apart).panorama))

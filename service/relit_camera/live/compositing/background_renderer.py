@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.config.look import (
     Background,
     BlurBackground,
@@ -256,7 +257,9 @@ class BackgroundRenderer:
     ) -> DisplayImage:
         panorama = environment.panorama
         if self._view is None or self._view[0] is not panorama or self._view[1:3] != (height_deg, blur):
-            self._view = (panorama, height_deg, blur, EnvironmentView(panorama, self._size, height_deg, blur))
+            self._view = None  # else both would be in memory for a moment
+            with large_allocations_apart(tidied=False):
+                self._view = (panorama, height_deg, blur, EnvironmentView(panorama, self._size, height_deg, blur))
         rotation = rotation_from_angles(lighting.yaw_deg, lighting.pitch_deg, lighting.roll_deg)
         surround = scene_light_map(environment, lighting.model_copy(update={"lamps": ()}))
         gain_ev = lighting.exposure_ev + lighting.background_gain_ev

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
+from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.errors import RelitError
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject
@@ -74,6 +75,7 @@ def load_and_change(lock: threading.Lock, change: Callable[[Loaded], Scene]) -> 
         except _NotLoadedError as error:
             missing = error
         try:
-            missing.load(loaded)
+            with large_allocations_apart(tidied=False):
+                missing.load(loaded)
         except RelitError as error:
             loaded.failed.append((missing.wanted, error))

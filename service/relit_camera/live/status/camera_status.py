@@ -43,6 +43,8 @@ class DegradationCode(StrEnum):
     """The sink takes no pictures; it is tried again."""
     ONE_CAMERA_FAILED = "one-camera-failed"
     """A virtual camera that is there takes no pictures, while another one does; it is tried again."""
+    KEEPER_FAILED = "keeper-failed"
+    """There is no keeper: a call may end when the camera is killed or restarted."""
     MODELS_MISSING = "models-missing"
     """Models that the tracker needs are not stored: no face is tracked until they are."""
     CONFIGURATION_FAILED = "configuration-failed"

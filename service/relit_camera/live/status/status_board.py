@@ -19,6 +19,7 @@ PARTS = {
     DegradationCode.SOURCE_FAILED: "source",
     DegradationCode.PICTURE_FAILED: "picture",
     DegradationCode.SINK_FAILED: "sink",
+    DegradationCode.KEEPER_FAILED: "keeper",
     DegradationCode.MODELS_MISSING: "tracker",
     DegradationCode.CONFIGURATION_FAILED: "configuration",
 }

@@ -106,7 +106,8 @@ class PipeWireSink:
 
     def describe(self) -> SinkInfo:
         """Facts about the sink."""
-        return SinkInfo("camera", "", self._size, self._node.readers() if self._node is not None else None)
+        node = self._node  # other threads ask too, while the publisher's changes it
+        return SinkInfo("camera", "", self._size, node.readers() if node is not None else None)
 
     def close(self) -> None:
         """Take the camera away. Harmless when repeated."""
@@ -126,7 +127,8 @@ def _open_node(size: tuple[int, int], fps: float, label: str, convert: I420Conve
         DeviceError: PipeWire is not installed, or no session runs.
     """
     socket = session_socket()
-    if socket is None or not socket.exists():  # the library would look as well, but takes its time
+    # The library would look as well, but takes its time.
+    if socket is None or not os.path.exists(socket):  # noqa: PTH110 - False where the folder may not be entered
         where = f"there is no {socket}" if socket else "XDG_RUNTIME_DIR is not set"
         raise DeviceError(f"no PipeWire session runs: {where}", NO_SESSION_CURE)
     return PipeWireNode(size, fps, label, convert)

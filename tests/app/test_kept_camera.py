@@ -1,0 +1,94 @@
+"""A real `relit run` that is killed and started again, and told to end: what its keeper shows meanwhile."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from tests.cli.relit_command import Material, environment, write_material
+from tests.devices.keeper.stand_in_sink import OPENER, VARIABLE, Noted, noted
+from tests.small_camera import wait_until
+
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.timeout(240),
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="keepers are Linux's"),
+]
+
+INJECTED = f"""
+import sys
+from relit_camera.devices.keeper import kept_sink
+kept_sink.KEPT_SINKS["null"] = "{OPENER}"
+sys.argv[0] = "relit"
+from relit_camera.cli.main import run
+run()
+"""
+"""`relit` for which the sink `null` is one that a keeper holds, and that notes its pictures."""
+MOST_GAP_S = 1.0
+"""Two hundred milliseconds where the machine has time; this also where it has not."""
+
+
+@pytest.fixture(scope="module")
+def material(tmp_path_factory: pytest.TempPathFactory) -> Material:
+    return write_material(tmp_path_factory.mktemp("material"))
+
+
+@pytest.fixture
+def start(tmp_path: Path, material: Material) -> Iterator[Callable[[], subprocess.Popen[str]]]:
+    """Starts the camera; returns when it says that it runs."""
+    started = []
+    # Short, for the path of a socket has some hundred characters at most.
+    runtime = Path(subprocess.run(["mktemp", "-d"], capture_output=True, text=True, check=True).stdout.strip())
+
+    def begin() -> subprocess.Popen[str]:
+        options = ["--source", material.clip, "--subject", material.subject, "--tracker", material.tracker]
+        camera = subprocess.Popen(
+            [sys.executable, "-c", INJECTED, "run", *map(str, options), "--sink", "null", "--port", "0"],
+            env={
+                **environment(tmp_path), VARIABLE: str(tmp_path / "pictures"), "XDG_RUNTIME_DIR": str(runtime),
+                "PYTHONPATH": str(Path(__file__).resolve().parents[2]), "RELIT_OUTPUT__KEEP_S": "90",
+            },
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+        )  # fmt: skip
+        started.append(camera)
+        assert camera.stdout is not None
+        assert "Relit Camera runs" in camera.stdout.readline()
+        return camera
+
+    yield begin
+    for camera in started:
+        if camera.poll() is None:
+            camera.send_signal(signal.SIGTERM)
+        camera.communicate(timeout=20)
+
+
+def test_its_virtual_camera_goes_on_through_kill_9_and_ends_when_it_is_told_to(
+    tmp_path: Path, start: Callable[[], subprocess.Popen[str]]
+) -> None:
+    def shown() -> list[Noted]:
+        return noted(tmp_path / "pictures")
+
+    camera = start()
+    wait_until(lambda: len(shown()) > 20)
+    camera.kill()
+    camera.wait()
+    at_death = len(shown())
+    camera = start()
+    assert len(shown()) > at_death + 10  # without a camera
+    started = len(shown())
+    wait_until(lambda: len(shown()) > started + 20)
+    camera.send_signal(signal.SIGTERM)
+    assert camera.wait(20) == 0
+    ended = len(shown())
+    gaps = [later.at - earlier.at for earlier, later in pairwise(shown())]
+    print(f"longest gap {1000 * max(gaps):.0f} ms")
+    assert max(gaps) < MOST_GAP_S
+    assert len({picture.process for picture in shown()}) == 1
+    with pytest.raises(AssertionError, match="did not come about"):
+        wait_until(lambda: len(shown()) > ended, 0.5)

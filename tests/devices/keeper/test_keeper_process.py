@@ -1,0 +1,271 @@
+"""Keepers as real processes: cameras that are killed, restarted, upgraded, doubled, and what a reader would see."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import stat
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import pairwise
+from pathlib import Path
+
+import psutil
+import pytest
+
+from relit_camera.base.errors import DeviceError
+from relit_camera.devices.device_users import KEEPER_MODULE
+from relit_camera.devices.keeper.keeper_socket import MessageSocket, mapped, require_private_folder, shared_memory
+from tests.devices.keeper.stand_in_sink import KEEP_S, PLACEHOLDER, VARIABLE, Noted, noted
+from tests.small_camera import wait_until
+
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.timeout(90),
+    pytest.mark.skipif(not sys.platform.startswith("linux"), reason="keepers are Linux's"),
+]
+
+LONGEST_GAP_S = 0.2
+ROOT = Path(__file__).resolve().parents[3]
+
+
+class Stage:
+    """Cameras, one after the other, and what their keepers show."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.pictures = folder / "run", folder / "pictures.jsonl"
+        self._cameras: list[subprocess.Popen[str]] = []
+        self._closing = threading.Event()
+        self._late_s = 0.0
+        self._measuring = threading.Thread(target=self._measure_lateness)
+        self._measuring.start()
+
+    def camera(self, grey: int, version: str = "", width: int = 64, keep_s: float = KEEP_S) -> subprocess.Popen[str]:
+        """Start a camera that shows this grey."""
+        module = "tests.devices.keeper.publishing_camera"
+        command = [sys.executable, "-m", module, str(self.folder), str(grey), version, str(width), str(keep_s)]
+        started = subprocess.Popen(
+            command, cwd=ROOT, env={**os.environ, VARIABLE: str(self.pictures), "PYTHONPATH": str(ROOT)},
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        self._cameras.append(started)
+        return started
+
+    def shown(self) -> list[Noted]:
+        return noted(self.pictures)
+
+    def wait_for(self, value: int, count: int = 20) -> None:
+        """Wait until a grey was shown so often."""
+        wait_until(lambda: sum(picture.value == value for picture in self.shown()) >= count, 30)
+
+    def gap_s(self) -> float:
+        """The longest between two pictures, without what a busy machine makes any process wait."""
+        times = [picture.at for picture in self.shown()]
+        return max(later - earlier for earlier, later in pairwise(times)) - self._late_s
+
+    def _measure_lateness(self) -> None:
+        before = time.monotonic()
+        while not self._closing.wait(0.01):
+            now = time.monotonic()
+            self._late_s = max(self._late_s, now - before - 0.01)
+            before = now
+
+    def keepers(self) -> set[int]:
+        """The processes that have shown something and still run."""
+        return {process for process in {picture.process for picture in self.shown()} if _runs(process)}
+
+    def close(self) -> None:
+        self._closing.set()
+        self._measuring.join()
+        for camera in self._cameras:
+            camera.kill()
+            camera.communicate()
+        for keeper in self.keepers():
+            with suppress(ProcessLookupError):
+                os.kill(keeper, signal.SIGKILL)
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Iterator[Stage]:
+    made = Stage(tmp_path)
+    yield made
+    made.close()
+
+
+def _runs(process: int) -> bool:
+    """Whether it is there, and more than a process that nobody has asked for its exit code."""
+    with suppress(psutil.NoSuchProcess):
+        return psutil.Process(process).status() != psutil.STATUS_ZOMBIE
+    return False
+
+
+def leave(camera: subprocess.Popen[str], how: str) -> None:
+    """Tell a camera to leave, and wait until it has."""
+    camera.communicate(f"{how}\n", timeout=20)
+    assert camera.returncode == 0
+
+
+def test_kill_9_and_a_new_start_are_no_gap_for_readers(stage: Stage) -> None:
+    first = stage.camera(10)
+    stage.wait_for(10)
+    first.kill()
+    first.wait()
+    time.sleep(1)  # nobody is there
+    stage.camera(20)
+    stage.wait_for(20)
+    values = [picture.value for picture in stage.shown()]
+    assert values[-1] == 20
+    assert sorted(values, key=(PLACEHOLDER, 10, 20).index) == values
+    assert stage.gap_s() < LONGEST_GAP_S
+    assert len({picture.process for picture in stage.shown()}) == 1
+
+
+def test_a_camera_that_leaves_ends_its_keeper(stage: Stage) -> None:
+    first = stage.camera(10)
+    stage.wait_for(10)
+    leave(first, "end")
+    assert stage.keepers() == set()
+    last = stage.shown()[-1]
+    time.sleep(0.3)
+    assert stage.shown()[-1] == last
+
+
+def test_a_camera_that_is_restarted_hands_over(stage: Stage) -> None:
+    first = stage.camera(10)
+    stage.wait_for(10)
+    leave(first, "hand-over")
+    stage.camera(20)
+    stage.wait_for(20)
+    assert stage.gap_s() < LONGEST_GAP_S
+    assert len({picture.process for picture in stage.shown()}) == 1
+
+
+def test_a_camera_of_another_version_replaces_the_keeper(stage: Stage) -> None:
+    first = stage.camera(10)
+    stage.wait_for(10)
+    first.kill()
+    first.wait()
+    stage.camera(20, version="another")
+    stage.wait_for(20)
+    assert len({picture.process for picture in stage.shown()}) == 2
+    assert stage.gap_s() < 2 * LONGEST_GAP_S  # the device is closed and opened between them
+    assert len(stage.keepers()) == 1
+
+
+def test_a_camera_of_another_size_has_the_device_opened_anew(stage: Stage) -> None:
+    first = stage.camera(10)
+    stage.wait_for(10)
+    first.kill()
+    first.wait()
+    stage.camera(20, width=128)
+    stage.wait_for(20)
+    assert stage.gap_s() < LONGEST_GAP_S
+    assert len({picture.process for picture in stage.shown()}) == 1
+
+
+def test_a_second_camera_is_refused(stage: Stage) -> None:
+    stage.camera(10)
+    stage.wait_for(10)
+    second = stage.camera(20)
+    _, said = second.communicate(timeout=20)
+    assert second.returncode == 1
+    assert said.strip() == (
+        "another Relit Camera publishes to stand-in already; "
+        "stop that one (relit doctor names its process), or give this one a device of its own"
+    )
+    stage.wait_for(10, len(stage.shown()) + 5)
+
+
+def test_a_keeper_that_nobody_comes_for_ends(stage: Stage) -> None:
+    first = stage.camera(10, keep_s=2)
+    stage.wait_for(10)
+    first.kill()
+    first.wait()
+    gone_at = time.monotonic()
+    wait_until(lambda: not stage.keepers(), 20)
+    assert stage.shown()[-1].at - gone_at == pytest.approx(2, abs=1)
+    assert not any(path.is_socket() for path in stage.folder.iterdir())
+
+
+def test_a_keeper_that_is_killed_is_replaced_at_once(stage: Stage) -> None:
+    stage.camera(10)
+    stage.wait_for(10)
+    (keeper,) = stage.keepers()
+    os.kill(keeper, signal.SIGKILL)
+    seen = len(stage.shown())
+    stage.wait_for(10, seen + 20)
+    assert stage.shown()[-1].process != keeper
+    assert stage.gap_s() < 5  # a start of Python on a busy machine
+
+
+def test_a_camera_that_is_stopped_for_a_while_is_bridged(stage: Stage) -> None:
+    first = stage.camera(10)
+    stage.wait_for(10)
+    first.send_signal(signal.SIGSTOP)
+    time.sleep(2)
+    first.send_signal(signal.SIGCONT)
+    seen = len(stage.shown())
+    stage.wait_for(10, seen)
+    assert stage.gap_s() < LONGEST_GAP_S
+
+
+def test_its_socket_is_its_user_s_alone_and_it_is_small(stage: Stage) -> None:
+    stage.camera(10)
+    stage.wait_for(10)
+    assert stat.S_IMODE(stage.folder.stat().st_mode) == 0o700
+    (path,) = (path for path in stage.folder.iterdir() if path.is_socket())
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert stat.S_IMODE(Path(f"{path}.lock").stat().st_mode) == 0o600
+
+
+def test_without_a_library_it_is_small() -> None:
+    # What holds a v4l2loopback device; the stand-in needs numpy.
+    code = f"import sys, {KEEPER_MODULE}; print(' '.join(sys.modules))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert {"numpy", "cv2", "pydantic", "onnxruntime", "platformdirs"} & set(loaded) == set()
+
+
+def test_a_folder_of_others_is_refused(tmp_path: Path) -> None:
+    open_to_all = tmp_path / "open"
+    open_to_all.mkdir()
+    open_to_all.chmod(0o755)
+    with pytest.raises(DeviceError, match="is not a folder that you alone may enter; set XDG_RUNTIME_DIR"):
+        require_private_folder(open_to_all)
+    link = tmp_path / "link"
+    link.symlink_to(open_to_all)
+    with pytest.raises(DeviceError, match="not a folder"):
+        require_private_folder(link)
+    require_private_folder(tmp_path / "own")
+
+
+def test_memory_that_could_be_cut_short_is_refused(tmp_path: Path) -> None:
+    with (tmp_path / "file").open("w+b") as file:
+        file.truncate(100)
+        with pytest.raises((OSError, ValueError), match=r"sealed|Invalid"):
+            mapped(file.fileno())
+    descriptor = shared_memory(100)
+    try:
+        with pytest.raises(OSError, match="not permitted"):
+            os.ftruncate(descriptor, 50)
+        assert len(mapped(descriptor)) == 100
+    finally:
+        os.close(descriptor)
+
+
+def test_messages_have_both_ends_and_their_user() -> None:
+    one, other = (MessageSocket(end) for end in socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET))
+    assert one.peer() == (os.getpid(), os.getuid())
+    one.send({"picture": 1})
+    assert other.receive() == ({"picture": 1}, None)
+    one.socket.send(b"[1]")
+    with pytest.raises(ValueError, match="object"):
+        other.receive()
+    one.close()
+    with pytest.raises(EOFError):
+        other.receive()
+    other.close()
