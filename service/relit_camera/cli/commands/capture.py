@@ -281,7 +281,7 @@ def build(
         with progress_bar() as progress:
             report_stage = stage_reporter(progress)
             subject, told = build_film_subject(video, options, checkpoint_folder, report_stage, method)
-            subject, coda = with_coda_stills(video, told, subject, report_stage)
+            subject, coda = with_coda_stills(video, video.name, told, subject, report_stage)
         write_subject(subject_file, subject)
         if report_file:
             report_file.write_text(json.dumps(told, indent=1), encoding="utf-8")

@@ -31,9 +31,10 @@ class IdentityTunables:
         residual: relative deviation of the live face from the relit one under the best light, 0..1.
         delay_s: how long a face is watched before it is judged.
         interval_s: time between two measurements of its shape.
+        gap_s: after so long without a frame whoever comes may be another person.
         ease_s: time over which a face that passes comes to be shown relit.
-        at_once: the product up to which a face passes as soon as it is seen: on eight recordings of four subjects it
-            began with 0.1 to 0.61, on 52 of other people with 0.74 or more.
+        at_once: the product up to which a face passes as soon as it is followed: on eight recordings of four subjects
+            it began with 0.1 to 0.61, on 56 of other people with 0.74 or more.
         kept: the product up to which such a face goes on to pass, while it is followed: in a hard room a subject's own
             reached 1.4 when it turned.
     """
@@ -43,6 +44,7 @@ class IdentityTunables:
     residual: float = 0.12
     delay_s: float = 1.5
     interval_s: float = 0.25
+    gap_s: float = 2.0
     ease_s: float = 0.2
     at_once: float = 0.65
     kept: float = 1.6
@@ -57,7 +59,7 @@ class IdentityCheck:
         self._tunables = tunables or IdentityTunables()
         self._since_s: float | None = None
         self._neutral: NeutralFace | None = None
-        self._measured_s = -np.inf
+        self._measured_s = self._checked_s = -np.inf
         self._shape_cm = np.inf
         self.forget()
 
@@ -65,6 +67,7 @@ class IdentityCheck:
         """Nobody is followed: whoever comes next may be another person."""
         self._passed_s: float | None = None
         self._most = 1.0  # up to which unlikeness it passes
+        self._since_s, self._shape_cm, self._measured_s = None, np.inf, -np.inf
 
     def recognized(self, time_s: float) -> float:
         """How far a frame may be shown relit: 0 until its face has passed for the subject's, then eased to 1."""
@@ -78,26 +81,31 @@ class IdentityCheck:
 
         Args:
             motion: of the live face, whose shape is compared.
-            residual: how badly any light explains the live face, see `RoomLightEstimate`.
+            residual: how badly any light explains the live face, see `RoomLightEstimate`; NaN where that is not known:
+                then nothing is judged.
             time_s: of the frame.
         """
         limits = self._tunables
+        if time_s - self._checked_s > limits.gap_s:
+            self.forget()
+        self._checked_s = time_s
         if motion.neutral is None or motion.presence < 1 or motion.neutral is not self._neutral:
             # Whoever comes next may be another person.
-            self._neutral, self._shape_cm, self._measured_s, self._since_s = motion.neutral, np.inf, -np.inf, None
+            self._neutral, self._since_s, self._most = motion.neutral, None, 1.0
+            self._shape_cm, self._measured_s = np.inf, -np.inf
         if motion.neutral is None or motion.presence <= 0:
             self.forget()
-            return None
-        if self._passed_s is None:
-            distance_cm = self._distance_cm(motion.neutral, motion)
-            if unlikeness(distance_cm, residual, limits) <= limits.at_once:
-                self._passed_s, self._most = time_s, limits.kept
-        if motion.presence < 1:
+        # Only where presence is 1 is the expression the face's own, and not on its way from the neutral one's.
+        if motion.neutral is None or motion.presence < 1 or np.isnan(residual):
             return None
         self._since_s = time_s if self._since_s is None else min(self._since_s, time_s)
         if not 0 <= time_s - self._measured_s < limits.interval_s:
             self._measured_s = time_s
-            self._shape_cm = min(self._shape_cm, self._distance_cm(motion.neutral, motion))
+            distance_cm = self._distance_cm(motion.neutral, motion)
+            self._shape_cm = min(self._shape_cm, distance_cm)
+            if unlikeness(distance_cm, residual, limits) <= limits.at_once:
+                self._passed_s = time_s if self._passed_s is None else self._passed_s
+                self._most = limits.kept
         if time_s - self._since_s < limits.delay_s:
             return None
         shape_cm = self._shape_cm
@@ -105,7 +113,7 @@ class IdentityCheck:
         if differs is None:
             self._passed_s = time_s if self._passed_s is None else self._passed_s
             return None
-        self.forget()
+        self._passed_s, self._most = None, 1.0
         return FaceMismatch(
             f"the live face is not the subject's: {differs}",
             "choose your own subject, or mode reenact",

@@ -40,6 +40,8 @@ RATIO_CELLS = 120
 """The ratio is made for cells of the frame, about so many on its shorter side: it is softer than the source image."""
 SMALL_FRAME_PX = 300
 """Shorter side of frames below which each pixel is such a cell."""
+BOX_CELLS = 8
+"""The box of what is relit of the frame begins and ends at multiples of so many cells."""
 EXTRAPOLATION_CELLS, WIDE_REDUCTION = 45, 4
 """The extrapolation beyond the person is computed for so many there, and its wide blurs for fewer by a factor."""
 
@@ -171,8 +173,9 @@ class RatioRelighting:
         return np.asarray(shown, np.uint8)
 
     def _cells_of_person(self, nodes: NDArray[np.float32]) -> Box:
-        """The box of those cells that look at the person, with one more round them; of all where none does.
+        """The box of those cells that look at the person, with some more round them; of all where none does.
 
+        Its sides are at multiples of `BOX_CELLS`, or what is computed for fewer cells would flicker as it moves.
         `nodes` (rows, columns, 2) are where they look, as OpenCV counts.
         """
         low, high = self._person
@@ -180,7 +183,9 @@ class RatioRelighting:
         rows, columns = nodes.shape[:2]
         if width == 0:
             return 0, 0, columns, rows
-        return max(left - 1, 0), max(top - 1, 0), min(left + width + 1, columns), min(top + height + 1, rows)
+        right, bottom = (-(-(end + 1) // BOX_CELLS) * BOX_CELLS for end in (left + width, top + height))
+        left, top = (max(start - 1, 0) // BOX_CELLS * BOX_CELLS for start in (left, top))
+        return left, top, min(right, columns), min(bottom, rows)
 
     def _warp(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> Warp:
         """The source image as it lies on the live face of a frame of `size`.

@@ -51,6 +51,7 @@ class RoomLightTunables:
         huber_threshold: relative residual from which a sample loses weight (Huber).
         min_samples: usable samples that the gain of a frame needs.
         gain_range: limits of that gain.
+        gap_s: after so long without a frame the residual begins anew.
     """
 
     harmonics_degree: int = 10
@@ -64,6 +65,7 @@ class RoomLightTunables:
     huber_threshold: float = 0.25
     min_samples: int = 20
     gain_range: tuple[float, float] = (0.25, 4.0)
+    gap_s: float = 0.5
 
 
 TUNABLES = RoomLightTunables()
@@ -83,7 +85,8 @@ class RoomLightEstimate:
         light_map: (32, 64, 3) float32 room radiance in units of the live picture's linear values.
         in_head_frame: the same as the head sees it, under its rotation or nearly so.
         gain: (3,) float32 by which this frame's exposure differs from the fit's.
-        residual: median relative deviation of the live face from the relit one, 0..1: how badly the light explains it.
+        residual: median relative deviation of the live face from the relit one, 0..1: how badly the light explains it;
+            NaN where too little of the face was seen so far.
     """
 
     light_map: LightMap
@@ -119,7 +122,7 @@ class RoomLightEstimator:
         self._response = samples @ (subject.coefficients @ weighted.astype(np.float32))
         self._amounts = np.zeros((LIGHTS.count, 3), np.float32)
         self._light_map = np.zeros((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
-        self._fitted_at = -np.inf
+        self._fitted_at = self._updated_s = -np.inf
         self._residual: float | None = None
         self._seen: _Prediction | None = None
 
@@ -133,6 +136,9 @@ class RoomLightEstimator:
             time_s: of the frame.
         """
         live, usable = _sample_frame(image, landmarks[self._triangles].mean(axis=1))
+        if not 0 <= time_s - self._updated_s <= TUNABLES.gap_s:
+            self._residual = None  # it may be another face
+        self._updated_s = time_s
         due = time_s - self._fitted_at > 1 / TUNABLES.fits_per_s or time_s < self._fitted_at
         if due:
             self._fit(live, usable, LIGHTS.maps(rotation))
@@ -148,7 +154,7 @@ class RoomLightEstimator:
                 now if self._residual is None else self._residual + TUNABLES.residual_smoothing * (now - self._residual)
             )
         return RoomLightEstimate(
-            self._light_map, self._seen.light_map, gain, 0.0 if self._residual is None else self._residual
+            self._light_map, self._seen.light_map, gain, np.nan if self._residual is None else self._residual
         )
 
     def _predict_under(self, rotation: Rotation) -> _Prediction:

@@ -172,7 +172,6 @@ class ExpressionJob:
             else:
                 what, cure = describe_failure("expression capture", error, named)
                 changes = {"stage": ExpressionStage.FAILED, "what": what, "cure": cure}
-        self._remove_video()
         return replace(self._status, **{"prompt": "", "say": "", "face": False, **changes})  # type: ignore[arg-type]
 
     def _film(self, name: str, canceled: threading.Event) -> tuple[ExpressionReport, str]:
@@ -206,15 +205,18 @@ class ExpressionJob:
             progress = begins + share * (min(done / total, 1.0) if total else 0.0)
             self._set(replace(self._status, progress=round(progress, 3)), seldom=True)
 
-        return self._maker.change(
-            name,
-            self._build_of_video,
-            video,
-            timeout_s=self._limits.video_timeout_s,
-            canceled=canceled,
-            progress=tell,
-            most_bytes=self._limits.most_bytes,
-        )
+        try:
+            return self._maker.change(
+                name,
+                self._build_of_video,
+                video,
+                timeout_s=self._limits.video_timeout_s,
+                canceled=canceled,
+                progress=tell,
+                most_bytes=self._limits.most_bytes,
+            )
+        finally:
+            self._remove_video()  # only here, where the folder is this process's own
 
     def _require_own_folder(self) -> None:
         """Create the folder where it is missing, and take it.

@@ -50,7 +50,7 @@ def write_film_subject(
     checkpoints = CheckpointFolder(folder / "subject.relit", input_fingerprint(film, read), log.info)
     with checkpoints.keep_until_done():
         subject, told = build_film_subject(film, read, checkpoints, tell, source=file_name)
-        subject, coda = with_coda_stills(film, told, subject, tell)
+        subject, coda = with_coda_stills(film, file_name, told, subject, tell)
         write_subject(path, subject)
     tell(DRAWING, 0, None)
     return film_report(told, subject.metadata, draw_pictures(subject, folder / "pictures"), coda)
