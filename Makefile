@@ -4,8 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
-# More than the cores of the smallest machine: many tests wait.
-PROCESSES ?= 3
+PROCESSES ?= 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
@@ -58,7 +57,7 @@ image-steps: setup ## the image's build without Docker: a wheel, installed by it
 tool-install: setup ## the wheel as users install it, used from an empty home; make tool-install WITH=pipx
 	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
-pytest: setup ## the tests alone, in three processes; make pytest PROCESSES=4
+pytest: setup ## the tests alone, in two processes; make pytest PROCESSES=4
 	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire
 	# By themselves: browser and emulated machine take both cores, and tests that hold in real time would not.
 	$(BIN)/python -m pytest tests/pipewire

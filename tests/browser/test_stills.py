@@ -92,7 +92,7 @@ def test_it_says_what_to_do_and_ticks_off_what_was_seen_by_the_keyboard(fake: Fa
     expect(dialog).to_have_attribute("data-step", "building")
     tell(fake, stage=ExpressionStage.DONE, report=REPORT)
     expect(dialog).to_have_attribute("data-step", "done")
-    expect(dialog.locator("#stills-words")).to_contain_text("14 pictures were taken; the file of “ada” has 3.3 MB now.")
+    expect(dialog.locator("#stills-words")).to_contain_text("14 pictures were taken for “ada”.")
     expect(dialog.locator("#stills-words")).to_contain_text("shut your eyes for a second")
     expect(items).to_have_text(["At rest: taken", "Smile: taken", "Eyes shut: not taken", "Right: taken"])
     expect(dialog.locator("#stills-keep")).to_be_focused()
@@ -159,7 +159,7 @@ def test_in_mode_ratio_it_says_where_they_show(fake: FakeServer, open_page: Open
     panel.page.keyboard.press("Enter")
     wait_until(lambda: stage(fake) is ExpressionStage.FILMING)
     tell(fake, stage=ExpressionStage.DONE, report=REPORT)
-    expect(dialog.locator("#stills-words")).to_contain_text("They show where your captured face is moved")
+    expect(dialog.locator("#stills-words")).to_contain_text("They show with “Captured face, moved”")
     dialog.locator("#stills-moved").click()
     fake.wait_for("scene", mode="reenact")
 

@@ -12,7 +12,6 @@ from relit_camera.face.face_state import LOST, FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose, project
 from tests.capture.expressions.talking_film import SCHEME, SIZE, moved_points
 
-YAWS_DEG = {"turned right": -19.0, "turned far right": -31.0, "turned left": 19.0, "turned far left": 31.0}
 CORNERS = [SCHEME.upper_lip_outer[0], SCHEME.upper_lip_outer[-1]]
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 
@@ -17,6 +20,7 @@ from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.ratio_relighting import (
+    BOX_CELLS,
     RatioPlan,
     RatioRelighting,
     extrapolate_roots,
@@ -119,6 +123,31 @@ def test_presence_eases_to_the_live_frame_as_it_is_shown(image: DisplayImage) ->
 
     np.testing.assert_allclose(shown(0.0), image, atol=1)
     np.testing.assert_allclose(shown(0.5), (shown(1.0) + image) / 2, atol=2)  # skin does not redden on the way
+
+
+def test_what_is_made_for_the_person_s_cells_alone_is_what_all_cells_would_give() -> None:
+    subject, image = close_up(), live_picture(WINDOW)
+    matte = np.zeros_like(subject.matte)
+    height, width = matte.shape
+    cv2.ellipse(matte, (width // 2, height // 2), (width // 4, height // 3), 0, 0, 360, 1.0, -1)
+    ours = RatioRelighting(
+        replace(subject, matte=matte),
+        face_of(subject),
+        KnownRoom(WINDOW),
+        DenseMotion(SessionOptions("cpu")),
+    )
+    frame, motion = live_frame(image, 0), before_the_camera()
+    assert motion.pose is not None
+    nodes = ours.positions(motion, motion.pose, frame.size).nodes()
+    left, top, right, bottom = ours._cells_of_person(nodes)
+    assert 0 < left < right < nodes.shape[1]
+    assert 0 < top < bottom < nodes.shape[0]
+    assert not any(side % BOX_CELLS for side in (left, top, right, bottom)), "or it would flicker as the person moves"
+    few = relit_live(ours, still_under(EVENING), motion, frame).astype(int)
+    ours._person = (-1e9, -1e9), (1e9, 1e9)
+    error = np.abs(few - relit_live(ours, still_under(EVENING), motion, frame))
+    assert error.mean() < 0.1
+    assert error.max() <= 5
 
 
 def test_odd_sizes_keep_their_size() -> None:

@@ -36,6 +36,7 @@ ladder.append(line, trust, next);
 const stills = make("button", { type: "button", id: "ladder-stills", hidden: true });
 stills.onclick = takeStills;
 
+let named = null;
 let known = "";
 
 function show(now) {
@@ -45,7 +46,8 @@ function show(now) {
   const rung = now.subject === DEMO_NAME ? DEMO : (RUNGS[now.rung] ?? OLD);
   line.textContent = now.subject === null ? "" : `“${now.subject}”: ${rung.line}.`;
   trust.textContent = now.subject === null ? "" : rung.trust;
-  stills.hidden = true;
+  if (now.subject !== named) stills.hidden = true; // else a button would vanish under somebody's hand
+  named = now.subject;
   if (now.subject !== null) tellDetails(now, rung);
   const focused = ladder.contains(document.activeElement) ? document.activeElement.id : null;
   next.replaceChildren(nextRung(now, rung), stills, people());

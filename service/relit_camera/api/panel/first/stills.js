@@ -69,7 +69,7 @@ class StillsDialog {
     this.video = button("stills-video", "Use a video…", "quiet", () => this.file.click());
     this.cancel = button("stills-cancel", "Cancel", "quiet", () => this.dialog.close());
     this.again = button("stills-again", "Once more", "", () => this.#show("ready"));
-    this.moved = button("stills-moved", "Show it moved", "", () => this.#showMoved());
+    this.moved = button("stills-moved", "Captured face, moved", "", () => this.#showMoved());
     this.start = button("stills-start", "Begin", "firm", () => this.#film());
     this.keep = button("stills-keep", "Done", "firm", () => this.dialog.close());
     this.dialog = make(
@@ -97,7 +97,8 @@ class StillsDialog {
     }
     const now = await call("GET", PATH).catch(() => null);
     // Begun before the page was loaded anew, or by another page
-    if (["filming", "building"].includes(now?.stage) && this.dialog.open && this.#step === "ready") this.#work(now.stage, () => now);
+    const same = now?.subject === this.subject && RUNNING.includes(now.stage);
+    if (same && this.dialog.open && this.#step === "ready") this.#work(now.stage, () => now);
     await closed;
     removeEventListener("pagehide", leave);
     this.models.stop();
@@ -109,7 +110,7 @@ class StillsDialog {
   }
 
   get #running() {
-    return ["filming", "building"].includes(this.#step);
+    return ["filming", "building", "sending"].includes(this.#step); // what was sent whole is worked on already
   }
 
   #show(step) {
@@ -209,11 +210,11 @@ class StillsDialog {
   }
 
   #report(status) {
-    const { stills, covered, missing, file_bytes: bytes } = status.report;
+    const { stills, covered, missing } = status.report;
     this.#mark(status, (name) => (covered.includes(name) ? "good" : "bad"));
-    const told = [`${stills} pictures were taken; the file of “${status.subject}” has ${(bytes / 1e6).toFixed(1)} MB now.`];
+    const told = [`${stills} pictures were taken for “${status.subject}”.`];
     if (status.what) told.push(sentence(status.what));
-    if (!this.moved.hidden) told.push("They show where your captured face is moved; now your live picture is shown.");
+    if (!this.moved.hidden) told.push("They show with “Captured face, moved”; now “Live picture, relit” is chosen.");
     if (missing.length) told.push(`For more, go through it once more and ${missing.join("; ")}.`);
     this.words.textContent = told.join(" ");
     this.words.hidden = false;

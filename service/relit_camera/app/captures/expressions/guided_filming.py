@@ -23,6 +23,8 @@ if TYPE_CHECKING:  # imported late: what only captures need would make the camer
 
 CALLED = "the webcam's picture"
 """What the film is called in messages."""
+UNSEEN_S = 1.0
+"""So long without a face it is told that none is seen: shut lids and far turns hide it for a moment."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ class GuidedFilming:
         prompts, coverage = PromptSequence(), LiveCoverage(faces)
         frames: dict[int, bytes] = {}
         first: Frame | None = None
-        seen_at = 0.0
+        seen_at, face_at = 0.0, -UNSEEN_S
         count = 0
         while prompts.name is not None:
             frame = self._next_frame(canceled)
@@ -142,10 +144,10 @@ class GuidedFilming:
             if frame.size != first.size:
                 raise CaptureError("the size of the webcam's picture changed", "leave it as it is until the end")
             time_s = frame.captured_at - first.captured_at
-            # The source counts from 0 again where it is opened again.
+            # Frames are left out: the index is that of those looked at.
             face = faces.add(replace(frame, index=count, time_s=time_s))
             if face is not None:
-                seen_at = time_s
+                seen_at = face_at = time_s
                 frames[count] = encode_display(frame.image, ".jpg", self._timings.jpeg_quality)
                 coverage.update(face, prompts.name == NEUTRAL)
                 prompts.update(time_s, coverage.covered)
@@ -155,7 +157,8 @@ class GuidedFilming:
                 )
             count += 1
             say = PROMPTS.get(prompts.name or "", "")
-            tell(FilmingState(prompts.name or "", say, face is not None, coverage.covered, round(prompts.share, 3)))
+            seen = time_s - face_at < UNSEEN_S
+            tell(FilmingState(prompts.name or "", say, seen, coverage.covered, round(prompts.share, 3)))
         film = faces.film()
         selection = select_stills(film)
         needed = frames_for_stills(film, selection)

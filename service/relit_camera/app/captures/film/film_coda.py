@@ -39,5 +39,4 @@ def with_coda_stills(
     except Exception as error:  # also a fault: the subject is whole without them
         what, cure = describe_failure("expression stills", error, {str(film): file_name, film.name: file_name})
         return subject, f"the film's end, after the flashes, gives no expression stills: {what}; {cure}"
-    shown = ", ".join(captured.selection.covered)
-    return replace(subject, stills=captured.stills), f"{len(captured.stills)} expression stills of its end: {shown}"
+    return replace(subject, stills=captured.stills), f"{len(captured.stills)} expression stills were taken of its end"
