@@ -14,6 +14,7 @@ RelitError                       what is wrong, and what cures it
 │   └── ModelError               a model is missing, has the wrong hash, or breaks its contract
 │       └── DownloadError        no host gives a model's file as it was tested
 ├── DeviceError                  a camera, virtual camera or provider is missing or in use
+│   ├── KeeperLostError          the process that holds the virtual camera has ended, or there can be none
 │   └── UnsupportedByDriverError the device's driver is too old for what it is asked
 ├── PortInUseError               another program listens on the port
 ├── StorageError                 a file cannot be written (disk full, no permission)
@@ -111,6 +112,10 @@ class DownloadError(ModelError):
 
 class DeviceError(RelitError):
     """A camera, a virtual camera or an execution provider is missing or in use."""
+
+
+class KeeperLostError(DeviceError):
+    """The process that holds the virtual camera for the camera has ended, or there can be none."""
 
 
 class UnsupportedByDriverError(DeviceError):

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from platformdirs import user_runtime_path
 
 from relit_camera.base.config.settings import OutputSettings
-from relit_camera.base.errors import DeviceError
+from relit_camera.base.errors import DeviceError, KeeperLostError
 from relit_camera.base.images.color import rgb_to_i420
 from relit_camera.base.images.image_types import DisplayImage, check_image
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.devices.keeper.keeper import PICTURE_SLOTS
 from relit_camera.devices.keeper.keeper_socket import shared_memory
 from relit_camera.devices.keeper.kept_output import I420, OutputOptions, picture_bytes
-from relit_camera.devices.keeper.sink_keeper import KeeperLostError, SinkKeeper
+from relit_camera.devices.keeper.sink_keeper import SinkKeeper
 from relit_camera.devices.sinks.sink import Sink, SinkInfo
 from relit_camera.devices.sinks.sink_factory import device_node
 

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from relit_camera.base import errors
-from relit_camera.base.errors import DeviceError, RelitError
+from relit_camera.base.errors import DeviceError, KeeperLostError, RelitError
 from relit_camera.devices.device_users import KEEPER_MODULE
 from relit_camera.devices.keeper.keeper_process import VERSION
 from relit_camera.devices.keeper.keeper_socket import MessageSocket, require_private_folder
@@ -29,13 +30,10 @@ START_S = 20.0
 ANSWER_S = 2.0
 """How long it may take for anything else: what takes longer hangs in a driver."""
 END_S = 1.0
+ENDING_S = 0.2
 _TRIES = 3
 _NO_KEEPER = "switch the keeper off: output.keep_s: 0"
 _ASKED_FOR = "stop that one (relit doctor names its process), or give this one a device of its own"
-
-
-class KeeperLostError(DeviceError):
-    """The keeper has ended or does not answer."""
 
 
 class SinkKeeper:
@@ -81,7 +79,7 @@ class SinkKeeper:
             RelitError: the virtual camera is missing, or in use.
         """
         hello = {"hello": self._version, "output": asdict(self._options), "keep_s": self._keep_s}
-        for _ in range(_TRIES):
+        for attempt in range(_TRIES):
             connection = self._connected()
             try:
                 answer = self._ask(connection, hello, START_S)
@@ -92,6 +90,9 @@ class SinkKeeper:
                 continue
             if "busy" in answer:
                 self._drop(connection)
+                if not answer["busy"] and attempt < _TRIES - 1:
+                    time.sleep(ENDING_S)  # one that holds nothing is about to end
+                    continue
                 at = f" to {answer['busy']}" if answer["busy"] else ""
                 raise DeviceError(f"another Relit Camera publishes{at} already", _ASKED_FOR)
             return self._checked(answer)
