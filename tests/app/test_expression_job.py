@@ -100,11 +100,11 @@ class Studio:
             upload.path.write_bytes(data)
             meanwhile(upload)
 
-    def stages(self) -> list[str]:
-        """The stages that were told since the last call, each once."""
-        told = []
-        while not self.events.empty():
-            event = self.events.get()
+    def stages_until(self, last: str) -> list[str]:
+        """The stages that are told until `last` is, each once."""
+        told: list[str] = []
+        while last not in told:
+            event = self.events.get(timeout=10.0)
             if event.kind == "expression-capture":
                 told.append(str(event.data["stage"]))
         return list(dict.fromkeys(told))
@@ -150,7 +150,7 @@ def test_the_subject_that_is_shown_has_its_stills_at_once_in_the_same_mode(studi
     assert done.report is not None
     assert (done.report.stills, done.covered, done.prompt) == (1, ("wide mouth",), "")
     assert done.report.file_bytes == there.file.stat().st_size
-    assert there.stages() == ["filming", "building", "done"]
+    assert there.stages_until("done") == ["filming", "building", "done"]
     assert count_stills(there.file) == 1
     now = there.scenes.scene
     assert now.subject is not None
@@ -268,7 +268,7 @@ def test_stills_of_a_video_that_is_sent(studio: Opener) -> None:
     there.send()
     done = there.end()
     assert (done.stage, done.film, done.progress) == (ExpressionStage.DONE, "my talk.mov", 1.0)
-    assert there.stages() == ["receiving", "building", "done"]
+    assert there.stages_until("done") == ["receiving", "building", "done"]
     assert count_stills(there.file) == 1
     assert list(there.storage.expression_capture.iterdir()) == []
 
