@@ -64,8 +64,12 @@ class Session:
         self.runtime.mkdir(mode=0o700, parents=True)
         bus = self.folder / "bus.conf"
         bus.write_text(BUS.format(address=self.environment["DBUS_SESSION_BUS_ADDRESS"]))
-        self._start("dbus-daemon", "--nofork", f"--config-file={bus}")
-        self.start()
+        try:
+            self._start("dbus-daemon", "--nofork", f"--config-file={bus}")
+            self.start()
+        except BaseException:
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:

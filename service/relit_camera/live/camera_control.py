@@ -224,7 +224,7 @@ class ReplayControl(Protocol):
         ...
 
     def status(self, name: str) -> ReplayStatus:
-        """One of them.
+        """How far the replay of that name is.
 
         Raises:
             NotFoundError: there is none of that name.

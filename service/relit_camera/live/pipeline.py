@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -88,7 +87,7 @@ class Pipeline:
         open_relighter: Callable[[Subject], Relighter],
         open_matte: Callable[[], Matting],
     ) -> None:
-        """Set up; the first frame of a subject opens its models. `close` ends the thread that it starts.
+        """Set up; the first frame of a subject opens its models.
 
         Args:
             tracker: measures the face in each frame.
@@ -110,7 +109,6 @@ class Pipeline:
         self._light = LightTransition()
         self._open_matte = open_matte
         self._compositor = Compositor(size, self._opened_matte, self.timer)
-        self._executor = ThreadPoolExecutor(1, "warp-planner")
         self._active: _ActiveMode | None = None
         self._mismatch: _MismatchedSubject | None = None
         self._troubles: dict[str, Degradation] = {}
@@ -131,12 +129,11 @@ class Pipeline:
         self._follower.reset_neutral()
 
     def close(self) -> None:
-        """End the thread that plans warps, after the plan that it is at, and let go of models and pictures.
+        """Let go of models and pictures.
 
         No frame can be begun afterwards. What holds this object, and is held by it, would else keep them until Python
         looks for such cycles: hours in a running camera, and never those of its start (`freeze_gc`).
         """
-        self._executor.shutdown()
         self._active = None
         self.on_opening = lambda: None
         with suppress(AttributeError):  # closed before
@@ -229,7 +226,6 @@ class Pipeline:
                 scene_relighting=SceneRelighting(subject, face, relighter, self._light, self.timer),
                 compositor=self._compositor,
                 size=self._size,
-                executor=self._executor,
                 timer=self.timer,
             )
             self._active = _ActiveMode(subject, name, relighter, self._modes[name](context))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import cv2
 import numpy as np
@@ -50,7 +51,7 @@ class KnownRoom:
 
     def update(self, image: DisplayImage, landmarks: Points, rotation: Rotation, time_s: float) -> RoomLightEstimate:
         room = self.light * exposure()
-        return RoomLightEstimate(room, rotate_light_map(room, rotation), np.ones(3, np.float32), 0.0)
+        return RoomLightEstimate(room, partial(rotate_light_map, room), np.ones(3, np.float32), 0.0)
 
 
 def relighting(light: LightMap | None = None) -> RatioRelighting:
@@ -66,7 +67,7 @@ def relit_live(
     """The live frame in the light of a relit picture."""
     assert motion.pose is not None
     room = ours.room_light.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
-    pictures = ours.raised_lights(relit, relighter().relight(room.in_head_frame[None])[0])
+    pictures = ours.raised_lights(relit, relighter().relight(room.in_head_frame(motion.rotation)[None])[0])
     positions = ours.positions(motion, motion.pose, frame.size)
     span = landmark_scheme("mesh478").eye_span(motion.landmarks)
     return ours.apply(RatioPlan(frame, motion.presence, room.gain, pictures, positions, span), blend)

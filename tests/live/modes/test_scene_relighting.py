@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -79,7 +80,7 @@ def test_a_change_of_light_is_eased_in_every_frame() -> None:
 def test_scene_and_room_are_relit_together_and_combined() -> None:
     ours, relighter = made()
     room: LightMap = builtin_environment("window").light_map
-    head = rotate_light_map(room, turn(3))
+    head = partial(rotate_light_map, room)
     both = ours.compare(SUNSET, turn(3), 0.1, room, head, lambda scene, room: np.concatenate([scene, room]), 2)
     assert relighter.lights == [4]
     height = close_up().matte.shape[0]

@@ -81,7 +81,7 @@ def _add(product: NDArray[np.uint16], cells: NDArray[np.uint16], step: int, buff
 
     `buffer` is overwritten; it has room for the cells in pixels.
     """
-    some = np.flatnonzero(cells.any(axis=(0, 2)))
+    some = np.flatnonzero(cells.max(axis=0).any(axis=1))
     if some.size == 0:
         return
     # With one more column on each side, between which the roots come down to 0.

@@ -26,8 +26,8 @@ class ReadingTunables:
     Attributes:
         most: frames that are kept.
         video_s: seconds of a video that are looked at.
-        webcam_s: seconds of a webcam, after `settling_s` in which it finds its exposure.
-        settling_s: see there.
+        webcam_s: seconds of a webcam that are looked at.
+        settling_s: seconds before these, in which a webcam finds its exposure.
         first_frame_s: how long a webcam may take until its first frame.
         longest_side_px: larger frames are reduced to it: a face needs no more.
     """

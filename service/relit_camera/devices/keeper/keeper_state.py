@@ -73,7 +73,7 @@ def next_step(state: KeeperState, now: float, limits: KeeperLimits) -> tuple[Kee
     Args:
         state: what is known.
         now: in seconds on the clock.
-        limits: see there.
+        limits: how long the keeper shows something by itself.
     """
     silent_s = now - state.camera_at
     if not state.connected and silent_s >= limits.keep_s:

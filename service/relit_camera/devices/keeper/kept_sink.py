@@ -85,7 +85,7 @@ class KeptSink:
 
         Args:
             keeper: holds it.
-            parts: see there.
+            parts: what the keeper shows where it may not show the last picture.
             open_directly: opens it without a keeper.
 
         Raises:

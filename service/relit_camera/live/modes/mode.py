@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -67,7 +66,6 @@ class ModeContext:
         scene_relighting: relights that subject as the scene says.
         compositor: puts the person before the background.
         size: (width, height) of the pictures to make.
-        executor: one thread for work beside the relighting.
         timer: counts the stages.
     """
 
@@ -77,7 +75,6 @@ class ModeContext:
     scene_relighting: SceneRelighting
     compositor: Compositor
     size: tuple[int, int]
-    executor: Executor
     timer: StageTimer
 
 

@@ -16,7 +16,6 @@ from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
 from relit_camera.live.modes.reenact_mode import blend_with_source
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.reenactment.rest_layer import RestLayer
-from relit_camera.live.reenactment.warp import PositionGrid
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
 
@@ -41,7 +40,7 @@ class RatioMode:
     ) -> RenderTask | FaceMismatch:
         """See `RenderMode.begin`: relights the source image in both lights, and finds where it lies on the live face.
 
-        Both at the same time; the task multiplies and composes.
+        The task multiplies and composes.
         """
         live = fit_frame(frame, self._context.size)
         motion = fit_motion(motion, frame.size, self._context.size)
@@ -108,7 +107,6 @@ class RatioMode:
             mismatch = self._identity.check(motion, room.residual, frame.time_s)
         if mismatch is not None:
             return mismatch
-        followed = context.executor.submit(self._follow, motion, frame)
         pictures = context.scene_relighting.compare(
             scene,
             motion.rotation,
@@ -118,13 +116,10 @@ class RatioMode:
             relighting.raised_lights,
             quality.relight_every,
         )
+        with context.timer.stage("follow"):
+            positions = relighting.positions(motion, pose, frame.size)
         eye_distance = context.face.scheme.eye_span(motion.landmarks)
-        return RatioPlan(frame, float(motion.presence), room.gain, pictures, followed.result(), eye_distance)
-
-    def _follow(self, motion: FaceMotion, frame: Frame) -> PositionGrid:
-        assert motion.pose is not None
-        with self._context.timer.stage("follow"):
-            return self._relighting.positions(motion, motion.pose, frame.size)
+        return RatioPlan(frame, float(motion.presence), room.gain, pictures, positions, eye_distance)
 
 
 def split_view(relit: DisplayImage, live: DisplayImage, share: float) -> DisplayImage:

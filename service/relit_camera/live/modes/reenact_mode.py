@@ -8,7 +8,7 @@ from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import Frame, LinearImage
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
-from relit_camera.live.reenactment.reenactor import Reenactor, WarpTask
+from relit_camera.live.reenactment.reenactor import Reenactor
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject
@@ -22,11 +22,11 @@ class ReenactMode:
         self._reenactor = reenactor
 
     def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
-        """See `RenderMode.begin`: plans the warp while the source image is relit; the task warps and composes."""
+        """See `RenderMode.begin`: relights the source image and plans its warp; the task warps and composes."""
         context, timer = self._context, self._context.timer
-        planned = context.executor.submit(self._plan, motion, frame, quality)
         relit = context.scene_relighting.relight(scene, motion.rotation, frame.time_s, quality.relight_every)
-        warp = planned.result()
+        with timer.stage("follow"):
+            warp = self._reenactor.plan_warp(motion, frame, quality)
 
         def render() -> RenderedFrame:
             with timer.stage("move"):
@@ -36,10 +36,6 @@ class ReenactMode:
             return RenderedFrame(image, motion, scene)
 
         return render
-
-    def _plan(self, motion: FaceMotion, frame: Frame, quality: RenderQuality) -> WarpTask:
-        with self._context.timer.stage("follow"):
-            return self._reenactor.plan_warp(motion, frame, quality)
 
 
 def blend_with_source(subject: Subject, relit: LinearImage, share: float) -> LinearImage:

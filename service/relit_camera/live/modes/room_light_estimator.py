@@ -10,7 +10,9 @@ are read in place of the subject's components and the 2048 texels.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import cv2
@@ -46,7 +48,8 @@ class RoomLightTunables:
         fits_per_s: how often the light is fitted.
         light_smoothing: share of the way from the last light to the newly fitted one.
         residual_smoothing: share of the way that the reported residual goes to that of each fit.
-        turn_tolerance: radians that the head turns before the light that it sees, and the face in it, are made anew.
+        turn_tolerance: radians that the head turns before the face under the last light is predicted anew, by which the
+            gain is measured: by half a degree it changes by less than 1 %.
         clipping_code: sRGB code from which a sample counts as clipped.
         huber_threshold: relative residual from which a sample loses weight (Huber).
         min_samples: usable samples that the gain of a frame needs.
@@ -60,7 +63,7 @@ class RoomLightTunables:
     fits_per_s: float = 4.0
     light_smoothing: float = 0.5
     residual_smoothing: float = 0.5
-    turn_tolerance: float = 0.25 * np.pi / 180
+    turn_tolerance: float = 0.5 * np.pi / 180
     clipping_code: int = 250
     huber_threshold: float = 0.25
     min_samples: int = 20
@@ -83,14 +86,14 @@ class RoomLightEstimate:
 
     Attributes:
         light_map: (32, 64, 3) float32 room radiance in units of the live picture's linear values.
-        in_head_frame: the same as the head sees it, under its rotation or nearly so.
+        in_head_frame: gives the same as a head sees it under a rotation, head → room.
         gain: (3,) float32 by which this frame's exposure differs from the fit's.
         residual: median relative deviation of the live face from the relit one, 0..1: how badly the light explains it;
             NaN where too little of the face was seen so far.
     """
 
     light_map: LightMap
-    in_head_frame: LightMap
+    in_head_frame: Callable[[Rotation], LightMap]
     gain: NDArray[np.float32]
     residual: float
 
@@ -101,12 +104,10 @@ class _Prediction:
 
     Attributes:
         rotation: of the head.
-        light_map: (32, 64, 3) float32 in its frame.
         samples: (count, 3) float32 of the face under that light.
     """
 
     rotation: Rotation
-    light_map: LightMap
     samples: NDArray[np.float32]
 
 
@@ -143,7 +144,7 @@ class RoomLightEstimator:
         if due:
             self._fit(live, usable, LIGHTS.maps(rotation))
             self._fitted_at = time_s
-            self._light_map = (LIGHTS.maps() @ self._amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3)
+            self._light_map = _soft_light_map(self._amounts)
         if due or self._seen is None or (rotation * self._seen.rotation.inv()).magnitude() > TUNABLES.turn_tolerance:
             self._seen = self._predict_under(rotation)
         gain = _exposure_gain(live, self._seen.samples, usable)
@@ -153,13 +154,13 @@ class RoomLightEstimator:
             self._residual = (
                 now if self._residual is None else self._residual + TUNABLES.residual_smoothing * (now - self._residual)
             )
-        return RoomLightEstimate(
-            self._light_map, self._seen.light_map, gain, np.nan if self._residual is None else self._residual
-        )
+        residual = np.nan if self._residual is None else self._residual
+        return RoomLightEstimate(self._light_map, partial(_soft_light_map, self._amounts), gain, residual)
 
     def _predict_under(self, rotation: Rotation) -> _Prediction:
-        light = LIGHTS.maps(rotation) @ self._amounts
-        return _Prediction(rotation, light.reshape(self._light_map.shape), self._predict(self._project @ light))
+        return _Prediction(
+            rotation, self._predict(self._project @ _soft_light_map(self._amounts, rotation).reshape(-1, 3))
+        )
 
     def _predict(self, harmonics: NDArray[np.floating]) -> NDArray[np.float32]:
         """The samples (count, 3) under a light of these harmonics (harmonics, 3)."""
@@ -170,6 +171,7 @@ class RoomLightEstimator:
         first = not self._amounts.any()
         predicted = self._predict(mixed @ self._amounts)
         predicted *= _exposure_gain(live, predicted, usable)
+        new = np.empty_like(self._amounts)  # estimates hold the old ones
         for channel in range(3):
             design, goal = self._response[channel] @ mixed, live[:, channel]
             amounts = self._amounts[:, channel]
@@ -178,7 +180,13 @@ class RoomLightEstimator:
             for _ in range(TUNABLES.robust_iterations if first else 1):
                 fitted = regularized_nnls(design, goal, weight, amounts, TUNABLES.ridge)
                 weight = _robust_weight(design @ fitted, goal, level, usable)
-            self._amounts[:, channel] = fitted if first else amounts + TUNABLES.light_smoothing * (fitted - amounts)
+            new[:, channel] = fitted if first else amounts + TUNABLES.light_smoothing * (fitted - amounts)
+        self._amounts = new
+
+
+def _soft_light_map(amounts: NDArray[np.float32], rotation: Rotation | None = None) -> LightMap:
+    """The light map of soft lights of these amounts (count, 3), in the room or as a head sees it under a rotation."""
+    return (LIGHTS.maps(rotation) @ amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3)
 
 
 def _exposure_gain(

@@ -106,7 +106,7 @@ class SceneRelighting:
         rotation: Rotation,
         time_s: float,
         room: LightMap,
-        room_in_head_frame: LightMap,
+        room_in_head_frame: Callable[[Rotation], LightMap],
         combine: Callable[[LinearImage, LinearImage], NDArray[np.float32]],
         every: int,
     ) -> NDArray[np.float32]:
@@ -119,7 +119,7 @@ class SceneRelighting:
             rotation: of the head since neutral.
             time_s: of the frame.
             room: the room's light map; another object for another light.
-            room_in_head_frame: the same as the head sees it.
+            room_in_head_frame: gives the same as a head sees it under a rotation.
             combine: makes an array (rows, columns, channels) of non-negative values.
             every: as in `relight`; the comparison is made less often.
         """
@@ -127,9 +127,8 @@ class SceneRelighting:
             light = self._light.update(scene, time_s)
 
         def relit() -> NDArray[np.float32]:
-            return combine(
-                *self._head_and_body(self._scene_light(light, rotation), _SeenLight(room_in_head_frame, room))
-            )
+            seen = _SeenLight(room_in_head_frame(rotation), room)
+            return combine(*self._head_and_body(self._scene_light(light, rotation), seen))
 
         with self._timer.stage("relight"):
             return self._compared.picture(rotation, light, room, every + RATIO_MORE_FRAMES, relit)

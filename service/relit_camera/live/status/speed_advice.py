@@ -54,7 +54,7 @@ def next_speed(
         now: time of the look.
         expected_fps: pictures a second that there could be; 0 while none are expected.
         new_fps: pictures a second that there are.
-        limits: see there.
+        limits: how few pictures a second are too few, and for how long.
     """
     behind = new_fps < limits.enough * expected_fps
     if behind is state.behind:

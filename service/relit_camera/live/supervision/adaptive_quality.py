@@ -70,7 +70,7 @@ def next_quality(state: QualityState, rendered_at: float, latency_s: float, limi
         state: before it.
         rendered_at: when it was rendered, in seconds on the clock.
         latency_s: from the arrival of its frame till then.
-        limits: see there.
+        limits: latencies at which pictures become cheaper and better again.
     """
     state = _with_latency(state, rendered_at, latency_s, limits)
     latency = state.latency_s or 0.0

@@ -129,7 +129,7 @@ class PipelineSupervisor:
             scene: gives the present scene.
             publish: takes a frame and its picture, in a worker's thread. Returns whether the picture is shown.
             on_trouble: takes each error, and None when a picture was rendered after one.
-            limits: see there.
+            limits: how long work may take until it is given up.
             clock: to measure by.
             start_worker: starts a worker.
             quality_limits: when pictures are made cheaper.

@@ -53,7 +53,7 @@ class Dict(Structure):
 
 
 class DictItem(Structure):
-    """One of them."""
+    """One text of a `Dict` and its key."""
 
     _fields_ = (("key", c_char_p), ("value", c_char_p))
 

@@ -82,7 +82,7 @@ class LiveRatio:
 
     def relit(self, light: LightMap) -> DisplayImage:
         """The last frame, as the program shows it in a light in display exposure."""
-        maps = np.stack([light * self._gain, self._room.in_head_frame])
+        maps = np.stack([light * self._gain, self._room.in_head_frame(self._last.motion.rotation)])
         pictures = self._relighting.raised_lights(*self._relighter.relight(maps))
         presence = float(self._last.motion.presence)
         plan = RatioPlan(self._last.frame, presence, self._room.gain, pictures, self._positions, self._eye_distance)
