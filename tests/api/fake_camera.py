@@ -312,7 +312,7 @@ class FakeReplays:
 
     def video(self, name: str) -> Path:
         if self.status(name).stage is not ReplayStage.DONE:
-            raise NotFoundError(f"no video of the replay '{name}'", "wait for its end")
+            raise ConflictError(f"the replay '{name}' has no video yet", "wait for its end")
         return self.folder / f"{name}.mp4"
 
     def remove(self, name: str) -> None:

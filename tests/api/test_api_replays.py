@@ -14,7 +14,8 @@ def test_a_video_is_sent_followed_watched_and_deleted(client: Client, camera: Fa
     assert answer.status_code == 202, answer.text
     assert (answer.json()["name"], answer.json()["stage"], answer.json()["video"]) == ("my talk", "working", None)
     check_problem(client.upload(PATH, "other", b"a video", "talk.mp4"), 409)
-    check_problem(client.get(f"{PATH}/my talk/video"), 404)
+    check_problem(client.get(f"{PATH}/my talk/video"), 409)
+    check_problem(client.get(f"{PATH}/other/video"), 404)
     camera.replays.finish("my talk")
     assert [each["stage"] for each in client.get(PATH).json()] == ["done"]
     done = client.get(f"{PATH}/my talk").json()

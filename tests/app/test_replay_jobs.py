@@ -93,9 +93,7 @@ def test_a_video_is_relit_as_the_scene_says_whole_and_kept(room: Opener) -> None
     assert done == ReplayStatus("talk", ReplayStage.DONE, 1.0, 30, path, what)
     assert there.jobs.video("talk").read_text() == "16 pixels at 40, split 0 by mesh"
     assert there.files() == {"talk.mp4"}
-    told = []
-    while not there.events.empty():
-        told.append(there.events.get().data)
+    told = [there.events.get(timeout=10.0).data for _ in range(4)]
     assert [each["stage"] for each in told] == ["receiving", "working", "working", "done"]
     assert (told[2]["progress"], told[2]["frames"]) == (0.5, 15)
     again = room(write_quickly)
@@ -166,6 +164,16 @@ def test_what_is_refused_is_told_until_it_is_removed_or_another_is_sent(room: Op
     there.end()
     there.jobs.remove("talk")
     assert there.jobs.all() == []
+
+
+def test_before_its_end_there_is_no_video(room: Opener) -> None:
+    there = room(write_quickly)
+    with there.jobs.receive("talk", "my talk.mov") as upload:
+        upload.path.write_bytes(VIDEO)
+        with pytest.raises(ConflictError, match="no video yet"):
+            there.jobs.video("talk")
+    with pytest.raises(NotFoundError):
+        there.jobs.video("song")
 
 
 def test_an_upload_that_breaks_off_or_is_removed_is_not_begun(room: Opener) -> None:

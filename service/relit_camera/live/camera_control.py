@@ -246,6 +246,7 @@ class ReplayControl(Protocol):
         """The file of a relit video.
 
         Raises:
+            ConflictError: it is not done.
             NotFoundError: there is none of that name.
         """
         ...

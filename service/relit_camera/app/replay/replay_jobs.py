@@ -91,7 +91,7 @@ class ReplayJobs:
         return [found[name] for name in sorted(found)]
 
     def status(self, name: str) -> ReplayStatus:
-        """One of them; see `ReplayControl.status`."""
+        """How far one is; see `ReplayControl.status`."""
         last = self._last
         if last is not None and last.name == name:
             return last
@@ -125,6 +125,8 @@ class ReplayJobs:
 
     def video(self, name: str) -> Path:
         """The file of a relit video; see `ReplayControl.video`."""
+        if self.status(name).stage is not ReplayStage.DONE:
+            raise ConflictError(f"the replay '{name}' has no video yet", "wait for its end; GET replays/NAME tells it")
         return self._results.path(name)
 
     def remove(self, name: str) -> None:

@@ -68,7 +68,7 @@ def get_replay(api: ApiContextDep, name: StoredName) -> ReplayStatus:
     return api.camera.replays.status(name)
 
 
-@router.get("/{name}/video", response_class=FileResponse, responses=VIDEO_RESPONSE | error_responses(404, 422))
+@router.get("/{name}/video", response_class=FileResponse, responses=VIDEO_RESPONSE | error_responses(404, 409, 422))
 def get_replay_video(api: ApiContextDep, name: StoredName) -> FileResponse:
     """The relit video; a part of it where the request has a `Range`."""
     path = api.camera.replays.video(name)
