@@ -117,7 +117,7 @@ def test_one_at_a_time_and_removed_while_it_runs(room: Opener) -> None:
     wait_until(lambda: there.jobs.status("talk").progress == 0.5)
     with pytest.raises(ConflictError, match="relit already"):
         there.send("other")
-    with pytest.raises(NotFoundError):
+    with pytest.raises(ConflictError, match="no video yet"):
         there.jobs.video("talk")
     there.jobs.remove("talk")
     assert there.files() == set()

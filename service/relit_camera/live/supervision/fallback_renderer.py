@@ -19,7 +19,7 @@ from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.reenactment.rest_layer import RestLayer
 from relit_camera.live.scene.light_transition import LightTransition
 from relit_camera.live.scene.scene import Scene
-from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.relighting.shared_relighters import shared_relighter
 from relit_camera.subject.subject import Subject
 
 log = logging.getLogger(__name__)
@@ -91,7 +91,7 @@ class _RelitSource:
 
     def __init__(self, subject: Subject, size: tuple[int, int]) -> None:
         self.subject = subject
-        self._relighter = BasisRelighter(subject)
+        self._relighter = shared_relighter(subject)
         subject.drop_pages()
         self._at_rest = RestLayer(subject, size)
         self._last: tuple[LightMap, WarpedLayer] | None = None

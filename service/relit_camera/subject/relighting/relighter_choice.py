@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 
 from relit_camera.base.models import provider_names
-from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.relighting.onnx_relighter import OnnxBasisRelighter
 from relit_camera.subject.relighting.relighter import Relighter, RelighterOptions
+from relit_camera.subject.relighting.shared_relighters import shared_relighter
 from relit_camera.subject.subject import Subject
 
 log = logging.getLogger(__name__)
@@ -22,9 +22,9 @@ def choose_relighter(subject: Subject, options: RelighterOptions) -> Relighter:
         DeviceError: the provider is strict, and cannot run it.
     """
     if provider_names.choose_provider(options.session.provider) == provider_names.CPU:
-        return BasisRelighter(subject, options)
+        return shared_relighter(subject, options)
     relighter = OnnxBasisRelighter(subject, options)
     if relighter.provider != provider_names.CPU:
         return relighter
     log.warning("relighting stays on the CPU: %s", relighter.session.why)
-    return BasisRelighter(subject, options)
+    return shared_relighter(subject, options)

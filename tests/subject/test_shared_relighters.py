@@ -1,0 +1,80 @@
+"""Relighters that are shared: made once, also by two threads at once, and gone when nobody has them."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import time
+import weakref
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.lab.bench.synthetic_subject import synthetic_subject
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.relighting.relighter import RelighterOptions
+from relit_camera.subject.relighting.shared_relighters import SharedRelighters
+from relit_camera.subject.subject import Subject
+
+
+class Maker:
+    """Makes relighters slowly, and counts them."""
+
+    def __init__(self) -> None:
+        self.made = 0
+
+    def __call__(self, subject: Subject, options: RelighterOptions) -> BasisRelighter:
+        self.made += 1
+        time.sleep(0.1)
+        return BasisRelighter(subject, options)
+
+
+def test_threads_that_want_it_at_once_have_the_same() -> None:
+    make = Maker()
+    shared, subject = SharedRelighters(make), synthetic_subject(16, 16)
+    with ThreadPoolExecutor(3) as pool:
+        found = list(pool.map(lambda _: shared.get(subject), range(3)))
+    assert make.made == 1
+    assert found[0] is found[1] is found[2]
+
+
+def test_another_subject_and_other_threads_have_their_own() -> None:
+    shared, subject = SharedRelighters(), synthetic_subject(16, 16)
+    first, other = shared.get(subject), shared.get(synthetic_subject(16, 16))
+    two = shared.get(subject, RelighterOptions(SessionOptions("cpu", threads=2)))
+    assert len({id(first), id(other), id(two)}) == 3
+
+
+def test_what_nobody_has_is_not_kept() -> None:
+    make = Maker()
+    shared, subject = SharedRelighters(make), synthetic_subject(16, 16)
+    gone = weakref.ref(shared.get(subject))
+    gc.collect()
+    assert gone() is None
+    assert shared.get(subject) is not None
+    assert make.made == 2
+
+
+def test_a_subject_is_not_kept() -> None:
+    shared, subject = SharedRelighters(), synthetic_subject(16, 16)
+    relighter, gone = shared.get(subject), weakref.ref(subject)
+    del subject
+    gc.collect()
+    assert gone() is None
+    assert relighter is not None
+
+
+def test_one_that_cannot_be_made_is_tried_again() -> None:
+    failing = threading.Event()
+
+    def make(subject: Subject, options: RelighterOptions) -> BasisRelighter:
+        if not failing.is_set():
+            failing.set()
+            raise MemoryError
+        return BasisRelighter(subject, options)
+
+    shared, subject = SharedRelighters(make), synthetic_subject(16, 16)
+    with pytest.raises(MemoryError):
+        shared.get(subject)
+    assert shared.get(subject) is not None
