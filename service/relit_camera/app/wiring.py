@@ -16,7 +16,7 @@ from relit_camera.face.motion.one_euro_filter import FACE_SMOOTHING
 from relit_camera.face.tracking.trackers import TRACKERS, TrackerOptions, open_tracker
 from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderMode
 from relit_camera.live.modes.ratio_mode import RatioMode
-from relit_camera.live.modes.ratio_relighting import RatioRelighting
+from relit_camera.live.modes.ratio_relighting import RatioRelighting, as_large_as_needed
 from relit_camera.live.modes.reenact_mode import ReenactMode
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.pipeline import Pipeline
@@ -103,7 +103,8 @@ def mode_factories(settings: RelitSettings) -> Mapping[Mode, ModeFactory]:
 
     def ratio(context: ModeContext) -> RenderMode:
         room_light = RoomLightEstimator(context.subject, context.face)
-        relighting = RatioRelighting(context.subject, context.face, room_light, DenseMotion(session))
-        return RatioMode(context, relighting)
+        subject, face = as_large_as_needed(context.subject, context.face)
+        relighting = RatioRelighting(subject, face, room_light, DenseMotion(session))
+        return RatioMode(context, relighting, context.open_scene_relighting(subject, face))
 
     return {Mode.REENACT: reenact, Mode.RATIO: ratio}

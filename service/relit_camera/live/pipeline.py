@@ -19,7 +19,7 @@ from relit_camera.live.compositing.compositor import Compositor
 from relit_camera.live.modes.frame_fitting import fit_frame
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, ModeFactory, RenderedFrame, RenderMode, RenderTask
 from relit_camera.live.modes.scene_relighting import SceneRelighting
-from relit_camera.live.reenactment.source_image import find_source_face
+from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
 from relit_camera.live.render_quality import FULL_QUALITY, RenderQuality
 from relit_camera.live.scene.light_transition import LightTransition
 from relit_camera.live.scene.scene import Scene
@@ -209,6 +209,9 @@ class Pipeline:
         what = f"mode {FALLBACK_MODE} is shown in place of mode {name}"
         self._troubles["mode"] = Degradation(what, mismatch.why, mismatch.cure, code=DegradationCode.FACE_MISMATCH)
 
+    def _open_scene_relighting(self, subject: Subject, face: SourceFace) -> SceneRelighting:
+        return SceneRelighting(subject, face, self._open_relighter(subject), self._light, self.timer)
+
     def _mode(self, subject: Subject, name: Mode) -> RenderMode:
         """The object of that mode for that subject, made anew when either changes."""
         active = self._active
@@ -222,8 +225,8 @@ class Pipeline:
             context = ModeContext(
                 subject=subject,
                 face=face,
-                relighter=relighter,
                 scene_relighting=SceneRelighting(subject, face, relighter, self._light, self.timer),
+                open_scene_relighting=self._open_scene_relighting,
                 compositor=self._compositor,
                 size=self._size,
                 timer=self.timer,

@@ -14,7 +14,6 @@ from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.stage_timing import StageTimer
-from relit_camera.subject.relighting.relighter import Relighter
 from relit_camera.subject.subject import Subject
 
 
@@ -62,8 +61,8 @@ class ModeContext:
     Attributes:
         subject: the person.
         face: the face in the subject's source image, in the tracker's landmark scheme.
-        relighter: of that subject, for lights other than the scene's.
         scene_relighting: relights that subject as the scene says.
+        open_scene_relighting: makes another one, for a subject and the face in its source image.
         compositor: puts the person before the background.
         size: (width, height) of the pictures to make.
         timer: counts the stages.
@@ -71,8 +70,8 @@ class ModeContext:
 
     subject: Subject
     face: SourceFace
-    relighter: Relighter
     scene_relighting: SceneRelighting
+    open_scene_relighting: Callable[[Subject, SourceFace], SceneRelighting]
     compositor: Compositor
     size: tuple[int, int]
     timer: StageTimer

@@ -14,6 +14,7 @@ from relit_camera.live.modes.identity_check import IdentityCheck
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
 from relit_camera.live.modes.reenact_mode import blend_with_source
+from relit_camera.live.modes.scene_relighting import SceneRelighting
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.reenactment.rest_layer import RestLayer
 from relit_camera.live.render_quality import RenderQuality
@@ -28,9 +29,17 @@ class RatioMode:
     shows it while it searches, until the live face has passed for the subject's; between them it is eased.
     """
 
-    def __init__(self, context: ModeContext, relighting: RatioRelighting) -> None:
+    def __init__(self, context: ModeContext, relighting: RatioRelighting, compared: SceneRelighting) -> None:
+        """Set up.
+
+        Args:
+            context: what the mode works with.
+            relighting: of the live picture.
+            compared: relights the source image that `relighting` was made for.
+        """
         self._context = context
         self._relighting = relighting
+        self._compared = compared
         self._identity = IdentityCheck(context.face)
         self._at_rest = RestLayer(context.subject, context.size)
         self._last_rest: tuple[LinearImage, float, WarpedLayer] | None = None
@@ -107,7 +116,7 @@ class RatioMode:
             mismatch = self._identity.check(motion, room.residual, frame.time_s)
         if mismatch is not None:
             return mismatch
-        pictures = context.scene_relighting.compare(
+        pictures = self._compared.compare(
             scene,
             motion.rotation,
             frame.time_s,

@@ -24,8 +24,9 @@ from relit_camera.live.reenactment.control_points import control_points, feature
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.face_mesh import triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
-from relit_camera.live.reenactment.source_image import SourceFace, feather_edges
+from relit_camera.live.reenactment.source_image import SourceFace, feather_edges, half_size_face
 from relit_camera.live.reenactment.warp import Box, PositionGrid, Warp
+from relit_camera.subject.half_size import half_size_subject
 from relit_camera.subject.subject import Subject
 
 RATIO_FLOOR = 0.03
@@ -201,6 +202,13 @@ class RatioRelighting:
         # Lids and lips are the live picture's; the light on them is that of the skin round them.
         flow = face_and_head_flow(self._motion, self._mesh, self._points, target, moved, pose, fine=False)
         return Warp(source_from_live, flow)
+
+
+def as_large_as_needed(subject: Subject, face: SourceFace) -> tuple[Subject, SourceFace]:
+    """The subject and its face at half their size where the cells of the ratio still are no smaller than its pixels."""
+    if min(subject.size) < 2 * RATIO_CELLS:
+        return subject, face
+    return half_size_subject(subject), half_size_face(face)
 
 
 def ratio_confidence(matte: Mask) -> Mask:

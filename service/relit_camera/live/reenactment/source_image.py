@@ -6,7 +6,7 @@ warped together with the picture.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -79,6 +79,13 @@ def find_source_face(subject: Subject, tracker: Tracker) -> SourceFace:
     if pose is None:
         raise SubjectError("no head pose fits the landmarks of the subject's face", "build the subject again")
     return SourceFace(scheme, landmarks, pose, unproject(landmarks, pose, scheme, subject.size), subject.size)
+
+
+def half_size_face(face: SourceFace) -> SourceFace:
+    """The face in the source image at half its size, see `subject.half_size`."""
+    width, height = (-(-side // 2) for side in face.size)
+    pose = replace(face.pose, focal_px=face.pose.focal_px / 2)
+    return replace(face, landmarks=face.landmarks / np.float32(2), pose=pose, size=(width, height))
 
 
 def _tracked_landmarks(subject: Subject, tracker: Tracker) -> Points | None:

@@ -15,7 +15,7 @@ from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
-from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
+from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting, as_large_as_needed
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.source_image import find_source_face
@@ -67,9 +67,10 @@ class LiveRatio:
             SubjectError: there is no face in the subject's picture.
         """
         face = find_source_face(subject, tracker)
-        self._relighter = BasisRelighter(subject)
         estimator = RoomLightEstimator(subject, face)
-        self._relighting = RatioRelighting(subject, face, estimator, DenseMotion(SessionOptions("cpu")))
+        compared, compared_face = as_large_as_needed(subject, face)
+        self._relighter = BasisRelighter(compared)
+        self._relighting = RatioRelighting(compared, compared_face, estimator, DenseMotion(SessionOptions("cpu")))
         self._gain = np.float32(subject.metadata.display_gain)
         for each in followed:
             room = estimator.update(each.frame.image, each.motion.landmarks, each.motion.rotation, each.frame.time_s)
