@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.capture.expressions.still_crops import MAX_ENLARGEMENT, StillCropper
+from relit_camera.capture.expressions.still_crops import MAX_ENLARGEMENT, StillCropper, black_beyond_face
 from relit_camera.subject.expression_stills import MAX_STILL_SIDE_PX
 from tests.capture.expressions.talking_film import SCHEME, SIZE, moved_points, tracked
 
@@ -47,3 +47,14 @@ def test_the_room_behind_is_not_kept() -> None:
     assert (corners == corners[0]).all()
     x, y = landmarks[1].astype(int)
     assert image[y - 5 : y + 5, x - 5 : x + 5].std() > 30
+
+
+@pytest.mark.parametrize("source_span", [20.0, 1000.0])
+def test_what_is_black_beyond_the_face_is_in_no_still(source_span: float) -> None:
+    faces = [tracked(0, moved_points()), tracked(1, moved_points(open_cm=1.5), yaw=30)]
+    cropper = StillCropper(faces, SCHEME, source_span)
+    room = np.random.default_rng(0).integers(0, 256, (SIZE[1], SIZE[0], 3)).astype(np.uint8)
+    for face in faces:
+        kept = black_beyond_face(room, face.landmarks)
+        assert (kept == 0).mean() > 0.5
+        np.testing.assert_array_equal(cropper.crop(kept, face)[0], cropper.crop(room, face)[0])

@@ -72,7 +72,7 @@ class FilmedStills:
     Attributes:
         film: the faces in all frames.
         selection: those that become stills.
-        frames: by index, in order of time, JPEG files of the frames that are needed.
+        frames: by index, in order of time, JPEG files of the frames that are needed, black beyond the face.
     """
 
     film: TrackedFilm
@@ -130,6 +130,7 @@ class GuidedFilming:
         from relit_camera.app.captures.expression_capture import frames_for_stills
         from relit_camera.capture.expressions.film_tracking import FaceCollection
         from relit_camera.capture.expressions.live_prompts import NEUTRAL, PROMPTS, LiveCoverage, PromptSequence
+        from relit_camera.capture.expressions.still_crops import black_beyond_face
         from relit_camera.capture.expressions.still_selection import select_stills
 
         faces = FaceCollection(self._new_tracker(), CALLED)
@@ -148,7 +149,8 @@ class GuidedFilming:
             face = faces.add(replace(frame, index=count, time_s=time_s))
             if face is not None:
                 seen_at = face_at = time_s
-                frames[count] = encode_display(frame.image, ".jpg", self._timings.jpeg_quality)
+                kept = black_beyond_face(frame.image, face.landmarks)
+                frames[count] = encode_display(kept, ".jpg", self._timings.jpeg_quality)
                 coverage.update(face, prompts.name == NEUTRAL)
                 prompts.update(time_s, coverage.covered)
             elif time_s - seen_at > self._timings.lost_s:
