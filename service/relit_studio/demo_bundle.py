@@ -9,10 +9,11 @@ from tempfile import TemporaryDirectory
 
 import cv2
 
+from relit_camera.app.captures.expression_capture import capture_expressions
 from relit_camera.app.demo import demo_files
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.image_types import Mask
-from relit_camera.base.storage.atomic_files import make_folder, write_atomic
+from relit_camera.base.storage.atomic_files import atomic_path, make_folder, write_atomic
 from relit_camera.capture.picture_import import import_samples
 from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD
 from relit_camera.capture.subject_builder import build_subject
@@ -20,7 +21,7 @@ from relit_camera.capture.subject_landmarks import read_landmarks
 from relit_camera.face.matte_files import write_mattes
 from relit_camera.face.tracking.track_recording import read_track
 from relit_camera.subject.compression.webp_packing import pack_subject
-from relit_camera.subject.subject_file import write_subject
+from relit_camera.subject.subject_file import read_subject, write_stills, write_subject
 from relit_studio.base.progress import Progress, no_progress
 from relit_studio.cycles.exr import read_rgba
 
@@ -28,7 +29,14 @@ MAX_BYTES = {demo_files.SUBJECT.name: 8_000_000, demo_files.CLIP.name: 4_000_000
 _MATTE_SHRINK = 2
 
 
-def make_bundle(field: Path, clip: Path, out: Path, components: int, progress: Progress = no_progress) -> list[Path]:
+def make_bundle(
+    field: Path,
+    clip: Path,
+    out: Path,
+    components: int,
+    progress: Progress = no_progress,
+    expressions: Path | None = None,
+) -> list[Path]:
     """Write the demonstration's files into `out` and return them.
 
     Args:
@@ -37,17 +45,23 @@ def make_bundle(field: Path, clip: Path, out: Path, components: int, progress: P
         out: folder to write to.
         components: principal pictures that the subject keeps.
         progress: told of the field's pictures as they are read.
+        expressions: another folder of `drive`, of which the subject gets expression stills; none without.
 
     Raises:
-        InputError: a folder is not finished, or the person is not the same in both.
+        InputError: a folder is not finished, or the person is not the same in all.
         LightsError, ImageError, TrackError: a file in it is damaged.
+        CaptureError, ModelError: no stills can be made.
         StorageError: a file cannot be written.
     """
-    _check_same_person(field / "field.json", clip / "drive.json")
+    for folder in (clip, expressions):
+        if folder is not None:
+            _check_same_person(field / "field.json", folder / "drive.json")
     frames = _frames(clip, len(read_track(clip / demo_files.TRACK.name).frames))
     make_folder(out)
     with TemporaryDirectory(prefix=".bundle.", dir=out) as name:
         made = _write(field, clip, frames, Path(name), components, progress)
+        if expressions is not None:
+            _add_stills(made[0], _existing(expressions / demo_files.CLIP.name))
         for path in made:
             max_bytes = MAX_BYTES.get(path.name)
             if max_bytes and path.stat().st_size > max_bytes:
@@ -80,6 +94,13 @@ def _write(
     lines = json.loads(_existing(clip / "truth.json").read_text(encoding="utf-8"))["credits"]
     write_atomic(credits_file, _credits_text(lines))
     return made
+
+
+def _add_stills(subject: Path, film: Path) -> None:
+    """Give the subject in a file the expression stills of a film of that person."""
+    stills = capture_expressions(film, read_subject(subject)).stills
+    with atomic_path(subject) as path:
+        write_stills(subject, path, stills)
 
 
 def _check_same_person(field: Path, drive: Path) -> None:

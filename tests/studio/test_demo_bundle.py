@@ -11,15 +11,18 @@ import numpy as np
 import OpenEXR
 import pytest
 
+from relit_camera.app.captures.expression_capture import ExpressionCapture
 from relit_camera.base.errors import InputError
 from relit_camera.base.images.image_types import Frame
+from relit_camera.capture.expressions.still_selection import Selection
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.face.matting import RecordedMatting
 from relit_camera.face.tracking.track_recording import read_track
 from relit_camera.subject.subject import Subject
-from relit_camera.subject.subject_file import read_subject
+from relit_camera.subject.subject_file import count_stills, read_subject
 from relit_studio import demo_bundle
 from relit_studio.demo_bundle import make_bundle
+from tests.app.still_builders import grey_still
 
 SIDE = 96
 BUILT: list[Subject] = []
@@ -70,6 +73,26 @@ def test_the_demo_has_all_it_needs(rendered: tuple[Path, Path], tmp_path: Path) 
         found = mattes.matte(Frame(np.zeros((SIDE, SIDE, 3), np.uint8), index, 0.0, 0.0))
         assert found[: 18 + 8 * index].max() == 0
         assert found[22 + 8 * index :].min() == 255
+
+
+def test_it_has_the_expression_stills_of_another_film(
+    rendered: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    films: list[Path] = []
+
+    def capture(film: Path, subject: Subject) -> ExpressionCapture:
+        films.append(film)
+        return ExpressionCapture((grey_still(),), Selection((), ()))
+
+    monkeypatch.setattr(demo_bundle, "capture_expressions", capture)
+    other = tmp_path / "other"
+    shutil.copytree(rendered[1], other)
+    make_bundle(*rendered, tmp_path / "out", 6, expressions=other)
+    assert films == [other / "clip.mp4"]
+    assert count_stills(tmp_path / "out" / "adam.relit") == 1
+    (other / "drive.json").write_text(json.dumps({"person": {"name": "bea"}}))
+    with pytest.raises(InputError, match=r"of adam, and .* of bea"):
+        make_bundle(*rendered, tmp_path / "out", 6, expressions=other)
 
 
 def test_two_people_are_not_mixed(rendered: tuple[Path, Path], tmp_path: Path) -> None:
