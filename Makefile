@@ -57,18 +57,20 @@ image-steps: setup ## the image's build without Docker: a wheel, installed by it
 tool-install: setup ## the wheel as users install it, used from an empty home; make tool-install WITH=pipx
 	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
+# What is compiled once need not be by each of the hundreds of processes that tests start.
+pytest: export PYTHONDONTWRITEBYTECODE =
 pytest: setup ## the tests alone, in two processes; make pytest PROCESSES=4
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire
 	# By themselves: browser and emulated machine take both cores, and tests that hold in real time would not.
 	$(BIN)/python -m pytest tests/pipewire
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup tests/browser
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder tests/browser
 	$(BIN)/python -m pytest tests/vm
 
 fuzz: setup ## mutated files on every reader, for an hour; make fuzz FUZZ="--seconds 60 --seed 3"
 	$(BIN)/python -m tests.fuzz.fuzzing $(FUZZ)
 
 coverage: setup ## the first of these with the share of lines that they execute: build/coverage/index.html
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire --cov --cov-report=
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire --cov --cov-report=
 	$(BIN)/python scripts/coverage_summary.py
 	$(BIN)/coverage html --quiet --directory build/coverage
 

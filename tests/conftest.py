@@ -33,12 +33,14 @@ def pytest_configure() -> None:
     os.environ["PIPEWIRE_RUNTIME_DIR"] = str(run_folder() / "no-session")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Group the tests for `pytest -n 2 --dist loadgroup`, and order the groups.
 
     A group runs in one process, one test after another: the tests of a file, which share its fixtures; all tests marked
     `real_time`, which would else slow each other; and all that use the virtual machine. The longest groups come first,
-    so that no process waits for the other at the end.
+    so that no process waits for the other at the end; `--no-loadscope-reorder` keeps that order. First of all hooks, as
+    pytest-xdist's reads the groups.
     """
     slow = {_group(item) for item in items if item.get_closest_marker("slow")}
     for item in items:

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 
 import httpx
@@ -22,22 +21,16 @@ from relit_camera.devices.sinks.sink import NullSink
 from relit_camera.devices.sources.playback_source import PlaybackSource, TimedImage
 from relit_camera.devices.sources.source import Source, SourceInfo
 from relit_camera.face.face_state import FaceState, Tracker
-from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.subject import Subject
+from tests.generated_subject import small_subject
 
 SIZE = (128, 96)
 FPS = 20.0
 WAIT_S = 60.0
 """Long enough for a slow machine that has much else to do."""
-
-
-@cache
-def small_subject() -> Subject:
-    """A generated subject of 64 lights, 64 x 80 pixels."""
-    return synthetic_subject(64, 80)
 
 
 class SteadyTracker(SyntheticTracker):

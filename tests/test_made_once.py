@@ -1,4 +1,4 @@
-"""Material is made once in a test run."""
+"""Material is made once in a test run, and a module's fixtures are too."""
 
 from __future__ import annotations
 
@@ -46,3 +46,9 @@ def test_what_failed_half_way_is_made_anew() -> None:
     with pytest.raises(OSError, match="no more space"):
         made_once("file.txt", fail)
     assert made_once("file.txt", lambda path: path.write_text("whole")).read_text() == "whole"
+
+
+def test_the_tests_of_a_module_run_in_one_process(request: pytest.FixtureRequest) -> None:
+    """Else each process of `pytest -n 2` makes the module's fixtures, and tests in real time slow each other."""
+    grouped = bool(request.config.getoption("loadgroup", False))
+    assert request.node.nodeid.endswith("@tests/test_made_once.py") is grouped

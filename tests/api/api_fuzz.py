@@ -18,7 +18,7 @@ from relit_camera.api.server.http_server import start_api_server
 from relit_camera.base.config.settings import RelitSettings, ServerSettings, StorageSettings
 from relit_camera.subject.subject_file import write_subject
 from tests.api.fake_camera import FakeCamera
-from tests.small_camera import small_subject
+from tests.generated_subject import small_subject
 
 CONFIGURATION = Path(__file__).with_name("schemathesis.toml")
 ENDLESS = r"/(events|preview\.mjpg)$"

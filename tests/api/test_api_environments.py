@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
 from tests.api.api_client import Client, check_problem, decoded_picture, hdr, png
 from tests.api.fake_camera import FakeCamera
-from tests.small_camera import difference, small_subject
+from tests.generated_subject import generated_subject, small_subject
+from tests.small_camera import difference
 
 ENVIRONMENTS = "/api/v1/environments"
 
@@ -141,7 +141,7 @@ def test_another_person_has_other_pictures(client: Client, camera: FakeCamera) -
     camera.scene_controller.show_subject("small", small_subject())
     client.upload(ENVIRONMENTS, "room", hdr(), "room.hdr")
     one = client.get(f"{ENVIRONMENTS}/room/on-me.jpg").content
-    camera.scene_controller.show_subject("other", synthetic_subject(64, 96))
+    camera.scene_controller.show_subject("other", generated_subject(96, 128))
     assert client.get(f"{ENVIRONMENTS}/room/on-me.jpg").content != one
     camera.scene_controller.environments.remove("room")
     client.upload(ENVIRONMENTS, "room", hdr(128, 64), "room.hdr")

@@ -11,7 +11,7 @@ from relit_camera.api.routes.whole_scene import matching_revisions
 from relit_camera.subject.subject_file import write_subject
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import FakeCamera
-from tests.small_camera import small_subject
+from tests.generated_subject import small_subject
 
 SCENE = "/api/v1/scene"
 

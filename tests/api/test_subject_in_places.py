@@ -8,7 +8,7 @@ import weakref
 from relit_camera.api.subject_in_places import SubjectInPlaces
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.environments.environment_store import EnvironmentStore
-from tests.small_camera import small_subject
+from tests.generated_subject import small_subject
 
 
 def test_the_picture_is_kept_and_the_environment_is_not() -> None:

@@ -12,7 +12,7 @@ from relit_camera.base.config.settings_loader import load_settings
 from relit_camera.base.errors import ConfigError, RelitError
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.subject.subject_file import write_subject
-from tests.cli.relit_command import small_subject
+from tests.generated_subject import small_subject
 
 
 @pytest.fixture

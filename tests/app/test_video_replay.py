@@ -19,7 +19,8 @@ from relit_camera.face.face_state import LOST, FaceState, Tracker
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.scene.scene import Scene
-from tests.small_camera import SteadyTracker, small_subject
+from tests.generated_subject import small_subject
+from tests.small_camera import SteadyTracker
 
 COUNT, FPS = 12, 12.5
 

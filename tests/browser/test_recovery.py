@@ -34,6 +34,7 @@ def check(panel: Panel, name: str) -> Locator:
     return panel.page.locator(f'#checks li[data-check="{name}"]')
 
 
+@pytest.mark.slow
 def test_webcam_module_and_models_are_missing_until_they_are_there(
     staged: StagedCamera, models: Path, tmp_path: Path, open_page: OpenPage, timed: Timed
 ) -> None:

@@ -181,6 +181,7 @@ def test_everybody_can_use_it_at_every_width(fake: FakeServer, open_page: OpenPa
     assert found == []
 
 
+@pytest.mark.slow
 def test_one_s_own_stills_from_a_recorded_webcam(
     tmp_path: Path, models: Path, open_page: OpenPage, timed: Timed
 ) -> None:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from unittest.mock import patch
@@ -19,10 +19,9 @@ from relit_camera.base.images.image_types import Frame
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.cli.main import run
 from relit_camera.face.tracking.track_recording import TrackRecorder
-from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
-from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import write_subject
+from tests.generated_subject import small_subject
 
 COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'relit'; from relit_camera.cli.main import run; run()"]
 CLIP_SIZE, CLIP_FPS = (128, 96), 20.0
@@ -101,11 +100,6 @@ def environment(folder: Path) -> dict[str, str]:
 def files(folder: Path) -> set[str]:
     """Every file and folder below, hidden ones too."""
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
-
-
-@cache
-def small_subject() -> Subject:
-    return synthetic_subject(64, 80)
 
 
 @dataclass(frozen=True)

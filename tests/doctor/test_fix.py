@@ -21,8 +21,9 @@ from relit_camera.doctor.report import FileOutcome, FixedFile, FixResult, Severi
 from relit_camera.doctor.run_checks import run_checks
 from relit_camera.doctor.systemd_unit import check_service, is_unmodified, unit_path, unit_text
 from relit_camera.subject.subject_file import write_subject
-from tests.cli.relit_command import call, small_subject
+from tests.cli.relit_command import call
 from tests.doctor.fake_host import RELEASE, FakeMachine, everybody_may, expect, nobody_may
+from tests.generated_subject import small_subject
 
 CAMERA = OutputSettings()
 

@@ -22,6 +22,7 @@ from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.supervision.pipeline_health import HealthLimits
 from relit_camera.subject.subject_file import write_subject
 from tests.faults.watched_camera import Survived, TimedSink, watched_camera
+from tests.generated_subject import small_subject
 from tests.small_camera import (
     FPS,
     SIZE,
@@ -30,7 +31,6 @@ from tests.small_camera import (
     grey,
     memory_source,
     running_camera,
-    small_subject,
     wait_until,
 )
 

@@ -90,7 +90,7 @@ def corpus() -> dict[str, tuple[tuple[str, bytes], ...]]:
 
 
 def _packed_subject() -> bytes:
-    from tests.cli.relit_command import small_subject
+    from tests.generated_subject import small_subject
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "a.relit"

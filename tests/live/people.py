@@ -17,12 +17,12 @@ from relit_camera.face.head_pose import HeadPose, guess_focal, project
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.face.motion.neutral_face import NeutralFace
-from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.live.compositing.alpha_compositing import split_alpha
 from relit_camera.live.reenactment.reenactor import Reenactor, ReenactorContext, WarpedLayer
 from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
 from relit_camera.live.render_quality import FULL_QUALITY
 from relit_camera.subject.subject import Subject
+from tests.generated_subject import generated_subject
 
 SCHEME = landmark_scheme("mesh478")
 LIVE_SIZE = (320, 240)
@@ -45,7 +45,7 @@ class Blind:
 @cache
 def close_up() -> Subject:
     """A face that fills its picture, 96 x 128, cut off by the border; not taken over black."""
-    subject = synthetic_subject(96, 128)
+    subject = generated_subject(96, 128)
     return dataclasses.replace(subject, metadata=subject.metadata.model_copy(update={"over_black": False}))
 
 

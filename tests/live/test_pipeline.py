@@ -21,7 +21,6 @@ from relit_camera.base.images.image_types import Alpha, Frame, LinearImage
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.live.modes.frame_fitting import fit_frame
@@ -34,7 +33,8 @@ from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.relighter import Relighter, open_relighter
 from relit_camera.subject.subject import Subject
-from tests.small_camera import SIZE, SteadyTracker, difference, grey, small_subject
+from tests.generated_subject import small_subject
+from tests.small_camera import SIZE, SteadyTracker, difference, grey
 
 CPU = RelitSettings(inference=InferenceSettings(provider="cpu"))
 STUDIO = builtin_environment("studio")
@@ -394,7 +394,7 @@ def test_it_says_when_models_are_opened() -> None:
     follower = make_follower(CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere)
     made.on_opening = lambda: said.append("opening")
-    blurred, other = scene(mode=Mode.RATIO, background={"kind": "blur"}), synthetic_subject(64, 80)
+    blurred, other = scene(mode=Mode.RATIO, background={"kind": "blur"}), replace(small_subject())
     ratio = scene(mode=Mode.RATIO)
     for wanted in (scene(), scene(), ratio, blurred, blurred, scene(), replace(scene(), subject=other)):
         made.process(frame(), wanted)

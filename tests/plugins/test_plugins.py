@@ -32,7 +32,8 @@ from relit_camera.live.status.event_hub import EventHub
 from relit_camera.live.status.status_board import StatusBoard
 from relit_camera.subject.relighting.relighter import RELIGHTERS
 from tests.cli.relit_command import Material, call, start
-from tests.small_camera import small_subject, wait_until
+from tests.generated_subject import small_subject
+from tests.small_camera import wait_until
 from tests.synthetic import sphere_samples
 
 FOLDER = Path(__file__).parent

@@ -24,7 +24,8 @@ from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import DegradationCode
 from tests.devices.fake_devices import FakeCapture, FakeTree
-from tests.small_camera import FPS, SIZE, SteadyTracker, difference, small_subject, wait_until
+from tests.generated_subject import small_subject
+from tests.small_camera import FPS, SIZE, SteadyTracker, difference, wait_until
 
 pytestmark = pytest.mark.real_time
 

@@ -25,7 +25,7 @@ from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.subject.subject_file import write_subject
 from tests.api.api_client import hdr
-from tests.small_camera import small_subject
+from tests.generated_subject import small_subject
 
 NOTHING_GIVEN = GivenOptions()
 

@@ -28,7 +28,7 @@ from relit_camera.light.light_map import irradiance
 from relit_camera.live.scene.look_loader import BACKGROUND_ENVIRONMENT
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.subject.subject_file import write_subject
-from tests.small_camera import small_subject
+from tests.generated_subject import small_subject
 
 
 @pytest.fixture

@@ -73,7 +73,7 @@ def bench(
     from relit_camera.lab.bench.relighting_benchmark import benchmark_gpu_transfer, benchmark_relighting
     from relit_camera.lab.bench.synthetic_subject import synthetic_subject
     from relit_camera.light.environments.environment_panorama import read_panorama
-    from relit_camera.light.light_map import resample_to_light_map
+    from relit_camera.light.light_map import LightMap, resample_to_light_map
     from relit_camera.live.scene.scene_controller import SceneController
     from relit_camera.subject.subject_store import SubjectStore
 
@@ -91,13 +91,16 @@ def bench(
         settings = settings.model_copy(update={"tracker": settings.tracker.model_copy(update={"name": tracker})})
     result: dict[str, Any] = {"machine": machine_info()}
     # Open everything before the long measurements, so that missing files are reported at once.
-    scene_controller = SceneController(settings.storage)
-    measured = SubjectStore(settings.storage.subjects).resolve(subject)[1] if subject else synthetic_subject()
-    maps = {name: scene_controller.environments.load(name).light_map for name in scene_controller.environments.names()}
+    measured = SubjectStore(settings.storage.subjects).resolve(subject)[1] if subject else None
+    maps: dict[str, LightMap] = {}
     if environments is not None:
         files = sorted(path for path in environments.iterdir() if path.suffix in (".hdr", ".exr"))
         maps |= {path.stem: resample_to_light_map(read_panorama(path).radiance) for path in files}
     open_source(settings.source).close()
+    if relighting:  # building a subject and painting environments takes ten seconds
+        measured = measured or synthetic_subject()
+        stored = SceneController(settings.storage).environments
+        maps = {name: stored.load(name).light_map for name in stored.names()} | maps
     if seconds:
         result["camera"] = []
         for cost in measure_cameras(settings, sizes, modes, backgrounds, source_fps, seconds):
@@ -106,6 +109,7 @@ def bench(
                 typer.echo(f"{cost_text(cost)}\n")
     if relighting:
         options = session_options(settings.inference)
+        assert measured is not None
         result["relight"] = benchmark_relighting(measured, maps, options)
         result["transfer"] = benchmark_gpu_transfer(options)
     typer.echo(json.dumps(result, indent=2) if as_json else _text({**result, "camera": None}))

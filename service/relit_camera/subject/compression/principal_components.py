@@ -13,6 +13,7 @@ from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 Values = NDArray[np.float32]
 
@@ -108,28 +109,44 @@ def fit_shared_basis(clusters: Sequence[ClusterComponents], allowed: float) -> S
 
     Principal components of the clusters' principal components are those of the whole, up to what the clusters dropped.
     """
-    energies, directions = _principal_directions(clusters)
-    lost = np.cumsum((directions**2 * energies)[:, ::-1], axis=1)[:, ::-1].max(axis=0)
-    enough = np.flatnonzero(lost <= allowed)
-    count = int(enough[0]) if len(enough) else len(energies)
-    vectors = np.ascontiguousarray(directions[:, : max(count, 1)].T, np.float32)
+    energies, directions, totals = _principal_directions(clusters, allowed)
+    left = totals[:, None] - np.cumsum(directions**2 * energies, axis=1)
+    enough = np.flatnonzero(left.max(axis=0) <= allowed)
+    count = int(enough[0]) + 1 if len(enough) else len(energies)
+    vectors = np.ascontiguousarray(directions[:, :count].T, np.float32)
     mixes = [(cluster.vectors.astype(np.float32) @ vectors.T).astype(np.float16) for cluster in clusters]
     return SharedBasis(vectors, mixes, _squared_error(clusters, vectors, mixes))
 
 
-def _principal_directions(clusters: Sequence[ClusterComponents]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Energies (count,), falling, and principal directions (columns, count) of all clusters' components together."""
+def _principal_directions(
+    clusters: Sequence[ClusterComponents], above: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Principal directions of all clusters' components together, and the energy of every column.
+
+    Returns:
+        Energies (count,), falling, and directions (columns, count): the first, and all others with an energy over
+        `above`. The rest cannot leave an error over `above` in any column. Then the columns' energies (columns,).
+    """
     columns = clusters[0].vectors.shape[1]
     weighted = (each.vectors.astype(np.float32) * np.sqrt(each.energies)[:, None] for each in clusters)
     if sum(len(each.scales) for each in clusters) < columns:
-        _, amounts, directions = np.linalg.svd(np.concatenate(list(weighted)).astype(np.float64), full_matrices=False)
-        return amounts**2, directions.T
+        rows = np.concatenate(list(weighted)).astype(np.float64)
+        energies, mixed = _strongest(rows @ rows.T, above)
+        directions = rows.T @ (mixed / np.sqrt(np.maximum(energies, 1e-20)))
+        return energies, directions, np.einsum("rc,rc->c", rows, rows)
     gram = np.zeros((columns, columns))
     for batch in iter(lambda: list(islice(weighted, CLUSTERS_PER_BATCH)), []):
         rows = np.concatenate(batch)
         gram += rows.T @ rows
-    energies, directions = np.linalg.eigh(gram)
-    return np.maximum(energies[::-1], 0), directions[:, ::-1]
+    return *_strongest(gram, above), np.diag(gram)
+
+
+def _strongest(gram: NDArray[np.float64], above: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Eigenvalues (count,) over `above`, falling, and their eigenvectors (size, count); the largest in any case."""
+    values, vectors = eigh(gram, subset_by_value=(above, np.inf))
+    if not len(values):
+        values, vectors = eigh(gram, subset_by_index=(len(gram) - 1, len(gram) - 1))
+    return np.maximum(values[::-1], 0), vectors[:, ::-1]
 
 
 def _squared_error(
