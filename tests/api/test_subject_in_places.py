@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import weakref
+from dataclasses import replace
 
 from relit_camera.api.subject_in_places import SubjectInPlaces
 from relit_camera.light.environments.environment_panorama import Environment
@@ -26,3 +27,12 @@ def test_the_picture_is_kept_and_the_environment_is_not() -> None:
     assert [each() for each in loaded] == [None]
     assert places.jpeg(subject, "place", lambda: load("sunset")).result(30) is first
     assert places.jpeg(subject, "place", lambda: load("party")).result(30) != first
+
+
+def test_a_subject_that_is_shown_no_more_is_not_kept() -> None:
+    subject, places = replace(small_subject()), SubjectInPlaces()
+    places.jpeg(subject, "place", lambda: EnvironmentStore().load("sunset")).result(30)
+    held = weakref.ref(subject)
+    del subject
+    gc.collect()
+    assert held() is None

@@ -23,6 +23,10 @@ def numbered(start: int) -> Decoded:
     return Decoded((array, np.array([1, 2, 3], np.uint8)), {"process": os.getpid(), "notes": ("a", "b")})
 
 
+def checked() -> Decoded:
+    return Decoded((), {"process": os.getpid()})
+
+
 def refuse() -> Decoded:
     raise ImageError("the file is no picture", "choose another")
 
@@ -210,3 +214,8 @@ def test_nothing_is_left_behind(process: DecodingProcess, tmp_path: Path) -> Non
     process.decode(numbered, 0)
     assert psutil.Process().num_fds() == open_files
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_process_goes_on_after_an_answer_without_arrays(process: DecodingProcess) -> None:
+    first = process.decode(checked).facts["process"]
+    assert process.decode(checked).facts["process"] == first

@@ -42,7 +42,7 @@ def test_each_is_light(name: str) -> None:
     assert radiance.dtype == np.float32
     assert np.isfinite(radiance).all()
     assert radiance.min() >= 0
-    np.testing.assert_allclose(total(environment.light_map), total(radiance), rtol=1e-5)
+    np.testing.assert_allclose(total(environment.light_map), total(radiance), rtol=5e-4)  # kept in 16 bits
 
 
 @pytest.mark.parametrize("name", BUILTIN_NAMES)

@@ -61,18 +61,14 @@ def test_loading_twice_reads_once_until_the_file_changes(store: EnvironmentStore
     assert store.load("room").light_map.max() == pytest.approx(3, rel=0.01)
 
 
-def test_what_was_read_last_is_kept_in_so_many_bytes(
-    store: EnvironmentStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    one = store.add("one", hdr(tmp_path / "a.hdr"))
-    size = one.panorama.radiance.nbytes
-    monkeypatch.setattr(environment_store, "MOST_KEPT_BYTES", 2 * size)
-    two, three = (store.add(name, hdr(tmp_path / "a.hdr")) for name in ("two", "three"))
-    assert store.load("two") is two
-    assert store.load("three") is three
-    assert store.load("one") is not one
-    monkeypatch.setattr(environment_store, "MOST_KEPT_BYTES", size - 1)
-    assert store.load("two") is store.load("two")  # the last one, however large it is
+def test_a_file_that_was_replaced_or_removed_takes_no_memory(store: EnvironmentStore, tmp_path: Path) -> None:
+    recent = environment_store._RECENT
+    store.add("room", hdr(tmp_path / "a.hdr"))
+    kept = recent.nbytes
+    store.add("room", hdr(tmp_path / "b.hdr", 3.0))
+    assert recent.nbytes == kept
+    store.remove("room")
+    assert recent.nbytes == kept - 16 * 32 * 3 * 2
 
 
 def test_a_replacement_of_another_format_leaves_one_file(store: EnvironmentStore, tmp_path: Path) -> None:

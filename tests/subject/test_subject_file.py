@@ -133,6 +133,23 @@ def _no_space(**_: object) -> None:
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
+@pytest.mark.parametrize("disk", ["free", "full"])
+def test_a_decoded_basis_can_be_dropped_from_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, disk: str) -> None:
+    path = tmp_path / "demonstration.relit"
+    shutil.copyfile(demo_files.SUBJECT, path)
+    if disk == "full":
+        monkeypatch.setattr("tempfile.TemporaryFile", _no_space)
+    copied, expected = read_subject(path, copied=True), read_subject(path).basis.values
+    owner: object = copied.basis.values
+    while isinstance(owner, np.ndarray):
+        owner = owner.base
+    assert isinstance(owner, mmap.mmap) == (disk == "free")
+    assert not copied.basis.values.flags.writeable
+    copied.drop_pages()
+    np.testing.assert_array_equal(copied.basis.values, expected)
+    assert list(tmp_path.iterdir()) == [path]
+
+
 def test_what_is_copied_may_be_less_than_what_is_mapped(path: Path) -> None:
     with path.open("ab") as file:
         file.truncate(MAX_COPIED_BYTES + 1)  # takes no room

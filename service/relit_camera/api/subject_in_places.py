@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+import weakref
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from hashlib import sha256
@@ -38,7 +39,8 @@ class SubjectInPlaces:
         self._lock = threading.Lock()
         self._waiting = 0
         # From here on: only in that thread.
-        self._subject: Subject | None = None
+        self._subject: Callable[[], Subject | None] = lambda: None
+        """A weak reference: a subject that is shown no more may be large."""
         self._made: dict[str, tuple[bytes, bytes]] = {}
         """The digest of the light, and the JPEG file, by the environment's name: the environment itself is large."""
         self._renderer: _SubjectRenderer | None = None
@@ -64,8 +66,8 @@ class SubjectInPlaces:
 
     def _kept_or_made(self, subject: Subject, name: str, load: Callable[[], Environment]) -> bytes:
         environment = load()
-        if subject is not self._subject:
-            self._subject, self._renderer = subject, None
+        if subject is not self._subject():
+            self._subject, self._renderer = weakref.ref(subject), None
             self._made.clear()
         found, light = self._made.pop(name, None), sha256(environment.light_map.tobytes()).digest()
         if found is None or found[0] != light:

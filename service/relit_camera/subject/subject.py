@@ -138,11 +138,12 @@ class Subject:
 
     def drop_pages(self) -> None:
         """Give back the memory of what was read of the mapped file; the system reads it again where it is needed."""
-        owner: object = self.coefficients
-        while isinstance(owner, np.ndarray):
-            owner = owner.base
-        if isinstance(owner, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
-            owner.madvise(mmap.MADV_DONTNEED)
+        for array in (self.coefficients, self.basis.values):
+            owner: object = array
+            while isinstance(owner, np.ndarray):
+                owner = owner.base
+            if isinstance(owner, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+                owner.madvise(mmap.MADV_DONTNEED)
 
     def pictures(self, amounts: NDArray[np.float32]) -> NDArray[np.float32]:
         """The linear pictures (count, height, width, 3) of amounts (components, count) of the shared basis."""

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -274,3 +277,18 @@ def test_another_picture_of_the_same_name_is_shown() -> None:
     renderer.static_background(BackgroundRequest(ImageBackground(image="office"), AT_ONCE, None, PICTURE), 0.0)
     other = BackgroundRequest(ImageBackground(image="office"), AT_ONCE, None, np.full_like(PICTURE, 9))
     assert (renderer.static_background(other, 1.0) == 9).all()
+
+
+@pytest.mark.parametrize("live", [False, True], ids=["another background", "the live room"])
+def test_a_place_that_is_shown_no_more_is_not_kept(room: MattedFrame, live: bool) -> None:
+    renderer = BackgroundRenderer(SIZE)
+    place = environment_from_panorama("grey", panorama_from_radiance(np.ones((32, 64, 3), np.float32)))
+    renderer.static_background(BackgroundRequest(EnvironmentBackground(), AT_ONCE, place), 0.0)
+    held = weakref.ref(place.panorama)
+    del place
+    if live:
+        renderer.live_background(BackgroundRequest(NoBackground(), AT_ONCE), room, 0.1)
+    else:
+        renderer.static_background(BackgroundRequest(ColorBackground(color="#336699"), AT_ONCE), 0.1)
+    gc.collect()
+    assert held() is None

@@ -132,3 +132,9 @@ def test_a_fine_panorama_does_not_alias_in_a_small_view() -> None:
     light = linear_from_display(EnvironmentView(panorama, (96, 54), 120.0).picture(UPRIGHT, UNIT))
     assert light.std() < 0.05
     assert light.mean() == pytest.approx(0.3, abs=0.02)
+
+
+def test_a_view_keeps_no_direction_for_each_pixel() -> None:
+    view = EnvironmentView(panorama_with_lamp(np.array([0.0, 0.0, -1.0])), (1280, 720), 50.0)
+    kept = sum(value.nbytes for value in vars(view).values() if isinstance(value, np.ndarray))
+    assert kept < 3 * 1280 * 720

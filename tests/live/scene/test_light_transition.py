@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -100,3 +102,12 @@ def test_a_clock_set_back_does_not_dazzle() -> None:
     low, high = sorted((ball(display_light(STUDIO, Lighting())), ball(display_light(STUDIO, Lighting(exposure_ev=-2)))))
     assert low - 1e-6 <= again <= high + 1e-6
     assert before <= high
+
+
+def test_the_panorama_of_the_last_light_is_not_kept() -> None:
+    environment = replace(builtin_environment("studio"))
+    held, transition = weakref.ref(environment), LightTransition()
+    transition.update(Scene(Look(), environment), 0.0)
+    del environment
+    gc.collect()
+    assert held() is None

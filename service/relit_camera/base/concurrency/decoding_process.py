@@ -13,7 +13,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
@@ -260,11 +260,15 @@ def _work(connection: Connection, most_bytes: int, cpu_limit_s: int) -> None:
             contents = [np.ascontiguousarray(array) for array in decoded.arrays]
             described = [[array.dtype.name, array.shape] for array in contents]
             _send(connection, {"arrays": described, "facts": decoded.facts})
-            for array in contents:
-                content = array.reshape(-1).view(np.uint8).data
-                for start in range(0, len(content), PART_BYTES):
-                    connection.send_bytes(content[start : start + PART_BYTES])
-            del decoded, contents, array, content
+            _send_arrays(connection, contents)
+            del decoded, contents  # not to be held while the next file is decoded
+
+
+def _send_arrays(connection: Connection, arrays: Sequence[NDArray[Any]]) -> None:
+    for array in arrays:
+        content = array.reshape(-1).view(np.uint8).data
+        for start in range(0, len(content), PART_BYTES):
+            connection.send_bytes(content[start : start + PART_BYTES])
 
 
 def _is_about_memory(error: BaseException | None) -> bool:

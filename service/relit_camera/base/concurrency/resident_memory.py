@@ -20,9 +20,11 @@ _MADV_DONTNEED = 4
 """Of madvise(2)."""
 RETAINED_BYTES = 32 << 20
 """More than any array of a frame, and the most that glibc takes."""
-GROWN_BYTES = 32 << 20
-"""More than the arrays of the frames in work take again after they were given back."""
-GIVEN_BACK_S = 30.0
+GROWN_BYTES = 12 << 20
+"""More than a steady camera's memory goes up and down."""
+GIVEN_BACK_S = 4.0
+SETTLED_S = 2.0
+"""So long after that the frames in work have their arrays again."""
 APART_BYTES = 128 << 10
 """What glibc begins with. Smaller blocks would waste much of their last page."""
 
@@ -124,17 +126,21 @@ class FreedMemoryReturn:
             clock: to measure by.
         """
         self._resident, self._give_back, self._clock = resident, give_back, clock
-        self._least_since = 0
-        self._not_before = -float("inf")
+        self._least = 0.0
+        self._not_before = self._settled_at = -float("inf")
 
     def check(self) -> None:
         """Give unused memory back where `GROWN_BYTES` more are resident than at some time since it was done last."""
+        at = self._clock.now()
+        if at < self._settled_at:
+            return
         now = self._resident()
-        if now - self._least_since >= GROWN_BYTES and self._clock.now() >= self._not_before:
-            self._not_before = self._clock.now() + GIVEN_BACK_S
+        if now - self._least >= GROWN_BYTES and at >= self._not_before:
             self._give_back()
-            now = self._least_since = self._resident()
-        self._least_since = min(now, self._least_since)
+            self._not_before, self._settled_at = at + GIVEN_BACK_S, at + SETTLED_S
+            self._least = float("inf")
+        else:
+            self._least = min(now, self._least)
 
 
 def drop_library_pages() -> None:

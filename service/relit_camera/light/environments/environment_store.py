@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-import threading
+from collections.abc import Hashable
 from functools import lru_cache
 from pathlib import Path
 from typing import BinaryIO
@@ -26,19 +26,21 @@ from relit_camera.light.environments.environment_panorama import (
 )
 from relit_camera.light.environments.environment_thumbnail import thumbnail_image
 from relit_camera.light.environments.panorama_axes import Axes, between_map_and_picture_axes
+from relit_camera.light.environments.recent_environments import RecentEnvironments
 
 RESERVED_NAMES = frozenset({*BUILTIN_NAMES, "background"})
 """Names that no file may have: the built-in ones, and `background`, which means the light of the virtual background."""
 
 
-MOST_KEPT_BYTES = 64 << 20
-"""Memory for panoramas that were read from files: one of 2048x1024 takes 25 MB, of 8192x4096 400 MB."""
+MOST_KEPT_BYTES = 16 << 20
+"""Memory for panoramas that were read from files and are not in use: one of 2048x1024 takes 13 MB, of 8192x4096 200.
+In use it takes twice as much."""
 
 
 class EnvironmentStore(NamedFiles):
     """A folder of panorama files, one an environment, named by its stem; the built-in ones are always there.
 
-    Files may be put there by hand. What was read last is kept while the file stays as it is.
+    Files may be put there by hand. What was read last is kept while the file stays as it is (`RecentEnvironments`).
     """
 
     def __init__(self, folder: Path | None = None, apart: bool = False) -> None:
@@ -58,7 +60,7 @@ class EnvironmentStore(NamedFiles):
         return [*BUILTIN_NAMES, *super().names()]
 
     def load(self, name: str) -> Environment:
-        """The environment of that name; the same object again until its file changes.
+        """The environment of that name; the same object while it is in use and its file stays as it is.
 
         Raises:
             NotFoundError: none of that name; the cure names a close one.
@@ -67,7 +69,7 @@ class EnvironmentStore(NamedFiles):
         if name in BUILTIN_NAMES:
             return builtin_environment(name)
         path = self.path(name)
-        return _RECENT.get(path, file_version(path), self._apart)
+        return _recent(path, file_version(path), self._apart)
 
     def resolve(self, name_or_path: str) -> Environment:
         """The environment of a stored name, else of the panorama file at that path.
@@ -141,44 +143,28 @@ class EnvironmentStore(NamedFiles):
         """
         if name in BUILTIN_NAMES:
             raise InputError(f"'{name}' is built in and stays", "remove stored environments only")
+        path = self.path(name)
         super().remove(name)
+        _RECENT.forget(lambda key: _is_of_file(key, path))
 
 
 def _read(path: Path, apart: bool) -> Panorama:
     return read_panorama_apart(path) if apart else read_panorama(path)
 
 
-class _RecentEnvironments:
-    """The environments that were read last, in `MOST_KEPT_BYTES` of memory, and the very last one however large it is.
-
-    Thread-safe: a file may be read twice where two threads ask for it at once.
-    """
-
-    def __init__(self) -> None:
-        self._kept: dict[tuple[Path, FileVersion], Environment] = {}
-        self._lock = threading.Lock()
-
-    def get(self, path: Path, version: FileVersion, apart: bool) -> Environment:
-        with self._lock:
-            found = self._kept.pop((path, version), None)
-        if found is None:
-            found = environment_from_panorama(path.stem, _read(path, apart))
-        with self._lock:
-            for older in [key for key in self._kept if key[0] == path]:
-                del self._kept[older]  # of a file that was replaced
-            self._kept[path, version] = found
-            while len(self._kept) > 1 and sum(map(_bytes, self._kept.values())) > MOST_KEPT_BYTES:
-                del self._kept[next(iter(self._kept))]
-        return found
+_RECENT = RecentEnvironments(MOST_KEPT_BYTES)
 
 
-_RECENT = _RecentEnvironments()
+def _recent(path: Path, version: FileVersion, apart: bool) -> Environment:
+    key = path, version
+    _RECENT.forget(lambda other: other != key and _is_of_file(other, path))  # what the file was before
+    return _RECENT.get(key, lambda: environment_from_panorama(path.stem, _read(path, apart)))
 
 
-def _bytes(environment: Environment) -> int:
-    return environment.panorama.radiance.nbytes
+def _is_of_file(key: Hashable, path: Path) -> bool:
+    return isinstance(key, tuple) and key[0] == path
 
 
 @lru_cache(maxsize=256)
 def _thumbnail(path: Path, version: FileVersion, apart: bool) -> bytes:
-    return encode_display(thumbnail_image(_RECENT.get(path, version, apart).panorama))
+    return encode_display(thumbnail_image(_recent(path, version, apart).panorama))

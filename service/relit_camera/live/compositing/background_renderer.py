@@ -121,7 +121,7 @@ def _halved_light(image: DisplayImage) -> NDArray[np.uint16]:
 
 
 _BAND_ROWS = 30
-"""Rows of half the picture that are made at a time: their light stays in the processor's cache."""
+"""Rows that are made at a time: their light stays in the processor's cache."""
 
 
 @lru_cache(maxsize=1)
@@ -224,7 +224,7 @@ class BackgroundRenderer:
             case _:
                 self._room = None
                 return self.static_background(request, now)
-        self._request = None
+        self._request, self._view = None, None
         return apply_exposure(image, request.lighting.background_gain_ev)
 
     def _blurred(self, matted: MattedFrame, strength: float, now: float) -> DisplayImage:
@@ -238,6 +238,8 @@ class BackgroundRenderer:
 
     def _render(self, request: BackgroundRequest) -> DisplayImage:
         background, gain_ev = request.background, request.lighting.background_gain_ev
+        if not isinstance(background, EnvironmentBackground | BlurBackground):
+            self._view = None  # the panorama of a place that is shown no more may be large
         match background:
             case ColorBackground():
                 return apply_exposure(solid_color(background.color, self._size), gain_ev)
@@ -275,10 +277,14 @@ def neutral_background(size: tuple[int, int]) -> DisplayImage:
     width, height = size
     x = (np.arange(width) + 0.5 - width / 2) / height
     y = (np.arange(height)[:, np.newaxis] + 0.5 - 0.45 * height) / height
-    falloff = np.exp(-(x**2 + y**2) / (2 * 0.45**2))
-    light = np.multiply.outer(_NEUTRAL_EDGE + (1 - _NEUTRAL_EDGE) * falloff, _NEUTRAL_LIGHT)
-    noise = np.random.default_rng(0).random((height, width, 1))
-    return np.floor(srgb_encode(light) * 255 + noise).astype(np.uint8)
+    random = np.random.default_rng(0)
+    neutral = np.empty((height, width, 3), np.uint8)
+    for top in range(0, height, _BAND_ROWS):  # all of it at once would take 66 MB for a moment
+        onto = neutral[top : top + _BAND_ROWS]
+        falloff = np.exp(-(x**2 + y[top : top + _BAND_ROWS] ** 2) / (2 * 0.45**2))
+        light = np.multiply.outer(_NEUTRAL_EDGE + (1 - _NEUTRAL_EDGE) * falloff, _NEUTRAL_LIGHT)
+        onto[:] = np.floor(srgb_encode(light) * 255 + random.random((len(onto), width, 1)))
+    return neutral
 
 
 def solid_color(color: str, size: tuple[int, int]) -> DisplayImage:

@@ -22,6 +22,10 @@ BLUR_SIGMA = 0.1
 _DISK_RADIUS = 5
 """Radius of the blur's disc in working pixels, where the panorama is fine enough: enough for lights to look round."""
 
+_BAND_ROWS = 32
+"""Rows of a view whose directions are in memory at once: all of them would be 22 MB at 1280 × 720, and as much again
+for each step of their conversion."""
+
 
 class EnvironmentView:
     """Looks from the camera along -Z into a panorama: at what lies around the edges of its file."""
@@ -44,7 +48,7 @@ class EnvironmentView:
         self._working_size = (max(1, round(width / shrink)), max(1, round(height / shrink)))
         self._disc = _disk_kernel(radius / shrink)
         self._panorama = _wrap_columns(_downsample(panorama.radiance, self._working_size[1] * 180 / height_deg))
-        self._directions = _view_directions(size, self._working_size, height_deg)
+        self._across, self._up = _image_plane(size, self._working_size, height_deg)
 
     def picture(self, rotation: Rotation, exposure: float) -> DisplayImage:
         """What the camera sees, uint8 sRGB of the view's size.
@@ -53,16 +57,22 @@ class EnvironmentView:
             rotation: turns the environment: the room's direction l shows the panorama at R⁻¹·l.
             exposure: display light of a unit of relit pictures (see `light.exposure.auto_exposure_scale`).
         """
-        directions = self._directions @ rotation.as_matrix()  # rows times R are R⁻¹·l
+        to_panorama = rotation.as_matrix()  # rows times it are R⁻¹·l
+        across = self._across[:, np.newaxis] * to_panorama[0] - to_panorama[2]
+        up = self._up[:, np.newaxis] * to_panorama[1]
         height, width = self._panorama.shape[0], self._panorama.shape[1] - 2
-        row, column = map_position_from_direction(directions, height, width)
-        radiance = cv2.remap(
-            self._panorama,
-            (column + 1).astype(np.float32),
-            row.astype(np.float32),
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
+        radiance = np.empty((len(up), len(across), 3), np.float32)
+        for top in range(0, len(up), _BAND_ROWS):
+            band = up[top : top + _BAND_ROWS, np.newaxis] + across
+            row, column = map_position_from_direction(band, height, width)
+            cv2.remap(
+                self._panorama,
+                (column + 1).astype(np.float32),
+                row.astype(np.float32),
+                cv2.INTER_LINEAR,
+                dst=radiance[top : top + _BAND_ROWS],
+                borderMode=cv2.BORDER_REPLICATE,
+            )
         light = cv2.filter2D(radiance, -1, self._disc, borderType=cv2.BORDER_REPLICATE)
         shown = display_from_linear(light * np.float32(exposure * RADIANCE_TO_DISPLAY))
         if self._working_size == self._size:
@@ -71,13 +81,15 @@ class EnvironmentView:
         return enlarged
 
 
-def _view_directions(size: tuple[int, int], working_size: tuple[int, int], height_deg: float) -> NDArray[np.float64]:
-    """Directions (rows, columns, 3), not normalised, through the middles of a picture's working pixels."""
+def _image_plane(
+    size: tuple[int, int], working_size: tuple[int, int], height_deg: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The middles of a picture's working pixels on a plane at distance 1: x (columns,) and y (rows,)."""
     (width, height), (columns, rows) = size, working_size
     top = np.tan(np.radians(height_deg) / 2)
     y = top * (1 - 2 * (np.arange(rows) + 0.5) / rows)
     x = top * width / height * (2 * (np.arange(columns) + 0.5) / columns - 1)
-    return np.stack(np.broadcast_arrays(x, y[:, np.newaxis], -1.0), axis=-1)
+    return x, y
 
 
 def _disk_kernel(radius: float) -> NDArray[np.float32]:

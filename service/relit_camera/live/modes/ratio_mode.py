@@ -64,6 +64,7 @@ class RatioMode:
         else:
             followed = replace(followed, presence=min(followed.presence, self._identity.recognized(frame.time_s)))
             if followed.presence >= 1:
+                self._last_rest = None  # megabytes that are shown no more
                 return partial(self._render, followed, live, motion, scene)
         at_rest = self._context.scene_relighting.relight(
             scene, Rotation.identity(), frame.time_s, quality.relight_every

@@ -29,17 +29,19 @@ class LightTransition:
     """Blends from the present light to that of the next scene over its `transition_s`, fast at first."""
 
     def __init__(self) -> None:
-        self._key: tuple[Environment | None, Lighting] | None = None
+        # Of an environment its light map: the panorama of one that is shown no more may be large.
+        self._key: tuple[LightMap | None, Lighting] | None = None
         self._from: LightMap | None = None
         self._target: LightMap | None = None
         self._since = self._last = 0.0
 
     def update(self, scene: Scene, now: float) -> LightMap:
         """The light map to show at `now` seconds; that of the first scene is shown without a transition."""
-        key = (scene.environment, scene.look.lighting)
+        environment = scene.environment
+        key = (None if environment is None else environment.light_map, scene.look.lighting)
         if self._key is None or key[0] is not self._key[0] or key[1] != self._key[1]:
             self._from = None if self._target is None else self._shown(self._last)
-            self._target = display_light(*key)
+            self._target = display_light(environment, key[1])
             # The transition began at the last frame, so that this frame shows its first step.
             self._key, self._since = key, min(self._last, now)
         self._last = now

@@ -60,9 +60,10 @@ class FallbackRenderer:
         self._failed_subject: Subject | None = None
 
     def release(self) -> None:
-        """Free the memory of the relit source image, while no fallback is needed."""
+        """Free the memory of the relit source image and its background, while no fallback is needed."""
         if self._source is not None:
             self._source = None
+            self._background_renderer = BackgroundRenderer(self._size)
             return_freed_memory()
 
     def picture(self, frame: Frame, scene: Scene) -> FallbackPicture:
