@@ -33,6 +33,11 @@ def pytest_configure() -> None:
     os.environ["PIPEWIRE_RUNTIME_DIR"] = str(run_folder() / "no-session")
 
 
+def pytest_make_parametrize_id(val: object) -> str | None:
+    """Name a test after the length of a file's content, not after megabytes of it."""
+    return f"{len(val)} bytes" if isinstance(val, bytes) and len(val) > 60 else None
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Group the tests for `pytest -n 2 --dist loadgroup`, and order the groups.

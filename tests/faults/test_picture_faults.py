@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -99,6 +103,53 @@ def test_a_tracker_that_hangs_for_ever_is_replaced(tracker: FaultyTracker, tmp_p
         watched.recovers()
         assert tracker.hanging == 1  # it still does
         survived("tracker hangs for ever", watched)
+
+
+class StarvedTracker(SteadyTracker):
+    """Computes for a fifth of a second a frame while `pinned` names a processor, which it may then not leave."""
+
+    def __init__(self) -> None:
+        self.pinned: int | None = None
+
+    def track(self, frame: Frame) -> FaceState:
+        if self.pinned is not None:
+            anywhere = os.sched_getaffinity(0)
+            os.sched_setaffinity(0, {self.pinned})  # of this thread alone
+            until = time.thread_time() + 0.2
+            while time.thread_time() < until:
+                hashlib.pbkdf2_hmac("sha256", b"", b"", 5000)  # lets the other threads run
+            os.sched_setaffinity(0, anywhere)
+        return super().track(frame)
+
+
+@pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="only Linux tells who waits for a processor")
+def test_a_tracker_that_starves_is_not_replaced(tmp_path: Path, survived: Survived) -> None:
+    tracker, replaced = StarvedTracker(), list[SteadyTracker]()
+
+    def new_tracker() -> SteadyTracker:
+        replaced.append(SteadyTracker())
+        return replaced[-1]
+
+    processor = min(os.sched_getaffinity(0))
+    others = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(12)]
+    try:
+        with watched_camera(tmp_path, tracker=tracker, new_tracker=new_tracker) as watched:
+            for other in others:
+                os.sched_setaffinity(other.pid, {processor})
+            tracker.pinned = processor
+            watched.reports("other programs keep the computer so busy")
+            watched.state("standing-in")
+            time.sleep(3 * IMPATIENT.pipeline.abandon_timeout_s)
+            tracker.pinned = None
+            for other in others:
+                other.kill()
+            watched.recovers()
+            assert not replaced
+            survived("tracker waits for a processor, 12 busy programs on it", watched)
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
 
 
 def test_trackers_that_all_hang_leave_the_fallback(tracker: FaultyTracker, tmp_path: Path, survived: Survived) -> None:

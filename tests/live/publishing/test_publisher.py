@@ -210,6 +210,14 @@ def test_the_placeholder_comes_back_when_pictures_are_stale() -> None:
     assert [camera.shown_at(at) for at in (0.9, 1.02, 3.99, 4.02, 5.02, 6.02)] == [7, 90, 90, 7, 8, 91]
 
 
+def test_after_the_program_stood_still_the_last_picture_is_shown_on() -> None:
+    camera = Publishing(stale_after_s=3.0)
+    camera.put(1.0, 90)
+    camera.clock.at(2.0, lambda: camera.clock.sleep(60.0))
+    camera.run(70.0)
+    assert [camera.shown_at(at) for at in (1.9, 62.1, 64.9, 65.1)] == [90, 90, 90, 7]
+
+
 def test_a_late_picture_does_not_replace_the_placeholder() -> None:
     camera = Publishing(stale_after_s=3.0)
     camera.show_placeholder(0.5, 8, last_index=0)

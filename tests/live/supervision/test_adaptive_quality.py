@@ -12,7 +12,7 @@ from relit_camera.live.render_quality import QUALITY_LEVELS
 from relit_camera.live.supervision.adaptive_quality import QualityLimits, QualityState, next_quality
 
 LIMITS = QualityLimits()
-SAVED = (1.0, 0.9, 0.7, 0.55)
+SAVED = (1.0, 0.9, 0.7, 0.55, 0.35)
 """Latency at each level, relative to full quality."""
 FRAME_S = 1 / 30
 
@@ -42,6 +42,7 @@ def test_there_is_no_cheaper_level_than_the_last_and_each_is_cheaper() -> None:
         assert cheaper.relight_every >= dearer.relight_every
         assert cheaper.half_size >= dearer.half_size
         assert cheaper.track_every >= dearer.track_every
+        assert cheaper.render_every >= dearer.render_every
         assert cheaper != dearer
 
 
@@ -63,6 +64,12 @@ def test_overload_beyond_all_levels_ends_at_the_cheapest_within_two_seconds() ->
     levels = simulate(lambda now: 0.3 if now > 1 else 0.035, 20)
     assert level_at(levels, 3.5) == len(QUALITY_LEVELS) - 1
     assert changes(levels, 4) == 0
+
+
+def test_pictures_that_come_once_a_second_are_made_cheaper_too() -> None:
+    """Each frame has waited while the picture before it was made: there is no pause between them."""
+    levels = simulate(lambda now: 2.0 if now > 1 else 0.035, 20)
+    assert level_at(levels, 8) == len(QUALITY_LEVELS) - 1
 
 
 def test_full_quality_is_back_two_seconds_after_the_load_has_gone() -> None:

@@ -109,8 +109,11 @@ class FakeFallback:
     def picture(self, frame: Frame, scene: Scene) -> FallbackPicture:
         return FallbackPicture(FALLBACK, self.unlit)
 
-    def release(self) -> None:
+    def release(self, now: float) -> None:
         self.released += 1
+
+    def note_live(self, frame: Frame, motion: FaceMotion | None) -> None:
+        self.live = frame.index
 
 
 NOTHING = np.zeros((0, 3))

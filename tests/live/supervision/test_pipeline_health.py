@@ -164,6 +164,70 @@ def test_a_hang_is_reported_once_after_two_seconds_and_the_worker_replaced_after
     assert script.arrive(25.1) == (SubmitFrame(),)
 
 
+def arrive_each_second(script: Script, since: int, until: int, starved_s: float) -> dict[int, tuple[Action, ...]]:
+    """Frames that arrive each second, between which the worker waits so long for a processor; what is done."""
+    return {at: script(FrameArrived(float(at), 0, starved_s=starved_s)) for at in range(since, until)}
+
+
+def test_a_worker_that_waits_for_a_processor_is_not_replaced_for_a_minute() -> None:
+    script = working()
+    script.start(10.0)
+    done = arrive_each_second(script, 11, 72, starved_s=0.95)
+    assert done[12] == (SubmitFrame(),)
+    assert done[13] == (ReportHang(0, starved=True), ShowFallback())
+    assert {done[at] for at in range(14, 71)} == {(ShowFallback(),)}
+    assert done[71] == (RetireWorker(0), ShowFallback())  # that it computes for ever is not ruled out
+
+
+def test_a_picture_after_starving_is_a_recovery() -> None:
+    script = working()
+    script.start(10.0)
+    arrive_each_second(script, 11, 40, starved_s=0.95)
+    assert script.render(40.1, begun_at=10.0) == (ReportRecovery(),)
+    assert script.arrive(40.2) == (SubmitFrame(),)
+
+
+def test_only_what_the_worker_did_not_wait_for_a_processor_counts() -> None:
+    script = working()
+    script.start(10.0)
+    done = arrive_each_second(script, 11, 32, starved_s=0.5)
+    assert done[13] == (ReportHang(0), ShowFallback())  # it waited for half of the time, no more
+    assert done[30] == (ShowFallback(),)
+    assert done[31] == (RetireWorker(0), ShowFallback())
+
+
+def test_a_frame_waits_for_the_picture_of_the_one_before_and_that_is_no_hang() -> None:
+    """One frame is rendered while the next is begun: a slow picture is not followed by a hang at once."""
+    script = working()
+    script.start(10.0)
+    script(FrameFinished(0))
+    script.start(11.0)
+    assert script(PictureRendered(0, 12.9, begun_at=10.0)) == ()
+    assert script.arrive(14.8) == (SubmitFrame(),)
+    assert script.arrive(15.0) == (ReportHang(0), ShowFallback())
+    assert script.arrive(23.0) == (RetireWorker(0), ShowFallback())
+
+
+def test_waiting_for_a_processor_counts_for_one_frame() -> None:
+    script = working()
+    script.start(10.0)
+    arrive_each_second(script, 11, 40, starved_s=0.95)
+    script.render(40.0, begun_at=10.0)
+    script.start(41.0)
+    done = arrive_each_second(script, 42, 53, starved_s=0.0)
+    assert done[44] == (ReportHang(0), ShowFallback())
+    assert done[52] == (RetireWorker(0), ShowFallback())
+
+
+def test_a_program_that_was_stopped_does_not_hang() -> None:
+    script = working()
+    script.start(10.0)
+    assert script(FrameArrived(3611.0, 0, paused_s=3600.0)) == (SubmitFrame(),)
+    assert script.arrive(3612.0) == (SubmitFrame(),)
+    assert script.arrive(3612.1) == (ReportHang(0), ShowFallback())  # two seconds of its own
+    assert script.arrive(3620.1) == (RetireWorker(0), ShowFallback())
+
+
 def test_a_hang_that_ends_by_itself_is_a_recovery() -> None:
     script = working()
     script.start(10.0)

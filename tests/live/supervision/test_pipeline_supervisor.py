@@ -15,6 +15,7 @@ from relit_camera.base.images.image_types import Frame
 from relit_camera.live.pipeline import Pipeline, RenderedFrame
 from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, RenderQuality
 from relit_camera.live.scene.scene import Scene
+from relit_camera.live.supervision.adaptive_quality import QualityState
 from relit_camera.live.supervision.pipeline_health import (
     Event,
     FrameFailed,
@@ -60,7 +61,7 @@ class FakeWorker:
         self._post, self._on_picture = post, on_picture
         self._waiting: Frame | None = None
         self._busy = self.closed = False
-        self.dropped = 0
+        self.dropped, self.run_delay_s = 0, 0.0
 
     def submit_frame(self, frame: Frame) -> None:
         if self.closed:
@@ -211,6 +212,41 @@ def test_a_slow_pipeline_drops_frames_but_does_not_hang() -> None:
     assert simulation.supervisor.dropped == pytest.approx(60 * FPS - 40, abs=4)
 
 
+def test_a_pipeline_that_starves_is_shown_as_such_and_kept() -> None:
+    simulation = Simulation()
+    simulation.run(10.0)
+    worker = simulation.workers[0]
+
+    def starve() -> None:
+        worker.run_delay_s += 0.095
+
+    simulation.render_s = 30.0
+    simulation.clock.every(0.1, starve)
+    simulation.run(11.0)
+    simulation.render_s = RENDER_S
+    simulation.run(60.0)
+    assert simulation.reported() == [(12.1, "PipelineHangError"), (40.1, "recovered")]
+    assert "other programs" in str(simulation.troubles[0][1])
+    assert simulation.workers == [worker]
+    assert {kind for at, kind, _ in simulation.shown if 12.2 < at < 40.0} == {"fallback"}
+    assert {kind for at, kind, _ in simulation.shown if at > 40.1} == {"picture"}
+
+
+def test_a_program_that_stands_still_for_a_minute_has_nothing_to_report() -> None:
+    simulation = Simulation()
+    simulation.run(10.0)
+    simulation.render_s = 61.0
+    simulation.run(10.1)
+    simulation.render_s = RENDER_S
+    simulation.clock.sleep(60.0)  # the supervisor comes back before the worker has ended its frame
+    simulation.run(80.0)
+    assert simulation.troubles == []
+    assert len(simulation.workers) == 1
+    simulation.render_s = HANG
+    simulation.run(100.0)
+    assert simulation.reported()[0] == (82.1, "PipelineHangError")
+
+
 def test_errors_are_retried_after_1_2_4_8_and_then_every_16_seconds() -> None:
     simulation = Simulation()
     simulation.at(10.0, error=TrackError("a track that ends"))
@@ -348,6 +384,20 @@ def test_late_pictures_get_cheaper_and_full_quality_comes_back_within_two_second
     simulation.run(10.0)
     assert simulation.quality() == FULL_QUALITY
     assert simulation.troubles == []
+
+
+def test_at_the_last_level_every_second_frame_is_rendered() -> None:
+    simulation = Simulation()
+    simulation.run(1.0)
+    simulation.supervisor.load = QualityState(level=len(QUALITY_LEVELS) - 1, latency_s=0.07)
+    count = len(simulation.published)
+    simulation.run(1.3)
+    assert set(np.diff(simulation.published[count + 1 :])) == {2}
+    simulation.run(4.0)
+    count = len(simulation.published)
+    simulation.run(5.0)
+    assert set(np.diff(simulation.published[count:])) == {1}
+    assert simulation.supervisor.dropped == pytest.approx(0.4 * FPS / 2, abs=2)
 
 
 def test_models_that_open_slowly_are_no_reason_for_cheaper_pictures() -> None:

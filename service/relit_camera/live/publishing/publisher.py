@@ -25,6 +25,10 @@ LATE_FRAME_GRACE = 0.4
 """Share of a period for which a tick waits for a late picture: so it is late by that much, not by a whole period."""
 
 
+LATE_TICK_S = 1.0
+"""After a tick that came so late the whole program had stood still: the last picture is shown on, and not as stale."""
+
+
 @dataclass(frozen=True)
 class PublishedPicture:
     """A finished picture on its way to the sink.
@@ -99,6 +103,7 @@ class Publisher:
         self._failing = ""
         """Why the last write failed; empty where it did not."""
         self._retry_at = self._held_at = 0.0
+        self._ticked_at = clock.now()
         self._published = self._repeated = self._overtaken = 0
         self._rate, self._new_rate = RateMeter(clock=clock), RateMeter(clock=clock)
         self._latency = DurationWindow()
@@ -209,8 +214,9 @@ class Publisher:
         last = self._last
         if last is not None and last.unlit and not self._unlit_allowed():
             last = self._last = None  # not even one that is held
-        if self.hold:
+        if self.hold or now - self._ticked_at > LATE_TICK_S:
             self._held_at = now
+        self._ticked_at = now
         fresh_at = max(self._newest.put_at, self._held_at)
         if self._stale_after_s is not None and now - fresh_at > self._stale_after_s:
             last = self._last = None  # holding later must not bring back a picture that the placeholder has replaced

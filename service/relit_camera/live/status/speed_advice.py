@@ -90,7 +90,7 @@ def reduced_quality(latency_s: float, size: tuple[int, int]) -> Degradation:
     """What the status says where pictures of `size` come `latency_s` seconds late, and are given less detail."""
     return Degradation(
         code=DegradationCode.REDUCED_QUALITY,
-        what="pictures have less detail",
+        what="pictures have less detail, or are fewer",
         why=f"the computer is busy: they come {1e3 * latency_s:.0f} ms late",
         cure=f"{slow_cure(size)}; full quality comes back by itself",
     )

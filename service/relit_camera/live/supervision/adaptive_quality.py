@@ -21,7 +21,7 @@ class QualityLimits:
         early_s: mean latency below which it is raised: far enough below `late_s` that a level up stays below that.
         idle_s: mean latency below which the load has surely gone, and raising is not delayed.
         lower_after_s: how long pictures must be late, and how long a level is given to show what it saves.
-        raise_after_s: how long pictures must be early. Three levels up within two seconds.
+        raise_after_s: how long pictures must be early. All levels up within two seconds.
         max_raise_delay_s: each time a raised level proves too costly the wait before the next try doubles, up to this.
         smoothing_s: time constant of the mean.
     """
@@ -30,7 +30,7 @@ class QualityLimits:
     early_s: float = 0.055
     idle_s: float = 0.040
     lower_after_s: float = 0.4
-    raise_after_s: float = 0.5
+    raise_after_s: float = 0.35
     max_raise_delay_s: float = 16.0
     smoothing_s: float = 0.15
 
@@ -89,11 +89,13 @@ def next_quality(state: QualityState, rendered_at: float, latency_s: float, limi
 
 
 def _with_latency(state: QualityState, now: float, latency_s: float, limits: QualityLimits) -> QualityState:
+    captured_at = now - latency_s
     latency_s = min(latency_s, 2 * limits.late_s)  # one that is very late, while models are opened, is still but one
     if state.latency_s is None or now < state.seen_at:
         return replace(state, latency_s=latency_s, seen_at=now)
     weight = min(1.0, (now - state.seen_at) / limits.smoothing_s)
-    since = None if now - state.seen_at > limits.lower_after_s else state.since  # nothing is known of a pause
+    # Nothing is known of a pause. Between pictures that take long there is none: the frame of the next has waited.
+    since = None if captured_at - state.seen_at > limits.lower_after_s else state.since
     return replace(state, latency_s=state.latency_s + weight * (latency_s - state.latency_s), seen_at=now, since=since)
 
 

@@ -119,10 +119,12 @@ class CameraLoop:
                 self._show(self._placeholders.no_subject, CameraState.NO_SUBJECT)
             return
         if self._supervisor.submit_frame(frame):
-            self._fallback.release()
+            self._fallback.release(frame.captured_at)
         else:
             picture = self._fallback.picture(frame, scene)
-            self._publisher.pictures.put(PublishedPicture(picture.image, frame.captured_at, frame.index, picture.unlit))
+            if picture is not None:
+                image, unlit = picture.image, picture.unlit
+                self._publisher.pictures.put(PublishedPicture(image, frame.captured_at, frame.index, unlit))
             if self._failing():
                 self._board.set_state(CameraState.FALLBACK)
 
@@ -168,6 +170,7 @@ class CameraLoop:
     def _note_shown(self, shown: ShownPicture) -> None:
         self.pipeline_rate.tick(shown.at)
         motion = shown.rendered.motion
+        self._fallback.note_live(shown.frame, motion)
         face = motion.status if motion else FaceStatus.LOST
         self._board.set_face(face)
         # A picture of a frame before the one that failed is no recovery: fallbacks follow.

@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart, return_freed_memory
 from relit_camera.base.config.settings import Fallback
-from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
 from relit_camera.base.images.resize import crop_to_fill
+from relit_camera.face.head_pose import fit_pose, unproject
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
 from relit_camera.live.compositing.background_renderer import BackgroundRenderer
 from relit_camera.live.compositing.compositor import composite_source_image
 from relit_camera.live.publishing.placeholder_image import Placeholder
+from relit_camera.live.reenactment.motion_transfer import split_body_motion
 from relit_camera.live.reenactment.reenactor import WarpedLayer
-from relit_camera.live.reenactment.rest_layer import RestLayer
+from relit_camera.live.reenactment.source_image import Cutout, SourceFace
+from relit_camera.live.reenactment.warp import Warp, move_body, source_from_output, visible_box
 from relit_camera.live.scene.light_transition import LightTransition
 from relit_camera.live.scene.scene import Scene
+from relit_camera.live.supervision.head_movement import HeadMovement
 from relit_camera.subject.relighting.shared_relighters import shared_relighter
 from relit_camera.subject.subject import Subject
 
@@ -38,40 +47,73 @@ class FallbackPicture:
     unlit: bool = False
 
 
-class FallbackRenderer:
-    """Renders without tracker and reenactor: the subject's source image at rest, relit as the scene says.
+KEPT_S = 10.0
+"""For so long the relit source image is kept after its last use: on a busy computer it is soon needed again."""
 
-    Where there is no subject, or where that fails too, it gives the placeholder, or where both settings and scene allow
-    it the live picture. Not thread-safe.
+
+def in_a_thread(work: Callable[[], _RelitSource]) -> Future[_RelitSource]:
+    """Do work that takes a tenth of a second of processor time, on a busy computer seconds, without waiting for it."""
+    executor = ThreadPoolExecutor(1, "fallback")
+    try:
+        return executor.submit(work)
+    finally:
+        executor.shutdown(wait=False)
+
+
+class FallbackRenderer:
+    """Renders without tracker and reenactor: the subject's source image, relit as the scene says.
+
+    It moves aside and nearer with the head, where that was tracked before; else it is at rest. Where there is no
+    subject, or where that fails too, it gives the placeholder, or where both settings and scene allow it the live
+    picture. Not thread-safe.
     """
 
-    def __init__(self, size: tuple[int, int], fallback: Fallback, placeholder: Placeholder) -> None:
+    def __init__(
+        self,
+        size: tuple[int, int],
+        fallback: Fallback,
+        placeholder: Placeholder,
+        start: Callable[[Callable[[], _RelitSource]], Future[_RelitSource]] = in_a_thread,
+    ) -> None:
         """Set up; nothing is rendered yet.
 
         Args:
             size: (width, height) of the output in pixels.
             fallback: what is shown where the source image cannot be relit.
             placeholder: of the output's size.
+            start: begins to open the relighter; whoever asks for pictures does not wait for it.
         """
-        self._size, self._fallback, self._placeholder = size, fallback, placeholder
+        self._size, self._fallback, self._placeholder, self._start = size, fallback, placeholder, start
         self._background_renderer = BackgroundRenderer(size)
         self._light = LightTransition()
+        self._head = HeadMovement()
         self._source: _RelitSource | None = None
+        self._opening: tuple[Subject, Future[_RelitSource]] | None = None
+        self._used_at = 0.0
         self._failed_subject: Subject | None = None
 
-    def release(self) -> None:
-        """Free the memory of the relit source image and its background, while no fallback is needed."""
-        if self._source is not None:
-            self._source = None
+    def note_live(self, frame: Frame, motion: FaceMotion | None) -> None:
+        """A live picture of this frame was shown, in which the face moved so: a fallback goes on from there."""
+        self._head.begin_at(frame, motion)
+
+    def release(self, now: float) -> None:
+        """Free the memory of relit image and background, where no fallback was needed for `KEPT_S` until `now`."""
+        if (self._source is not None or self._opening is not None) and now - self._used_at > KEPT_S:
+            self._source = self._opening = None
             self._background_renderer = BackgroundRenderer(self._size)
             return_freed_memory()
 
-    def picture(self, frame: Frame, scene: Scene) -> FallbackPicture:
-        """A picture in place of this live frame. Never raises. As filmed only where the scene allows that too."""
+    def picture(self, frame: Frame, scene: Scene) -> FallbackPicture | None:
+        """A picture in place of this live frame; None while the relighter is opened. Never raises.
+
+        As filmed only where the scene allows that too.
+        """
         subject = scene.subject
+        self._used_at = frame.captured_at
         if subject is not None and subject is not self._failed_subject:
             try:
-                return FallbackPicture(self._relit(subject, scene, frame.time_s))
+                source = self._opened(subject)
+                return None if source is None else FallbackPicture(self._relit(source, scene, frame))
             except Exception:  # this is what is shown when all else fails
                 log.exception("the source image cannot be relit either")
                 self._failed_subject = subject
@@ -79,26 +121,67 @@ class FallbackRenderer:
             return FallbackPicture(crop_to_fill(frame.image, self._size), unlit=True)
         return FallbackPicture(self._placeholder.image)
 
-    def _relit(self, subject: Subject, scene: Scene, now: float) -> DisplayImage:
-        if self._source is None or self._source.subject is not subject:
-            with large_allocations_apart():
-                self._source = _RelitSource(subject, self._size)
-        light = self._light.update(scene, now) * np.float32(subject.metadata.display_gain)
-        return composite_source_image(self._background_renderer, self._source.render(light), scene, now)
+    def _opened(self, subject: Subject) -> _RelitSource | None:
+        if self._source is not None and self._source.subject is subject:
+            return self._source
+        if self._opening is None or self._opening[0] is not subject:
+            self._source = None
+            self._opening = subject, self._start(lambda: _open(subject, self._size))
+        opening = self._opening[1]
+        if opening.done():
+            self._opening = None
+            self._source = opening.result()
+        return self._source
+
+    def _relit(self, source: _RelitSource, scene: Scene, frame: Frame) -> DisplayImage:
+        light = self._light.update(scene, frame.time_s) * np.float32(source.subject.metadata.display_gain)
+        layer = source.render(light, self._head.motion(frame))
+        return composite_source_image(self._background_renderer, layer, scene, frame.time_s)
+
+
+def _open(subject: Subject, size: tuple[int, int]) -> _RelitSource:
+    with large_allocations_apart():
+        return _RelitSource(subject, size)
 
 
 class _RelitSource:
-    """The source image of one subject, placed in the output as it is at rest."""
+    """The source image of one subject, placed in the output as it is at rest, or moved with the head."""
 
     def __init__(self, subject: Subject, size: tuple[int, int]) -> None:
-        self.subject = subject
+        self.subject, self._size = subject, size
         self._relighter = shared_relighter(subject)
         subject.drop_pages()
-        self._at_rest = RestLayer(subject, size)
-        self._last: tuple[LightMap, WarpedLayer] | None = None
+        self._person = Cutout(subject)
+        self._face = _stored_face(subject) if self._person.whole else None
+        self._at_rest = source_from_output(subject.size, size)
+        self._relit: tuple[LightMap, LinearImage] | None = None
+        self._layer: tuple[LinearImage, NDArray[np.float64], WarpedLayer] | None = None
 
-    def render(self, light: LightMap) -> WarpedLayer:
-        """The person under `light`; the previous layer again if the light has not changed."""
-        if self._last is None or not np.array_equal(self._last[0], light):
-            self._last = light, self._at_rest.render(self._relighter.relight(light[None])[0])
-        return self._last[1]
+    def render(self, light: LightMap, motion: FaceMotion | None) -> WarpedLayer:
+        """The person under `light`, where this motion brings them; the last layer again if neither has changed."""
+        if self._relit is None or not np.array_equal(self._relit[0], light):
+            self._relit = light, self._relighter.relight(light[None])[0]
+        relit, placed = self._relit[1], self._placed(motion)
+        last = self._layer
+        if last is not None and last[0] is relit and np.array_equal(last[1], placed):
+            return last[2]
+        box = visible_box(placed, self.subject.size, self._size)
+        layer = WarpedLayer(self._person.warped(relit, Warp(placed, ()).grid(box)), box[:2])
+        self._layer = relit, placed, layer
+        return layer
+
+    def _placed(self, motion: FaceMotion | None) -> NDArray[np.float64]:
+        if self._face is None or motion is None:
+            return self._at_rest
+        body = split_body_motion(self._face, motion)
+        return move_body(self._at_rest, body.pivot, body.shift, body.scale, self.subject.size[1])
+
+
+def _stored_face(subject: Subject) -> SourceFace | None:
+    """The face by the landmarks that the subject keeps; None where it keeps none, and then it does not move."""
+    for name, landmarks in subject.landmarks.items():
+        scheme = landmark_scheme(name)
+        pose = fit_pose(landmarks, scheme, subject.size)
+        if pose is not None:
+            return SourceFace(scheme, landmarks, pose, unproject(landmarks, pose, scheme, subject.size), subject.size)
+    return None

@@ -21,7 +21,9 @@ class HealthLimits:
             double at most.
         hang_timeout_s: a worker that has been at one frame for longer hangs: the fallback is shown.
         abandon_timeout_s: a worker that has been at one frame for longer is abandoned and another started. The time
-            doubles with each abandoned worker in a row.
+            doubles with each abandoned worker in a row. What it waited for a processor does not count: another worker
+            would wait as well, and open models besides.
+        starved_factor: a worker that waits for a processor is abandoned all the same after so many times as long.
         first_frame_factor: the first picture of a worker, and the first after it began to open other models, may take
             so many times as long.
         max_abandoned_workers: abandoned workers hold memory. With so many, no other is started until one of them ends.
@@ -33,6 +35,7 @@ class HealthLimits:
     max_backoff_doublings: int = 4
     hang_timeout_s: float = 2.0
     abandon_timeout_s: float = 10.0
+    starved_factor: int = 6
     first_frame_factor: int = 6
     max_abandoned_workers: int = 3
     faults_before_restart: int = 3
@@ -43,10 +46,18 @@ class HealthLimits:
 
 @dataclass(frozen=True)
 class FrameArrived:
-    """The source gave a frame, while the scene had this revision."""
+    """The source gave a frame, while the scene had this revision.
+
+    Attributes:
+        paused_s: for how long the supervisor itself did not run since the last frame: the program was stopped, say. The
+            worker did not run either.
+        starved_s: for how long the worker at work waited for a processor since the last frame.
+    """
 
     at: float
     scene_revision: int
+    paused_s: float = 0.0
+    starved_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -152,9 +163,10 @@ class ReportFailure:
 
 @dataclass(frozen=True)
 class ReportHang:
-    """Say that the worker at work hangs."""
+    """Say that the worker at work hangs, or, where it is starved, that it waited for a processor most of the time."""
 
     worker: int
+    starved: bool = False
 
 
 @dataclass(frozen=True)
@@ -173,7 +185,10 @@ class PipelineHealth:
         worker: number of the worker at work; None before the first and while none may be started.
         started_workers: how many were started so far; the next one gets this number.
         abandoned: workers that were retired and have not ended.
-        busy_since: when the worker at work took the frame that it is at; None while it waits for one.
+        busy_since: when the worker at work took the frame that it is at, or gave the picture of the one before, if that
+            was later; None while it waits for a frame.
+        paused_s: for how long of that time the supervisor itself did not run.
+        starved_s: for how long of that time the worker waited for a processor.
         opening_at: when the worker at work last began to open models.
         has_rendered: whether it has rendered a picture of a frame that it took after that.
         failures: frames that failed since the last picture.
@@ -189,6 +204,8 @@ class PipelineHealth:
     started_workers: int = 0
     abandoned: frozenset[int] = frozenset()
     busy_since: float | None = None
+    paused_s: float = 0.0
+    starved_s: float = 0.0
     opening_at: float = 0.0
     has_rendered: bool = False
     failures: int = 0
@@ -220,7 +237,7 @@ def next_health(health: PipelineHealth, event: Event, limits: HealthLimits) -> T
     if event.worker != health.worker:
         return health, ()
     if isinstance(event, FrameStarted):
-        return replace(health, busy_since=event.at), ()
+        return replace(health, busy_since=event.at, paused_s=0.0, starved_s=0.0), ()
     if isinstance(event, ModelsOpening):
         return replace(health, opening_at=event.at, has_rendered=False), ()
     if isinstance(event, FrameFinished):
@@ -238,7 +255,9 @@ def _after_arrival(health: PipelineHealth, event: FrameArrived, limits: HealthLi
         number = health.started_workers
         health = replace(health, worker=number, started_workers=number + 1, has_rendered=False, busy_since=None)
         actions = (StartWorker(number),)
-    busy_s = 0.0 if health.busy_since is None else event.at - health.busy_since
+    paused_s, starved_s = health.paused_s + event.paused_s, health.starved_s + event.starved_s
+    health = replace(health, paused_s=paused_s, starved_s=starved_s)
+    busy_s = 0.0 if health.busy_since is None else event.at - health.busy_since - paused_s
     if busy_s > limits.hang_timeout_s:
         return _after_hang(health, busy_s, limits)
     if health.failures and event.at < health.retry_at and event.scene_revision == health.failed_revision:
@@ -256,11 +275,13 @@ def _after_hang(health: PipelineHealth, busy_s: float, limits: HealthLimits) -> 
     actions: tuple[Action, ...] = ()
     # Opening models takes seconds: a worker that has rendered nothing since is not reported so soon.
     if not health.hang_reported and (health.has_rendered or busy_s > limits.abandon_timeout_s):
-        health, actions = replace(health, hang_reported=True), (ReportHang(worker),)
+        starved = health.starved_s > busy_s / 2
+        health, actions = replace(health, hang_reported=True), (ReportHang(worker, starved),)
     patience_s = limits.abandon_timeout_s * _backoff(health.hangs, limits)
     if not health.has_rendered:
         patience_s *= limits.first_frame_factor
-    if busy_s > patience_s:
+    working_s = max(busy_s - health.starved_s, busy_s / limits.starved_factor)
+    if working_s > patience_s:
         health, retired = _retired(replace(health, hangs=health.hangs + 1))
         actions += retired
     return health, (*actions, ShowFallback())
@@ -270,6 +291,10 @@ def _after_picture(health: PipelineHealth, event: PictureRendered) -> Transition
     # One frame is rendered while the next is begun: the picture may be of a frame before the one that failed, or before
     # the one for which models are opened.
     health = replace(health, has_rendered=health.has_rendered or event.begun_at >= health.opening_at)
+    if health.has_rendered and health.busy_since is not None:
+        # A worker that gives a picture works: its next frame, begun meanwhile, has had to wait for that.
+        since = max(health.busy_since, event.at)
+        health = replace(health, busy_since=since, paused_s=0.0, starved_s=0.0)
     if health.failures and event.begun_at < health.failed_frame_at:
         return health, ()
     actions = (ReportRecovery(),) if health.in_trouble else ()

@@ -35,6 +35,9 @@ from relit_camera.live.supervision.pipeline_worker import PipelineWorker
 
 DEFAULT_LIMITS = HealthLimits()
 DEFAULT_QUALITY_LIMITS = QualityLimits()
+LATE_S = 1.0
+"""The supervisor looks five times a second or more. Where it comes later than this, the rest of the time counts as one
+in which the whole program did not run."""
 
 
 class Worker(Protocol):
@@ -51,6 +54,11 @@ class Worker(Protocol):
     @property
     def stages(self) -> str:
         """The stages that are running now, for messages to users."""
+        ...
+
+    @property
+    def run_delay_s(self) -> float:
+        """For how long its threads have waited for a processor since they began."""
         ...
 
     def submit_frame(self, frame: Frame) -> None:
@@ -148,6 +156,9 @@ class PipelineSupervisor:
         self._closed = False
         self._replacement: Callable[[], Pipeline] | None = None  # put by any thread, taken by the one of the frames
         self._dropped_by_retired = 0
+        self._since_rendered = self._passed_over = 0
+        self._looked_at = clock.now()
+        self._paused_s = self._run_delay_s = 0.0
 
     @property
     def health(self) -> PipelineHealth:
@@ -156,7 +167,8 @@ class PipelineSupervisor:
 
     def handle_messages(self) -> list[ShownPicture]:
         """Take in what the workers did since the last call. Returns the pictures that were shown."""
-        shown = []
+        now, before, shown = self._clock.now(), self._looked_at, []
+        self._looked_at, self._paused_s = now, self._paused_s + max(0.0, now - before - LATE_S)
         while not self._messages.empty():
             message = self._messages.get()
             if isinstance(message, tuple):
@@ -175,12 +187,14 @@ class PipelineSupervisor:
         if replacement is not None:
             self._next_pipeline = replacement
             self._apply(ReplacementAsked())
-        actions = self._apply(FrameArrived(self._clock.now(), self._scene().revision), frame)
+        paused_s, self._paused_s = self._paused_s, 0.0
+        starved_s = self._starved_s()
+        actions = self._apply(FrameArrived(self._clock.now(), self._scene().revision, paused_s, starved_s), frame)
         if self._worker is not None:
             self.pipeline = self._worker.pipeline or self.pipeline
         if self.pipeline is not None:
             self.pipeline.quality = self.load.quality
-        self.dropped = self._dropped_by_retired + (self._worker.dropped if self._worker else 0)
+        self.dropped = self._passed_over + self._dropped_by_retired + (self._worker.dropped if self._worker else 0)
         return ShowFallback() not in actions
 
     def replace_pipeline(self, first: Callable[[], Pipeline] | None = None) -> None:
@@ -200,6 +214,11 @@ class PipelineSupervisor:
     def ended(self, by: float) -> bool:
         """Whether all workers have ended, waiting until `by` on the clock. Call after `close`."""
         return all(worker.ended(max(0.0, by - self._clock.now())) for worker in self._workers())
+
+    def _starved_s(self) -> float:
+        """For how long the worker at work has waited for a processor since the last call."""
+        before, self._run_delay_s = self._run_delay_s, self._worker.run_delay_s if self._worker else 0.0
+        return max(0.0, self._run_delay_s - before)
 
     def _workers(self) -> list[Worker]:
         return [*self._retired.values(), *([self._worker] if self._worker else [])]
@@ -229,18 +248,17 @@ class PipelineSupervisor:
         elif isinstance(action, SubmitFrame):
             assert self._worker is not None
             assert frame is not None
-            self._worker.submit_frame(frame)
+            self._since_rendered += 1
+            if self._since_rendered >= self.load.quality.render_every:
+                self._since_rendered = 0
+                self._worker.submit_frame(frame)
+            else:
+                self._passed_over += 1
         elif isinstance(action, ReportFailure):
             self._on_trouble(action.error)
         elif isinstance(action, ReportHang):
             assert self._worker is not None
-            self._on_trouble(
-                PipelineHangError(
-                    f"the pipeline has rendered no picture for some seconds (in: {self._worker.stages})",
-                    "a fallback picture is shown and the pipeline is restarted by itself; "
-                    "if that does not help, restart the camera",
-                )
-            )
+            self._on_trouble(_hang_error(action, self._worker.stages))
         elif isinstance(action, ReportRecovery):
             self._on_trouble(None)
 
@@ -252,3 +270,16 @@ class PipelineSupervisor:
             self._messages.put((event, ShownPicture(frame, rendered, event.at)))
         else:
             self._messages.put(event)
+
+
+def _hang_error(hang: ReportHang, stages: str) -> PipelineHangError:
+    if hang.starved:
+        return PipelineHangError(
+            f"other programs keep the computer so busy that no picture was rendered for some seconds (in: {stages})",
+            "a fallback picture is shown until there is time again; end what else is running",
+        )
+    return PipelineHangError(
+        f"the pipeline has rendered no picture for some seconds (in: {stages})",
+        "a fallback picture is shown and the pipeline is restarted by itself; "
+        "if that does not help, restart the camera",
+    )

@@ -8,6 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 
 from relit_camera.base.concurrency.clock import Clock
 from relit_camera.base.concurrency.newest_slot import NewestSlot
+from relit_camera.base.concurrency.run_delay import run_delay_s
 from relit_camera.base.images.image_types import Frame
 from relit_camera.live.pipeline import Pipeline, RenderedFrame, RenderTask
 from relit_camera.live.scene.scene import Scene
@@ -61,6 +62,7 @@ class PipelineWorker:
         self._newest = self._frames.reader()
         self._closing = threading.Event()
         self._renderer = ThreadPoolExecutor(1, "renderer")
+        self._renderer_id: int | None = None
         self._rendering: Future[None] = Future()
         self._rendering.set_result(None)
         # A daemon thread: when it hangs, it must not keep the program from ending.
@@ -80,6 +82,11 @@ class PipelineWorker:
     def stages(self) -> str:
         """The stages that are running now, for messages to users."""
         return ", ".join(self.pipeline.timer.running()) if self.pipeline else "opening models"
+
+    @property
+    def run_delay_s(self) -> float:
+        """For how long its threads have waited for a processor since they began."""
+        return sum(run_delay_s(thread) for thread in (self._thread.native_id, self._renderer_id) if thread is not None)
 
     def close(self) -> None:
         """Let the threads end when they can. A frame that hangs is not waited for."""
@@ -120,6 +127,7 @@ class PipelineWorker:
             self._rendering = self._renderer.submit(self._render, frame, task, begun_at)
 
     def _render(self, frame: Frame, task: RenderTask, begun_at: float) -> None:
+        self._renderer_id = threading.get_native_id()
         try:
             rendered = task()
             if not self._closing.is_set():

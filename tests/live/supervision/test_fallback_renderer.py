@@ -1,0 +1,123 @@
+"""The picture in place of a live one: it follows light and head, and nobody waits while its relighter is opened."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+import numpy as np
+import pytest
+
+from relit_camera.base.config.look import Lamp, Lighting, Look
+from relit_camera.base.config.settings import Fallback
+from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.live.publishing.placeholder_image import Placeholder
+from relit_camera.live.scene.scene import Scene
+from relit_camera.live.supervision import fallback_renderer
+from relit_camera.live.supervision.fallback_renderer import KEPT_S, FallbackRenderer
+from tests.live.people import LIVE_SIZE, live_frame, motion, person
+
+FAILED = np.full((LIVE_SIZE[1], LIVE_SIZE[0], 3), 7, np.uint8)
+
+
+class Opener:
+    """Opens when it is told."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[Callable[[], Any], Future[Any]]] = []
+
+    def __call__(self, work: Callable[[], Any]) -> Future[Any]:
+        future: Future[Any] = Future()
+        self.asked.append((work, future))
+        return future
+
+    def open(self) -> None:
+        work, future = self.asked[-1]
+        future.set_result(work())
+
+
+def at_once(work: Callable[[], Any]) -> Future[Any]:
+    opener = Opener()
+    future = opener(work)
+    opener.open()
+    return future
+
+
+def renderer(start: Callable[[Callable[[], Any]], Future[Any]] = at_once) -> FallbackRenderer:
+    return FallbackRenderer(LIVE_SIZE, Fallback.PLACEHOLDER, Placeholder(lambda: FAILED), start)
+
+
+def lit_from(azimuth_deg: float) -> Scene:
+    lighting = Lighting(environment=None, lamps=[Lamp(azimuth_deg=azimuth_deg)], transition_s=0)
+    return Scene(Look(lighting=lighting), subject=person())
+
+
+def shown(fallback: FallbackRenderer, frame: Frame, scene: Scene) -> DisplayImage:
+    picture = fallback.picture(frame, scene)
+    assert picture is not None
+    assert not picture.unlit
+    return picture.image
+
+
+def middle(image: DisplayImage) -> float:
+    """Column of the person's middle: where the picture differs from its border."""
+    weight = np.abs(image.astype(float) - image[0, 0]).sum(axis=(0, 2))
+    return float((weight * np.arange(len(weight))).sum() / weight.sum())
+
+
+def test_it_follows_the_light() -> None:
+    fallback = renderer()
+    left, right = (shown(fallback, live_frame(index=index), lit_from(side)) for index, side in enumerate((-90, 90)))
+    assert np.abs(left.astype(int) - right).mean() > 2
+
+
+def test_it_moves_aside_as_the_head_did_when_it_was_last_tracked_and_does_since() -> None:
+    fallback, scene = renderer(), lit_from(0)
+    live = live_frame()
+    at_rest = middle(shown(fallback, live, scene))
+    fallback.note_live(live, motion(shift=(4, 0, 0)))
+    aside = middle(shown(fallback, live, scene))
+    assert aside > at_rest + 5
+    moved = Frame(np.roll(live.image, 6, axis=1), 1, live.captured_at + 0.03, live.time_s + 0.03)
+    assert middle(shown(fallback, moved, scene)) > aside + 2
+
+
+def test_nobody_waits_while_it_is_opened() -> None:
+    opener = Opener()
+    fallback, scene = renderer(opener), lit_from(0)
+    assert fallback.picture(live_frame(index=0), scene) is None
+    assert fallback.picture(live_frame(index=1), scene) is None
+    assert len(opener.asked) == 1
+    opener.open()
+    assert fallback.picture(live_frame(index=2), scene) is not None
+
+
+def test_it_is_kept_for_some_seconds_after_its_last_use() -> None:
+    opener = Opener()
+    fallback, scene = renderer(opener), lit_from(0)
+    fallback.picture(live_frame(index=0), scene)
+    opener.open()
+    fallback.picture(live_frame(index=0), scene)
+    fallback.release(KEPT_S - 0.1)
+    assert fallback.picture(live_frame(index=0), scene) is not None
+    fallback.release(KEPT_S + 0.1)
+    assert fallback.picture(live_frame(index=0), scene) is None
+    assert len(opener.asked) == 2
+
+
+def test_where_it_cannot_be_opened_the_placeholder_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("a bug")
+
+    monkeypatch.setattr(fallback_renderer, "shared_relighter", fail)
+
+    def start(work: Callable[[], Any]) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            work()
+        except ZeroDivisionError as error:
+            future.set_exception(error)
+        return future
+
+    np.testing.assert_array_equal(shown(renderer(start), live_frame(), lit_from(0)), FAILED)
