@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import Mask
 
+_GATHERED_NUMBERS = 4 << 20
+"""Values that are read at a time for sums of rows: 16 MB as floats."""
+
 
 @dataclass(frozen=True)
 class LocalBasis:
@@ -91,13 +94,21 @@ class LocalBasis:
         bounds = np.searchsorted(place[order], np.arange(len(self.pixels) + 1) * places)
         result = np.zeros((3, len(pixels), self.components), np.float32)
         for index, (_, part) in enumerate(self._clusters()):
-            entries = order[bounds[index] : bounds[index + 1]]
+            entries = np.sort(order[bounds[index] : bounds[index + 1]])  # those of one sum beside one another
             if len(entries):
-                touched, at = np.unique(entries // pixels.shape[1], return_inverse=True)
-                shares = np.zeros((len(touched), places), np.float32)
-                np.add.at(shares, (at, place[entries] - index * places), weights.ravel()[entries])
-                values = self.values[part].transpose(1, 2, 0).astype(np.float32)
-                result[:, touched] += shares @ values @ self.scaled_mixes(part)
+                touched, starts = np.unique(entries // pixels.shape[1], return_index=True)
+                sums = np.empty((part.stop - part.start, 3, len(touched)), np.float32)
+                step = max(_GATHERED_NUMBERS // (len(sums) * 3 * pixels.shape[1]), 1)
+                for first in range(0, len(touched), step):
+                    begin, end = starts[first], np.append(starts, len(entries))[min(first + step, len(starts))]
+                    some = entries[begin:end]
+                    used = self.values[part][:, :, place[some] - index * places] * weights.ravel()[some].astype(
+                        np.float32
+                    )
+                    sums[:, :, first : first + step] = np.add.reduceat(
+                        used, starts[first : first + step] - begin, axis=2, dtype=np.float32
+                    )
+                result[:, touched] += sums.transpose(1, 2, 0) @ self.scaled_mixes(part)
         return result
 
     def gram(self) -> NDArray[np.float64]:
