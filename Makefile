@@ -62,8 +62,9 @@ pytest: export PYTHONDONTWRITEBYTECODE =
 pytest: setup ## the tests alone, in two processes; make pytest PROCESSES=4
 	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire
 	# By themselves: browser and emulated machine take both cores, and tests that hold in real time would not.
+	# Of the browser's tests each may run in any process: those of a file take up to four minutes.
 	$(BIN)/python -m pytest tests/pipewire
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder tests/browser
+	$(BIN)/python -m pytest -n $(PROCESSES) --dist worksteal tests/browser
 	$(BIN)/python -m pytest tests/vm
 
 fuzz: setup ## mutated files on every reader, for an hour; make fuzz FUZZ="--seconds 60 --seed 3"

@@ -159,6 +159,8 @@ def test_what_is_refused_is_told_until_it_is_removed_or_another_is_sent(room: Op
         "look toward the camera",
     )
     assert there.jobs.all() == [failed]
+    with pytest.raises(ConflictError, match="it has failed"):
+        there.jobs.video("talk")
     assert there.files() == set()
     there.send()
     there.end()

@@ -32,6 +32,13 @@ def test_colours_of_any_pixels_in_any_order(basis: LocalBasis) -> None:
     np.testing.assert_allclose(basis.at(amounts, pixels), expected.transpose(2, 0, 1), atol=1e-5)
 
 
+def test_a_cluster_without_components_is_black(basis: LocalBasis) -> None:
+    more = replace(basis, pixels=np.vstack([basis.pixels, [29] * 5]), first=np.append(basis.first, 9).astype(np.int32))
+    pixels = np.array([[29, 29]])
+    assert not more.rows(pixels, np.ones((1, 2))).any()
+    assert not more.at(np.ones((4, 1), np.float32), pixels[0, :1]).any()
+
+
 def test_weighted_sums_of_rows_count_a_repeated_place_once_and_a_repeated_pixel_twice(basis: LocalBasis) -> None:
     rng = np.random.default_rng(3)
     pixels, weights = rng.integers(0, PIXELS, (7, 12)), rng.random((7, 12))

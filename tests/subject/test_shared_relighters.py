@@ -12,6 +12,7 @@ import pytest
 
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
+from relit_camera.subject.relighting import shared_relighters
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.relighting.relighter import RelighterOptions
 from relit_camera.subject.relighting.shared_relighters import SharedRelighters
@@ -44,6 +45,33 @@ def test_another_subject_and_other_threads_have_their_own() -> None:
     first, other = shared.get(subject), shared.get(synthetic_subject(16, 16))
     two = shared.get(subject, RelighterOptions(SessionOptions("cpu", threads=2)))
     assert len({id(first), id(other), id(two)}) == 3
+
+
+def test_one_that_is_made_already_can_be_had_without_waiting() -> None:
+    shared, subject = SharedRelighters(), synthetic_subject(16, 16)
+    assert shared.made(subject) is None
+    relighter = shared.get(subject)
+    assert shared.made(subject) is relighter
+    assert shared.made(synthetic_subject(16, 16)) is None
+
+
+def test_one_who_hangs_while_making_it_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared_relighters, "WAIT_S", 0.05)
+    hanging, go_on = threading.Event(), threading.Event()
+
+    def make(subject: Subject, options: RelighterOptions) -> BasisRelighter:
+        if not hanging.is_set():
+            hanging.set()
+            go_on.wait(30)
+        return BasisRelighter(subject, options)
+
+    shared, subject = SharedRelighters(make), synthetic_subject(16, 16)
+    thread = threading.Thread(target=shared.get, args=(subject,))
+    thread.start()
+    hanging.wait(30)
+    assert shared.get(subject) is not None
+    go_on.set()
+    thread.join()
 
 
 def test_what_nobody_has_is_not_kept() -> None:

@@ -21,7 +21,8 @@ from relit_camera.live.compositing.compositor import composite_source_image
 from relit_camera.live.reenactment.rest_layer import RestLayer
 from relit_camera.live.scene.light_transition import display_light
 from relit_camera.live.scene.scene import Scene
-from relit_camera.subject.relighting.shared_relighters import shared_relighter
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.relighting.shared_relighters import made_relighter
 from relit_camera.subject.subject import Subject
 
 SIZE = (256, 192)
@@ -84,7 +85,8 @@ class _SubjectRenderer:
     """Relights one subject at rest, before each place that lights it."""
 
     def __init__(self, subject: Subject) -> None:
-        self._relighter = shared_relighter(subject)
+        # Not for others: this thread has a low priority, and they would wait for it.
+        self._relighter = made_relighter(subject) or BasisRelighter(subject)
         subject.drop_pages()
         self._at_rest = RestLayer(subject, SIZE)
         self._gain = np.float32(subject.metadata.display_gain)

@@ -72,7 +72,7 @@ CAPTURING_STAGES = (CaptureStage.FILMING, CaptureStage.BUILDING, CaptureStage.FA
 """Stages of an instant capture in which the person should look at the camera."""
 NO_SUBJECT_MESSAGE = "nobody to show yet: choose or capture yourself in the panel"
 """What the placeholder says while nobody is chosen."""
-HANGING_THREAD_PREFIXES = ("source-", "camera", "pipeline", "renderer", "warp-planner", "fallback", "publisher")
+HANGING_THREAD_PREFIXES = ("source-", "camera", "pipeline", "renderer", "fallback", "publisher")
 """Threads that may be inside a driver or a network."""
 
 

@@ -103,11 +103,14 @@ class FakeSupervisor:
 
 
 class FakeFallback:
-    released = 0
+    released = forgotten = 0
     unlit = False
 
     def picture(self, frame: Frame, scene: Scene) -> FallbackPicture:
         return FallbackPicture(FALLBACK, self.unlit)
+
+    def forget(self) -> None:
+        self.forgotten += 1
 
     def release(self, now: float) -> None:
         self.released += 1

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.image_types import Frame
+from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.head_pose import project
 from relit_camera.live.supervision.head_movement import TUNABLES, HeadMovement
@@ -84,8 +85,21 @@ def test_a_head_that_is_lost_comes_to_rest_and_is_found_again() -> None:
 
 
 def test_another_picture_size_is_no_head() -> None:
-    head = following()
+    head = HeadMovement()
+    head.begin_at(frame(0.0), motion(rotation_from_angles(25), shift=(6, 0, 0)))
     small = np.zeros((LIVE_SIZE[1] // 2, LIVE_SIZE[0] // 2, 3), np.uint8)
     found = head.motion(Frame(small, 1, 1.0, 1.0))
     assert found is not None
+    assert found.presence == 0
+    assert found.rotation.magnitude() == 0
     np.testing.assert_array_equal(found.translation, 0)
+
+
+def test_what_is_forgotten_is_not_followed() -> None:
+    head = following()
+    assert head.motion(frame(0.1)) is not None
+    head.forget()
+    assert head.motion(frame(0.2)) is None
+    head = following()
+    head.forget()
+    assert head.motion(frame(0.1)) is None

@@ -228,6 +228,13 @@ def test_a_program_that_was_stopped_does_not_hang() -> None:
     assert script.arrive(3620.1) == (RetireWorker(0), ShowFallback())
 
 
+def test_what_a_frame_did_not_see_of_a_pause_does_not_count_for_it() -> None:
+    script = working()
+    script.start(3610.9)  # after the pause, before the supervisor has run
+    assert script(FrameArrived(3611.0, 0, paused_s=3600.0)) == (SubmitFrame(),)
+    assert script.arrive(3613.2) == (ReportHang(0), ShowFallback())
+
+
 def test_a_hang_that_ends_by_itself_is_a_recovery() -> None:
     script = working()
     script.start(10.0)

@@ -125,8 +125,11 @@ class ReplayJobs:
 
     def video(self, name: str) -> Path:
         """The file of a relit video; see `ReplayControl.video`."""
-        if self.status(name).stage is not ReplayStage.DONE:
+        last = self.status(name)
+        if last.stage.is_running:
             raise ConflictError(f"the replay '{name}' has no video yet", "wait for its end; GET replays/NAME tells it")
+        if last.stage is not ReplayStage.DONE:
+            raise ConflictError(f"the replay '{name}' has no video: it has {last.stage}", "send the video again")
         return self._results.path(name)
 
     def remove(self, name: str) -> None:

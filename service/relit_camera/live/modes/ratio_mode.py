@@ -52,11 +52,11 @@ class RatioMode:
         The task multiplies and composes.
         """
         live = fit_frame(frame, self._context.size)
-        motion = fit_motion(motion, frame.size, self._context.size)
+        fitted = fit_motion(motion, frame.size, self._context.size)  # what is given on is that of the frame
         if scene.unlit_allowed:
-            plan = self._plan(motion, live, scene, quality)
+            plan = self._plan(fitted, live, scene, quality)
             return plan if isinstance(plan, FaceMismatch) else partial(self._render, plan, live, motion, scene)
-        followed = None if motion.presence <= 0 else self._plan(motion, live, scene, quality)
+        followed = None if motion.presence <= 0 else self._plan(fitted, live, scene, quality)
         if isinstance(followed, FaceMismatch):
             return followed
         if followed is None:

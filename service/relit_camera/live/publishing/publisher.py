@@ -26,7 +26,8 @@ LATE_FRAME_GRACE = 0.4
 
 
 LATE_TICK_S = 1.0
-"""After a tick that came so late the whole program had stood still: the last picture is shown on, and not as stale."""
+"""Where a tick comes later than its period by so much, the whole program had stood still: the last picture is shown on,
+and not as stale."""
 
 
 @dataclass(frozen=True)
@@ -200,9 +201,10 @@ class Publisher:
             self._new_rate.tick(now)
         image = self._image(now)
         self._show(image)
-        if not self._write(image, now):
+        written = self._write(image, now)
+        done = self._ticked_at = self._clock.now()
+        if not written:
             return
-        done = self._clock.now()
         self._published += 1
         self._rate.tick(done)
         if picture is None:
@@ -214,9 +216,8 @@ class Publisher:
         last = self._last
         if last is not None and last.unlit and not self._unlit_allowed():
             last = self._last = None  # not even one that is held
-        if self.hold or now - self._ticked_at > LATE_TICK_S:
+        if self.hold or now - self._ticked_at > 1 / self._fps + LATE_TICK_S:
             self._held_at = now
-        self._ticked_at = now
         fresh_at = max(self._newest.put_at, self._held_at)
         if self._stale_after_s is not None and now - fresh_at > self._stale_after_s:
             last = self._last = None  # holding later must not bring back a picture that the placeholder has replaced

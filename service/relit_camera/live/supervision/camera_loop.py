@@ -112,6 +112,8 @@ class CameraLoop:
         scene = self._scene()
         if scene.frozen:
             return
+        if scene.subject is None:
+            self._fallback.forget()
         if scene.subject is None and not scene.unlit_allowed:
             if self._is_capturing():
                 self._show(self._placeholders.capturing, CameraState.CAPTURING)
@@ -125,6 +127,8 @@ class CameraLoop:
             if picture is not None:
                 image, unlit = picture.image, picture.unlit
                 self._publisher.pictures.put(PublishedPicture(image, frame.captured_at, frame.index, unlit))
+            else:
+                self._publisher.hold = True  # the last one stays
             if self._failing():
                 self._board.set_state(CameraState.FALLBACK)
 
@@ -158,6 +162,7 @@ class CameraLoop:
         return any(map(self._board.is_degraded, codes))
 
     def _show(self, placeholder: Placeholder, state: CameraState) -> None:
+        self._fallback.forget()
         self._publisher.show_placeholder(placeholder.image, self._last_index)
         self._board.set_state(state)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart, return_freed_memory
 from relit_camera.base.config.settings import Fallback
+from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.face.head_pose import fit_pose, unproject
@@ -47,6 +48,8 @@ class FallbackPicture:
     unlit: bool = False
 
 
+OPENING_S = 10.0
+"""Seconds for which the last picture is shown while the relighter is opened."""
 KEPT_S = 10.0
 """For so long the relit source image is kept after its last use: on a busy computer it is soon needed again."""
 
@@ -89,12 +92,18 @@ class FallbackRenderer:
         self._head = HeadMovement()
         self._source: _RelitSource | None = None
         self._opening: tuple[Subject, Future[_RelitSource]] | None = None
+        self._opened_at = 0.0
         self._used_at = 0.0
         self._failed_subject: Subject | None = None
 
     def note_live(self, frame: Frame, motion: FaceMotion | None) -> None:
         """A live picture of this frame was shown, in which the face moved so: a fallback goes on from there."""
         self._head.begin_at(frame, motion)
+
+    def forget(self) -> None:
+        """Nobody is shown: keep neither a frame nor the relit source image."""
+        self._head.forget()
+        self._source = self._opening = None
 
     def release(self, now: float) -> None:
         """Free the memory of relit image and background, where no fallback was needed for `KEPT_S` until `now`."""
@@ -104,7 +113,7 @@ class FallbackRenderer:
             return_freed_memory()
 
     def picture(self, frame: Frame, scene: Scene) -> FallbackPicture | None:
-        """A picture in place of this live frame; None while the relighter is opened. Never raises.
+        """A picture in place of this live frame; None while the relighter is opened, if not for too long. Never raises.
 
         As filmed only where the scene allows that too.
         """
@@ -112,8 +121,11 @@ class FallbackRenderer:
         self._used_at = frame.captured_at
         if subject is not None and subject is not self._failed_subject:
             try:
-                source = self._opened(subject)
-                return None if source is None else FallbackPicture(self._relit(source, scene, frame))
+                source = self._opened(subject, frame.captured_at)
+                if source is not None:
+                    return FallbackPicture(self._relit(source, scene, frame))
+                if frame.captured_at - self._opened_at < OPENING_S:
+                    return None
             except Exception:  # this is what is shown when all else fails
                 log.exception("the source image cannot be relit either")
                 self._failed_subject = subject
@@ -121,12 +133,12 @@ class FallbackRenderer:
             return FallbackPicture(crop_to_fill(frame.image, self._size), unlit=True)
         return FallbackPicture(self._placeholder.image)
 
-    def _opened(self, subject: Subject) -> _RelitSource | None:
+    def _opened(self, subject: Subject, now: float) -> _RelitSource | None:
         if self._source is not None and self._source.subject is subject:
             return self._source
         if self._opening is None or self._opening[0] is not subject:
             self._source = None
-            self._opening = subject, self._start(lambda: _open(subject, self._size))
+            self._opening, self._opened_at = (subject, self._start(lambda: _open(subject, self._size))), now
         opening = self._opening[1]
         if opening.done():
             self._opening = None
@@ -135,8 +147,16 @@ class FallbackRenderer:
 
     def _relit(self, source: _RelitSource, scene: Scene, frame: Frame) -> DisplayImage:
         light = self._light.update(scene, frame.time_s) * np.float32(source.subject.metadata.display_gain)
-        layer = source.render(light, self._head.motion(frame))
+        layer = source.render(light, self._motion(frame))
         return composite_source_image(self._background_renderer, layer, scene, frame.time_s)
+
+    def _motion(self, frame: Frame) -> FaceMotion | None:
+        try:
+            return self._head.motion(frame)
+        except Exception:  # a person at rest is better than none
+            log.exception("the head cannot be followed")
+            self._head.forget()
+            return None
 
 
 def _open(subject: Subject, size: tuple[int, int]) -> _RelitSource:
@@ -180,7 +200,12 @@ class _RelitSource:
 def _stored_face(subject: Subject) -> SourceFace | None:
     """The face by the landmarks that the subject keeps; None where it keeps none, and then it does not move."""
     for name, landmarks in subject.landmarks.items():
-        scheme = landmark_scheme(name)
+        try:
+            scheme = landmark_scheme(name)
+        except NotFoundError:  # of a tracker that is not here
+            continue
+        if len(landmarks) != scheme.count:
+            continue
         pose = fit_pose(landmarks, scheme, subject.size)
         if pose is not None:
             return SourceFace(scheme, landmarks, pose, unproject(landmarks, pose, scheme, subject.size), subject.size)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import DisplayImage, Frame
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.landmarks.rotated_crop import bounding_box
 from relit_camera.face.motion.face_follower import FaceMotion
@@ -75,6 +76,10 @@ class HeadMovement:
         followed = motion is not None and motion.status is FaceStatus.FOUND and motion.presence > 0
         self._tracked = (frame, motion) if motion is not None and followed else None
         self._reference = None
+
+    def forget(self) -> None:
+        """Follow nobody, and keep no frame."""
+        self._tracked = self._reference = None
 
     def motion(self, frame: Frame) -> FaceMotion | None:
         """The motion in this frame: the last one, with the head moved. None while there is none to follow."""
@@ -147,4 +152,5 @@ def _moved(
     depth = -z / max(float(np.hypot(*similarity[:, 0])), 0.1)
     across, down = (after - center) * depth / pose.focal_px
     translation = motion.translation + np.array([across, -down, -depth]) - pose.translation
-    return replace(motion, translation=presence * translation, presence=presence * motion.presence)
+    rotation = Rotation.from_rotvec(presence * motion.rotation.as_rotvec())
+    return replace(motion, rotation=rotation, translation=presence * translation, presence=presence * motion.presence)

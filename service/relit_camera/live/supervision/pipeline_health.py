@@ -255,9 +255,11 @@ def _after_arrival(health: PipelineHealth, event: FrameArrived, limits: HealthLi
         number = health.started_workers
         health = replace(health, worker=number, started_workers=number + 1, has_rendered=False, busy_since=None)
         actions = (StartWorker(number),)
-    paused_s, starved_s = health.paused_s + event.paused_s, health.starved_s + event.starved_s
+    at_frame_s = 0.0 if health.busy_since is None else event.at - health.busy_since  # it may have begun after the pause
+    paused_s = min(health.paused_s + event.paused_s, at_frame_s)
+    starved_s = min(health.starved_s + event.starved_s, at_frame_s)
     health = replace(health, paused_s=paused_s, starved_s=starved_s)
-    busy_s = 0.0 if health.busy_since is None else event.at - health.busy_since - paused_s
+    busy_s = at_frame_s - paused_s
     if busy_s > limits.hang_timeout_s:
         return _after_hang(health, busy_s, limits)
     if health.failures and event.at < health.retry_at and event.scene_revision == health.failed_revision:

@@ -35,6 +35,8 @@ from relit_camera.live.supervision.pipeline_worker import PipelineWorker
 
 DEFAULT_LIMITS = HealthLimits()
 DEFAULT_QUALITY_LIMITS = QualityLimits()
+LATE_FRAME_S = 0.3
+"""A worker that is at one frame for longer is late: from then on it counts for how long it waits for a processor."""
 LATE_S = 1.0
 """The supervisor looks five times a second or more. Where it comes later than this, the rest of the time counts as one
 in which the whole program did not run."""
@@ -158,7 +160,8 @@ class PipelineSupervisor:
         self._dropped_by_retired = 0
         self._since_rendered = self._passed_over = 0
         self._looked_at = clock.now()
-        self._paused_s = self._run_delay_s = 0.0
+        self._paused_s = 0.0
+        self._run_delay_s: float | None = None
 
     @property
     def health(self) -> PipelineHealth:
@@ -188,8 +191,8 @@ class PipelineSupervisor:
             self._next_pipeline = replacement
             self._apply(ReplacementAsked())
         paused_s, self._paused_s = self._paused_s, 0.0
-        starved_s = self._starved_s()
-        actions = self._apply(FrameArrived(self._clock.now(), self._scene().revision, paused_s, starved_s), frame)
+        now = self._clock.now()
+        actions = self._apply(FrameArrived(now, self._scene().revision, paused_s, self._starved_s(now)), frame)
         if self._worker is not None:
             self.pipeline = self._worker.pipeline or self.pipeline
         if self.pipeline is not None:
@@ -215,10 +218,14 @@ class PipelineSupervisor:
         """Whether all workers have ended, waiting until `by` on the clock. Call after `close`."""
         return all(worker.ended(max(0.0, by - self._clock.now())) for worker in self._workers())
 
-    def _starved_s(self) -> float:
-        """For how long the worker at work has waited for a processor since the last call."""
-        before, self._run_delay_s = self._run_delay_s, self._worker.run_delay_s if self._worker else 0.0
-        return max(0.0, self._run_delay_s - before)
+    def _starved_s(self, now: float) -> float:
+        """For how long a worker that is late with its frame has waited for a processor since the last call."""
+        busy_since, before = self._health.busy_since, self._run_delay_s
+        if self._worker is None or busy_since is None or now - busy_since < LATE_FRAME_S:
+            self._run_delay_s = None  # not asked of the system with every frame
+            return 0.0
+        self._run_delay_s = self._worker.run_delay_s
+        return 0.0 if before is None else max(0.0, self._run_delay_s - before)
 
     def _workers(self) -> list[Worker]:
         return [*self._retired.values(), *([self._worker] if self._worker else [])]

@@ -95,7 +95,7 @@ class LocalBasis:
         result = np.zeros((3, len(pixels), self.components), np.float32)
         for index, (_, part) in enumerate(self._clusters()):
             entries = np.sort(order[bounds[index] : bounds[index + 1]])  # those of one sum beside one another
-            if len(entries):
+            if len(entries) and part.stop > part.start:
                 touched, starts = np.unique(entries // pixels.shape[1], return_index=True)
                 sums = np.empty((part.stop - part.start, 3, len(touched)), np.float32)
                 step = max(_GATHERED_NUMBERS // (len(sums) * 3 * pixels.shape[1]), 1)

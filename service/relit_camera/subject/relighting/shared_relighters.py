@@ -14,6 +14,9 @@ from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.relighting.relighter import RelighterOptions
 from relit_camera.subject.subject import Subject
 
+WAIT_S = 5.0
+"""How long somebody who makes a relighter is waited for."""
+
 
 @dataclass(eq=False)
 class _Entry:
@@ -35,15 +38,26 @@ class SharedRelighters:
         self._entries: list[_Entry] = []
 
     def get(self, subject: Subject, options: RelighterOptions | None = None) -> BasisRelighter:
-        """The relighter of that very object; whoever comes while it is made waits for it."""
+        """The relighter of that very object; whoever comes while it is made waits for it, but not for `WAIT_S`."""
         options = options or RelighterOptions()
         entry = self._entry(subject, options.session.threads)
-        with entry.lock:
+        if not entry.lock.acquire(timeout=WAIT_S):
+            return self._make(subject, options)  # whoever makes it hangs
+        try:
             relighter = None if entry.relighter is None else entry.relighter()
             if relighter is None:
                 relighter = self._make(subject, options)
                 entry.relighter = weakref.ref(relighter)
             return relighter
+        finally:
+            entry.lock.release()
+
+    def made(self, subject: Subject) -> BasisRelighter | None:
+        """The relighter that somebody has of that very object; None where nobody has one yet."""
+        with self._lock:
+            entries = [entry for entry in self._entries if entry.subject() is subject]
+        found = (entry.relighter() for entry in entries if entry.relighter is not None)
+        return next((relighter for relighter in found if relighter is not None), None)
 
     def _entry(self, subject: Subject, threads: int) -> _Entry:
         with self._lock:
@@ -61,3 +75,8 @@ _SHARED = SharedRelighters()
 def shared_relighter(subject: Subject, options: RelighterOptions | None = None) -> BasisRelighter:
     """The relighter of a subject that everybody in this process shares; see `SharedRelighters.get`."""
     return _SHARED.get(subject, options)
+
+
+def made_relighter(subject: Subject) -> BasisRelighter | None:
+    """The shared relighter of a subject if there is one; see `SharedRelighters.made`."""
+    return _SHARED.made(subject)
