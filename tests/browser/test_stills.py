@@ -113,9 +113,9 @@ def test_escape_cancels_it(fake: FakeServer, open_page: OpenPage) -> None:
 
 
 def test_a_page_that_is_closed_cancels_it(fake: FakeServer, open_page: OpenPage) -> None:
-    panel, _ = open_card(fake, open_page)
+    panel, dialog = open_card(fake, open_page)
     panel.page.keyboard.press("Enter")
-    wait_until(lambda: stage(fake) is ExpressionStage.FILMING)
+    expect(dialog).to_have_attribute("data-step", "filming")
     panel.page.goto("about:blank")
     wait_until(lambda: stage(fake) is ExpressionStage.CANCELED)
 
