@@ -131,11 +131,11 @@ def test_a_tracker_that_starves_is_not_replaced(tmp_path: Path, survived: Surviv
         return replaced[-1]
 
     processor = min(os.sched_getaffinity(0))
-    others = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(12)]
+    busy = f"import os; os.sched_setaffinity(0, {{{processor}}})\nwhile True: pass"
+    others: list[subprocess.Popen[bytes]] = []
     try:
         with watched_camera(tmp_path, tracker=tracker, new_tracker=new_tracker) as watched:
-            for other in others:
-                os.sched_setaffinity(other.pid, {processor})
+            others += [subprocess.Popen([sys.executable, "-c", busy]) for _ in range(12)]
             tracker.pinned = processor
             watched.reports("other programs keep the computer so busy")
             watched.state("standing-in")

@@ -232,6 +232,19 @@ def test_a_pipeline_that_starves_is_shown_as_such_and_kept() -> None:
     assert {kind for at, kind, _ in simulation.shown if at > 40.1} == {"picture"}
 
 
+def test_what_a_worker_waits_from_the_start_of_a_frame_counts() -> None:
+    simulation = Simulation(HealthLimits(hang_timeout_s=0.4, abandon_timeout_s=1.0))
+    simulation.run(10.0)
+
+    def starve() -> None:
+        simulation.workers[0].run_delay_s += 0.06  # of each tenth of a second: just over the half
+
+    simulation.render_s = 3.0
+    simulation.clock.every(0.1, starve)
+    simulation.run(12.0)
+    assert "other programs" in str(simulation.troubles[0][1])
+
+
 def test_a_program_that_stands_still_for_a_minute_has_nothing_to_report() -> None:
     simulation = Simulation()
     simulation.run(10.0)

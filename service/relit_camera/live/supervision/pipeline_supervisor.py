@@ -35,8 +35,6 @@ from relit_camera.live.supervision.pipeline_worker import PipelineWorker
 
 DEFAULT_LIMITS = HealthLimits()
 DEFAULT_QUALITY_LIMITS = QualityLimits()
-LATE_FRAME_S = 0.3
-"""A worker that is at one frame for longer is late: from then on it counts for how long it waits for a processor."""
 LATE_S = 1.0
 """The supervisor looks five times a second or more. Where it comes later than this, the rest of the time counts as one
 in which the whole program did not run."""
@@ -192,7 +190,7 @@ class PipelineSupervisor:
             self._apply(ReplacementAsked())
         paused_s, self._paused_s = self._paused_s, 0.0
         now = self._clock.now()
-        actions = self._apply(FrameArrived(now, self._scene().revision, paused_s, self._starved_s(now)), frame)
+        actions = self._apply(FrameArrived(now, self._scene().revision, paused_s, self._starved_s()), frame)
         if self._worker is not None:
             self.pipeline = self._worker.pipeline or self.pipeline
         if self.pipeline is not None:
@@ -218,14 +216,10 @@ class PipelineSupervisor:
         """Whether all workers have ended, waiting until `by` on the clock. Call after `close`."""
         return all(worker.ended(max(0.0, by - self._clock.now())) for worker in self._workers())
 
-    def _starved_s(self, now: float) -> float:
-        """For how long a worker that is late with its frame has waited for a processor since the last call."""
-        busy_since, before = self._health.busy_since, self._run_delay_s
-        if self._worker is None or busy_since is None or now - busy_since < LATE_FRAME_S:
-            self._run_delay_s = None  # not asked of the system with every frame
-            return 0.0
-        self._run_delay_s = self._worker.run_delay_s
-        return 0.0 if before is None else max(0.0, self._run_delay_s - before)
+    def _starved_s(self) -> float:
+        """For how long the worker has waited for a processor since the last call."""
+        before, self._run_delay_s = self._run_delay_s, self._worker.run_delay_s if self._worker else None
+        return max(0.0, self._run_delay_s - before) if self._run_delay_s is not None and before is not None else 0.0
 
     def _workers(self) -> list[Worker]:
         return [*self._retired.values(), *([self._worker] if self._worker else [])]
@@ -251,7 +245,7 @@ class PipelineSupervisor:
             self._worker.close()
             self._retired = {**self._retired, action.worker: self._worker}
             self._dropped_by_retired += self._worker.dropped
-            self._worker = None
+            self._worker = self._run_delay_s = None
         elif isinstance(action, SubmitFrame):
             assert self._worker is not None
             assert frame is not None
