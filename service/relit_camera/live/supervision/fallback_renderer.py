@@ -101,15 +101,14 @@ class FallbackRenderer:
         self._head.begin_at(frame, motion)
 
     def forget(self) -> None:
-        """Nobody is shown: keep neither a frame nor the relit source image."""
+        """Nobody is shown: keep neither a frame nor the relit source image nor the background."""
         self._head.forget()
-        self._source = self._opening = None
+        self._drop()
 
     def release(self, now: float) -> None:
         """Free the memory of relit image and background, where no fallback was needed for `KEPT_S` until `now`."""
         if (self._source is not None or self._opening is not None) and now - self._used_at > KEPT_S:
-            self._source = self._opening = None
-            self._background_renderer = BackgroundRenderer(self._size)
+            self._drop()
             return_freed_memory()
 
     def picture(self, frame: Frame, scene: Scene) -> FallbackPicture | None:
@@ -132,6 +131,10 @@ class FallbackRenderer:
         if self._fallback is Fallback.LIVE and scene.unlit_allowed:
             return FallbackPicture(crop_to_fill(frame.image, self._size), unlit=True)
         return FallbackPicture(self._placeholder.image)
+
+    def _drop(self) -> None:
+        self._source = self._opening = None
+        self._background_renderer = BackgroundRenderer(self._size)
 
     def _opened(self, subject: Subject, now: float) -> _RelitSource | None:
         if self._source is not None and self._source.subject is subject:
