@@ -104,16 +104,31 @@ def test_edges_follow_the_picture_where_the_mask_is_coarse() -> None:
     image = np.round(60 + 140 * truth[..., None] + np.zeros(3)).astype(np.uint8)
     mask = cv2.resize(truth, (32, 18), interpolation=cv2.INTER_AREA)
     enlarged = cv2.resize(mask, (640, 360), interpolation=cv2.INTER_LINEAR)
-    guided = refine_edges(mask, image) / 255
+    guided = refine_edges(mask, image, (640, 360)) / 255
     assert np.abs(guided - truth).mean() < 0.5 * np.abs(enlarged - truth).mean()
 
 
 def test_where_the_picture_has_no_edge_the_mask_is_kept_but_for_its_doubtful_ends() -> None:
     ramp = np.repeat(np.linspace(0, 1, 64, dtype=np.float32)[None], 36, axis=0)
-    alpha = refine_edges(ramp, np.full((360, 640, 3), 128, np.uint8))
+    alpha = refine_edges(ramp, np.full((360, 640, 3), 128, np.uint8), (640, 360))
     middle = alpha[180, ::80] / 255
     expected = np.clip((np.linspace(0, 1, 640)[::80] - 0.25) / 0.6, 0, 1)
     np.testing.assert_allclose(middle, expected, atol=0.03)
+
+
+@pytest.mark.parametrize(("x", "radius"), [(300, 90), (20, 60), (620, 40), (320, 300)])
+def test_alpha_near_the_person_is_that_of_a_guided_filter_of_the_whole_picture(x: int, radius: int) -> None:
+    """The same within six codes, wherever the person is; and where there is nobody, nothing."""
+    random = np.random.default_rng(4)
+    truth = disc(360, 640, x, radius)
+    image = np.clip(60 + 90 * truth[..., None] + random.normal(0, 12, (360, 640, 3)), 0, 255).astype(np.uint8)
+    mask = 0.04 + 0.92 * cv2.resize(truth, (256, 144), interpolation=cv2.INTER_AREA)
+    whole = cv2.ximgproc.guidedFilter(
+        cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), cv2.resize(mask, (640, 360)), 3, 4e-3 * 255**2, scale=0.5
+    )
+    expected = np.clip(np.rint(255 * (whole - 0.25) / 0.6), 0, 255)
+    assert np.abs(refine_edges(mask, image, (640, 360)) - expected).max() <= 6
+    assert not refine_edges(np.full_like(mask, 0.04), image, (1280, 720)).any()
 
 
 def test_only_doubt_is_steadied() -> None:

@@ -117,12 +117,10 @@ class SelfieMatting:
         if frame.size != self._size:
             self.reset()
             self._size = frame.size
-        width, height = frame.size
         image = halve(frame.image) if min(frame.size) >= TUNABLES.half_size_from_px else frame.image
         mask = smooth_over_time(self._segment(image), self._previous)
         self._previous = mask
-        alpha: Alpha = cv2.resize(refine_edges(mask, image), (width, height), interpolation=cv2.INTER_LINEAR)
-        return alpha
+        return refine_edges(mask, image, frame.size)
 
     def reset(self) -> None:
         """Forget the previous frame (after a cut, or with a new source)."""
@@ -165,26 +163,53 @@ def smooth_over_time(mask: Mask, previous: Mask | None) -> Mask:
     return mask + share * (previous - mask)
 
 
-def refine_edges(mask: Mask, image: DisplayImage) -> Alpha:
-    """Alpha of the image's size, from a coarser mask of the same scene, with the image's edges.
+def refine_edges(mask: Mask, image: DisplayImage, size: tuple[int, int]) -> Alpha:
+    """Alpha of `size` (width, height), from a coarser mask of the same scene, with the edges of its image.
 
-    Fast guided filter (He and Sun 2015) with the gray image as guide. Then the certain ends of the mask are stretched
-    to 0 and 1.
+    Fast guided filter (He and Sun 2015) with the gray image, which is no larger than `size`, as guide. Then the certain
+    ends of the mask are stretched to 0 and 1. Only what is near the person is computed: beyond, alpha is 0.
     """
     height, width = image.shape[:2]
     shrink = max(1, round(min(height, width) / TUNABLES.guide_side_px))
-    fitted: Mask = cv2.ximgproc.guidedFilter(
-        cv2.cvtColor(image, cv2.COLOR_RGB2GRAY),
-        cv2.resize(mask, (width, height), interpolation=cv2.INTER_LINEAR),
-        TUNABLES.guide_radius_px,  # at the shrunken size
-        TUNABLES.guide_epsilon * 255**2,  # the guide is in 8 bits
-        scale=1 / shrink,
+    enlarged: Mask = cv2.resize(mask, (width, height), interpolation=cv2.INTER_LINEAR)
+    near = _near_person(enlarged, shrink)
+    alpha = np.zeros(size[::-1], np.uint8)
+    if enlarged[near].size:
+        fitted: Mask = cv2.ximgproc.guidedFilter(
+            cv2.cvtColor(image[near], cv2.COLOR_RGB2GRAY),
+            enlarged[near],
+            TUNABLES.guide_radius_px,  # at the shrunken size
+            TUNABLES.guide_epsilon * 255**2,  # the guide is in 8 bits
+            scale=1 / shrink,
+        )
+        low, high = TUNABLES.certain_background, TUNABLES.certain_person
+        scale = 255 / (high - low)
+        # Rounded, and clipped to 0..255.
+        stretched = cv2.addWeighted(fitted, scale, fitted, 0, -low * scale, dtype=cv2.CV_8U)
+        rows, columns = (
+            slice(round(part.start * large / small), round(part.stop * large / small))
+            for part, large, small in zip(near, size[::-1], (height, width), strict=True)
+        )
+        onto = alpha[rows, columns]
+        cv2.resize(stretched, onto.shape[::-1], dst=onto, interpolation=cv2.INTER_LINEAR)
+    return alpha
+
+
+def _near_person(mask: Mask, shrink: int) -> tuple[slice, slice]:
+    """Rows and columns outside of which the guided filter gives alpha 0; empty where it does everywhere.
+
+    They begin and end at multiples of `shrink`, so that the shrunken pixels are those of the whole.
+    """
+    left, top, width, height = cv2.boundingRect(cv2.inRange(mask, 0.4 * TUNABLES.certain_background, np.inf))
+    if width == 0:
+        return slice(0, 0), slice(0, 0)
+    reach = shrink * (2 * TUNABLES.guide_radius_px + 2)  # two windows, and what is interpolated
+    sides = zip((top, left), (top + height, left + width), mask.shape, strict=True)
+    rows, columns = (
+        slice(max(start - reach, 0) // shrink * shrink, min(-(-(end + reach) // shrink) * shrink, side))
+        for start, end, side in sides
     )
-    low, high = TUNABLES.certain_background, TUNABLES.certain_person
-    scale = 255 / (high - low)
-    # Rounded, and clipped to 0..255.
-    stretched: Alpha = cv2.addWeighted(fitted, scale, fitted, 0, -low * scale, dtype=cv2.CV_8U)
-    return stretched
+    return rows, columns
 
 
 class RecordedMatting:

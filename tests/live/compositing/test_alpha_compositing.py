@@ -6,6 +6,7 @@ import pytest
 from relit_camera.base.errors import ImageError
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.live.compositing.alpha_compositing import over, replace_room, split_alpha
+from relit_camera.live.compositing.matted_frame import MattedFrame
 
 Pictures = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -46,7 +47,8 @@ def test_over_leaves_its_inputs_alone(pictures: Pictures) -> None:
     for picture in pictures:
         picture.setflags(write=False)
     over(*pictures)
-    replace_room(*pictures)
+    foreground, alpha, background = pictures
+    replace_room(MattedFrame(foreground, alpha), background)
     for picture, copy in zip(pictures, before, strict=True):
         np.testing.assert_array_equal(picture, copy)
 
@@ -69,7 +71,7 @@ def test_replacing_the_room_takes_it_out_of_the_edge() -> None:
     person, room, new = (np.full((90, 160, 3), colour, np.uint8) for colour in ((120, 60, 40), (250, 240, 200), 30))
     live, truth = over(person, alpha, room), over(person, alpha, new)
     plain = np.abs(over(live, alpha, new).astype(int) - truth).max()
-    cleaned = np.abs(replace_room(live, alpha, new).astype(int) - truth).max()
+    cleaned = np.abs(replace_room(MattedFrame(live, alpha), new).astype(int) - truth).max()
     assert plain > 50
     assert cleaned <= 4
 
@@ -83,7 +85,7 @@ def test_the_colours_of_an_edge_are_those_beside_it(size: tuple[int, int]) -> No
     person = np.dstack([60 + 120 * x, 90 - 40 * x, 50 + 0 * x]).astype(np.uint8)
     room, new = np.full_like(person, 210), np.full_like(person, 20)
     truth = over(person, alpha, new)
-    cleaned = replace_room(over(person, alpha, room), alpha, new).astype(int) - truth
+    cleaned = replace_room(MattedFrame(over(person, alpha, room), alpha), new).astype(int) - truth
     assert np.abs(cleaned).max() <= 12
     assert np.abs(cleaned).mean() < 0.5
 
@@ -91,7 +93,7 @@ def test_the_colours_of_an_edge_are_those_beside_it(size: tuple[int, int]) -> No
 def test_a_matte_without_an_edge_copies(pictures: Pictures) -> None:
     foreground, _, background = pictures
     for value, expected in ((0, background), (255, foreground)):
-        result = replace_room(foreground, np.full(foreground.shape[:2], value, np.uint8), background)
+        result = replace_room(MattedFrame(foreground, np.full(foreground.shape[:2], value, np.uint8)), background)
         np.testing.assert_array_equal(result, expected)
         assert not np.shares_memory(result, expected)
 
@@ -111,6 +113,6 @@ def test_sizes_and_types_that_do_not_fit_are_refused(pictures: Pictures) -> None
     with pytest.raises(ImageError, match="alpha is float32"):
         over(foreground, alpha.astype(np.float32), background)
     with pytest.raises(ImageError, match="image has shape"):
-        replace_room(foreground[..., 0], alpha, background)
+        replace_room(MattedFrame(foreground[..., 0], alpha), background)
     with pytest.raises(ImageError, match="but the background"):
-        replace_room(foreground, alpha, background[1:])
+        replace_room(MattedFrame(foreground, alpha), background[1:])

@@ -4,9 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from relit_camera.base.images.color import linear_from_uint8
+from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.live.compositing.alpha_compositing import over
-from relit_camera.live.compositing.background_renderer import MattedFrame, blur_background
+from relit_camera.live.compositing.background_renderer import blur_background
+from relit_camera.live.compositing.matted_frame import MattedFrame
 
 HEIGHT, WIDTH = 240, 320
 
@@ -50,3 +51,14 @@ def test_a_frame_full_of_person_still_gives_a_picture() -> None:
     image = np.full((HEIGHT, WIDTH, 3), 120, np.uint8)
     result = blur_background(MattedFrame(image, np.full((HEIGHT, WIDTH), 255, np.uint8)), 0.5)
     assert result.shape == image.shape
+
+
+@pytest.mark.parametrize(("radius", "kept"), [(2, 0.84), (4, 0.94), (8, 0.96)])
+def test_small_lamps_keep_their_light(radius: int, kept: float) -> None:
+    """Many, so that the blurred room is even: what they lose is that codes of neighbours are averaged, not light."""
+    y, x = np.mgrid[:720, :960] % (12 * radius)
+    lamps = np.clip(radius + 0.5 - np.hypot(x - 5.7 * radius, y - 6.2 * radius), 0, 1)[..., None].astype(np.float32)
+    image = uint8_from_linear(np.repeat(0.03 + 0.97 * lamps, 3, axis=2))
+    found = linear_from_uint8(blur_background(MattedFrame(image, np.zeros((720, 960), np.uint8)), 1.0))
+    light = linear_from_uint8(image)
+    assert kept < (found.mean() - light.min()) / (light.mean() - light.min()) < 1.02

@@ -11,9 +11,9 @@ from relit_camera.live.compositing.alpha_compositing import over, replace_room, 
 from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
     BackgroundRequest,
-    MattedFrame,
     needs_matte,
 )
+from relit_camera.live.compositing.matted_frame import MattedFrame
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.stage_timing import StageTimer
@@ -47,12 +47,10 @@ class Compositor:
         with self._timer.stage("matte"):
             if self._matte is None:
                 self._matte = self._open_matte()
-            alpha = self._matte.matte(frame)
-        background = self._background_renderer.live_background(
-            _background_request(scene), MattedFrame(picture, alpha), frame.time_s
-        )
+            matted = MattedFrame(picture, self._matte.matte(frame))
+        background = self._background_renderer.live_background(_background_request(scene), matted, frame.time_s)
         # A blurred room is this frame's own.
-        return replace_room(picture, alpha, background, in_place=isinstance(scene.look.background, BlurBackground))
+        return replace_room(matted, background, in_place=isinstance(scene.look.background, BlurBackground))
 
 
 def composite_source_image(
