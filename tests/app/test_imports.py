@@ -35,3 +35,11 @@ def test_the_camera_renders_without_scipy_and_onnx() -> None:
     loaded = done.stdout.split()
     assert "onnxruntime" in loaded
     assert not {"scipy", "onnx", "google"} & set(loaded)
+
+
+def test_the_first_scene_is_begun_before_most_of_the_program_is_imported() -> None:
+    code = "import sys, relit_camera.app.first_scene; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    loaded = set(done.stdout.split())
+    assert "relit_camera.live.scene.scene_controller" in loaded
+    assert not {"onnxruntime", "fastapi", "av", "relit_camera.live.pipeline", "relit_camera.app.run_camera"} & loaded

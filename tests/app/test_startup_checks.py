@@ -89,7 +89,7 @@ def test_instant_shows_neither_the_configured_subject_nor_the_unlit_picture(
         made.append(SceneController(storage))
         return made[-1]
 
-    monkeypatch.setattr("relit_camera.app.run_camera.SceneController", make)
+    monkeypatch.setattr("relit_camera.app.first_scene.SceneController", make)
     with pytest.raises(VideoError, match="the source was reached"):
         run(material, tmp_path, Devices(), {}, instant=True)
     assert made[0].scene.subject is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fastapi import APIRouter, Depends, FastAPI
+from fastapi import Depends, FastAPI
 from starlette.responses import FileResponse, HTMLResponse
 from starlette.staticfiles import StaticFiles
 
@@ -74,7 +74,6 @@ def create_app_without_camera() -> FastAPI:
         redoc_url=None,
         generate_unique_id_function=operation_id,
     )
-    api = APIRouter(prefix=API_PREFIX, dependencies=[Depends(require_strict_json)])
     for topic in (
         whole_scene,
         lighting,
@@ -95,8 +94,7 @@ def create_app_without_camera() -> FastAPI:
         server_sent_events,
         monitoring,
     ):
-        api.include_router(topic.router)
-    app.include_router(api)
+        app.include_router(topic.router, prefix=API_PREFIX, dependencies=[Depends(require_strict_json)])
     app.include_router(monitoring.probe_router)
     app.add_api_route("/", _panel_page, include_in_schema=False)
     app.add_api_route("/desk", _desk_page, include_in_schema=False)

@@ -24,6 +24,7 @@ from relit_camera.app.camera_service import CameraService
 from relit_camera.app.captures.desk.controls_note import restore_noted_controls
 from relit_camera.app.captures.live_capture import require_instant_name
 from relit_camera.app.config_reload import apply_edited_settings
+from relit_camera.app.first_scene import FirstScene
 from relit_camera.app.setup.check_runner import Checks, no_checks
 from relit_camera.app.setup.needed_models import missing_models
 from relit_camera.app.setup.startup_checks import check_before_devices
@@ -31,11 +32,10 @@ from relit_camera.app.systemd import is_being_restarted, notify_systemd
 from relit_camera.app.wiring import make_tracker
 from relit_camera.base.concurrency.regular_checks import checking_regularly
 from relit_camera.base.concurrency.resident_memory import FreedMemoryReturn, large_allocations_apart
-from relit_camera.base.concurrency.threads import freeze_gc, limit_threads
+from relit_camera.base.concurrency.threads import freeze_gc
 from relit_camera.base.config.config_watcher import ConfigWatcher
 from relit_camera.base.config.settings import OutputSettings, RelitSettings, SourceSettings
 from relit_camera.base.errors import ModelError, RelitError
-from relit_camera.base.storage.atomic_files import remove_unfinished_files
 from relit_camera.devices.keeper.kept_sink import KeeperParts, KeptSink, keeper_for
 from relit_camera.devices.keeper.sink_keeper import SinkKeeper
 from relit_camera.devices.on_demand.on_demand_source import DemandWatch
@@ -47,9 +47,10 @@ from relit_camera.devices.sources.source import Source
 from relit_camera.devices.sources.source_factory import open_source
 from relit_camera.face.face_state import Tracker
 from relit_camera.live.publishing.placeholder_image import placeholder
-from relit_camera.live.scene.kept_scene import GivenOptions, SceneKeeper, show_first_scene
+from relit_camera.live.scene.kept_scene import GivenOptions, SceneKeeper
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import DegradationCode
+from relit_camera.subject.subject_store import SubjectStore
 
 log = logging.getLogger(__name__)
 
@@ -75,6 +76,7 @@ def run_camera(
     strict: bool = False,
     checks: Checks = no_checks,
     given: GivenOptions | None = None,
+    first_scene: FirstScene | None = None,
 ) -> None:
     """Run the camera until SIGTERM or SIGINT, then end within 3 s.
 
@@ -95,20 +97,17 @@ def run_camera(
         strict: raise for a device or model that is missing, in place of waiting for it.
         checks: what the API answers with to `GET checks`; called in a worker process.
         given: options of the command line, where look and subject are kept from run to run; None keeps nothing.
+        first_scene: made with `environment`, `instant` and `given`, where somebody has begun it already.
 
     Raises:
         RelitError: the port is in use, a file is missing; with `strict`, a device or model …
     """
-    limit_threads()
     opening = contextlib.ExitStack()
     opening.enter_context(large_allocations_apart())
-    for folder in (settings.storage.data_dir, *settings.storage.folders):
-        remove_unfinished_files(folder)  # of an earlier run that was killed
-    scene_controller = SceneController(settings.storage)
+    first_scene = first_scene or FirstScene(settings, environment, instant, given)
     if instant:
         cure = f"show it with --subject {INSTANT_SUBJECT}, or give it another name"
-        require_instant_name(scene_controller.subjects, INSTANT_SUBJECT, cure)
-    show_first_scene(scene_controller, settings, environment, instant, given)
+        require_instant_name(SubjectStore(settings.storage.subjects), INSTANT_SUBJECT, cure)
     check_before_devices(settings)
     restore_noted_controls(settings.storage.data_dir)
     stop = threading.Event()
@@ -121,6 +120,7 @@ def run_camera(
         cleanup.push(opening)
         listener = cleanup.enter_context(open_listener(settings.server))
         tracker, models_error = _open_tracker(settings, strict)
+        scene_controller = first_scene.controller()
         sink_keeper = keeper_for(settings.output) if sink_for is open_sink else None
         sink = _open_sink(settings, sink_keeper, scene_controller, sink_for)
         until_owned = cleanup.enter_context(contextlib.ExitStack())

@@ -6,10 +6,12 @@ https://packaging.python.org/en/latest/specifications/entry-points/
 from __future__ import annotations
 
 import logging
+import sys
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, distributions, entry_points
+from functools import lru_cache
+from importlib.metadata import EntryPoint, EntryPoints, distributions, entry_points
 from typing import Any, Generic, TypeVar
 
 from relit_camera.base.errors import ConfigError, InputError, NotFoundError, PluginError, RelitError
@@ -20,6 +22,14 @@ OWN_PACKAGE = "relit-camera"
 GROUP_PREFIX = "relit_camera."
 """How the names of all groups begin."""
 Factory = TypeVar("Factory")
+
+
+@lru_cache(maxsize=1)
+def _selection_on(path: tuple[str, ...]) -> Callable[..., EntryPoints]:
+    """What selects among the entry points of all packages on a search path: to read those of a hundred takes 10 ms."""
+    found: Any = entry_points()  # of another type in Python 3.11
+    select: Callable[..., EntryPoints] = found.select
+    return select
 
 
 @dataclass(frozen=True)
@@ -39,11 +49,11 @@ class PluginGroup(Generic[Factory]):
 
     def names(self) -> list[str]:
         """List the names of all that are installed, sorted."""
-        return sorted(entry_points(group=self.group).names)
+        return sorted(self._announced().names)
 
     def has(self, text: str) -> bool:
         """Whether `NAME` or `NAME:ARGUMENT` names one that is installed."""
-        return bool(entry_points(group=self.group, name=text.partition(":")[0]))
+        return bool(self._announced().select(name=text.partition(":")[0]))
 
     def load(self, text: str) -> tuple[Factory, str]:
         """Import what `NAME` or `NAME:ARGUMENT` names; returns it and the argument, empty where there is none.
@@ -70,8 +80,12 @@ class PluginGroup(Generic[Factory]):
             ) from error
         return loaded if is_ours else self._guarded(loaded, point), argument
 
+    def _announced(self) -> EntryPoints:
+        """Those that were installed when one was first asked for."""
+        return _selection_on(tuple(sys.path))(group=self.group)
+
     def _entry_point(self, name: str) -> EntryPoint:
-        points = list(entry_points(group=self.group, name=name))
+        points = list(self._announced().select(name=name))
         if not points:
             raise NotFoundError(f"no {self.kind} is called '{name}'", f"there are: {', '.join(self.names())}")
         if len(points) > 1:

@@ -8,7 +8,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from fastapi.routing import APIRoute
 
-from relit_camera.api.problem_details import MEDIA_TYPE, PROBLEM_TYPES
+from relit_camera.api.problem_details import MEDIA_TYPE, PROBLEM_TYPES, Problem
 
 TAGS = [
     {"name": "scene", "description": "Everything that is shown, in one step."},
@@ -24,6 +24,7 @@ TAGS = [
     {"name": "status", "description": "How the camera is doing."},
     {"name": "probes", "description": "For supervisors and Prometheus."},
 ]
+SCHEMA_REFERENCE = "#/components/schemas/{model}"
 OTHER_ERRORS = "Any other error: 401 the token is needed, 403 another site, 421 wrong host, 500 a fault"
 
 
@@ -42,6 +43,9 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
         routes=app.routes,
         tags=TAGS,
     )
+    problem = Problem.model_json_schema(ref_template=SCHEMA_REFERENCE)
+    schemas = document["components"]["schemas"] | problem.pop("$defs") | {"Problem": problem}
+    document["components"]["schemas"] = dict(sorted(schemas.items()))
     document["components"]["securitySchemes"] = {
         "token": {"type": "http", "scheme": "bearer", "description": "Needed where the camera was given a token"}
     }
@@ -54,5 +58,5 @@ def openapi_document(app: FastAPI) -> dict[str, Any]:
             answers["default"] = {"description": OTHER_ERRORS}
             for status, answer in answers.items():
                 if status >= "400":
-                    answer["content"] = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
+                    answer["content"] = {MEDIA_TYPE: {"schema": {"$ref": SCHEMA_REFERENCE.format(model="Problem")}}}
     return document

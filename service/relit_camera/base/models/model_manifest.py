@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import Annotated
+from typing import Annotated, Any
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -129,4 +129,6 @@ class Manifest(_ManifestEntry):
 def public_manifest() -> Manifest:
     """Read the manifest that comes with the package."""
     text = resources.files(__package__).joinpath("manifest.yaml").read_text("utf-8")
-    return Manifest.model_validate(yaml.safe_load(text))
+    # libyaml's loader, where PyYAML has it, takes a tenth of the 40 ms of the one in Python.
+    safe_loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    return Manifest.model_validate(yaml.load(text, safe_loader))  # noqa: S506 - either is safe

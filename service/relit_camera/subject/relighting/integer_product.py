@@ -176,8 +176,11 @@ class ClusterProducts:
 def _tiled(values: NDArray[np.int8]) -> NDArray[np.int8]:
     """Values (clusters, 3, rank, places) as (clusters, tiles, 3, rank, PLACES_PER_TILE), filled up with zeros."""
     clusters, _, rank, places = values.shape
-    padded = np.pad(values, ((0, 0), (0, 0), (0, 0), (0, -places % PLACES_PER_TILE)))
-    return np.ascontiguousarray(padded.reshape(clusters, 3, rank, -1, PLACES_PER_TILE).transpose(0, 3, 1, 2, 4))
+    tiled = np.zeros((clusters, -(-places // PLACES_PER_TILE), 3, rank, PLACES_PER_TILE), np.int8)
+    for tile in range(tiled.shape[1]):  # without a second copy of the whole, padded
+        part = values[..., tile * PLACES_PER_TILE : (tile + 1) * PLACES_PER_TILE]
+        tiled[:, tile, ..., : part.shape[-1]] = part
+    return tiled
 
 
 def _cluster_session(groups: Sequence[NDArray[np.int8]], threads: int) -> Session:

@@ -35,7 +35,10 @@ def bearings() -> tuple[Canvas, Canvas]:
 def directions() -> Canvas:
     """Unit vectors (512, 1024, 3) toward the pixel centres."""
     bearing, elevation = bearings()
-    return direction_from_degrees(180 - bearing, elevation).astype(np.float32)
+    azimuth, height = (np.radians(each).astype(np.float64) for each in (180 - bearing[0], elevation[:, :1]))
+    level, vectors = np.cos(height), np.empty((HEIGHT, WIDTH, 3), np.float32)
+    vectors[..., 0], vectors[..., 1], vectors[..., 2] = np.sin(azimuth) * level, np.sin(height), np.cos(azimuth) * level
+    return vectors
 
 
 def color(code: str, strength: float = 1.0) -> NDArray[np.float32]:
@@ -51,7 +54,11 @@ def color_ramp(value: NDArray, stops: Sequence[float], colors: list[NDArray[np.f
 
 def blend_over(canvas: Canvas, mask: Canvas, paint: NDArray[np.float32]) -> Canvas:
     """`paint` (3,) or (512, 1024, 3) laid over the canvas where the mask (512, 1024) is 1."""
-    return np.asarray(canvas + mask[..., None] * (paint - canvas), np.float32)
+    covered = canvas.copy()
+    inside = np.nonzero(mask)  # a panel covers a twentieth of the canvas
+    below = canvas[inside]
+    covered[inside] += mask[inside][:, None] * ((paint[inside] if paint.ndim > 1 else paint) - below)
+    return covered
 
 
 def angle_from(azimuth_deg: float, elevation_deg: float) -> Canvas:
@@ -72,14 +79,17 @@ def panel_mask(
     facing = direction_from_degrees(azimuth_deg, elevation_deg)
     right = direction_from_degrees(azimuth_deg + 90, 0)
     axes = np.stack([right, np.cross(facing, right), facing]).astype(np.float32)
-    u, v, depth = np.moveaxis(directions() @ axes.T, -1, 0)
-    inside = [
-        smoothstep(
-            np.abs(np.degrees(np.arctan2(offset, np.maximum(depth, 1e-6)))), size / 2 + soft_deg, size / 2 - soft_deg
-        )
-        for offset, size in ((u, width_deg), (v, height_deg))
+    outer = np.array([width_deg, height_deg]) / 2 + soft_deg
+    # No corner is further from the middle than the diagonal of these two angles.
+    near = directions() @ facing.astype(np.float32) > np.cos(np.radians(min(float(np.hypot(*outer)), 90.0)))
+    u, v, depth = axes @ directions()[near].T
+    covers = [
+        smoothstep(np.abs(np.degrees(np.arctan2(offset, np.maximum(depth, 1e-6)))), half, half - 2 * soft_deg)
+        for offset, half in ((u, outer[0]), (v, outer[1]))
     ]
-    return np.where(depth > 0, inside[0] * inside[1], 0).astype(np.float32)
+    mask = np.zeros((HEIGHT, WIDTH), np.float32)
+    mask[near] = covers[0] * covers[1]
+    return mask
 
 
 def fractal_noise(u: NDArray, v: NDArray, seed: int, octaves: int = 5) -> Canvas:
