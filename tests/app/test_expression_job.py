@@ -35,6 +35,7 @@ from tests.app.still_builders import (
     wait_with_video,
 )
 from tests.app.subject_builders import captured
+from tests.app.told_stages import stages_until
 from tests.small_camera import wait_until
 
 
@@ -102,12 +103,7 @@ class Studio:
 
     def stages_until(self, last: str) -> list[str]:
         """The stages that are told until `last` is, each once."""
-        told: list[str] = []
-        while last not in told:
-            event = self.events.get(timeout=10.0)
-            if event.kind == "expression-capture":
-                told.append(str(event.data["stage"]))
-        return list(dict.fromkeys(told))
+        return list(dict.fromkeys(stages_until(last, self.events, "expression-capture")))
 
     def is_being_written(self) -> bool:
         """Whether a worker has begun."""

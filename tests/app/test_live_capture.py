@@ -22,6 +22,7 @@ from relit_camera.live.status.capture_status import CaptureStage
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.subject.subject_file import write_subject
 from tests.app.subject_builders import build, captured, refuse, refuse_once, take_long
+from tests.app.told_stages import stages_until
 from tests.small_camera import wait_until
 
 TIMINGS = LiveCaptureTimings(frames=3, interval_s=0.0, filming_timeout_s=2.0, building_timeout_s=120.0, retry_s=0.05)
@@ -75,13 +76,8 @@ class Studio:
         return told
 
     def stages_until(self, last: str) -> list[str]:
-        """The stages that are told since the last call, until `last` is: the status has changed before that."""
-        told: list[str] = []
-        while last not in told:
-            event = self.events.get(timeout=10.0)
-            if event.kind == "capture":
-                told.append(str(event.data["stage"]))
-        return told
+        """The stages that are told since the last call, until `last` is."""
+        return stages_until(last, self.events, "capture")
 
 
 @pytest.fixture

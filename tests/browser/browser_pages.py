@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, expect, sync_playwright
 
 FAILURES = Path(__file__).resolve().parents[2] / "test-failures" / "browser"
 EXECUTABLE_VARIABLE = "CHROMIUM"
@@ -22,6 +22,16 @@ NEEDED_VARIABLE = "BROWSER_NEEDED"
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 TIMEOUT_MS = 15_000
 """How long a state of the page is waited for; a machine with much else to do needs seconds."""
+UNUSED = (
+    # For each context's window Chromium loads two pages of its own, unseen: half a second of a processor each time.
+    *("WebUIOmniboxPopup", "WebUIOmniboxAimPopup"),
+    # Of two lists Chromium takes the last: what Playwright 1.65 switches off for its own needs is named again.
+    *("AvoidUnnecessaryBeforeUnloadCheckSync", "DestroyProfileOnBrowserClose", "HttpsUpgrades", "LensOverlay"),
+    *("HttpsFirstBalancedModeAutoEnable", "MediaRouter", "PaintHolding", "ThirdPartyStoragePartitioning"),
+    *("AvoidCorsURLLoaderRestartOnRedirect", "OptimizationHints", "NetworkTimeServiceQuerying", "AimEnabled"),
+    "PreconnectToSearch",
+)
+"""Features of Chromium that are switched off."""
 BLOCKED = re.compile(r"Content Security Policy|Refused to")
 
 WIDTHS = (390, 768, 1440, 1920)
@@ -53,10 +63,10 @@ def chromium() -> Iterator[Browser]:
     """A headless Chromium, ended with the block."""
     program = chromium_program()
     root = hasattr(os, "geteuid") and os.geteuid() == 0
+    expect.set_options(timeout=TIMEOUT_MS)  # else five seconds, in which a busy machine at times loads no dialog
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=program, args=["--no-sandbox"] if root else [], chromium_sandbox=not root
-        )
+        words = [f"--disable-features={','.join(UNUSED)}", *(["--no-sandbox"] if root else [])]
+        browser = playwright.chromium.launch(executable_path=program, args=words, chromium_sandbox=not root)
         yield browser
         browser.close()
 

@@ -121,7 +121,7 @@ def test_repeated_pictures_are_not_counted_as_frames(tmp_path: Path, open_page: 
             yield grey(100 + index % 20), index / slow
 
     source = PlaybackSource(SourceInfo("still", "memory", SIZE, slow), play())
-    with running_camera(tmp_path, source=source) as camera:
+    with running_camera(tmp_path, source=source, subject=captured("film")) as camera:
         url = str(camera.http.base_url).removesuffix("api/v1/")
         panel = open_panel(open_page, url)
         expect(panel.rate).to_have_text(re.compile(rf"^{slow:.0f} pictures"))

@@ -28,7 +28,7 @@ from tests.synthetic import sphere_samples
 
 PATIENCE_S = 100
 CHOSEN: dict[str, object] = {"size": 72, "light-distance-cm": 90}
-KNOWN = [*films.Shot(films.GOOD.codes()[:0], CHOSEN).arguments, "--keep-room", "--far-lamp"]
+KNOWN = [*films.Shot(np.empty((0, 1, 1, 3), np.uint8), CHOSEN).arguments, "--keep-room", "--far-lamp"]
 
 
 @dataclass(frozen=True)

