@@ -40,6 +40,7 @@ def run(
     """Run the camera until it is told to stop (Ctrl-C or SIGTERM)."""
     from functools import partial
 
+    from relit_camera.base.concurrency.threads import paused_gc
     from relit_camera.base.config.settings_loader import config_path, load_settings
     from relit_camera.base.errors import ModelError
     from relit_camera.cli.arguments import load_command_settings, parse_mode, parse_size
@@ -67,22 +68,23 @@ def run(
     # Always the same file: if it is deleted, another one must not be read instead.
     load = partial(load_settings, overrides={"log_level": settings.log_level, **given})
     reload = (path.absolute(), load) if path else None
-    from relit_camera.app.first_scene import FirstScene
-    from relit_camera.live.scene.kept_scene import GivenOptions
+    with paused_gc():
+        from relit_camera.app.first_scene import FirstScene
+        from relit_camera.live.scene.kept_scene import GivenOptions
 
-    given_options = GivenOptions(subject=subject is not None, mode=mode is not None)
-    first_scene = FirstScene(settings, environment, instant, given_options)
-    # The most of the program is imported meanwhile.
-    from relit_camera.app.run_camera import run_camera
-    from relit_camera.doctor.camera_checks import check_camera
+        given_options = GivenOptions(subject=subject is not None, mode=mode is not None)
+        first_scene = FirstScene(settings, environment, instant, given_options)
+        # The most of the program is imported meanwhile.
+        from relit_camera.app.run_camera import run_camera
+        from relit_camera.doctor.camera_checks import check_camera
 
-    run_camera(
-        settings,
-        environment,
-        reload=reload,
-        instant=instant,
-        strict=strict,
-        checks=check_camera,
-        given=given_options,
-        first_scene=first_scene,
-    )
+        run_camera(
+            settings,
+            environment,
+            reload=reload,
+            instant=instant,
+            strict=strict,
+            checks=check_camera,
+            given=given_options,
+            first_scene=first_scene,
+        )

@@ -166,7 +166,7 @@ class BackgroundRenderer:
         """`size` is (width, height)."""
         self._size = size
         self._request: BackgroundRequest | None = None
-        self._goal = self._shown = self._previous = neutral_background(size)
+        self._goal = self._shown = self._previous = np.empty((0, 0, 3), np.uint8)  # nothing is shown before a request
         self._changed_at = self._last = 0.0
         self._view: tuple[Panorama, float, float, EnvironmentView] | None = None
         self._room: _BlurredRoom | None = None
