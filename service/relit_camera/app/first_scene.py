@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Self
 
+from relit_camera.base.concurrency.decoding_process import DECODING_PROCESS
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.concurrency.threads import limit_threads
 from relit_camera.base.config.settings import RelitSettings
@@ -16,7 +18,8 @@ class FirstScene:
     """Shows the first scene, in a thread of its own.
 
     NumPy and OpenCV let other threads run while they compute, so that one core does this while another one imports the
-    rest of the program: this module imports no more than a scene needs.
+    rest of the program: this module imports no more than a scene needs. Whoever begins it leaves it as a context, so
+    that a program that ends meanwhile waits for no file to be decoded.
     """
 
     def __init__(
@@ -39,6 +42,14 @@ class FirstScene:
         with_one_thread = ThreadPoolExecutor(1, thread_name_prefix="first-scene")
         self._shown = with_one_thread.submit(show)
         with_one_thread.shutdown(wait=False)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        while not self._shown.done():
+            DECODING_PROCESS.interrupt()  # again and again: the next file may be begun only now
+            wait([self._shown], timeout=0.1)
 
     def controller(self) -> SceneController:
         """What holds the scene, once it is shown.

@@ -103,11 +103,12 @@ def run_camera(
         RelitError: the port is in use, a file is missing; with `strict`, a device or model …
     """
     opening = contextlib.ExitStack()
-    opening.enter_context(large_allocations_apart())
-    first_scene = first_scene or FirstScene(settings, environment, instant, given)
-    if instant:
-        cure = f"show it with --subject {INSTANT_SUBJECT}, or give it another name"
-        require_instant_name(SubjectStore(settings.storage.subjects), INSTANT_SUBJECT, cure)
+    with first_scene or FirstScene(settings, environment, instant, given) as begun:
+        opening.enter_context(large_allocations_apart())
+        if instant:
+            cure = f"show it with --subject {INSTANT_SUBJECT}, or give it another name"
+            require_instant_name(SubjectStore(settings.storage.subjects), INSTANT_SUBJECT, cure)
+        scene_controller = begun.controller()
     check_before_devices(settings)
     restore_noted_controls(settings.storage.data_dir)
     stop = threading.Event()
@@ -120,7 +121,6 @@ def run_camera(
         cleanup.push(opening)
         listener = cleanup.enter_context(open_listener(settings.server))
         tracker, models_error = _open_tracker(settings, strict)
-        scene_controller = first_scene.controller()
         sink_keeper = keeper_for(settings.output) if sink_for is open_sink else None
         sink = _open_sink(settings, sink_keeper, scene_controller, sink_for)
         until_owned = cleanup.enter_context(contextlib.ExitStack())

@@ -196,7 +196,7 @@ def refine_edges(mask: Mask, image: DisplayImage, size: tuple[int, int]) -> Alph
 
 
 def _near_person(mask: Mask, shrink: int) -> tuple[slice, slice]:
-    """Rows and columns outside of which the guided filter gives alpha 0; empty where it does everywhere.
+    """Rows and columns outside of which the guided filter gives no alpha to speak of; empty where there is nobody.
 
     They begin and end at multiples of `shrink`, so that the shrunken pixels are those of the whole.
     """

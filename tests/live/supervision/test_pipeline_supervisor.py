@@ -234,6 +234,8 @@ def test_a_pipeline_that_starves_is_shown_as_such_and_kept() -> None:
 
 def test_what_a_worker_waits_from_the_start_of_a_frame_counts() -> None:
     simulation = Simulation(HealthLimits(hang_timeout_s=0.4, abandon_timeout_s=1.0))
+    simulation.run(1.0)
+    simulation.workers[0].run_delay_s = 0.1
     simulation.run(10.0)
 
     def starve() -> None:

@@ -73,18 +73,18 @@ def run(
         from relit_camera.live.scene.kept_scene import GivenOptions
 
         given_options = GivenOptions(subject=subject is not None, mode=mode is not None)
-        first_scene = FirstScene(settings, environment, instant, given_options)
-        # The most of the program is imported meanwhile.
-        from relit_camera.app.run_camera import run_camera
-        from relit_camera.doctor.camera_checks import check_camera
+        with FirstScene(settings, environment, instant, given_options) as first_scene:
+            # The most of the program is imported meanwhile.
+            from relit_camera.app.run_camera import run_camera
+            from relit_camera.doctor.camera_checks import check_camera
 
-        run_camera(
-            settings,
-            environment,
-            reload=reload,
-            instant=instant,
-            strict=strict,
-            checks=check_camera,
-            given=given_options,
-            first_scene=first_scene,
-        )
+            run_camera(
+                settings,
+                environment,
+                reload=reload,
+                instant=instant,
+                strict=strict,
+                checks=check_camera,
+                given=given_options,
+                first_scene=first_scene,
+            )

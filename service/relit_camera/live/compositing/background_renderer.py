@@ -78,7 +78,7 @@ def _blurred_room(matted: MattedFrame, strength: float) -> DisplayImage:
     height = len(matted.matte)
     sigma, reduction = BLUR_SIGMA * strength * height, _reduction(height, strength)
     # Averaged as light: of codes, small lamps would come out too dark. But four neighbours are so much alike that their
-    # codes may be averaged first, which leaves a quarter of the look-ups.
+    # codes may be averaged first, which leaves a quarter of the look-ups. Only glints of a pixel suffer.
     steps, matte = cv2.LUT(matted.half.image, _light_in_16_bits()), matted.half.matte
     for _ in range(reduction.bit_length() - 2):
         steps, matte = halve(steps), halve(matte)

@@ -219,7 +219,8 @@ class PipelineSupervisor:
     def _starved_s(self) -> float:
         """For how long the worker has waited for a processor since the last call."""
         before, self._run_delay_s = self._run_delay_s, self._worker.run_delay_s if self._worker else None
-        return max(0.0, self._run_delay_s - before) if self._run_delay_s is not None and before is not None else 0.0
+        # 0 where the system did not tell, too: from there to what it tells next nobody has waited.
+        return max(0.0, self._run_delay_s - before) if self._run_delay_s and before else 0.0
 
     def _workers(self) -> list[Worker]:
         return [*self._retired.values(), *([self._worker] if self._worker else [])]
