@@ -23,7 +23,6 @@ from relit_camera.api.problem_details import PROBLEM_TYPES
 from relit_camera.api.server.connection_timeouts import MIN_BODY_BYTES_PER_TIMEOUT, WRITE_TIMEOUT_S
 from relit_camera.base.concurrency import decoding_process
 from relit_camera.base.config.access_token import MIN_TOKEN_LENGTH
-from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH, MAX_YAML_NODES
 from relit_camera.base.config.settings import RelitSettings, StorageSettings
 from relit_camera.base.images.image_limits import (
     MAX_DECODED_BYTES,
@@ -33,6 +32,7 @@ from relit_camera.base.images.image_limits import (
     MAX_JPEG_SCANS,
 )
 from relit_camera.base.models.model_manifest import public_manifest
+from relit_camera.base.safe_yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH, MAX_YAML_NODES
 from relit_camera.base.video import video_decoding
 from relit_camera.capture import lights_file, subject_landmarks
 from relit_camera.cli.main import app

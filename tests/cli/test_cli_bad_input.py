@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.image_files import write_linear
+from relit_camera.cli import main
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.tracking.track_recording import Track, TrackFrame, read_track
 from tests.cli.relit_command import (
@@ -312,6 +313,28 @@ def test_a_command_told_to_end_leaves_nothing(out: Path, tmp_path: Path) -> None
     process.terminate()
     assert process.communicate(timeout=30) == ("", "")
     assert process.returncode == 143
+
+
+@pytest.mark.parametrize(("raised", "status"), [(SystemExit(143), 143), (KeyboardInterrupt(), 130)])
+def test_told_to_end_while_a_library_is_imported(
+    raised: BaseException, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The library says that its import failed, because of what the signal raised (as pybind11 does)."""
+
+    def import_fails() -> None:
+        raise ImportError("initialization failed") from raised
+
+    monkeypatch.setattr(main, "app", import_fails)
+    assert call("bench") == Answer(status, "", "")
+
+
+def test_an_import_that_fails_by_itself_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    def import_fails() -> None:
+        raise ImportError("initialization failed") from OSError("no such library")
+
+    monkeypatch.setattr(main, "app", import_fails)
+    with pytest.raises(ImportError):
+        call("bench")
 
 
 def test_folder_that_cannot_be_written(material: Material, out: Path) -> None:

@@ -121,6 +121,8 @@ def run() -> None:
     except Exception as error:
         from relit_camera.base.plugin_groups import package_at_fault
 
+        if (status := _status_of_end(error)) is not None:
+            sys.exit(status)
         if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:  # only a name given by a person causes it
             print(f"relit: cannot use {error.filename}: the name is too long; choose a shorter one", file=sys.stderr)
         elif (package := package_at_fault(error)) is not None:
@@ -129,3 +131,19 @@ def run() -> None:
         else:
             raise
         sys.exit(1)
+
+
+def _status_of_end(error: BaseException) -> int | None:
+    """The exit status where the program was told to end in the middle of an import, else None.
+
+    A library that is being imported then (NumPy, ONNX Runtime) says that its import failed: an ImportError whose cause
+    is what the signal raised.
+    """
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, KeyboardInterrupt):
+            return 128 + signal.SIGINT
+        if isinstance(cause, SystemExit):
+            return cause.code if isinstance(cause.code, int) else 1
+        cause = cause.__cause__
+    return None

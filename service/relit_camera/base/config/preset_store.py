@@ -7,8 +7,8 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from relit_camera.base.config.look import Preset
-from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml, yaml_text
 from relit_camera.base.errors import ConflictError, InputError, StorageError
+from relit_camera.base.safe_yaml import MAX_YAML_BYTES, parse_yaml, yaml_text
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.base.storage.named_files import NamedFiles
 

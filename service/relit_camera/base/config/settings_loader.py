@@ -12,9 +12,9 @@ from platformdirs import user_config_path
 from pydantic import ValidationError
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsError
 
-from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import ConfigError
+from relit_camera.base.safe_yaml import MAX_YAML_BYTES, parse_yaml
 
 CONFIG_VARIABLE = "RELIT_CONFIG"
 NON_SETTING_VARIABLES = frozenset({CONFIG_VARIABLE, "RELIT_MODELS_DIR", "RELIT_SHARED"})

@@ -179,15 +179,19 @@ def _wait(process: subprocess.Popen[bytes], folder: Path, grown: Callable[[int],
     began = progressed = time.monotonic()
     largest = 0
     while True:
-        with suppress(subprocess.TimeoutExpired):
+        ended = True
+        try:
             process.wait(_POLL_S)
-            return None
+        except subprocess.TimeoutExpired:
+            ended = False
         size, now = _size(folder), time.monotonic()
         if size > largest:
             largest, progressed = size, now
             grown(size)
         if size > limit:
             return "it gives far more than the wheel"
+        if ended:
+            return None
         if now - progressed > _STALL_S or now - began > _TIME_LIMIT_S:
             return "it takes too long"
 

@@ -44,7 +44,7 @@ def schema() -> None:
 @app.command()
 def show(context: typer.Context) -> None:
     """Print the settings that hold here, as YAML: it can be used as a configuration file."""
-    from relit_camera.base.config.safe_yaml import yaml_text
+    from relit_camera.base.safe_yaml import yaml_text
     from relit_camera.cli.arguments import load_command_settings
 
     settings = load_command_settings(context).model_dump(mode="json")

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from relit_camera.base.config.look import EnvironmentBackground, Look, SettingsModel, merge_edits
 from relit_camera.base.config.preset_store import PresetStore
-from relit_camera.base.config.safe_yaml import MAX_YAML_BYTES, parse_yaml, yaml_text
 from relit_camera.base.config.settings import RelitSettings, StorageSettings
 from relit_camera.base.errors import NotReadyError, RelitError
+from relit_camera.base.safe_yaml import MAX_YAML_BYTES, parse_yaml, yaml_text
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import ChosenSubject, SceneController

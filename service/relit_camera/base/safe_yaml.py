@@ -1,4 +1,4 @@
-"""Reads YAML from untrusted files (settings and presets) within limits, and writes it.
+"""Reads YAML from files (settings, presets, the list of models) within limits, for some are untrusted, and writes it.
 
 What a plain value stands for is decided by the core schema of YAML 1.2 (yaml.org/spec/1.2.2, 10.3): null, true and
 false, whole numbers, fractions, and else text. There are no dates, no sexagesimal numbers and no tags but !!str.

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from relit_camera.base.config.safe_yaml import MAX_NUMBER_LENGTH, MAX_YAML_DEPTH, MAX_YAML_NODES, parse_yaml, yaml_text
+from relit_camera.base.safe_yaml import MAX_NUMBER_LENGTH, MAX_YAML_DEPTH, MAX_YAML_NODES, parse_yaml, yaml_text
 
 
 @pytest.mark.parametrize(
