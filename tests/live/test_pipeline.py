@@ -447,6 +447,22 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
     assert tracker.measured - before == 4
 
 
+@pytest.mark.parametrize(("mode", "measured"), [(Mode.REENACT, 8), (Mode.RATIO, 4)])
+def test_the_running_camera_measures_every_second_face_in_mode_ratio(mode: Mode, measured: int) -> None:
+    tracker = CountingTracker()
+    modes = {Mode.REENACT: OneGrey, Mode.RATIO: OneGrey}
+    follower = make_follower(CPU.tracker, tracker)
+    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
+    noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)
+    made.quality = QUALITY_LEVELS[0]
+    made.process(frame(0, noise), scene(mode=mode))
+    before = tracker.measured
+    for index in range(1, 9):
+        made.process(frame(index, noise), scene(mode=mode))
+    made.close()
+    assert tracker.measured - before == measured
+
+
 @pytest.mark.parametrize("mode", list(Mode))
 def test_a_closed_pipeline_holds_no_models_though_nobody_looks_for_cycles(mode: Mode) -> None:
     made, opened = pipeline(), list[weakref.ref[object]]()

@@ -7,11 +7,15 @@ import threading
 import time
 import weakref
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
+from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
+from relit_camera.subject.half_size import half_size_subject
 from relit_camera.subject.relighting import shared_relighters
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.relighting.relighter import RelighterOptions
@@ -25,10 +29,10 @@ class Maker:
     def __init__(self) -> None:
         self.made = 0
 
-    def __call__(self, subject: Subject, options: RelighterOptions) -> BasisRelighter:
+    def __call__(self, subject: Subject, options: RelighterOptions, other: BasisRelighter | None) -> BasisRelighter:
         self.made += 1
         time.sleep(0.1)
-        return BasisRelighter(subject, options)
+        return BasisRelighter(subject, options, other)
 
 
 def test_threads_that_want_it_at_once_have_the_same() -> None:
@@ -59,11 +63,11 @@ def test_one_who_hangs_while_making_it_is_not_waited_for(monkeypatch: pytest.Mon
     monkeypatch.setattr(shared_relighters, "WAIT_S", 0.05)
     hanging, go_on = threading.Event(), threading.Event()
 
-    def make(subject: Subject, options: RelighterOptions) -> BasisRelighter:
+    def make(subject: Subject, options: RelighterOptions, other: BasisRelighter | None) -> BasisRelighter:
         if not hanging.is_set():
             hanging.set()
             go_on.wait(30)
-        return BasisRelighter(subject, options)
+        return BasisRelighter(subject, options, other)
 
     shared, subject = SharedRelighters(make), synthetic_subject(16, 16)
     thread = threading.Thread(target=shared.get, args=(subject,))
@@ -96,13 +100,35 @@ def test_a_subject_is_not_kept() -> None:
 def test_one_that_cannot_be_made_is_tried_again() -> None:
     failing = threading.Event()
 
-    def make(subject: Subject, options: RelighterOptions) -> BasisRelighter:
+    def make(subject: Subject, options: RelighterOptions, other: BasisRelighter | None) -> BasisRelighter:
         if not failing.is_set():
             failing.set()
             raise MemoryError
-        return BasisRelighter(subject, options)
+        return BasisRelighter(subject, options, other)
 
     shared, subject = SharedRelighters(make), synthetic_subject(16, 16)
     with pytest.raises(MemoryError):
         shared.get(subject)
     assert shared.get(subject) is not None
+
+
+def test_the_same_person_in_another_size_shares_the_mixes() -> None:
+    shared, whole = SharedRelighters(), synthetic_subject(96, 80)
+    half = half_size_subject(whole)
+    assert half.basis.has_mixes_of(whole.basis)
+    assert half.basis.values.dtype == np.int8
+    first = shared.get(whole)
+    second = shared.get(half)
+    assert second._mixes is first._mixes
+    light = builtin_environment("sunset").light_map[None]
+    np.testing.assert_array_equal(second.relight(light), BasisRelighter(half).relight(light))
+    assert shared.get(synthetic_subject(96, 80))._mixes is not first._mixes
+
+
+def test_mixes_of_half_floats_are_not_shared() -> None:
+    """In 8 bits their units depend on the values, which are others at half the size."""
+    shared, whole = SharedRelighters(), synthetic_subject(96, 80)
+    whole = replace(whole, basis=replace(whole.basis, values=whole.basis.values.astype(np.float16)))
+    half = half_size_subject(whole)
+    assert half.basis.has_mixes_of(whole.basis)
+    assert shared.get(half)._mixes is not shared.get(whole)._mixes

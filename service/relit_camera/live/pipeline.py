@@ -158,13 +158,14 @@ class Pipeline:
             ModelError: a model that the scene needs is missing; so does the task.
         """
         quality = self.quality
-        motion = self._track(frame, quality) if scene_now().subject else None
+        scene = scene_now()
+        motion = self._track(frame, scene, quality) if scene.subject else None
         scene = scene_now()
         self._forget_mismatch_of_other(scene.subject)
         if scene.subject is None:
             return lambda: self._render_unrelit(frame, scene)
         if motion is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
-            motion = self._track(frame, quality)
+            motion = self._track(frame, scene, quality)
         if self._mismatch is not None and self._mismatch.mismatch.is_over(motion):
             self._forget_mismatch()
         name = self._mode_for(scene.look.mode)
@@ -176,9 +177,10 @@ class Pipeline:
                 raise SubjectError(task.why, task.cure)
         return task
 
-    def _track(self, frame: Frame, quality: RenderQuality) -> FaceMotion:
+    def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> FaceMotion:
+        in_ratio = self._mode_for(scene.look.mode) is Mode.RATIO
         with self.timer.stage("track"):
-            self._live_tracker.set_interval(quality.track_every)
+            self._live_tracker.set_interval(quality.ratio_track_every if in_ratio else quality.track_every)
             return self._follower.follow(self._live_tracker.track(frame), frame.size, frame.time_s)
 
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:

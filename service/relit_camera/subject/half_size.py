@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -32,7 +33,10 @@ def half_size_subject(subject: Subject) -> Subject:
 
 
 def half_size_basis(basis: LocalBasis, size: tuple[int, int]) -> LocalBasis:
-    """The rows of blocks of 2 × 2 pixels of a picture of `size` (width, height), each in its largest cluster there."""
+    """The rows of blocks of 2 × 2 pixels of a picture of `size` (width, height), each in its largest cluster there.
+
+    Where every cluster has a block, `first`, `scales` and `mixes` are the very arrays of `basis`.
+    """
     width = size[0]
     half_width = -(-width // 2)
     clusters = [np.unique(cluster, return_index=True) for cluster in basis.pixels]
@@ -51,13 +55,17 @@ def half_size_basis(basis: LocalBasis, size: tuple[int, int]) -> LocalBasis:
         values.append((np.rint(means) if part.dtype == np.int8 else means).astype(part.dtype))
     most = max(len(blocks) for blocks in found)
     chosen = [index for index, blocks in enumerate(found) if len(blocks)]
+    pixels = np.stack([np.pad(found[i], (0, most - len(found[i])), "edge") for i in chosen])
+    halved = np.concatenate(
+        [np.pad(values[i], ((0, 0), (0, 0), (0, most - values[i].shape[2])), "edge") for i in chosen]
+    )
+    if len(chosen) == len(clusters):
+        return replace(basis, pixels=pixels, values=halved)
     components = np.concatenate([np.arange(basis.first[i], basis.first[i + 1]) for i in chosen])
     return LocalBasis(
-        pixels=np.stack([np.pad(found[i], (0, most - len(found[i])), "edge") for i in chosen]),
+        pixels=pixels,
         first=np.concatenate([[0], np.cumsum([len(values[i]) for i in chosen])]).astype(np.int32),
-        values=np.concatenate(
-            [np.pad(values[i], ((0, 0), (0, 0), (0, most - values[i].shape[2])), "edge") for i in chosen]
-        ),
+        values=halved,
         scales=basis.scales[components],
         mixes=basis.mixes[components],
     )

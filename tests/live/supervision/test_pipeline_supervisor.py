@@ -13,7 +13,7 @@ from relit_camera.base.config.look import Look
 from relit_camera.base.errors import PipelineHangError, TrackError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.live.pipeline import Pipeline, RenderedFrame
-from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, RenderQuality
+from relit_camera.live.render_quality import QUALITY_LEVELS, RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.supervision.adaptive_quality import QualityState
 from relit_camera.live.supervision.pipeline_health import (
@@ -38,7 +38,7 @@ HANG = 1e9
 class FakePipeline:
     """In the place of a pipeline: a `FakeWorker` uses nothing of it."""
 
-    quality = FULL_QUALITY
+    quality = QUALITY_LEVELS[0]
 
 
 class FakeWorker:
@@ -392,12 +392,12 @@ def test_late_pictures_get_cheaper_and_full_quality_comes_back_within_two_second
     simulation = Simulation()
     simulation.at(5.0, render_s=0.2)
     simulation.run(5.0)
-    assert simulation.quality() == FULL_QUALITY
+    assert simulation.quality() == QUALITY_LEVELS[0]
     simulation.run(8.0)
     assert simulation.quality() == QUALITY_LEVELS[-1]
     simulation.at(8.0, render_s=RENDER_S)
     simulation.run(10.0)
-    assert simulation.quality() == FULL_QUALITY
+    assert simulation.quality() == QUALITY_LEVELS[0]
     assert simulation.troubles == []
 
 

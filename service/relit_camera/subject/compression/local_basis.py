@@ -65,6 +65,11 @@ class LocalBasis:
         """Bytes of all arrays."""
         return sum(a.nbytes for a in (self.pixels, self.first, self.values, self.scales, self.mixes))
 
+    def has_mixes_of(self, other: LocalBasis) -> bool:
+        """Whether components, scales and mixes are the very arrays of another basis."""
+        pairs = ((self.first, other.first), (self.scales, other.scales), (self.mixes, other.mixes))
+        return all(mine is its for mine, its in pairs)
+
     def scaled_mixes(self, part: slice = slice(None)) -> NDArray[np.float32]:
         """The mixes times their scales, float32, for a slice of the components."""
         return np.asarray(self.mixes[part].astype(np.float32) * self.scales[part, None])

@@ -6,7 +6,7 @@ rank lie side by side in one array, so that one product serves all of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,14 +27,14 @@ class RankGroup:
     """Clusters of one rank.
 
     Attributes:
+        clusters: which they are.
         pixels: (clusters, places) int32 row-major.
         values: (clusters, 3, rank, places) int8 or float16.
-        mixes: (clusters, rank, components) float32, units of the values included.
     """
 
+    clusters: NDArray[np.intp]
     pixels: NDArray[np.int32]
-    values: NDArray[np.int8] | NDArray[np.float16]
-    mixes: NDArray[np.float32]
+    values: NDArray[Any]
 
 
 def rounded_ranks(basis: LocalBasis) -> NDArray[np.int32]:
@@ -42,18 +42,31 @@ def rounded_ranks(basis: LocalBasis) -> NDArray[np.int32]:
     return np.asarray(-(-np.diff(basis.first) // RANK_STEP) * RANK_STEP, np.int32)
 
 
-def groups_by_rank(basis: LocalBasis) -> Iterator[RankGroup]:
-    """All clusters of a basis, by rising rank; one group at a time, because mixes are large as floats."""
+def groups_by_rank(basis: LocalBasis) -> list[RankGroup]:
+    """All clusters of a basis, by rising rank."""
     ranks, rounded = np.diff(basis.first), rounded_ranks(basis)
+    groups = []
     for rank in np.unique(rounded):
         chosen = np.flatnonzero(rounded == rank)
         grouped = np.zeros((len(chosen), 3, rank, basis.pixels.shape[1]), basis.values.dtype)
-        mixes = np.zeros((len(chosen), rank, basis.components), np.float32)
         for index, cluster in enumerate(chosen):
-            part = slice(int(basis.first[cluster]), int(basis.first[cluster + 1]))
-            grouped[index, :, : ranks[cluster]] = basis.values[part].transpose(1, 0, 2)
-            mixes[index, : ranks[cluster]] = basis.scaled_mixes(part)
-        yield RankGroup(basis.pixels[chosen], grouped, mixes)
+            values = basis.values[basis.first[cluster] : basis.first[cluster + 1]]
+            grouped[index, :, : ranks[cluster]] = values.transpose(1, 0, 2)
+        groups.append(RankGroup(chosen, basis.pixels[chosen], grouped))
+    return groups
+
+
+def mixes_by_rank(basis: LocalBasis, groups: Sequence[RankGroup]) -> Iterator[NDArray[np.float32]]:
+    """The mixes (rank, components) of each cluster in `groups`, units of the values included.
+
+    One cluster at a time, because mixes are large as floats.
+    """
+    for group in groups:
+        for cluster in group.clusters:
+            mixes = np.zeros((group.values.shape[2], basis.components), np.float32)
+            own = basis.scaled_mixes(slice(int(basis.first[cluster]), int(basis.first[cluster + 1])))
+            mixes[: len(own)] = own
+            yield mixes
 
 
 def in_8_bits(basis: LocalBasis) -> LocalBasis:
@@ -87,29 +100,32 @@ class BasisRelighter:
 
     name, provider = "basis", "cpu"
 
-    def __init__(self, subject: Subject, options: RelighterOptions | None = None) -> None:
-        """Of `options` it takes the number of threads; it always runs on the CPU."""
+    def __init__(
+        self, subject: Subject, options: RelighterOptions | None = None, same_mixes: BasisRelighter | None = None
+    ) -> None:
+        """Prepare the products.
+
+        Args:
+            subject: the person.
+            options: only the number of threads is used; it always runs on the CPU.
+            same_mixes: a relighter of 8-bit bases with the same mixes, those of the same person in another size: its
+                product, which has most of the bytes, is used here too.
+        """
         threads = (options or RelighterOptions()).session.threads
         self._shape = (subject.metadata.height, subject.metadata.width)
         self._coefficients = subject.coefficients
         basis = in_8_bits(subject.basis)
-        values: list[NDArray[Any]] = []
-        pixels: list[NDArray[np.int32]] = []
-
-        def mixes() -> Iterator[NDArray[np.float32]]:
-            for group in groups_by_rank(basis):
-                values.append(group.values)
-                pixels.append(group.pixels)
-                for part in np.array_split(group.mixes, len(group.mixes)):
-                    yield part.reshape(-1, basis.components)
-
-        rows = int(rounded_ranks(basis).sum())
-        self._mixes = IntegerProduct(rows, basis.components, mixes(), threads)
-        self._clusters = ClusterProducts(values, threads)
+        groups = groups_by_rank(basis)
+        if same_mixes is None:
+            rows = int(rounded_ranks(basis).sum())
+            self._mixes = IntegerProduct(rows, basis.components, mixes_by_rank(basis, groups), threads)
+        else:
+            self._mixes = same_mixes._mixes
+        self._clusters = ClusterProducts([group.values for group in groups], threads)
         # Where each value of the picture stands among the clusters' products; what is in no cluster is behind them.
         self._source = np.full((subject.matte.size, 3), self._clusters.size, np.intp)
-        for group, positions in zip(pixels, self._clusters.positions(), strict=True):
-            self._source[group] = positions
+        for group, positions in zip(groups, self._clusters.positions(), strict=True):
+            self._source[group.pixels] = positions
 
     @property
     def nbytes(self) -> int:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.models.session_with_fallback import open_session
 from relit_camera.subject.reflectance_field import TEXELS
-from relit_camera.subject.relighting.basis_relighter import groups_by_rank
+from relit_camera.subject.relighting.basis_relighter import groups_by_rank, mixes_by_rank
 from relit_camera.subject.relighting.relighter import RelighterOptions, weighted_light
 from relit_camera.subject.subject import Subject
 
@@ -28,8 +28,8 @@ def basis_graph(subject: Subject) -> bytes:
     """A serialised model, as `BasisRelighter` multiplies: `light` (3, 2048, count) → `pictures` (3, pixels, count)."""
     from onnx import helper
 
-    groups = list(groups_by_rank(subject.basis))
-    mixes = np.concatenate([group.mixes.reshape(-1, subject.basis.components) for group in groups])
+    groups = groups_by_rank(subject.basis)
+    mixes = np.concatenate(list(mixes_by_rank(subject.basis, groups)))
     constants: dict[str, NDArray] = {"coefficients": subject.coefficients, "mixes": mixes}
     nodes = [
         helper.make_node("MatMul", ["coefficients", "light"], ["shared"]),

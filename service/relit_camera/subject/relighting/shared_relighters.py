@@ -1,6 +1,7 @@
 """One relighter for everybody who relights the same subject: to make it takes half a second, and to keep it some 20 MB.
 
-The pipeline, what stands in for it, and the pictures of the subject in each place want one at about the same time.
+The pipeline, what stands in for it, and the pictures of the subject in each place want one at about the same time. Mode
+ratio wants another one of the subject at half its size, which shares two thirds of the bytes.
 """
 
 from __future__ import annotations
@@ -10,9 +11,13 @@ import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.relighting.relighter import RelighterOptions
 from relit_camera.subject.subject import Subject
+
+RelighterMaker = Callable[[Subject, RelighterOptions, BasisRelighter | None], BasisRelighter]
 
 WAIT_S = 5.0
 """How long somebody who makes a relighter is waited for."""
@@ -31,8 +36,8 @@ class _Entry:
 class SharedRelighters:
     """Makes each relighter once, and keeps none that nobody has any more. Thread-safe."""
 
-    def __init__(self, make: Callable[[Subject, RelighterOptions], BasisRelighter] = BasisRelighter) -> None:
-        """`make` makes a relighter."""
+    def __init__(self, make: RelighterMaker = BasisRelighter) -> None:
+        """`make` makes a relighter: of a subject, options, and another one whose mixes it may use too."""
         self._make = make
         self._lock = threading.Lock()
         self._entries: list[_Entry] = []
@@ -42,11 +47,11 @@ class SharedRelighters:
         options = options or RelighterOptions()
         entry = self._entry(subject, options.session.threads)
         if not entry.lock.acquire(timeout=WAIT_S):
-            return self._make(subject, options)  # whoever makes it hangs
+            return self._make(subject, options, None)  # whoever makes it hangs
         try:
             relighter = None if entry.relighter is None else entry.relighter()
             if relighter is None:
-                relighter = self._make(subject, options)
+                relighter = self._make(subject, options, self._with_same_mixes(subject, options.session.threads))
                 entry.relighter = weakref.ref(relighter)
             return relighter
         finally:
@@ -58,6 +63,18 @@ class SharedRelighters:
             entries = [entry for entry in self._entries if entry.subject() is subject]
         found = (entry.relighter() for entry in entries if entry.relighter is not None)
         return next((relighter for relighter in found if relighter is not None), None)
+
+    def _with_same_mixes(self, subject: Subject, threads: int) -> BasisRelighter | None:
+        """A relighter of the same person in another size, as far as somebody has one."""
+        if subject.basis.values.dtype != np.int8:
+            return None  # in 8 bits it has mixes of its own
+        with self._lock:
+            entries = [entry for entry in self._entries if entry.threads == threads]
+        for entry in entries:
+            other, relighter = entry.subject(), None if entry.relighter is None else entry.relighter()
+            if other is not None and relighter is not None and subject.basis.has_mixes_of(other.basis):
+                return relighter
+        return None
 
     def _entry(self, subject: Subject, threads: int) -> _Entry:
         with self._lock:
