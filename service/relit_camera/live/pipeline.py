@@ -180,7 +180,8 @@ class Pipeline:
     def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> FaceMotion:
         in_ratio = self._mode_for(scene.look.mode) is Mode.RATIO
         with self.timer.stage("track"):
-            self._live_tracker.set_interval(quality.ratio_track_every if in_ratio else quality.track_every)
+            every = quality.ratio_track_every if in_ratio else quality.track_every
+            self._live_tracker.set_interval(every, follow_lips=not in_ratio)
             return self._follower.follow(self._live_tracker.track(frame), frame.size, frame.time_s)
 
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.light_multiplication import light_of_root, root_of_light
-from relit_camera.live.modes.live_detail import CellBlend, SourceCells, blend_cells, live_cells
+from relit_camera.live.modes.live_detail import (
+    CellBlend,
+    SourceCells,
+    blend_cells,
+    live_cells,
+    noise_fraction,
+    smoothed,
+)
 
 ROWS, COLUMNS, UNIT = 60, 80, 20.0
 ALBEDO = 0.3 + 0.2 * np.random.default_rng(1).random((ROWS, COLUMNS, 3))
@@ -21,7 +28,8 @@ def blended(live: np.ndarray, room: np.ndarray, scene: np.ndarray = SIDE, bright
     even = np.full((ROWS, COLUMNS, 3), ALBEDO.mean())
     relit, under_room = (root_of_light((even * light).astype(np.float32)) for light in (scene, room))
     source = SourceCells(relit, under_room, EVERYWHERE, EVERYWHERE, EVERYWHERE)
-    return blend_cells(root_of_light(live.astype(np.float32)), brightest * EVERYWHERE, source, UNIT)
+    roots = root_of_light(live.astype(np.float32))
+    return blend_cells(roots, roots, brightest * EVERYWHERE, source, UNIT)
 
 
 def ratio_of(blend: CellBlend) -> np.ndarray:
@@ -93,7 +101,9 @@ def test_black_pixels_and_nothing_to_go_by_are_numbers_all_the_same(brightest: f
     room = relit.copy()
     room[20:24, 20:24] = 0
     sure = np.float32(confidence) * EVERYWHERE
-    blend = blend_cells(live, brightest * EVERYWHERE, SourceCells(relit, room, sure, EVERYWHERE, EVERYWHERE), UNIT)
+    blend = blend_cells(
+        live, live, brightest * EVERYWHERE, SourceCells(relit, room, sure, EVERYWHERE, EVERYWHERE), UNIT
+    )
     assert np.isfinite(blend.ratio).all()
     assert np.isfinite(blend.trust).all()
     assert blend.ratio[..., :3].max() < 6
@@ -104,7 +114,7 @@ def test_eyes_and_lips_are_the_live_pictures_even_where_they_are_overexposed() -
     skin = EVERYWHERE.copy()
     skin[20:40, 30:50] = 0
     relit = root_of_light(np.full((ROWS, COLUMNS, 3), 0.3, np.float32))
-    blend = blend_cells(relit, 255 * EVERYWHERE, SourceCells(relit, relit, EVERYWHERE, skin, EVERYWHERE), UNIT)
+    blend = blend_cells(relit, relit, 255 * EVERYWHERE, SourceCells(relit, relit, EVERYWHERE, skin, EVERYWHERE), UNIT)
     assert blend.trust[25:35, 35:45].min() == 1
     assert blend.trust[5, 5] < 0.1
 
@@ -115,5 +125,71 @@ def test_noise_near_overexposure_does_not_flicker() -> None:
     source = SourceCells(relit, relit, EVERYWHERE, EVERYWHERE, EVERYWHERE)
     for _ in range(6):
         brightest = (241 + rng.normal(0, 1.5, (ROWS, COLUMNS))).astype(np.float32)
-        shown.append(blend_cells(relit, brightest, source, UNIT).trust[5:-5, 5:-5])
+        shown.append(blend_cells(relit, relit, brightest, source, UNIT).trust[5:-5, 5:-5])
     assert np.diff(shown, axis=0).std() < 0.05
+
+
+STEP = 6
+BOX = (0, 0, COLUMNS, ROWS)
+
+
+def noisy(image: np.ndarray, sigma: float) -> np.ndarray:
+    return np.clip(image + np.random.default_rng(5).normal(0, sigma, image.shape), 0, 255).astype(np.uint8)
+
+
+def dim_picture() -> np.ndarray:
+    """A dim live picture: even above, with a coarse weave below."""
+    image = np.full((ROWS * STEP, COLUMNS * STEP, 3), 60.0)
+    weave = np.random.default_rng(7).choice([-20.0, 20.0], (ROWS * STEP // 2, COLUMNS * STEP, 1))
+    image[ROWS * STEP // 2 :] += weave
+    return image
+
+
+def noise_in(image: np.ndarray, factor: float, confidence: np.ndarray = EVERYWHERE, step: int = STEP) -> np.ndarray:
+    """How much of each cell is taken for noise where roots of the picture are multiplied by `factor`."""
+    roots = np.full((ROWS, COLUMNS, 3), 0.5, np.float32)
+    source = SourceCells(roots, roots, confidence, EVERYWHERE, EVERYWHERE)
+    return noise_fraction(image, step, BOX, np.full((ROWS, COLUMNS, 3), factor, np.float32), source, UNIT)
+
+
+def test_noise_that_would_be_seen_is_told_from_detail() -> None:
+    fraction = noise_in(noisy(dim_picture(), 4.0), 2.5)
+    assert fraction[3:27, 3:-3].mean() > 0.85
+    assert fraction[33:-3, 3:-3].mean() < 0.2
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0])
+def test_noise_that_the_ratio_does_not_multiply_stays(factor: float) -> None:
+    assert noise_in(noisy(dim_picture(), 4.0), factor).max() == 0
+
+
+def test_beside_the_person_nothing_is_smoothed() -> None:
+    person = EVERYWHERE.copy()
+    person[:, :30] = 0
+    fraction = noise_in(noisy(dim_picture(), 4.0), 2.5, person)
+    assert fraction[:, :30].max() == 0
+    assert fraction[3:27, 33:-3].mean() > 0.8
+
+
+def test_a_person_of_a_few_cells_does_not_tell_the_noise_alone() -> None:
+    """So nothing appears at once where a few cells begin to be in the dark."""
+    image, one = noisy(dim_picture(), 4.0), np.zeros((ROWS, COLUMNS), np.float32)
+    one[10, 10] = 1
+    assert noise_in(image, 2.5, one).max() < 0.05
+
+
+def test_noise_is_told_in_cells_of_one_pixel_too() -> None:
+    image = noisy(np.full((ROWS, COLUMNS, 3), 40.0), 4.0)
+    fraction = noise_in(image, 2.5, step=1)
+    assert fraction.shape == (ROWS, COLUMNS)
+    assert fraction.mean() > 0.7
+
+
+def test_a_picture_without_noise_is_not_smoothed() -> None:
+    assert noise_in(dim_picture().astype(np.uint8), 2.5)[33:-3].max() == 0
+
+
+def test_smoothed_cells_have_hardly_any_noise() -> None:
+    roots = root_of_light(np.full((ROWS, COLUMNS, 3), 0.1, np.float32))
+    rough = roots + np.random.default_rng(6).normal(0, 0.02, roots.shape).astype(np.float32)
+    assert smoothed(rough, UNIT)[5:-5, 5:-5].std() < 0.5 * 0.02

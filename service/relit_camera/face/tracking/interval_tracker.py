@@ -88,21 +88,25 @@ class IntervalTracker:
         self._lips = LipRegression(self._scheme)
         self._flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST)
         self._flow.setFinestScale(TUNABLES.finest_scale)
-        self._interval = 1
+        self._interval, self._follow_lips = 1, True
         self.set_interval(interval)
         self.reset()
 
-    def set_interval(self, frames: int) -> None:
+    def set_interval(self, frames: int, follow_lips: bool = True) -> None:
         """Measure every so many frames from now on. Between two calls of `track`, and from their thread.
+
+        Args:
+            frames: from one measurement to the next.
+            follow_lips: whether the lips follow what was learned of them, or the flow as the rest of the face does.
 
         Raises:
             InputError: it is less than 1.
         """
         if frames < 1:
             raise InputError(f"a tracker cannot measure every {frames} frames", "give an interval of 1 or more")
-        if frames != self._interval:
+        if (frames, follow_lips) != (self._interval, self._follow_lips):
             self._lips.reset()  # what it learned before may be another person's by now
-        self._interval = frames
+        self._interval, self._follow_lips = frames, follow_lips
 
     @property
     def interval(self) -> int:
@@ -130,7 +134,7 @@ class IntervalTracker:
     def _learn(self, frame: Frame, state: FaceState) -> None:
         if state.pose is None:
             self._lips.reset()
-        elif self._interval > 1 and state.status is FaceStatus.FOUND:
+        elif self._interval > 1 and self._follow_lips and state.status is FaceStatus.FOUND:
             self._lips.learn(frame.image, state.landmarks, state.pose)
 
     def _remember(self, frame: Frame, state: FaceState) -> _TrackedFrame | None:
@@ -158,7 +162,8 @@ class IntervalTracker:
         pose = fit_pose(landmarks, self._scheme, frame.size, last.state.pose.focal_px if last.state.pose else None)
         if pose is None or self._motion(last.state.landmarks, landmarks) > TUNABLES.max_motion:
             return None
-        landmarks = self._lips.corrected(frame.image, landmarks, pose)
+        if self._follow_lips:
+            landmarks = self._lips.corrected(frame.image, landmarks, pose)
         return replace(
             last.state,
             landmarks=landmarks,

@@ -5,6 +5,8 @@ hard, the old shading shows through. The relit source image has no trace of the 
 the live face only as well as the landmarks do. So the coarse part of the shown picture is that of the relit source
 image, and the detail is the live picture's: each of the two where it is better. Where the live picture has no detail to
 trust, because it is overexposed or so dark that the ratio would multiply its noise, the source image gives that too.
+Where the ratio makes noise visible, but the live picture is still the better one, what varies no more than its noise is
+shown smooth (the filter of Lee, 1980, whose weight is that of Wiener).
 """
 
 from __future__ import annotations
@@ -39,6 +41,12 @@ class LiveDetailTunables:
             something else: beside the face, and inside it.
         mismatch_floor: share of the person's mean root below which differences do not count as such.
         wide: sigma of the neighborhood that tells what is expected, in eye distances.
+        smooth: sigma of the live picture that is compared with what is expected, and shown in place of noise, in eye
+            distances.
+        visible_excess: by how much a root of the ratio exceeds 1 where half of the noise is suppressed.
+        noise_fraction: of the cells whose noise could be seen, how many are taken to show nothing but noise.
+        noise_margin: how many times the variance of noise counts as noise.
+        noise_cells: so many cells must tell the noise; with fewer it is suppressed less.
     """
 
     coarse: float = 0.08
@@ -47,11 +55,16 @@ class LiveDetailTunables:
     floor: float = 0.02
     full_code: float = 232.0
     clipped_code: float = 252.0
-    noise: float = 3.5
+    noise: float = 3.8
     mismatch: float = 0.5
     mismatch_face: float = 1.2
     mismatch_floor: float = 0.15
     wide: float = 0.6
+    smooth: float = 0.03
+    visible_excess: float = 0.3
+    noise_fraction: float = 0.05
+    noise_margin: float = 5.0
+    noise_cells: int = 200
 
 
 TUNABLES = LiveDetailTunables()
@@ -89,11 +102,12 @@ class CellBlend:
     trust: Cells
 
 
-def blend_cells(live: Cells, brightest: Cells, source: SourceCells, unit: float) -> CellBlend:
+def blend_cells(live: Cells, smooth: Cells, brightest: Cells, source: SourceCells, unit: float) -> CellBlend:
     """Find the ratio for each cell of the live picture, and how far its detail can be trusted.
 
     Args:
         live: (rows, columns, 3) roots of the live picture's light.
+        smooth: the same, see `smoothed`.
         brightest: (rows, columns) its brightest code there, 0..255.
         source: of the source image there.
         unit: the eye distance in cells.
@@ -101,7 +115,8 @@ def blend_cells(live: Cells, brightest: Cells, source: SourceCells, unit: float)
     tuning = TUNABLES
     clipped = np.clip((brightest - tuning.full_code) / (tuning.clipped_code - tuning.full_code), 0, 1)
     seen = source.skin * source.confidence * (1 - clipped)
-    match = _match(live, clipped, source, seen, unit)
+    # Single noisy cells in the dark would else not match, and show.
+    match = _match(smooth, clipped, source, seen, unit)
     confidence = source.confidence * match
     ratio = np.clip(cv2.divide(source.relit, np.maximum(source.under_room, _LEAST)), *_RATIO_ROOTS)
     ratio *= _correction(source.relit, live * ratio, seen * match, tuning.coarse * unit)
@@ -113,6 +128,65 @@ def blend_cells(live: Cells, brightest: Cells, source: SourceCells, unit: float)
     return CellBlend(np.asarray(weighted, np.float32), np.asarray(trust, np.float32))
 
 
+def smoothed(live: Cells, unit: float) -> Cells:
+    """Cells of the live picture, blurred so far that hardly any noise is left; `unit` is the eye distance in cells."""
+    return np.asarray(cv2.GaussianBlur(live, (0, 0), max(TUNABLES.smooth * unit, _LEAST_SIGMA)), np.float32)
+
+
+def noise_fraction(image: DisplayImage, step: int, box: Box, factor: Cells, source: SourceCells, unit: float) -> Cells:
+    """How much of each cell's detail is noise that would be seen on the person, (rows, columns), 0..1.
+
+    Roots of light have about the same noise in the dark as in light (it is that of counted photons). So the noise is
+    taken from the calmest of those cells of the person where the factor would show it.
+
+    Args:
+        image: the live picture.
+        step: side of a cell in its pixels.
+        box: left, top, right and bottom of the cells.
+        factor: (rows, columns, 3) that roots of its light are multiplied by.
+        source: of the source image there.
+        unit: the eye distance in cells.
+    """
+    tuning = TUNABLES
+    excess = cv2.max(_largest(factor) - 1, 0.0)
+    excess = cv2.multiply(excess, excess)
+    visible = cv2.multiply(cv2.divide(excess, cv2.add(excess, tuning.visible_excess**2)), source.confidence)
+    told = cv2.bitwise_and(cv2.compare(visible, _VISIBLE, cv2.CMP_GT), cv2.compare(source.skin, _STILL, cv2.CMP_GT))
+    count = cv2.countNonZero(told)
+    if count == 0:
+        return np.zeros(visible.shape, np.float32)
+    variance = _variance(image, step, box, max(tuning.smooth * unit, _LEAST_SIGMA))
+    few = variance[told > 0][:: count // _NOISE_SAMPLES + 1]
+    noise = float(np.quantile(few, tuning.noise_fraction)) * tuning.noise_margin * min(count / tuning.noise_cells, 1)
+    fraction = cv2.min(cv2.divide(noise, cv2.add(variance, 1e-9)), 1.0)
+    return np.asarray(cv2.multiply(visible, fraction), np.float32)
+
+
+def _variance(image: DisplayImage, step: int, box: Box, sigma: float) -> Cells:
+    """The variance of roots of the live picture's green light in each cell's surroundings, (rows, columns).
+
+    From the difference of two pixels of each cell: shades that go on over several cells do not count.
+    """
+    green = _cell_part(image, step, box)[..., 1]
+    one, other = step // 4, step // 4 + max(step // 2, 1)
+    first, second = green[one::step, one::step], green[other::step, other::step]
+    rows, columns = second.shape  # of cells of one pixel the last have no other
+    codes = cv2.hconcat([np.ascontiguousarray(first[:rows, :columns]), np.ascontiguousarray(second)])
+    roots = cv2.LUT(codes, _ROOTS_OF_CODES)
+    difference = cv2.subtract(roots[:, :columns], roots[:, columns:])
+    left, top, right, bottom = box
+    squares = cv2.multiply(difference, difference, scale=0.5)
+    squares = cv2.copyMakeBorder(squares, 0, bottom - top - rows, 0, right - left - columns, cv2.BORDER_REPLICATE)
+    return np.asarray(cv2.GaussianBlur(squares, (0, 0), sigma), np.float32)
+
+
+def _cell_part(image: DisplayImage, step: int, box: Box) -> DisplayImage:
+    """The part of a live picture that a box of its cells of `step` pixels shows, without cells that are cut."""
+    left, top, right, bottom = box
+    rows, columns = min(bottom, image.shape[0] // step), min(right, image.shape[1] // step)
+    return image[top * step : rows * step, left * step : columns * step]
+
+
 def live_cells(image: DisplayImage, step: int, box: Box) -> tuple[Cells, Cells]:
     """The live picture in cells of `step` pixels: roots of its light (rows, columns, 3), its brightest code there.
 
@@ -120,11 +194,10 @@ def live_cells(image: DisplayImage, step: int, box: Box) -> tuple[Cells, Cells]:
     cells that are wanted; what is of them beyond the picture repeats its border.
     """
     left, top, right, bottom = box
-    whole_right, whole_bottom = min(right, image.shape[1] // step), min(bottom, image.shape[0] // step)
-    part = image[top * step : whole_bottom * step, left * step : whole_right * step]
-    size = (whole_right - left, whole_bottom - top)
-    small = part if step == 1 else cv2.resize(part, size, interpolation=cv2.INTER_LINEAR)
-    small = cv2.copyMakeBorder(small, 0, bottom - whole_bottom, 0, right - whole_right, cv2.BORDER_REPLICATE)
+    part = _cell_part(image, step, box)
+    rows, columns = (side // step for side in part.shape[:2])
+    small = part if step == 1 else cv2.resize(part, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    small = cv2.copyMakeBorder(small, 0, bottom - top - rows, 0, right - left - columns, cv2.BORDER_REPLICATE)
     return np.asarray(cv2.LUT(small, _ROOTS_OF_CODES), np.float32), _largest(small).astype(np.float32)
 
 
@@ -133,6 +206,12 @@ _RATIO_ROOTS = (0.02 ** (1 / POWER), 12 ** (1 / POWER))
 """Limits of the ratio: the source image is extrapolated while the head turns, and may have no light somewhere."""
 _LEAST, _SURE = np.float32(1e-4), np.float32(1.5)
 """A least divisor; and what makes a confidence of two thirds count as certainty, since it is soft at the rim."""
+_VISIBLE, _STILL = 0.3, 0.9
+"""Cells tell the noise where it can be seen on the person, and not on lids, eyes or lips."""
+_NOISE_SAMPLES = 1000
+"""So many of these cells are looked at."""
+_LEAST_SIGMA = 0.3
+"""Of a blur, in cells; OpenCV takes 0 for something else."""
 _GRAY = np.full((1, 3), 1 / 3, np.float32)
 _NEAR = np.float32(0.02)
 """Mean weight in the neighborhood below which nobody knows what is expected."""

@@ -18,7 +18,7 @@ from relit_camera.base.images.light_multiplication import POWER, light_of_root, 
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.live.modes.live_detail import SourceCells, blend_cells, live_cells
+from relit_camera.live.modes.live_detail import SourceCells, blend_cells, live_cells, noise_fraction, smoothed
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.reenactment.control_points import control_points, feature_landmarks, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion
@@ -157,12 +157,18 @@ class RatioRelighting:
         live, brightest = live_cells(plan.frame.image, step, box)
         confidence, skin, face = cv2.split(parts)
         source = SourceCells(relit, under_room, confidence, skin, face)
-        cells = blend_cells(live, brightest, source, plan.eye_distance / step)
+        unit = plan.eye_distance / step
+        smooth = smoothed(live, unit)
+        cells = blend_cells(live, smooth, brightest, source, unit)
         beside = (top, nodes.shape[0] - bottom, left, nodes.shape[1] - right)
         factor = extrapolate_roots(cv2.copyMakeBorder(cells.ratio, *beside, cv2.BORDER_CONSTANT))
         trust = cv2.cvtColor(cells.trust, cv2.COLOR_GRAY2RGB)
         added = cv2.multiply(relit, 1 - trust)
         factor[inside] *= trust
+        noise = noise_fraction(plan.frame.image, step, box, factor[inside], source, unit)
+        calm = cv2.multiply(factor[inside], cv2.cvtColor(noise, cv2.COLOR_GRAY2RGB))
+        factor[inside] -= calm
+        added += cv2.multiply(calm, smooth)
         if blend < 1:
             factor, added = blend_toward_live(factor, added, live, blend)
         added = cv2.copyMakeBorder(added, *beside, cv2.BORDER_CONSTANT)

@@ -49,7 +49,7 @@ class RoomLightTunables:
         light_smoothing: share of the way from the last light to the newly fitted one.
         residual_smoothing: share of the way that the reported residual goes to that of each fit.
         turn_tolerance: radians that the head turns before the face under the last light is predicted anew, by which the
-            gain is measured: by half a degree it changes by less than 1 %.
+            gain is measured: by one degree it changes by less than 2 %.
         clipping_code: sRGB code from which a sample counts as clipped.
         huber_threshold: relative residual from which a sample loses weight (Huber).
         min_samples: usable samples that the gain of a frame needs.
@@ -63,7 +63,7 @@ class RoomLightTunables:
     fits_per_s: float = 4.0
     light_smoothing: float = 0.5
     residual_smoothing: float = 0.5
-    turn_tolerance: float = 0.5 * np.pi / 180
+    turn_tolerance: float = np.pi / 180
     clipping_code: int = 250
     huber_threshold: float = 0.25
     min_samples: int = 20
