@@ -22,9 +22,7 @@ from relit_camera.live.scene.scene_controller import SceneController
 
 ENVIRONMENTS = ("studio", "window", "sunset", "night-street", "party", "overcast")
 SHEET_FRAMES = 12
-FADE_IN = 12
-"""Frames over which the live picture gives way to the relit one when a face is first seen."""
-README_ENVIRONMENTS, README_FRAMES = ("studio", "sunset", "party"), (1, 5, 6, 9, 10)
+README_ENVIRONMENTS, README_FRAMES = ("studio", "sunset", "party"), (1, 4, 6, 8, 10)
 
 
 def main() -> None:
@@ -67,8 +65,7 @@ def relit(environment: str) -> tuple[list[DisplayImage], list[DisplayImage]]:
         lambda _: scene_controller.scene,
         keep,
     )
-    every = (len(after) - FADE_IN) / SHEET_FRAMES
-    indices = [FADE_IN + int((index + 0.5) * every) for index in range(SHEET_FRAMES)]
+    indices = [int((index + 0.5) * len(after) / SHEET_FRAMES) for index in range(SHEET_FRAMES)]
     return [before[index] for index in indices], [after[index] for index in indices]
 
 

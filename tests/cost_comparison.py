@@ -73,6 +73,7 @@ def main() -> None:
     parser.add_argument("subject", type=Path)
     parser.add_argument("--old-models", type=Path, help="folder of the networks that the other checkout pulls")
     parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--old-seconds", type=float, help="for the other checkout; as --seconds if not given")
     options = parser.parse_args()
     here = Path(__file__).resolve().parents[1]
     with tempfile.TemporaryDirectory(prefix="relit-cost.") as folder:
@@ -84,12 +85,13 @@ def main() -> None:
                 chosen = ["--source", str(options.video.resolve()), "--subject", str(options.subject.resolve())]
                 arguments = ["run", *chosen, "--tracker", "mesh", "--mode", mode, "--sink", "null", "--port", "0"]
                 unit_ms = mesh_run_ms()
+                seconds = options.old_seconds if name == "before" and options.old_seconds else options.seconds
                 # Not here: each camera would read the configuration file of this checkout.
-                found = measure(Path(folder), variables, arguments, options.seconds)
+                found = measure(Path(folder), variables, arguments, seconds)
                 unit_ms = (unit_ms + mesh_run_ms()) / 2
                 runs = round(found["picture_ms"] / unit_ms, 2)
-                line = {"mode": mode, "camera": name, "mesh_runs": runs, "mesh_run_ms": round(unit_ms, 2), **found}
-                print(json.dumps(line), flush=True)
+                line = {"mode": mode, "camera": name, "seconds": seconds, "mesh_runs": runs}
+                print(json.dumps({**line, "mesh_run_ms": round(unit_ms, 2), **found}), flush=True)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ import typer
 from pydantic import BaseModel
 from typer.core import TyperCommand, TyperGroup
 
+from relit_camera.api.dependencies import MAX_IMAGE_WORK
 from relit_camera.api.middleware.body_limits import MAX_JSON_BYTES, MAX_UPLOAD_BYTES
 from relit_camera.api.middleware.upload_limits import MAX_UPLOADS
 from relit_camera.api.preview_stream import MAX_FRAMES_SENT_PER_S, MAX_VARIANTS, MAX_VIEWERS
@@ -149,6 +150,7 @@ LIMITS = {
         f"{decoding_process.CPU_LIMIT_S} s",
     ],
     "files that are received": [f"{MAX_UPLOADS}"],
+    "requests that read": [f"{MAX_IMAGE_WORK}"],
     "the data folder": [f"{StorageSettings().quota_gb:.0f} GB"],
     "a stored background": [f"{MAX_BACKGROUND_SIDE_PX} pixels"],
     "a preset's or settings file": [

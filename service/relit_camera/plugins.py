@@ -36,8 +36,7 @@ from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
 from relit_camera.capture.reflectance.method_registry import LinearMethod, ReflectanceMethod, factored_field
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
-from relit_camera.devices.sinks.sink import Sink, SinkInfo
-from relit_camera.devices.sinks.sink_factory import SinkOptions
+from relit_camera.devices.sinks.sink import Sink, SinkInfo, SinkOptions
 from relit_camera.devices.sources.source import Source, SourceInfo, SourceState, ThreadedSource
 from relit_camera.devices.sources.source_factory import SourceOptions
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker

@@ -19,6 +19,7 @@ from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.upload import Upload
 from relit_camera.devices.webcam_formats import FrameSize
 from relit_camera.face.framing.framing import FaceCount, Framing, FramingItem, FramingState
+from relit_camera.live.scene.present_light import PresentLight
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import (
     CameraState,
@@ -344,6 +345,7 @@ class FakeCamera:
         self.degraded: list[Degradation] = []
         self.neutral_resets = 0
         self.base = STATUS
+        self._present_light = PresentLight()
         self._started = time.monotonic()
         self._stop = threading.Event()
 
@@ -356,6 +358,7 @@ class FakeCamera:
             subject=scene.subject_name,
             mode=scene.look.mode.value,
             degraded=self.degraded,
+            light=self._present_light.trust(scene),
             fps=self.base.fps if self.publishing else replace(self.base.fps, published=0.0),
         )
 

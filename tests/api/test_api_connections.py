@@ -1,17 +1,20 @@
-"""Connections that are cut off, and those that are not."""
+"""Connections that are cut off, those that are not, and requests that wait for each other."""
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import socket
 import time
 from collections.abc import Iterator
 from contextlib import suppress
 
+import httpx
 import pytest
 from fastapi import FastAPI
 
 from relit_camera.api.app import create_app
+from relit_camera.api.dependencies import MAX_IMAGE_WORK
 from relit_camera.api.server import connection_timeouts
 from relit_camera.api.server.http_server import (
     MALFORMED_INTERVAL_S,
@@ -21,6 +24,7 @@ from relit_camera.api.server.http_server import (
     start_api_server,
 )
 from relit_camera.base.config.settings import RelitSettings, ServerSettings
+from tests.api.api_client import BASE_URL
 from tests.api.fake_camera import FakeCamera
 
 SILENT_S = 0.4
@@ -192,3 +196,25 @@ def test_malformed_requests_are_counted_in_the_log() -> None:
     now[0] = MALFORMED_INTERVAL_S
     assert passes(MALFORMED_REQUEST) == f"{MALFORMED_REQUEST} (2 more since the last such line)"
     assert passes(MALFORMED_REQUEST) is None
+
+
+def test_changes_are_answered_while_many_wait_for_pictures(app: FastAPI) -> None:
+    """A file is decoded, and more requests wait for pictures than there are threads: most are refused."""
+    context = app.state.context
+
+    async def run() -> tuple[httpx.Response, list[int]]:
+        transport = httpx.ASGITransport(app, raise_app_exceptions=False)
+        async with httpx.AsyncClient(transport=transport, base_url=BASE_URL) as client:
+            with context.image_work_lock:
+                asked = [
+                    asyncio.create_task(client.get("/api/v1/environments/studio/thumbnail.jpg")) for _ in range(60)
+                ]
+                await asyncio.wait(asked, timeout=30, return_when=asyncio.FIRST_COMPLETED)
+                change = asyncio.create_task(client.patch("/api/v1/lighting", json={"yaw_deg": 3}))
+                changed = await asyncio.wait_for(change, timeout=30)
+            return changed, [answer.status_code for answer in await asyncio.gather(*asked)]
+
+    changed, statuses = asyncio.run(run())
+    assert changed.status_code == 200
+    assert statuses.count(200) == MAX_IMAGE_WORK
+    assert statuses.count(503) == 60 - MAX_IMAGE_WORK

@@ -10,6 +10,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from relit_camera.live.status.camera_status import CameraState, Degradation, DegradationCode, Percentiles
 from tests.api.api_client import Client, check_problem
 from tests.api.fake_camera import STATUS, FakeCamera
+from tests.app.subject_builders import captured
 
 
 def test_status_tells_everything(client: Client, camera: FakeCamera) -> None:
@@ -32,6 +33,19 @@ def test_status_tells_everything(client: Client, camera: FakeCamera) -> None:
     assert status["providers"] == {"face_mesh": "CPUExecutionProvider"}
     assert status["degraded"][0]["cure"] == "install the GPU variant"
     assert status["degraded"][0]["code"] == "provider-fallback"
+
+
+def test_status_tells_how_far_to_trust_the_face_in_the_present_light(client: Client, camera: FakeCamera) -> None:
+    """An instant face under one lamp: before it nothing is a guess or softened, behind it everything."""
+    assert client.get("/api/v1/status").json()["light"] is None  # nobody is shown
+    camera.scene_controller.show_subject("ada", captured("instant"))
+    lamp = {"elevation_deg": 0, "size_deg": 5}
+    client.patch("/api/v1/lighting", {"environment": None, "lamps": [lamp | {"azimuth_deg": 10}]})
+    assert client.get("/api/v1/status").json()["light"] == {"measured": 0, "behind": 0, "softened": 0}
+    client.patch("/api/v1/lighting", {"lamps": [lamp | {"azimuth_deg": 170}]})
+    assert client.get("/api/v1/status").json()["light"] == {"measured": 0, "behind": 1, "softened": 1}
+    client.patch("/api/v1/lighting", {"lamps": []})
+    assert client.get("/api/v1/status").json()["light"] is None  # it is dark
 
 
 def test_figures_that_are_no_numbers_are_null(client: Client, camera: FakeCamera) -> None:

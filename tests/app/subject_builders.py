@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_types import DisplayImage
@@ -17,16 +18,18 @@ from relit_camera.subject.rungs import Rung
 from relit_camera.subject.subject import Subject, SubjectMetadata
 from relit_camera.subject.subject_file import write_subject
 
+TWO_LIGHTS = np.array([[0, 0, 1], [1, 0, 0]], np.float32)
 
-def captured(rung: Rung | None) -> Subject:
-    """A grey subject of 16 x 24 pixels."""
-    matte = np.ones((24, 16), np.float32)
+
+def captured(rung: Rung | None, light_directions: NDArray[np.float32] = TWO_LIGHTS) -> Subject:
+    """A grey subject of 16 x 24 pixels, captured by lights from `light_directions` (lights, 3)."""
+    matte, lights = np.ones((24, 16), np.float32), len(light_directions)
     return Subject(
         metadata=SubjectMetadata(
             width=16,
             height=24,
             method="nearest",
-            lights=2,
+            lights=lights,
             components=1,
             source="webcam",
             psnr_db=60.0,
@@ -36,8 +39,8 @@ def captured(rung: Rung | None) -> Subject:
         ),
         basis=global_basis(np.ones((3, 1, 24, 16), np.float16), matte),
         coefficients=np.ones((1, TEXELS), np.float32),
-        light_directions=np.array([[0, 0, 1], [1, 0, 0]], np.float32),
-        light_coefficients=np.ones((1, 2), np.float32),
+        light_directions=light_directions,
+        light_coefficients=np.ones((1, lights), np.float32),
         matte=matte,
         neutral=np.full((24, 16, 3), 90, np.uint8),
     )

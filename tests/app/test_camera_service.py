@@ -71,6 +71,7 @@ def test_status_says_what_runs(tmp_path: Path) -> None:
         assert status["source"] == "still memory"
         assert status["tracker"] == {"name": "nodding", "state": "found"}
         assert status["degraded"] == []
+        assert status["light"] == {"measured": 1, "behind": 0, "softened": 0}  # lit from all sides for its capture
         assert {"track", "light", "relight", "follow", "move", "compose"} <= status["stage_ms"].keys()  # type: ignore[attr-defined]
         found = camera.camera_service.status()
         assert 0 < found.latency_ms.p50 <= found.latency_ms.p95

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.relit_command import Material, environment, write_material
-from tests.devices.keeper.stand_in_sink import OPENER, VARIABLE, Noted, noted
+from tests.devices.keeper.stand_in_sink import VARIABLE, Noted, noted
 from tests.small_camera import wait_until
 
 pytestmark = [
@@ -21,10 +21,13 @@ pytestmark = [
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="keepers are Linux's"),
 ]
 
-INJECTED = f"""
+INJECTED = """
 import sys
 from relit_camera.devices.keeper import kept_sink
-kept_sink.KEPT_SINKS["null"] = "{OPENER}"
+from relit_camera.devices.sinks import sink_factory
+from tests.devices.keeper.stand_in_sink import open_noting
+kept_sink.KEPT_SINKS["null"] = "null"
+sink_factory.open_null = open_noting
 sys.argv[0] = "relit"
 from relit_camera.cli.main import run
 run()

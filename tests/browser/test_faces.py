@@ -145,6 +145,7 @@ def test_a_face_is_deleted_only_when_that_was_confirmed(fake: FakeServer, open_p
     expect(panel.page.get_by_role("button", name="Options of bea")).to_be_focused()
     assert names(fake) == [SUBJECT, "bea"]
     panel.choose_option("bea", "Delete")
+    expect(panel.page.locator("#ask-ok")).to_be_visible()  # `press` does not wait for that
     panel.page.locator("#ask-ok").press("Enter")
     expect(panel.face("bea")).to_be_hidden()
     wait_until(lambda: panel.what_has_the_focus() != "")

@@ -13,9 +13,9 @@ import pytest
 
 from relit_camera.app.demo import demo_files
 from relit_camera.base.video.video_readers import VideoReader, probe_video
-from relit_camera.capture.subject_builder import measured_fraction
 from relit_camera.cli.commands.demo import opens_in_browser
 from relit_camera.face.tracking.track_recording import read_track
+from relit_camera.subject.measured_light import measured_fraction
 from relit_camera.subject.subject_file import read_metadata, read_subject
 from tests.api.api_client import decoded_picture
 from tests.cli.relit_command import call, start
@@ -157,7 +157,7 @@ def test_the_panel_is_told_how_the_bundled_person_was_captured(tmp_path: Path) -
     shipped = read_metadata(demo_files.SUBJECT)
     assert told.model_copy(update={"rung": shipped.rung, "measured_fraction": shipped.measured_fraction}) == shipped
     subject = read_subject(noted)
-    assert measured_fraction(subject.light_directions.astype(np.float64)) == pytest.approx(told.measured_fraction)
+    assert measured_fraction(subject.light_directions) == pytest.approx(told.measured_fraction)
     np.testing.assert_array_equal(subject.neutral, read_subject(demo_files.SUBJECT).neutral)
     assert noted == demo_files.noted_subject(tmp_path / "demo")
     (tmp_path / "file").touch()
@@ -167,9 +167,10 @@ def test_the_panel_is_told_how_the_bundled_person_was_captured(tmp_path: Path) -
 def test_the_bundled_subject_is_as_any_other() -> None:
     subject = read_subject(demo_files.SUBJECT)
     assert "mesh478" in subject.landmarks
-    answer = call("subject", "info", demo_files.SUBJECT)
+    answer = call("subject", "info", demo_files.SUBJECT, "--places")
     assert answer.code == 0
     assert "adam" in answer.out
+    assert "measured of the light of studio 100 %, " in answer.out
 
 
 def test_no_browser_of_the_terminal_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.rotations import Rotation
 from relit_camera.capture.desk import desk_capture
-from relit_camera.capture.desk.desk_recording import DeskRecording
 from relit_camera.capture.desk.person import desk_face
 from relit_camera.face.detection.face_detector import Detection
+from relit_camera.face.head_pose import HeadPose
 from relit_camera.subject.subject_file import read_metadata
+from tests.capture.desk.bundled_person import write_recording
 from tests.capture.desk.desk_person import SETUP, film, lambertian_person
 from tests.cli.relit_command import call
 
@@ -27,15 +29,6 @@ class Found:
 
     def detect_all(self, picture: DisplayImage) -> list[Detection]:
         return self.faces
-
-
-def write_recording(folder: Path, recording: DeskRecording) -> Path:
-    """The folder with the recording's frames and setup."""
-    folder.mkdir()
-    for index in range(len(recording.frames)):
-        write_display(folder / f"{index:04d}.png", recording.frames[index])
-    (folder / "desk.json").write_text(recording.setup.model_dump_json(), encoding="utf-8")
-    return folder
 
 
 def test_a_recorded_folder_becomes_a_subject(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,8 +70,19 @@ def test_a_bad_recording_is_one_clear_line_and_nothing_is_left(tmp_path: Path, m
         }
     )
     searched = good.setup.model_copy(update={"face": None, "pixels_per_cm": None})
+    small = Detection((150, 90, 60, 70), np.array([[168, 118], [192, 118]], np.float32), 0.9)
     face = Detection((150, 90, 100, 120), np.array([[180, 140], [220, 140]], np.float32), 0.9)
+    length = len(frames) // len(SETUP.patterns)
+    mixed = [index for index, pattern in enumerate(SETUP.patterns) if not isinstance(pattern, str)]
+    lost = {frame for index in mixed[2:5] for frame in range(index * length, (index + 1) * length)}
+    dark, white = (np.minimum(np.arange(256) * gain, 255).astype(np.uint8) for gain in (0.12, 3))
     for name, recording, faces, words in (
+        ("still", replace(good, frames=frames[:1] * 60), [], "no patterns are seen"),
+        ("short", replace(good, frames=frames[: len(frames) // 2]), [], "leave the page open"),
+        ("lost", replace(good, frames=[frames[k] for k in range(len(frames)) if k not in lost]), [], "are missing"),
+        ("dark", replace(good, frames=[dark[frame] for frame in frames]), [], "too dark"),
+        ("white", replace(good, frames=[white[frame] for frame in frames]), [], "over-exposed"),
+        ("small", replace(good, setup=searched), [small], "only 70 pixels high"),
         ("left", replace(good, frames=gone), [], "stay before the webcam"),
         ("turned", film(person, turned, said=SETUP), [], "mirrored"),
         ("nobody", replace(good, setup=searched), [], "no face is seen"),
@@ -88,3 +92,15 @@ def test_a_bad_recording_is_one_clear_line_and_nothing_is_left(tmp_path: Path, m
         folder = write_recording(tmp_path / name, recording)
         call("capture", "desk", "--frames", folder, "--out", out).complains(words)
         assert not out.exists()
+
+
+def test_somebody_who_looks_aside_is_told_and_nothing_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tracker follows a profile, but not from the front."""
+    pose = HeadPose(Rotation.from_rotvec([0, np.radians(60), 0]), np.array([0.0, 0.0, -60.0]), 640.0)
+    for visible, words in ((True, "turned away from the webcam by 60 degrees"), (False, "seen from the side")):
+        state = SimpleNamespace(visible=visible, pose=pose, landmarks=np.zeros((478, 2), np.float32))
+        monkeypatch.setattr(desk_face, "open_tracker", lambda name, options: None)
+        monkeypatch.setattr(desk_face, "track_still", lambda picture, tracker, state=state: state)
+        folder = write_recording(tmp_path / words, film(lambertian_person()))
+        call("capture", "desk", "--frames", folder, "--out", tmp_path / "me.relit").complains(words)
+        assert not (tmp_path / "me.relit").exists()

@@ -3,21 +3,43 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
+from relit_camera.app.demo import demo_files
+from relit_camera.base.config.settings import SourceSettings
+from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_files import write_display
+from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
+from relit_camera.capture.instant import frame_reading
+from relit_camera.devices.sources.source import Source
+from relit_camera.devices.sources.webcam_source import WebcamSource
 from relit_camera.subject.subject_file import write_subject
 from tests.app.subject_builders import captured
 from tests.capture.instant.conftest import models, pulled_models
 from tests.capture.instant.lit_person import SKIN, picture_of, window
 from tests.cli.relit_command import call
+from tests.devices.fake_devices import FakeCapture, FakeTree
 
 __all__ = ["models", "pulled_models"]
+
+
+TURNED = 57
+"""A frame of the bundled person's film in which they look aside, by 28 degrees."""
+
+
+def film_frames() -> list[DisplayImage]:
+    """The bundled person's film."""
+    with VideoReader(demo_files.CLIP) as frames:
+        return [frame.image for frame in frames]
 
 
 def left(folder: Path) -> list[str]:
@@ -47,24 +69,20 @@ def test_where_nothing_can_be_written_it_says_so_at_once(tmp_path: Path) -> None
     call("capture", "instant", tmp_path / "me.png", "--out", tmp_path / "no" / "me.relit").complains("cannot write")
 
 
-def test_a_person_comes_out_and_info_tells_the_rung(tmp_path: Path, shared: Path, models: Path) -> None:
-    clip = shared / "driving" / "adam_talk.mp4"
-    answer = call("capture", "instant", clip, "--out", tmp_path / "me.relit")
+def test_a_person_comes_out_and_info_tells_the_rung(tmp_path: Path, models: Path) -> None:
+    answer = call("capture", "instant", demo_files.CLIP, "--out", tmp_path / "me.relit")
     assert answer.code == 0, answer
     assert "me.relit: 256x256" in answer.out
     told = call("subject", "info", tmp_path / "me.relit")
     assert told.out.startswith("instant: captured from a few frames in the light of the room")
     header = json.loads(call("subject", "info", tmp_path / "me.relit", "--json").out)
-    assert (header["rung"], header["measured_fraction"], header["source"]) == ("instant", 0.0, "adam_talk.mp4")
+    assert (header["rung"], header["measured_fraction"], header["source"]) == ("instant", 0.0, demo_files.CLIP.name)
     assert header["stills"] >= 4, "somebody who talks and turns shows expressions"
     assert f"{header['stills']} expression stills: " in answer.out
 
 
-def test_somebody_who_keeps_still_gives_a_subject_without_expression_stills(
-    tmp_path: Path, shared: Path, models: Path
-) -> None:
-    with VideoReader(shared / "driving" / "adam_talk.mp4") as frames:
-        first = next(iter(frames)).image
+def test_somebody_who_keeps_still_gives_a_subject_without_expression_stills(tmp_path: Path, models: Path) -> None:
+    first = film_frames()[0]
     write_display(tmp_path / "me.png", first)
     with VideoWriter(tmp_path / "me.mp4", (first.shape[1], first.shape[0]), 24.0) as writer:
         for index in range(48):
@@ -75,10 +93,74 @@ def test_somebody_who_keeps_still_gives_a_subject_without_expression_stills(
         assert "stills" not in answer.out + answer.err
 
 
-def test_a_picture_without_a_face_leaves_nothing(tmp_path: Path, shared: Path, models: Path) -> None:
-    write_display(tmp_path / "wall.png", np.full((240, 320, 3), 128, np.uint8))
-    call("capture", "instant", tmp_path / "wall.png", "--out", tmp_path / "me.relit").complains("no face", "wall.png")
-    assert left(tmp_path) == ["wall.png"]
+def in_light(picture: DisplayImage, factor: float) -> DisplayImage:
+    """The picture in that many times the light."""
+    return uint8_from_linear(linear_from_uint8(picture) * np.float32(factor))
+
+
+def far_away(picture: DisplayImage) -> DisplayImage:
+    """The picture of somebody who stands five times as far away, before a wall."""
+    height, width = picture.shape[:2]
+    small = np.asarray(cv2.resize(picture, (width // 5, height // 5), interpolation=cv2.INTER_AREA))
+    aside = (width - width // 5) // 2
+    room = ((height - height // 5, 0), (aside, width - width // 5 - aside), (0, 0))
+    return np.pad(small, room, mode="edge")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("nobody", "no face was found"),
+        ("two", "there are two faces"),
+        ("far away", "pixels high, at least 60 are needed"),
+        ("turned", "turned away by 2"),
+        ("dark", "it is too dark"),
+        ("white", "over-exposed"),
+    ],
+)
+@pytest.mark.parametrize("suffix", [".png", ".mkv"])
+def test_what_is_no_use_is_one_line_and_nothing_is_left(
+    tmp_path: Path, models: Path, name: str, words: str, suffix: str
+) -> None:
+    frames = film_frames()
+    face = frames[0]
+    pictures: dict[str, Callable[[], DisplayImage]] = {
+        "nobody": lambda: np.full_like(face, 128),
+        "two": lambda: np.hstack([face, face[:, ::-1]]),
+        "far away": lambda: far_away(face),
+        "turned": lambda: frames[TURNED],
+        "dark": lambda: in_light(face, 0.01),
+        "white": lambda: in_light(face, 6),
+    }
+    picture, source = np.ascontiguousarray(pictures[name]()), tmp_path / f"me{suffix}"
+    if suffix == ".png":
+        write_display(source, picture)
+    else:
+        with VideoWriter(source, (picture.shape[1], picture.shape[0]), 10.0) as film:
+            for index in range(3):
+                film.write(picture, index / 10)
+    call("capture", "instant", source, "--out", tmp_path / "me.relit").complains(words, source.name)
+    assert left(tmp_path) == [source.name]
+
+
+def test_a_webcam_that_another_program_holds_is_told_and_nothing_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The device is there, and cannot be opened for filming; the virtual machine's tests try a real one."""
+    tree = FakeTree(tmp_path / "system")
+    tree.add_webcam(0, "HD Webcam")
+
+    def open_busy(settings: SourceSettings) -> Source:
+        size = (settings.width, settings.height)
+        return WebcamSource(
+            settings.source, size, settings.fps, tree=tree, open_capture=lambda *asked: FakeCapture(opened=False)
+        )
+
+    monkeypatch.setattr(frame_reading, "read_frames", partial(frame_reading.read_frames, open_live=open_busy))
+    monkeypatch.setattr(frame_reading, "TUNABLES", replace(frame_reading.TUNABLES, first_frame_s=1.0))
+    answer = call("capture", "instant", "HD Webcam", "--out", tmp_path / "me.relit")
+    answer.complains("HD Webcam cannot be opened: another program may be using it", "close the program")
+    assert left(tmp_path) == ["system"]
 
 
 def test_info_tells_of_a_subject_whose_rung_nobody_noted(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 from relit_camera.app.demo import demo_files
 from relit_camera.base.images.image_files import read_display
 from relit_camera.base.images.resize import halve
-from relit_camera.base.models.model_manifest import public_manifest
 from relit_camera.base.models.model_store import ModelStore
 from relit_camera.base.models.session_with_fallback import open_session
 from relit_camera.base.video.video_readers import VideoReader
@@ -26,6 +24,7 @@ from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.tracking.mesh_refinement import mesh_points
 from relit_camera.face.tracking.track_recording import read_track
 from tests.cli.relit_command import COMMAND, Answer
+from tests.package_index import require_package_index
 
 pytestmark = pytest.mark.slow
 
@@ -41,47 +40,49 @@ def refuse(host, *rest, **more):
 socket.getaddrinfo = refuse
 """
 REFERENCE = Path(__file__).parent / "mesh_reference"
+PIP_SETTINGS = (".config/pip/pip.conf", ".pip/pip.conf")
+"""Of a user, from the home."""
 BACKGROUND = (48, 80, 112)
 INDEXED = {"face_mesh_attention", "face_detector_short_range", "selfie_landscape", "selfie_square"}
 
 
 @dataclass(frozen=True)
 class Machine:
-    """Reaches no host of the models' authors, and has nothing of Relit Camera's yet."""
+    """Reaches no host of the models' authors; the home is empty at first."""
 
     folder: Path
 
     def relit(self, *arguments: object) -> Answer:
         """Run a command."""
-        kept = {name: value for name, value in os.environ.items() if not name.startswith("RELIT_")}
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(("RELIT_", "XDG_"))}
         # With a proxy the names would be looked up there.
         direct = dict.fromkeys(("NO_PROXY", "no_proxy"), ",".join((*HOSTS, os.environ.get("NO_PROXY", ""))))
-        own = {
-            "XDG_CACHE_HOME": str(self.folder / "cache"),
-            "XDG_DATA_HOME": str(self.folder / "share"),
-            "PYTHONPATH": str(self.folder / "python"),
-        }
+        own = {"HOME": str(self.home), "PYTHONPATH": str(self.folder / "python")}
+        # Which index it is may be in the settings of the real home.
+        settings = [path for place in PIP_SETTINGS if (path := Path.home() / place).exists()]
+        if settings:
+            own["PIP_CONFIG_FILE"] = str(settings[0])
         everything = {**kept, **direct, **own}
         command = [*COMMAND, *map(str, arguments)]
         done = subprocess.run(command, env=everything, capture_output=True, text=True, timeout=120, check=False)
         return Answer(done.returncode, done.stdout, done.stderr)
 
     @property
+    def home(self) -> Path:
+        return self.folder / "home"
+
+    @property
     def models(self) -> Path:
-        return self.folder / "cache" / "relit-camera" / "models"
+        return self.home / ".cache" / "relit-camera" / "models"
 
 
 @pytest.fixture(scope="module")
 def pulled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Machine, Answer]:
     """The machine after `relit models pull`, and what that said."""
-    package = public_manifest().packages["mediapipe"]
-    asked = [sys.executable, "-m", "pip", "index", "versions", "mediapipe", "--retries", "1", "--timeout", "20"]
-    asked += ["--only-binary", ":all:", "--platform", package.platform, "--python-version", package.python]
-    answer = subprocess.run(asked, capture_output=True, text=True, check=False)
-    if package.version not in answer.stdout:
-        pytest.skip(f"the package index has no mediapipe {package.version}: {answer.stderr.strip()[-200:]}")
+    require_package_index()
     folder = tmp_path_factory.mktemp("index only")
     (folder / "python").mkdir()
+    (folder / "home").mkdir()
     (folder / "python" / "sitecustomize.py").write_text(NO_HOSTS)
     machine = Machine(folder)
     return machine, machine.relit("models", "pull")

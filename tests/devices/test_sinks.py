@@ -15,7 +15,7 @@ from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.devices import v4l2, v4l2loopback_output
 from relit_camera.devices.device_discovery import DeviceFolders
 from relit_camera.devices.device_users import DeviceUser
-from relit_camera.devices.sinks import camera_device, sink_factory
+from relit_camera.devices.sinks import call_app_cameras, camera_device
 from relit_camera.devices.sinks import virtual_camera_sink as camera_module
 from relit_camera.devices.sinks.sink import NullSink, SinkInfo
 from relit_camera.devices.sinks.sink_factory import open_sink, published_label
@@ -387,7 +387,7 @@ def settings(sink):
 def test_sinks_are_opened_by_name(tmp_path, tree, monkeypatch):
     opener = Opener()
     monkeypatch.setattr(camera_module, "_open_output", opener)
-    monkeypatch.setattr(sink_factory, "LoopbackCamera", lambda size, node, convert: opener(size, 30, node))
+    monkeypatch.setattr(call_app_cameras, "LoopbackCamera", lambda size, node, convert: opener(size, 30, node))
     assert isinstance(open_sink(settings("null")), NullSink)
     assert open_sink(settings("camera"), tree).describe().id == str(tree.dev / "video10")
     (tree.dev / "mine").symlink_to("video3")

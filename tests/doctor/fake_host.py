@@ -40,6 +40,7 @@ class FakeMachine:
             root / "run/pipewire-0",
             lambda: self.processes,
             lambda library: library in self.libraries,
+            data_home=None,
         )
 
     def write(self, path: str, text: str) -> Path:

@@ -49,7 +49,7 @@ def test_a_bare_machine_gets_every_command_from_the_package_to_the_restart(tmp_p
     ]
     assert found["webcam"].state is CheckState.FAILED
     assert found["models"].commands == ("relit models pull",)
-    assert len(found) == 17  # the ids are of one check each
+    assert len(found) == 19  # the ids are of one check each
 
 
 def test_what_is_there_is_fine_and_needs_no_command(tmp_path: Path) -> None:

@@ -29,8 +29,8 @@ from tests.doctor.fake_host import FakeMachine, everybody_may, expect
 
 TOPICS = [
     "python", "packages", "configuration", "cores", "data folder", "models folder", "models", "provider", "subject",
-    "webcam", "kernel module", "after a restart", "virtual camera", "pipewire", "browsers", "port", "running",
-    "service",
+    "webcam", "kernel module", "after a restart", "virtual camera", "pipewire", "camera portal", "browsers",
+    "call apps", "port", "running", "service",
 ]  # fmt: skip
 
 

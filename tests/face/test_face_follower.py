@@ -133,6 +133,14 @@ def test_landmarks_stay_where_a_lost_face_was_last_seen() -> None:
     assert lost.pose is seen.pose
 
 
+def test_a_face_is_followed_at_once_in_the_first_frame_and_eased_in_when_it_comes_later() -> None:
+    assert FaceFollower(SCHEME.name).follow(face(), SIZE, 0.0).presence == 1
+    late = FaceFollower(SCHEME.name)
+    later = [late.follow(state, SIZE, index / RATE).presence for index, state in enumerate([LOST, *[face()] * 30])]
+    assert later[:2] == [0, pytest.approx(0, abs=0.05)]
+    assert later[-1] == 1
+
+
 def test_turning_out_of_reach_eases_to_neutral_and_back_without_a_jump() -> None:
     player = Player()
     turn = np.concatenate([np.linspace(0, 70, 45), np.full(30, 70), np.linspace(70, 10, 40), np.full(30, 10)])

@@ -16,6 +16,7 @@ from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.matting import (
     LANDSCAPE_MODEL,
     SQUARE_MODEL,
+    TUNABLES,
     SelfieMatting,
     refine_edges,
     smooth_over_time,
@@ -124,7 +125,11 @@ def test_alpha_near_the_person_is_that_of_a_guided_filter_of_the_whole_picture(x
     image = np.clip(60 + 90 * truth[..., None] + random.normal(0, 12, (360, 640, 3)), 0, 255).astype(np.uint8)
     mask = 0.04 + 0.92 * cv2.resize(truth, (256, 144), interpolation=cv2.INTER_AREA)
     whole = cv2.ximgproc.guidedFilter(
-        cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), cv2.resize(mask, (640, 360)), 3, 4e-3 * 255**2, scale=0.5
+        cv2.medianBlur(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), 3),
+        cv2.resize(mask, (640, 360)),
+        TUNABLES.guide_radius_px,
+        TUNABLES.guide_epsilon * 255**2,
+        scale=0.5,
     )
     expected = np.clip(np.rint(255 * (whole - 0.25) / 0.6), 0, 255)
     assert np.abs(refine_edges(mask, image, (640, 360)) - expected).max() <= 6

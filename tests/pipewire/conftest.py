@@ -13,6 +13,7 @@ from typing import Any, Self
 
 import pytest
 
+from tests.pipewire.portal import PortalSession
 from tests.pipewire.session import Session, wait_for, what_is_missing
 
 SUITES = os.environ.get("PIPEWIRE_SUITES", "own").split()
@@ -37,6 +38,17 @@ def suite(request: pytest.FixtureRequest) -> str:
 def session(suite: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Session]:
     """A session in which nothing runs but its daemons."""
     with Session(suite, tmp_path_factory.mktemp("pipewire")) as session:
+        yield session
+
+
+@pytest.fixture(scope="module")
+def portal(suite: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[PortalSession]:
+    """A session with the portal, which is of this machine's own packages."""
+    if reason := what_is_missing("own"):
+        if os.environ.get(NEEDED_VARIABLE):
+            pytest.fail(reason)
+        pytest.skip(reason)
+    with PortalSession(suite, tmp_path_factory.mktemp("portal")) as session:
         yield session
 
 

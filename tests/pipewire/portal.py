@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import sysconfig
 import threading
 import time
 from collections.abc import Iterator
@@ -33,8 +34,18 @@ FIREFOX_PREFERENCES = {
     "app.update.enabled": False,
 }
 PAGE = """<!doctype html><title>call</title><video id="video" autoplay muted></video><script>
+// Chromium at times gives up a camera that has only just appeared; a person would press the button once more.
+async function opened(tries) {
+  try {
+    return await navigator.mediaDevices.getUserMedia({ video: true });
+  } catch (error) {
+    if (tries <= 1 || !["NotReadableError", "NotFoundError", "AbortError"].includes(error.name)) throw error;
+    await new Promise((resolve) => setTimeout(resolve, 2000));
+    return opened(tries - 1);
+  }
+}
 async function call() {
-  const stream = await navigator.mediaDevices.getUserMedia({ video: true });
+  const stream = await opened(5);
   const devices = await navigator.mediaDevices.enumerateDevices();
   video.srcObject = stream;
   await new Promise((resolve) => (video.onplaying = resolve));
@@ -58,11 +69,14 @@ class PortalSession(Session):
     @property
     def environment(self) -> dict[str, str]:
         """Variables for the programs of the session."""
-        root = cache_folder() / self.suite / "root"
+        root = cache_folder() / "own" / "root"  # of other suites there is PipeWire alone
         found = super().environment
+        libraries = f"{root}/usr/lib/{sysconfig.get_config_var('MULTIARCH')}"
         return {
             **found,
             "PATH": f"{root}/usr/libexec:{found['PATH']}",
+            "LD_LIBRARY_PATH": f"{found['LD_LIBRARY_PATH']}:{libraries}",
+            "XDG_DATA_DIRS": f"{found['XDG_DATA_DIRS']}:{root}/usr/share",
             "XDG_CURRENT_DESKTOP": "tests",
             "XDG_DESKTOP_PORTAL_DIR": str(self.folder / "portals"),
         }
@@ -75,8 +89,7 @@ class PortalSession(Session):
         asks = "org.freedesktop.impl.portal.Access"
         (portals / "tests.portal").write_text(f"[portal]\nDBusName=tests.desktop\nInterfaces={asks}\nUseIn=tests\n")
         self._start("xdg-permission-store")
-        allow = ["string:devices", "boolean:true", "string:camera", "string:", "array:string:yes"]
-        wait_for(lambda: self._send(*STORE, f"{STORE[0]}.SetPermission", *allow), "the store of permissions")
+        wait_for(lambda: self.answer_for("", "yes"), "the store of permissions")
         super().start()
         self._start("xdg-desktop-portal")
         wait_for(lambda: self.camera_is_present() is not None, "the portal's cameras")
@@ -86,6 +99,18 @@ class PortalSession(Session):
         self._end("xdg-desktop-portal")
         self._end("xdg-permission-store")
         super().stop()
+
+    def answer_for(self, app: str, answer: str) -> bool:
+        """Note what the person has answered to a program that asked for cameras; "" is any without a sandbox."""
+        change = ["string:devices", "boolean:true", "string:camera", f"string:{app}", f"array:string:{answer}"]
+        return self._send(*STORE, f"{STORE[0]}.SetPermission", *change) is not None
+
+    def forget(self, app: str) -> bool:
+        """Let the store forget it, as the doctor's cure does."""
+        return (
+            self._send(*STORE, f"{STORE[0]}.DeletePermission", "string:devices", "string:camera", f"string:{app}")
+            is not None
+        )
 
     def camera_is_present(self) -> bool | None:
         """Whether the portal says that there is a camera; None while it does not answer."""

@@ -14,6 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
+import psutil
+
+from relit_camera.devices.device_users import KEEPER_MODULE
+
 T = TypeVar("T")
 
 CACHE_VARIABLE = "PIPEWIRE_TEST_CACHE"
@@ -66,6 +70,7 @@ class Session:
         bus.write_text(BUS.format(address=self.environment["DBUS_SESSION_BUS_ADDRESS"]))
         try:
             self._start("dbus-daemon", "--nofork", f"--config-file={bus}")
+            wait_for(self._bus_answers, "the bus")  # what is started before that ends at once
             self.start()
         except BaseException:
             self.__exit__()
@@ -160,9 +165,29 @@ class Session:
             if info.get("props", {}).get("media.class") == "Video/Source"
         ]
 
+    def keepers(self) -> list[psutil.Process]:
+        """The keepers that hold a camera in it."""
+        found = []
+        for process in psutil.process_iter():
+            try:
+                if KEEPER_MODULE in process.cmdline() and str(self.runtime) in process.environ().values():
+                    found.append(process)
+            except (psutil.NoSuchProcess, psutil.AccessDenied):
+                continue
+        return found
+
+    def end_keepers(self) -> None:
+        """End them, as if nobody came for their cameras."""
+        for process in self.keepers():
+            process.kill()
+
     def log(self, name: str) -> str:
         """What a daemon has written."""
         return (self.folder / f"{name}.log").read_text(errors="replace")
+
+    def _bus_answers(self) -> bool:
+        bus = "org.freedesktop.DBus"
+        return self.run("dbus-send", "--session", "--print-reply", f"--dest={bus}", "/", f"{bus}.GetId").returncode == 0
 
     def _start(self, name: str, *arguments: str) -> None:
         program = shutil.which(name, path=self.environment["PATH"])

@@ -2,30 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterator
 
 import pytest
 
+from relit_camera.doctor.readers.permission_store import camera_permissions
 from tests.browser.browser_pages import chromium_program
-from tests.pipewire.conftest import NEEDED_VARIABLE, PatternCamera
+from tests.pipewire.conftest import PatternCamera
 from tests.pipewire.portal import Call, PortalSession, call_in_chromium, call_in_firefox
-from tests.pipewire.session import cache_folder, wait_for, what_is_missing
+from tests.pipewire.session import cache_folder, wait_for
 from tests.pipewire.test_pipewire_camera import LABEL, LARGE, WITHIN, Notes, worst_of
 
 FIREFOXES = ("firefox-esr", "firefox")
-
-
-@pytest.fixture(scope="module")
-def portal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PortalSession]:
-    """A session with the portal, of this machine's own packages."""
-    if reason := what_is_missing("own"):
-        if os.environ.get(NEEDED_VARIABLE):
-            pytest.fail(reason)
-        pytest.skip(reason)
-    with PortalSession("own", tmp_path_factory.mktemp("portal")) as session:
-        yield session
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +35,20 @@ def firefox_program() -> str:
     return found
 
 
+def test_the_doctor_reads_what_was_answered_and_its_cure_forgets_it(portal: PortalSession) -> None:
+    app, stored = "com.example.Call", portal.folder / "data/flatpak/db/devices"
+
+    def answers() -> dict[str, str]:
+        return camera_permissions(stored.read_bytes()) if stored.is_file() else {}
+
+    assert portal.answer_for(app, "no")
+    wait_for(lambda: answers().get(app) == "no", "the store's file")
+    assert answers()[""] == "yes"
+    assert portal.forget(app)
+    wait_for(lambda: app not in answers(), "the store's file")
+    assert answers()[""] == "yes"
+
+
 def check(call: Call, shown: PatternCamera, name: str) -> int:
     """The page found our camera and no other, with the right colours; gives how far off these are.
 
@@ -60,11 +63,11 @@ def check(call: Call, shown: PatternCamera, name: str) -> int:
     return worst
 
 
-def test_firefox_shows_the_camera(portal: PortalSession, shown: PatternCamera, note_row: Notes) -> None:
+def test_firefox_shows_the_camera(portal: PortalSession, shown: PatternCamera, suite: str, note_row: Notes) -> None:
     worst = check(call_in_firefox(portal, firefox_program()), shown, "firefox")
-    note_row("readers of the camera in PipeWire", ("own", "Firefox, 1280x720", str(worst)))
+    note_row("readers of the camera in PipeWire", (suite, "Firefox, 1280x720", str(worst)))
 
 
-def test_chromium_shows_the_camera(portal: PortalSession, shown: PatternCamera, note_row: Notes) -> None:
+def test_chromium_shows_the_camera(portal: PortalSession, shown: PatternCamera, suite: str, note_row: Notes) -> None:
     worst = check(call_in_chromium(portal, chromium_program()), shown, "chrom")
-    note_row("readers of the camera in PipeWire", ("own", "Chromium, 1280x720", str(worst)))
+    note_row("readers of the camera in PipeWire", (suite, "Chromium, 1280x720", str(worst)))

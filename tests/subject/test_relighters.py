@@ -8,6 +8,7 @@ import numpy as np
 import onnxruntime
 import pytest
 
+from relit_camera.app.demo import demo_files
 from relit_camera.base.errors import DeviceError, NotFoundError
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.models import provider_names, session_with_fallback
@@ -17,10 +18,13 @@ from relit_camera.capture.reflectance.directional_light import relight_from_dire
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.light.directions import direction_from_degrees, texel_directions, texel_solid_angles
 from relit_camera.light.light_map_rotation import rotate_light_map
-from relit_camera.subject.compression.local_basis import global_basis
+from relit_camera.subject.compression.local_basis import LocalBasis, global_basis
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter, ClusterPictures
+from relit_camera.subject.relighting.component_pictures import ComponentPictures, component_bytes
 from relit_camera.subject.relighting.onnx_relighter import OnnxBasisRelighter
-from relit_camera.subject.relighting.relighter import open_relighter
+from relit_camera.subject.relighting.relighter import open_relighter, weighted_light
 from relit_camera.subject.subject import Subject
+from relit_camera.subject.subject_file import read_subject
 from tests.subject.handmade_basis import rows_by_hand
 from tests.synthetic import render_sphere, sphere_samples, sphere_surface
 
@@ -55,6 +59,79 @@ def test_agrees_with_the_field_summed_by_hand(sphere: Subject, coloured_light: n
     picture = relit(name, sphere, coloured_light)
     assert picture.dtype == np.float32
     assert psnr(picture, expected, sphere.matte) > ACCURACY_DB[name]
+
+
+FEW = 40
+"""Lights of a subject whose components are few enough for a picture each."""
+LAMP_DB = 70
+"""Least PSNR under one lamp, whose 99th percentile is taken for 1."""
+
+
+@pytest.fixture(scope="module")
+def few() -> Subject:
+    return build_subject(
+        sphere_samples(FEW, 32), "barycentric", "sphere", landmarks={"none": np.zeros((1, 2), np.float32)}
+    )
+
+
+@pytest.mark.parametrize("values", [np.int8, np.float16])
+def test_few_components_are_relit_by_whole_pictures(few: Subject, coloured_light: np.ndarray, values: type) -> None:
+    subject = replace(few, basis=replace(few.basis, values=few.basis.values.astype(values)))
+    assert subject.metadata.components <= FEW
+    field = _field_by_hand(subject)
+    lamp = np.zeros_like(coloured_light)
+    lamp[6, 50] = (40, 20, 10)
+    lights = np.stack([coloured_light, lamp])
+    relighter = BasisRelighter(subject)
+    pictures = relighter.relight(lights)
+    assert isinstance(relighter._pictures, ComponentPictures)
+    for light, picture in zip(lights, pictures, strict=True):
+        weighted = (light * texel_solid_angles()[..., None]).reshape(-1, 3)
+        expected = np.einsum("hwlc,lc->hwc", field, weighted).astype(np.float32)
+        peak = np.percentile(expected[subject.matte > 0], 99)
+        assert psnr(picture / peak, expected / peak, subject.matte) > LAMP_DB
+        assert not picture[subject.matte == 0].any()
+        np.testing.assert_allclose(relighter.relight(light[None])[0], picture, atol=1e-4 * expected.max())
+    assert not relighter.relight(np.zeros((1, 32, 64, 3), np.float32)).any()
+
+
+def test_the_bundled_person_under_lamps_all_round() -> None:
+    """Packed, with few components, and dark from behind: there one code a value showed blotches."""
+    subject = read_subject(demo_files.SUBJECT)
+    relighter = BasisRelighter(subject)
+    assert isinstance(relighter._pictures, ComponentPictures)
+    for row in (8, 16):
+        for column in range(0, 64, 8):
+            light = np.zeros((1, 32, 64, 3), np.float32)
+            light[0, row, column] = 1
+            weighted = weighted_light(light)[0]
+            truth = subject.pictures(subject.coefficients @ weighted)
+            expected = np.stack([truth[channel, ..., channel] for channel in range(3)], axis=-1)
+            peak = np.percentile(expected[subject.matte > 0.5], 99)
+            assert psnr(relighter.relight(light)[0] / peak, expected / peak, subject.matte) > LAMP_DB, (row, column)
+
+
+def test_many_times_the_bytes_are_not_read_for_few_components(few: Subject) -> None:
+    """Clusters of one component each, as of a large picture with little in it."""
+    pixels = np.arange(32 * 32, dtype=np.int32).reshape(8, 128)
+    rng = np.random.default_rng(4)
+    values = rng.integers(-127, 128, (8, 3, 128)).astype(np.int8)
+    mixes = rng.standard_normal((8, few.metadata.components)).astype(np.float16)
+    basis = LocalBasis(pixels, np.arange(9, dtype=np.int32), values, np.ones(8, np.float32), mixes)
+    relighter = BasisRelighter(replace(few, basis=basis))
+    assert isinstance(relighter._pictures, ClusterPictures)
+    assert component_bytes(basis) > 3 * relighter._pictures.nbytes
+
+
+def test_pictures_of_few_components_without_a_matte(few: Subject, coloured_light: np.ndarray) -> None:
+    """Every pixel is in a cluster."""
+    everywhere = np.ones_like(few.matte)
+    pictures = np.random.default_rng(0).random((3, 8, 32, 32)).astype(np.float16)
+    basis = global_basis(pictures, everywhere)
+    amounts = np.random.default_rng(1).standard_normal((3, 2, 8)).astype(np.float32)
+    found = ComponentPictures(basis, everywhere.size)(amounts)
+    expected = np.einsum("cnk,ckp->npc", amounts, pictures.reshape(3, 8, -1).astype(np.float32))
+    np.testing.assert_allclose(found, expected, atol=2e-4 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -13,14 +13,16 @@ import numpy as np
 import pytest
 
 from relit_camera.base.models.session_with_fallback import SessionOptions
+from relit_camera.capture.subject_builder import build_subject
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.subject.half_size import half_size_subject
 from relit_camera.subject.relighting import shared_relighters
-from relit_camera.subject.relighting.basis_relighter import BasisRelighter
+from relit_camera.subject.relighting.basis_relighter import BasisRelighter, ClusterPictures
 from relit_camera.subject.relighting.relighter import RelighterOptions
 from relit_camera.subject.relighting.shared_relighters import SharedRelighters
 from relit_camera.subject.subject import Subject
+from tests.synthetic import sphere_samples
 
 
 class Maker:
@@ -112,23 +114,48 @@ def test_one_that_cannot_be_made_is_tried_again() -> None:
     assert shared.get(subject) is not None
 
 
+def sphere_of_many_lights() -> Subject:
+    """A subject of more components than are relit without mixes."""
+    return build_subject(
+        sphere_samples(100, 64), "barycentric", "sphere", landmarks={"none": np.zeros((1, 2), np.float32)}
+    )
+
+
+def mixes_of(relighter: BasisRelighter) -> object:
+    """The product that two relighters may share."""
+    assert isinstance(relighter._pictures, ClusterPictures)
+    return relighter._pictures.mixes
+
+
 def test_the_same_person_in_another_size_shares_the_mixes() -> None:
-    shared, whole = SharedRelighters(), synthetic_subject(96, 80)
+    shared, whole = SharedRelighters(), sphere_of_many_lights()
     half = half_size_subject(whole)
     assert half.basis.has_mixes_of(whole.basis)
     assert half.basis.values.dtype == np.int8
     first = shared.get(whole)
     second = shared.get(half)
-    assert second._mixes is first._mixes
+    assert mixes_of(second) is mixes_of(first)
+    assert second._coefficient_product is first._coefficient_product
+    other = replace(half, coefficients=2 * half.coefficients)
+    assert shared.get(other)._coefficient_product is not first._coefficient_product
     light = builtin_environment("sunset").light_map[None]
     np.testing.assert_array_equal(second.relight(light), BasisRelighter(half).relight(light))
-    assert shared.get(synthetic_subject(96, 80))._mixes is not first._mixes
+    assert mixes_of(shared.get(sphere_of_many_lights())) is not mixes_of(first)
+
+
+def test_the_same_person_in_another_size_shares_the_coefficients_of_few_components() -> None:
+    shared, whole = SharedRelighters(), synthetic_subject(96, 80)
+    half = half_size_subject(whole)
+    first, second = shared.get(whole), shared.get(half)
+    assert second._coefficient_product is first._coefficient_product
+    light = builtin_environment("sunset").light_map[None]
+    np.testing.assert_array_equal(second.relight(light), BasisRelighter(half).relight(light))
 
 
 def test_mixes_of_half_floats_are_not_shared() -> None:
     """In 8 bits their units depend on the values, which are others at half the size."""
-    shared, whole = SharedRelighters(), synthetic_subject(96, 80)
+    shared, whole = SharedRelighters(), sphere_of_many_lights()
     whole = replace(whole, basis=replace(whole.basis, values=whole.basis.values.astype(np.float16)))
     half = half_size_subject(whole)
     assert half.basis.has_mixes_of(whole.basis)
-    assert shared.get(half)._mixes is not shared.get(whole)._mixes
+    assert mixes_of(shared.get(half)) is not mixes_of(shared.get(whole))

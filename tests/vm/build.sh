@@ -1,8 +1,8 @@
 #!/bin/sh
-# Makes the small Debian 12 machine in which the virtual camera is tested: a stock kernel with vivid and, compiled for
-# it, three versions of v4l2loopback; v4l-utils, ffmpeg and Chromium. Everything comes from Debian's archive and lands
-# in $RELIT_VM_CACHE (2 GB). Called again it returns at once while the recipe is the same. Exit status 69: the machine
-# cannot be had here, and why.
+# Makes the small Debian 12 machine in which the virtual camera is tested: a stock kernel with vivid, the drivers of USB
+# webcams and of a bus to plug one into and, compiled for it, three versions of v4l2loopback; v4l-utils, ffmpeg and
+# Chromium. Everything comes from Debian's archive and lands in $RELIT_VM_CACHE (2 GB). Called again it returns at once
+# while the recipe is the same. Exit status 69: the machine cannot be had here, and why.
 set -eu
 
 here=$(cd "$(dirname "$0")" && pwd)
@@ -11,7 +11,7 @@ suite=bookworm
 # Where each version of v4l2loopback is taken from; all are compiled for the one kernel.
 loopback_suites="bookworm bookworm-backports trixie"
 # What the guest loads, beyond what these need; and what must be there before its disk can be read.
-modules="virtio_pci virtio_blk virtio_console virtio_rng 9pnet_virtio 9p ext4 crc32c_generic videodev vivid"
+modules="virtio_pci virtio_blk virtio_console virtio_rng 9pnet_virtio 9p ext4 crc32c_generic videodev vivid uvcvideo vhci_hcd"
 early_modules="virtio_pci virtio_blk crc32c_generic ext4"
 packages="python3,kmod,util-linux,procps,iproute2,curl,v4l-utils,ffmpeg,chromium,chromium-driver,fonts-dejavu-core"
 keyring=/usr/share/keyrings/debian-archive-keyring.gpg

@@ -78,6 +78,7 @@ def running(
         if not camera.command.ended:
             status = camera.status()
             assert not [trouble for trouble in status["degraded"] if trouble["code"] not in EXPECTED], status
+            assert camera.stop().status == 0  # its keeper ends too, which would hold the device for long after a kill
     finally:
         if not camera.command.ended:
             camera.kill()

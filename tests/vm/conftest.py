@@ -21,6 +21,9 @@ NEWEST = pytest.mark.parametrize("version", VERSIONS[-1:], indirect=True)
 LONG = pytest.mark.parametrize("version", CHOSEN or VERSIONS[-1:], indirect=True)
 """For what takes minutes: by itself with one version, with all of them where they are asked for."""
 
+AT_LENGTH = pytest.mark.skipif(not CHOSEN, reason="takes minutes: `make test-vm` runs it")
+"""For what CI has no time for, with any version."""
+
 
 @pytest.fixture(scope="session")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:

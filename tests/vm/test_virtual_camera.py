@@ -59,7 +59,7 @@ class TestWhileItRuns:
         assert outcome.status == 1
         assert outcome.errors.splitlines()[-1] == (
             f"relit: another Relit Camera publishes to {NODE} already; "
-            "stop that one (relit doctor names its process), or give this one a device of its own"
+            "stop that one (relit doctor names its process), or give this one a name of its own: output.label"
         )
         assert camera.status()["frames"]["published"] > before
 

@@ -17,6 +17,10 @@ from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import NotReadyError
 from relit_camera.live.camera_control import CameraControl
 
+MAX_IMAGE_WORK = 24
+"""Requests that work on pictures or wait to. The server has 40 threads for all requests: while a file is decoded, which
+may take half a minute, those that change the scene find a free one."""
+
 
 @dataclass(frozen=True)
 class ApiContext:
@@ -29,6 +33,7 @@ class ApiContext:
         subject_in_places: pictures of the subject in the environments.
         closing: set when the server shuts down: endless answers must end.
         image_work_lock: held while a picture is read, drawn or encoded.
+        image_work_places: one is taken by each request that does so or waits for it.
     """
 
     camera: CameraControl
@@ -37,6 +42,7 @@ class ApiContext:
     subject_in_places: SubjectInPlaces = field(default_factory=SubjectInPlaces)
     closing: threading.Event = field(default_factory=threading.Event)
     image_work_lock: threading.Lock = field(default_factory=threading.Lock)
+    image_work_places: threading.Semaphore = field(default_factory=lambda: threading.BoundedSemaphore(MAX_IMAGE_WORK))
 
     def is_stopping(self) -> bool:
         """Whether endless answers must end now."""
@@ -47,12 +53,17 @@ class ApiContext:
         """Do the block's work on pictures alone: one at a time, so that the camera keeps its cores.
 
         Raises:
-            NotReadyError: the camera is stopping.
+            NotReadyError: the camera is stopping, or `MAX_IMAGE_WORK` others work or wait.
         """
-        with self.image_work_lock:
-            if self.is_stopping():
-                raise NotReadyError("the camera is stopping", "start it again")
-            yield
+        if not self.image_work_places.acquire(blocking=False):
+            raise NotReadyError(f"{MAX_IMAGE_WORK} other requests work on pictures", "try again in a few seconds")
+        try:
+            with self.image_work_lock:
+                if self.is_stopping():
+                    raise NotReadyError("the camera is stopping", "start it again")
+                yield
+        finally:
+            self.image_work_places.release()
 
     def publish_collection_changed(self, collection: str) -> None:
         """Send an event that the content of a stored collection, such as `environments`, has changed."""

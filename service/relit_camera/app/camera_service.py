@@ -44,6 +44,7 @@ from relit_camera.live.frame_recorder import FrameRecorder
 from relit_camera.live.pipeline import RenderedFrame, subject_troubles
 from relit_camera.live.publishing.placeholder_image import Placeholder, placeholder
 from relit_camera.live.publishing.publisher import Publisher
+from relit_camera.live.scene.present_light import PresentLight
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import (
@@ -138,6 +139,7 @@ class CameraService:
         self._pipelines = PipelineChoice(settings, tracker, new_tracker)
         self._on_viewer, self._timings, self._clock = on_viewer, timings, SYSTEM_CLOCK
         self._board = StatusBoard(self.events)
+        self._present_light = PresentLight()
         size = (settings.output.width, settings.output.height)
         self._speed = SpeedState()
         self._readers = ReaderList(lambda: sink.describe().id if sink.describe().kind == "camera" else "")
@@ -348,6 +350,7 @@ class CameraService:
             ],
             readers=all_readers(self._readers.readers(), sink),
             advice=self._advice(fps, state),
+            light=self._present_light.trust(scene),
             version=__version__,
             uptime_s=self._clock.now() - self._started_at,
         )

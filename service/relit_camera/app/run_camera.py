@@ -210,11 +210,7 @@ def _open_sink(
         placeholder=lambda size: placeholder(size, AWAY_MESSAGE, output.placeholder),
         may_repeat=lambda: not scene_controller.scene.unlit_allowed,
     )
-    opener: Callable[[], Sink] = open_directly
-    if keeper is not None:
-        hold = partial(KeptSink, keeper, parts)
-        # `camera` may be in PipeWire too: the keeper holds the device alone.
-        opener = partial(open_sink, output, hold=hold) if output.sink == "camera" else partial(hold, open_directly)
+    opener: Callable[[], Sink] = open_directly if keeper is None else partial(KeptSink, keeper, parts, open_directly)
     return ReopeningSink(opener, (output.width, output.height))
 
 

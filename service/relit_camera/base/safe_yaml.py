@@ -45,6 +45,8 @@ def parse_yaml(text: str) -> Any:
         return _Document(yaml.parse(text, _PARSER)).value()
     except yaml.YAMLError as error:
         reason = getattr(error, "problem", None) or str(error)
+        if "nesting depth" in reason:  # newer versions of libyaml have a limit too, which lies further ahead of us
+            reason = f"nested more than {MAX_YAML_DEPTH} deep"
         mark = getattr(error, "problem_mark", None)
         # The end of a text lies in a line of its own, which nobody sees.
         last = max(len(text.splitlines()), 1)

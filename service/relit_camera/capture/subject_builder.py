@@ -15,12 +15,12 @@ from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
 from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD, open_method
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
-from relit_camera.capture.reflectance.sampled_region import region_coverage
 from relit_camera.capture.subject_landmarks import find_landmarks
 from relit_camera.light.directions import texel_directions, texel_solid_angles
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.compression.field_compression import CompressedField, compress_field
+from relit_camera.subject.measured_light import measured_fraction
 from relit_camera.subject.reflectance_field import ReflectanceField
 from relit_camera.subject.rungs import EXPECTED_DB, Rung
 from relit_camera.subject.subject import HORIZON_STEP_RAD, Subject, SubjectMetadata
@@ -126,12 +126,6 @@ def subject_from_field(
         stills=(),
         **(quantize_geometry(samples.geometry) if with_geometry else {}),
     )
-
-
-def measured_fraction(directions: NDArray[np.float64]) -> float:
-    """Share of the sphere within the region that the lights (lights, 3) span."""
-    inside = region_coverage(directions, texel_directions().reshape(-1, 3)) > 0.99
-    return min(float(inside @ texel_solid_angles().ravel() / (4 * np.pi)), 1.0)
 
 
 def quantize_geometry(geometry: Geometry) -> dict[str, NDArray]:

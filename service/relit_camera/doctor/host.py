@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import platform
 import shlex
 from collections.abc import Callable
@@ -22,6 +23,12 @@ KERNEL_MODULE = "v4l2loopback"
 def running_programs() -> set[str]:
     """Names of the processes that run, as far as this user may see them."""
     return {process.info["name"] or "" for process in psutil.process_iter(["name"])}
+
+
+def data_home() -> Path | None:
+    """Where this user's programs keep their data, if the environment says so; a relative path does not count."""
+    folder = Path(os.environ.get("XDG_DATA_HOME", ""))
+    return folder if folder.is_absolute() else None
 
 
 def can_load(library: str) -> bool:
@@ -46,6 +53,7 @@ class Host:
         socket: where this user's programs reach PipeWire; None where the environment does not say.
         find_processes: names of the processes that run.
         can_load: whether a library of that file name can be loaded.
+        data_home: where this user's programs keep their data; None for the usual folder in the user's home.
     """
 
     root: Path = Path("/")
@@ -56,10 +64,15 @@ class Host:
     socket: Path | None = field(default_factory=session_socket)
     find_processes: Callable[[], set[str]] = running_programs
     can_load: Callable[[str], bool] = can_load
+    data_home: Path | None = field(default_factory=data_home)
 
     def read(self, path: str) -> str:
         """Text of a file below the root; empty where it cannot be read."""
         return self.tree.read(self.root / path)
+
+    def user_data(self, home: Path) -> Path:
+        """Where the programs of the user of that home keep their data."""
+        return self.root / str(self.data_home or home / ".local/share").lstrip("/")
 
     @property
     def family(self) -> str:

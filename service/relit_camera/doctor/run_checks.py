@@ -12,13 +12,15 @@ from relit_camera.base.config.settings_loader import NON_SETTING_VARIABLES, conf
 from relit_camera.base.errors import ConfigError
 from relit_camera.base.models.model_store import FOLDER_VARIABLE, models_folder
 from relit_camera.devices.sinks.sink_factory import published_label
-from relit_camera.doctor.browsers import check_browsers
 from relit_camera.doctor.camera_access import AccessCheck, check_pipewire, check_virtual_camera, check_webcam
 from relit_camera.doctor.fix import apply_fixes
 from relit_camera.doctor.host import Host
 from relit_camera.doctor.installation import check_cores, check_folder, check_packages, check_python
 from relit_camera.doctor.kernel_module import check_load_at_boot, check_module
 from relit_camera.doctor.models_and_subject import check_models, check_provider, check_subject
+from relit_camera.doctor.readers.browsers import check_browsers
+from relit_camera.doctor.readers.call_apps import check_call_apps
+from relit_camera.doctor.readers.camera_portal import check_portal
 from relit_camera.doctor.report import Finding, Report, Severity, ok, problem_from_error
 from relit_camera.doctor.running_processes import check_port, check_running
 from relit_camera.doctor.systemd_unit import check_service
@@ -65,7 +67,9 @@ def checks_of(
         lambda: check_load_at_boot(settings.output, host),
         lambda: check_virtual_camera(settings.output, host, access),
         lambda: check_pipewire(settings.output, host),
+        lambda: check_portal(host, settings=settings.output),
         lambda: check_browsers(host, settings=settings.output),
+        lambda: check_call_apps(host, settings=settings.output),
         lambda: check_port(settings.server),
         check_running,
         lambda: check_service(host),

@@ -41,6 +41,12 @@ class HeadPose:
         """Distance in centimetres, along the camera's axis, from the camera to a head-space point (3,)."""
         return float(-(self.rotation.apply(point) + self.translation)[2])
 
+    @property
+    def turn_deg(self) -> float:
+        """Angle between the nose and the direction from the head to the camera, in degrees."""
+        toward = -self.translation / np.linalg.norm(self.translation)
+        return float(np.degrees(np.arccos(np.clip(self.rotation.as_matrix()[:, 2] @ toward, -1, 1))))
+
 
 _CV_FROM_OURS = np.array([1.0, -1.0, -1.0])
 

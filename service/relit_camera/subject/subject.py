@@ -5,6 +5,7 @@ from __future__ import annotations
 import mmap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from relit_camera.base.images.image_types import DisplayImage, Mask, Points
 from relit_camera.subject.compression.local_basis import LocalBasis
 from relit_camera.subject.expression_stills import ExpressionStill
+from relit_camera.subject.measured_light import measured_texels
 from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.rungs import Rung
 
@@ -135,6 +137,11 @@ class Subject:
     def size(self) -> tuple[int, int]:
         """Width and height in pixels."""
         return self.metadata.width, self.metadata.height
+
+    @cached_property
+    def measured_texels(self) -> NDArray[np.bool_]:
+        """Which texels (32, 64) of a light map lie in measured directions."""
+        return measured_texels(self.light_directions)
 
     def drop_pages(self) -> None:
         """Give back the memory of what was read of the mapped file; the system reads it again where it is needed."""

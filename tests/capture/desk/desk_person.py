@@ -110,9 +110,10 @@ def film(
     said: DeskSetup | None = None,
     webcam: SimulatedWebcam = WEBCAM,
     change: Callable[[int, DisplayImage], DisplayImage] | None = None,
+    room_picture: bool = False,
 ) -> DeskRecording:
     """A recording whose frames are made once."""
-    recording = simulate_desk_recording(person, shown, webcam, said)
+    recording = simulate_desk_recording(person, shown, webcam, said, room_picture=room_picture)
     frames = recording.frames
     assert isinstance(frames, SimulatedFrames)
     if change is not None:

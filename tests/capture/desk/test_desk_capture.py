@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.base.rotations import Rotation
 from relit_camera.capture.desk import desk_capture
 from relit_camera.capture.desk.desk_capture import (
     build_desk_subject,
@@ -21,8 +23,9 @@ from relit_camera.capture.desk.desk_capture import (
 from relit_camera.capture.desk.desk_recording import DeskRecording
 from relit_camera.capture.desk.patterns.pattern_sequence import Pattern, pattern_lights, standard_sequence
 from relit_camera.capture.desk.person import desk_face
-from relit_camera.capture.desk.person.desk_face import PUPIL_DISTANCE_CM, find_face
+from relit_camera.capture.desk.person.desk_face import PUPIL_DISTANCE_CM, find_face, find_mesh_landmarks
 from relit_camera.face.detection.face_detector import Box, Detection
+from relit_camera.face.head_pose import HeadPose
 from relit_camera.lab.evaluate.desk_simulation import SimulatedPerson
 from tests.capture.desk.desk_person import SETUP, WEBCAM, LambertianField, face_landmarks, film, lambertian_person
 
@@ -94,7 +97,7 @@ def test_normals_and_skin_of_the_person_come_back(recording: DeskRecording, pers
 
 
 def test_dark_skin_stays_dark(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The exposure makes both equally bright; the whites of the eyes tell them apart, a quarter less than all."""
+    """The exposure makes both equally bright; the whites of the eyes tell them apart."""
     monkeypatch.setattr(desk_capture, "find_mesh_landmarks", lambda picture: face_landmarks(len(picture)))
     told, fitted = [], []
     for skin in (1.0, 0.4):
@@ -103,10 +106,28 @@ def test_dark_skin_stays_dark(monkeypatch: pytest.MonkeyPatch) -> None:
         _, samples = fit_field(found)
         told.append(found.skin_luminance)
         fitted.append(float(np.median(luminance(samples.geometry.albedo)[found.head.skin])))
-    share = 1.25 * 0.75
-    assert told[1] / told[0] == pytest.approx(0.4**share, rel=0.15)
+    assert told[1] / told[0] == pytest.approx(0.4**1.25, rel=0.15)
     assert fitted[1] / fitted[0] == pytest.approx(told[1] / told[0], rel=0.1)
     assert 0.15 < fitted[0] < 0.45
+
+
+@pytest.mark.parametrize(
+    ("visible", "yaw_deg", "words"),
+    [(True, 0, None), (True, 30, None), (True, 60, "away from the webcam by 60 degrees"), (False, 0, "from the side")],
+)
+def test_a_face_from_the_side_is_refused(
+    monkeypatch: pytest.MonkeyPatch, visible: bool, yaw_deg: float, words: str | None
+) -> None:
+    pose = HeadPose(Rotation.from_rotvec([0, np.radians(yaw_deg), 0]), np.array([0.0, 0.0, -60.0]), 640.0)
+    state = SimpleNamespace(visible=visible, pose=pose, landmarks=np.zeros((478, 2), np.float32))
+    monkeypatch.setattr(desk_face, "open_tracker", lambda name, options: None)
+    monkeypatch.setattr(desk_face, "track_still", lambda picture, tracker: state)
+    picture = np.zeros((480, 640, 3), np.uint8)
+    if words is None:
+        assert find_mesh_landmarks(picture) is state.landmarks
+    else:
+        with pytest.raises(CaptureError, match=words):
+            find_mesh_landmarks(picture)
 
 
 def test_the_subject_says_how_it_was_captured(recording: DeskRecording) -> None:
@@ -127,6 +148,23 @@ def test_a_head_that_moves_is_aligned(person: SimulatedPerson) -> None:
     inner = np.s_[:, 80:-80, 80:-80]
     error = np.abs(shifts[inner] - still[inner]).mean() / still[inner].mean()
     assert error < 0.06
+
+
+def test_the_picture_in_the_room_s_light_is_laid_on_the_others(person: SimulatedPerson) -> None:
+    """In a room so dark that the frames before black show nothing of it."""
+    webcam = replace(WEBCAM, room=0.001)
+    found = measure_desk_samples(film(person, webcam=webcam))
+    assert not found.room.any()
+    recording = film(person, webcam=webcam, room_picture=True)
+    assert recording.room is not None
+    moved = replace(recording, room=np.roll(recording.room, 5, axis=1))
+    skin = found.head.skin
+    details = []
+    for shown in (recording, moved):
+        seen = measure_desk_samples(shown).room
+        gray = np.log(luminance(seen) + 0.05)
+        details.append(gray[skin] - gray[skin].mean())
+    assert np.corrcoef(*details)[0, 1] > 0.97
 
 
 @pytest.mark.parametrize("turned", ["mirrored", "upside down", "turned by half"])

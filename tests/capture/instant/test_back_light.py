@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from relit_camera.capture.instant.back_light import SOFT_FROM_DEG, soften_back_light
+from relit_camera.capture.instant.back_light import soften_back_light
 from relit_camera.light.directions import texel_directions
+from relit_camera.subject.rungs import SOFT_FROM_DEG
 
 TOWARD = texel_directions().reshape(-1, 3)
 FIELD = np.random.default_rng(3).random((5, len(TOWARD))).astype(np.float32)

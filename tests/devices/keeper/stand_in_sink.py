@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.devices.sinks.sink import SinkInfo
-from relit_camera.devices.sinks.sink_factory import SinkOptions
+from relit_camera.devices.sinks.sink import SinkInfo, SinkOptions
 
 OPENER = f"{__name__}:open_noting"
 VARIABLE = "TEST_PICTURES"

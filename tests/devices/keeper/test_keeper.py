@@ -14,7 +14,7 @@ from relit_camera.devices.keeper.keeper_state import FILMED_S, LAST_PICTURE_S
 from relit_camera.devices.keeper.kept_output import RGB, OutputOptions, picture_bytes
 from tests.virtual_clock import VirtualClock
 
-FPS, KEEP_S, VERSION = 25.0, 60.0, "1"
+FPS, KEEP_S, VERSION = 25.0, 60.0, "1.0 1"
 SIZE = (4, 2)
 OPTIONS = OutputOptions(SIZE, FPS, "Relit Camera")
 PLACEHOLDER = 9
@@ -26,6 +26,7 @@ class FakeOutput:
 
     Attributes:
         shown: the time and the first byte of each picture.
+        given: the pictures.
     """
 
     clock: VirtualClock
@@ -35,6 +36,12 @@ class FakeOutput:
     layout: str = RGB
     closed: bool = False
     fails: bool = False
+    is_bound: bool = False
+    given: list[memoryview] = field(default_factory=list)
+
+    @property
+    def place(self) -> str:
+        return self.node
 
     def describe(self) -> dict[str, object]:
         return {"kind": "camera", "id": self.node, "size": self.size}
@@ -44,6 +51,7 @@ class FakeOutput:
         assert len(picture) == picture_bytes(self.size, self.layout)
         if self.fails:
             raise DeviceError("it is gone", "plug it in")
+        self.given.append(picture)
         self.shown.append((self.clock.now(), picture[0]))
 
     def close(self) -> None:
@@ -73,7 +81,8 @@ class Bench:
         answer = self.keeper.handle({"hello": version, "output": asdict(options), "keep_s": KEEP_S})
         assert answer is not None
         if "info" in answer:
-            count = picture_bytes(options.size, RGB)
+            width, height = answer["size"]
+            count = picture_bytes((width, height), RGB)
             self.memory = bytearray((PICTURE_SLOTS + 1) * count)
             self.memory[PICTURE_SLOTS * count :] = bytes([PLACEHOLDER]) * count
             assert self.keeper.handle({"memory": True}, memoryview(self.memory)) == {}
@@ -110,7 +119,7 @@ class Bench:
 @pytest.fixture
 def bench() -> Bench:
     made = Bench()
-    assert made.greet() == {"info": made.outputs[0].describe(), "layout": RGB}
+    assert made.greet() == {"info": made.outputs[0].describe(), "layout": RGB, "size": SIZE}
     return made
 
 
@@ -221,11 +230,32 @@ def test_another_size_opens_it_anew(bench: Bench) -> None:
 def test_a_camera_of_another_version_is_told_and_may_end_it(bench: Bench) -> None:
     bench.publish(7)
     bench.keeper.camera_left()
-    assert bench.greet(version="2") == {"other_version": VERSION}
+    assert bench.greet(version="2.0 1") == {"other_version": VERSION}
     bench.pass_time(1)
     assert bench.shown[-1][1] == 7  # it goes on until the other one is ready
     assert bench.keeper.handle({"goodbye": "end"}) is None
     assert bench.keeper.step() is None
+
+
+@pytest.mark.parametrize("other", [OutputOptions((8, 4), FPS, "Relit Camera"), OutputOptions(SIZE, 30, "Relit Camera")])
+def test_what_is_read_and_would_be_lost_is_not_opened_anew(bench: Bench, other: OutputOptions) -> None:
+    bench.publish(7)
+    bench.keeper.camera_left()
+    bench.outputs[0].is_bound = True
+    assert bench.greet(other, "2.0 1")["size"] == SIZE
+    bench.publish(8)
+    assert bench.shown[-1][1] == 8
+    assert len(bench.outputs) == 1
+    bench.keeper.camera_left()
+    bench.outputs[0].is_bound = False
+    assert bench.greet(other)["size"] == other.size
+    assert len(bench.outputs) == 2
+
+
+def test_a_camera_that_says_other_things_is_not_served_whoever_reads(bench: Bench) -> None:
+    bench.keeper.camera_left()
+    bench.outputs[0].is_bound = True
+    assert bench.greet(version="1.0 2") == {"other_version": VERSION}
 
 
 def test_what_a_sink_says_of_itself_is_told_when_it_changes(bench: Bench) -> None:
@@ -264,6 +294,21 @@ def test_why_it_cannot_be_opened_is_told() -> None:
     assert keeper.step() is not None  # the camera asks again
     keeper.camera_left()
     assert keeper.step() is None
+
+
+def test_the_same_picture_again_is_the_same_object(bench: Bench) -> None:
+    bench.publish(7)
+    assert bench.keeper.handle({"picture": 0, "repeatable": True}) == {}
+    bench.pass_time(1)  # the keeper repeats it
+    bench.publish(8)
+    bench.publish(9)
+    bench.greet()  # another camera, with a memory of its own
+    bench.slot = 0
+    bench.publish(5)
+    given = [(picture, value) for picture, (_, value) in zip(bench.outputs[0].given, bench.shown, strict=True)]
+    assert [value for _, value in given[-3:]] == [8, 9, 5]
+    assert len({id(picture) for picture, value in given if value == 7}) == 1
+    assert len({id(picture) for picture, _ in given}) == 4
 
 
 def test_memory_that_is_too_small_is_refused(bench: Bench) -> None:

@@ -21,7 +21,9 @@ import pytest
 from relit_camera.base.errors import DeviceError
 from relit_camera.devices.device_users import KEEPER_MODULE
 from relit_camera.devices.keeper.keeper_socket import MessageSocket, mapped, require_private_folder, shared_memory
-from tests.devices.keeper.stand_in_sink import KEEP_S, PLACEHOLDER, VARIABLE, Noted, noted
+from relit_camera.devices.keeper.kept_output import OutputOptions
+from relit_camera.devices.keeper.sink_keeper import SinkKeeper
+from tests.devices.keeper.stand_in_sink import FPS, KEEP_S, OPENER, PLACEHOLDER, VARIABLE, Noted, noted
 from tests.small_camera import wait_until
 
 pytestmark = [
@@ -48,7 +50,10 @@ class Stage:
     def camera(self, grey: int, version: str = "", width: int = 64, keep_s: float = KEEP_S) -> subprocess.Popen[str]:
         """Start a camera that shows this grey."""
         module = "tests.devices.keeper.publishing_camera"
-        command = [sys.executable, "-m", module, str(self.folder), str(grey), version, str(width), str(keep_s)]
+        return self.spawn(sys.executable, "-m", module, str(self.folder), str(grey), version, str(width), str(keep_s))
+
+    def spawn(self, *command: str) -> subprocess.Popen[str]:
+        """Start a process, which ends with the stage."""
         started = subprocess.Popen(
             command, cwd=ROOT, env={**os.environ, VARIABLE: str(self.pictures), "PYTHONPATH": str(ROOT)},
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -176,7 +181,7 @@ def test_a_second_camera_is_refused(stage: Stage) -> None:
     assert second.returncode == 1
     assert said.strip() == (
         "another Relit Camera publishes to stand-in already; "
-        "stop that one (relit doctor names its process), or give this one a device of its own"
+        "stop that one (relit doctor names its process), or give this one a name of its own: output.label"
     )
     stage.wait_for(10, len(stage.shown()) + 5)
 
@@ -201,6 +206,67 @@ def test_a_keeper_that_is_killed_is_replaced_at_once(stage: Stage) -> None:
     stage.wait_for(10, seen + 20)
     assert stage.shown()[-1].process != keeper
     assert stage.gap_s() < 5  # a start of Python on a busy machine
+
+
+ODD_KEEPER = """
+import os, socket, sys
+listener = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+listener.bind(sys.argv[1])
+listener.listen()
+print("listens", flush=True)
+while True:
+    camera = listener.accept()[0]
+    while camera.recv(1 << 16) and sys.argv[2]:
+        camera.send(sys.argv[2].encode())
+    camera.close()
+"""
+"""Answers everything with the same text; with none, it hangs up."""
+
+
+def odd_keeper(stage: Stage, answer: str, path: Path | None = None) -> subprocess.Popen[str]:
+    """Start it at a path, or where the stage's cameras look for theirs."""
+    require_private_folder(stage.folder)
+    path = path or SinkKeeper(OutputOptions((64, 32), FPS, "Relit Camera", sink=OPENER), KEEP_S, stage.folder).path
+    odd = stage.spawn(sys.executable, "-c", ODD_KEEPER, str(path), answer)
+    assert odd.stdout is not None
+    assert odd.stdout.readline() == "listens\n"
+    return odd
+
+
+def test_a_keeper_whose_answers_cannot_be_read_is_ended_and_replaced(stage: Stage) -> None:
+    odd = odd_keeper(stage, '{"info": {"pipewire": [1, ["cut in the mid')
+    stage.camera(10)
+    stage.wait_for(10)
+    assert odd.wait(1) == -signal.SIGKILL
+
+
+def test_without_a_keeper_none_is_left_that_holds_the_virtual_camera(stage: Stage) -> None:
+    odd = odd_keeper(stage, "")
+    camera = stage.camera(10)
+    assert camera.stdout is not None
+    assert "published without a keeper" in camera.stdout.readline()
+    assert odd.wait(1) == -signal.SIGKILL
+
+
+def test_another_version_that_hears_no_goodbye_is_ended(stage: Stage) -> None:
+    odd = odd_keeper(stage, '{"other_version": "0.0.1 1"}')
+    stage.camera(10)
+    stage.wait_for(10)
+    assert odd.wait(1) == -signal.SIGKILL
+
+
+def test_a_keeper_of_another_camera_is_left_alone(stage: Stage) -> None:
+    odd = odd_keeper(stage, '{"busy": "/dev/video10"}')
+    _, said = stage.camera(10).communicate(timeout=20)
+    assert "publishes to /dev/video10 already" in said
+    assert odd.poll() is None
+
+
+def test_where_a_device_is_named_the_cure_is_another_one(stage: Stage) -> None:
+    keeper = SinkKeeper(OutputOptions((64, 32), FPS, "Relit Camera", "/dev/video10"), KEEP_S, stage.folder)
+    odd_keeper(stage, '{"busy": "/dev/video10"}', keeper.path)
+    with pytest.raises(DeviceError, match=r"or give this one a device of its own: output\.sink$"):
+        keeper.greet()
 
 
 def test_a_camera_that_is_stopped_for_a_while_is_bridged(stage: Stage) -> None:

@@ -76,6 +76,17 @@ def test_replacing_the_room_takes_it_out_of_the_edge() -> None:
     assert cleaned <= 4
 
 
+def test_a_matte_that_is_too_wide_leaves_no_light_rim_of_a_bright_room() -> None:
+    """The network's mattes are soft: what has the room's colour there is room."""
+    true = np.repeat(np.rint(255 * np.clip((np.arange(160) - 79) / 2, 0, 1))[None], 90, axis=0).astype(np.uint8)
+    wide = np.repeat(np.rint(255 * np.clip((np.arange(160) - 74) / 10, 0, 1))[None], 90, axis=0).astype(np.uint8)
+    person, room, new = (np.full((90, 160, 3), colour, np.uint8) for colour in ((120, 60, 40), (250, 240, 200), 0))
+    live, truth = over(person, true, room), over(person, true, new).astype(int)
+    cleaned = np.abs(replace_room(MattedFrame(live, wide), new).astype(int) - truth).max()
+    assert np.abs(over(live, wide, new).astype(int) - truth).max() > 150
+    assert cleaned < 80, "121 without what the colours tell"
+
+
 @pytest.mark.parametrize("size", [(1920, 1080), (1280, 720), (405, 301), (301, 405), (160, 90)])
 def test_the_colours_of_an_edge_are_those_beside_it(size: tuple[int, int]) -> None:
     """Person and room that change over the picture: each place of the edge finds its own, at any size."""

@@ -99,6 +99,17 @@ def test_the_subject_is_recognized_from_the_first_frame_and_a_stranger_never() -
     assert check.recognized(3.0) == 1, "the film begins anew"
 
 
+def test_who_passes_in_the_first_frame_is_shown_at_once_and_after_a_gap_eased_in() -> None:
+    """Before the first frame nothing was shown; in a gap the subject at rest was."""
+    check, tunables = IdentityCheck(face_of(close_up())), IdentityTunables()
+    check.check(before_the_camera(), NO_LIGHT_EXPLAINS, 5.0)
+    assert check.recognized(5.0) == 1
+    back_s = 5.0 + 2 * tunables.gap_s
+    check.check(before_the_camera(), NO_LIGHT_EXPLAINS, back_s)
+    assert check.recognized(back_s) == 0
+    assert check.recognized(back_s + 1.5 * tunables.ease_s) == 1
+
+
 def test_one_who_comes_after_the_subject_with_its_neutral_face_is_not_recognized() -> None:
     """The neutral face stays the subject's until it is taken anew; the stranger's expression is eased from it."""
     check, subject = IdentityCheck(face_of(close_up())), before_the_camera()

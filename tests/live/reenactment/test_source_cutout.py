@@ -9,7 +9,14 @@ import numpy as np
 
 from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.live.compositing.alpha_compositing import over, split_alpha
-from relit_camera.live.reenactment.source_image import COLORED, UPSAMPLING, Cutout, feather_edges, shows_whole_head
+from relit_camera.live.reenactment.source_image import (
+    COLORED,
+    UPSAMPLING,
+    Cutout,
+    feather_edges,
+    fill_pinholes,
+    shows_whole_head,
+)
 from relit_camera.live.reenactment.warp import Warp, source_from_output
 from tests.live.people import close_up, person
 
@@ -98,6 +105,19 @@ def test_what_the_cutout_leaves_out_cannot_be_seen() -> None:
         left_out = (cut != whole).any(axis=2)
         assert left_out.mean() > 0.02
         assert whole[left_out, 3].max() == 0
+
+
+def test_holes_of_a_few_pixels_are_filled_and_larger_ones_and_hairs_are_not() -> None:
+    matte = np.zeros((200, 200), np.float32)
+    matte[40:, 40:160] = 1
+    matte[80:83, 60:62], matte[81, 63] = 0.1, 0.95  # between hair and ear
+    matte[120:140, 90:110] = 0  # an arm
+    matte[20:40, 50] = matte[20:40, 53] = 0.7  # two hairs, and a third across them
+    matte[20, 50:54] = 0.7
+    filled = fill_pinholes(matte)
+    expected = matte.copy()
+    expected[80:83, 60:64] = 1
+    np.testing.assert_array_equal(filled, expected)
 
 
 def test_who_is_seen_whole() -> None:

@@ -67,6 +67,12 @@ def test_overload_beyond_all_levels_ends_at_the_cheapest_within_two_seconds() ->
     assert changes(levels, 4) == 0
 
 
+def test_at_the_last_level_of_an_overload_another_one_is_tried_seldom_and_for_a_moment() -> None:
+    levels = simulate(lambda now: 0.3 if now > 1 else 0.035, 120)
+    assert 0 < changes(levels, 4) <= 2 * 120 / LIMITS.last_level_s
+    assert sum(level < len(QUALITY_LEVELS) - 1 for at, level in levels if at > 4) < 0.05 * len(levels)
+
+
 def test_pictures_that_come_once_a_second_are_made_cheaper_too() -> None:
     """Each frame has waited while the picture before it was made: there is no pause between them."""
     levels = simulate(lambda now: 2.0 if now > 1 else 0.035, 20)
@@ -77,6 +83,65 @@ def test_full_quality_is_back_two_seconds_after_the_load_has_gone() -> None:
     levels = simulate(lambda now: 0.3 if 1 < now < 30 else 0.035, 40)
     assert level_at(levels, 29) == len(QUALITY_LEVELS) - 1
     assert level_at(levels, 32.0) == 0
+
+
+def test_a_slow_computer_that_is_never_early_comes_back_to_full_quality() -> None:
+    """Its pictures take 65 ms by themselves; at the last level, which renders fewer, each takes even longer."""
+
+    def latency(level: int, now: float) -> float:
+        return 0.2 if 1 < now < 15 else (0.065, 0.065, 0.06, 0.06, 0.073)[level]
+
+    state, now, levels = QualityState(), 0.0, []
+    while now < 60:
+        now += FRAME_S
+        state = next_quality(state, now, latency(state.level, now), LIMITS)
+        levels.append((now, state.level))
+    assert level_at(levels, 14) == len(QUALITY_LEVELS) - 1
+    assert level_at(levels, 15 + 5 * LIMITS.probe_after_s) == 0
+    assert changes(levels, 15 + 5 * LIMITS.probe_after_s) == 0
+
+
+def test_a_last_level_that_is_late_by_itself_is_left() -> None:
+    """It renders fewer pictures, each of which may take longer than one of the levels above."""
+    state, now, levels = QualityState(), 0.0, []
+    while now < 60:
+        now += FRAME_S
+        latency = 0.2 if 1 < now < 10 else 0.083 if state.level == len(QUALITY_LEVELS) - 1 else 0.065
+        state = next_quality(state, now, latency, LIMITS)
+        levels.append((now, state.level))
+    assert level_at(levels, 9) == len(QUALITY_LEVELS) - 1
+    assert level_at(levels, 10 + LIMITS.last_level_s + 5 * LIMITS.probe_after_s) == 0
+
+
+def test_a_level_that_becomes_late_only_after_a_while_is_tried_less_and_less_often_too() -> None:
+    state, now, raised, reached = QualityState(level=1), 0.0, list[float](), 0.0
+    while now < 240:
+        now += FRAME_S
+        before = state.level
+        latency = 0.1 if state.level == 0 and now - reached > 2.3 else 0.07
+        state = next_quality(state, now, latency, LIMITS)
+        if state.level < before:
+            raised.append(now)
+            reached = now
+    assert sum(at > 120 for at in raised) <= 8
+
+
+def test_what_was_tried_under_a_load_does_not_delay_the_way_back_after_a_larger_one() -> None:
+    """Level 1 is bearable and level 0 late, so the next try waits for long; then all are late; then none is."""
+    state, now, levels = QualityState(), 0.0, []
+    while now < 150:
+        now += FRAME_S
+        latency = 0.095 if state.level == 0 else 0.07
+        state = next_quality(state, now, latency if now < 100 else 0.2 if now < 110 else 0.065, LIMITS)
+        levels.append((now, state.level))
+    assert level_at(levels, 109) == len(QUALITY_LEVELS) - 1
+    assert level_at(levels, 110 + 5 * LIMITS.probe_after_s) == 0
+
+
+def test_a_level_that_is_bearable_is_left_less_and_less_often_where_the_one_above_is_late() -> None:
+    levels = simulate(lambda now: 0.105 if now > 1 else 0.035, 120)
+    assert {level for at, level in levels if at > 3} == {1, 2}
+    assert sum(level == 1 for at, level in levels if at > 60) * FRAME_S < 0.05 * 60
 
 
 def test_a_level_that_proves_too_costly_is_tried_less_and_less_often() -> None:

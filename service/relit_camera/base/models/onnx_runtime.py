@@ -10,6 +10,7 @@ from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from relit_camera.base.models import provider_names
 
@@ -30,8 +31,11 @@ class TensorSpec(NamedTuple):
         return f"{self.dtype.name} [{', '.join('?' if size is None else str(size) for size in self.shape)}]"
 
 
-def runtime_options(threads: int) -> onnxruntime.SessionOptions:
-    """Make options for `threads` threads on one operator and one operator at a time, none of them spinning."""
+def runtime_options(threads: int, constants: Mapping[str, NDArray] | None = None) -> onnxruntime.SessionOptions:
+    """Options for `threads` threads on one operator and one operator at a time, none of them spinning.
+
+    `constants` are the external tensors of the model by name.
+    """
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
@@ -43,6 +47,9 @@ def runtime_options(threads: int) -> onnxruntime.SessionOptions:
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.add_session_config_entry("session.inter_op.allow_spinning", "0")
     options.add_session_config_entry("session.record_ep_graph_assignment_info", "1")
+    if constants:
+        values = [onnxruntime.OrtValue.ortvalue_from_numpy(value) for value in constants.values()]
+        options.add_external_initializers(list(constants), values)
     return options
 
 

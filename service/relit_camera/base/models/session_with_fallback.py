@@ -175,11 +175,20 @@ def require_provider(options: SessionOptions) -> None:
             raise DeviceError(f"models cannot run on {provider}: {error}", _REJECTED_CURE) from error
 
 
-def open_session(model: Model, name: str, options: SessionOptions | None = None) -> Session:
+def open_session(
+    model: Model, name: str, options: SessionOptions | None = None, constants: Mapping[str, NDArray] | None = None
+) -> Session:
     """Open an ONNX model, prove its provider and warm it up.
 
     A provider that is missing, does not load, or takes fewer than half of the nodes is replaced by the CPU, and the
     session's `why` says so; with `options.strict` that is an error.
+
+    Args:
+        model: the model.
+        name: of the model, for messages.
+        options: how to run it.
+        constants: the model's external tensors by name. As a part of the model's bytes they would be copied thrice,
+            and one copy would be kept.
 
     Raises:
         ModelError: the model is missing, damaged, or cannot run.
@@ -191,7 +200,7 @@ def open_session(model: Model, name: str, options: SessionOptions | None = None)
         raise ConfigError(f"a model cannot run on {options.threads} threads", "give it at least 1")
     wanted = provider_names.choose_provider(options.provider)
     try:
-        session = _open_verified(model, name, wanted, options)
+        session = _open_verified(model, name, wanted, options, constants)
         if wanted != provider_names.CPU and not options.strict:
             session._on_cpu = lambda why: _open_on_provider(
                 model,
@@ -200,11 +209,13 @@ def open_session(model: Model, name: str, options: SessionOptions | None = None)
                 options,
                 f"{wanted} failed: {why}",
                 "restart the camera to try it again",
+                constants,
             )
     except _ProviderRejectedError as error:
         if options.strict:
             raise DeviceError(f"model {name} cannot run on {wanted}: {error}", _REJECTED_CURE) from error
-        session = _open_on_provider(model, name, provider_names.CPU, options, f"{wanted}: {error}", _REJECTED_CURE)
+        why = f"{wanted}: {error}"
+        session = _open_on_provider(model, name, provider_names.CPU, options, why, _REJECTED_CURE, constants)
     with _open_sessions_lock:
         _open_sessions.add(session)
     return session
@@ -222,11 +233,13 @@ def _require_built_in(provider: str) -> None:
         raise _ProviderRejectedError("the installed ONNX Runtime was built without it")
 
 
-def _open_verified(model: Model, name: str, provider: str, options: SessionOptions) -> Session:
+def _open_verified(
+    model: Model, name: str, provider: str, options: SessionOptions, constants: Mapping[str, NDArray] | None
+) -> Session:
     _require_built_in(provider)
     missing = provider_names.preload(provider)
     try:
-        session = _open_on_provider(model, name, provider, options)
+        session = _open_on_provider(model, name, provider, options, constants=constants)
     except _ProviderRejectedError as error:
         raise _ProviderRejectedError(missing or str(error)) from error
     placement = session.report.placement
@@ -241,7 +254,13 @@ def _open_verified(model: Model, name: str, provider: str, options: SessionOptio
 
 
 def _open_on_provider(
-    model: Model, name: str, provider: str, options: SessionOptions, why: str = "", cure: str = ""
+    model: Model,
+    name: str,
+    provider: str,
+    options: SessionOptions,
+    why: str = "",
+    cure: str = "",
+    constants: Mapping[str, NDArray] | None = None,
 ) -> Session:
     import onnxruntime
     from onnxruntime.capi.onnxruntime_pybind11_state import InvalidProtobuf, NoModel, NoSuchFile
@@ -251,7 +270,7 @@ def _open_on_provider(
     try:
         runtime = onnxruntime.InferenceSession(
             model() if callable(model) else model,
-            runtime_options(options.threads),
+            runtime_options(options.threads, constants),
             providers=list(
                 dict.fromkeys([provider_names.full_name(provider), provider_names.full_name(provider_names.CPU)])
             ),

@@ -18,7 +18,7 @@ from relit_camera.capture.desk.desk_recording import DeskRecording, require_fram
 from relit_camera.capture.desk.patterns.pattern_matching import FaceCells, match_patterns
 from relit_camera.capture.desk.patterns.pattern_pictures import find_motion, mean_frame, pattern_frames
 from relit_camera.capture.desk.patterns.pattern_sequence import demultiplex, pattern_lights
-from relit_camera.capture.desk.patterns.plateaus import Plateau, find_plateaus, frame_cells
+from relit_camera.capture.desk.patterns.plateaus import Plateau, decode_table, find_plateaus, frame_cells
 from relit_camera.capture.desk.person.desk_face import DeskFace, find_face, find_mesh_landmarks, segment_person
 from relit_camera.capture.desk.person.desk_field import (
     DeskField,
@@ -43,7 +43,7 @@ from relit_camera.capture.desk.recording_checks import (
     white_drift_warnings,
 )
 from relit_camera.capture.film.olat.flash_matte import estimate_flash_matte
-from relit_camera.capture.film.olat.head_crop import place_head_crop
+from relit_camera.capture.film.olat.head_crop import HeadCrop, place_head_crop
 from relit_camera.capture.instant.skin.eye_whites import eye_white_ratio
 from relit_camera.capture.instant.skin.skin_prior import skin_luminance_by_eyes
 from relit_camera.capture.reflectance.methods.appearance_field import AppearanceField
@@ -73,7 +73,7 @@ class DeskSamples:
 
     Attributes:
         samples: pictures under distant lights of unit irradiance, in the patches' directions.
-        room: (height, width, 3) the person in the room's own light; black where it has next to none.
+        room: (height, width, 3) the person in the room's own light, of any exposure; black where it has next to none.
         head: generic head in the same picture.
         mirrored: (height, width) mask of eyes and glasses that mirrored the screen.
         skin_luminance: of the person's skin, a white wall having 1.
@@ -132,7 +132,7 @@ def measure_desk_samples(recording: DeskRecording, progress: Progress = lambda s
     crop = place_head_crop(face.circle, recording.size, SIZE_PX)
     scale, on_face = face.pixels_per_cm * crop.scale, crop.disc(*face.circle)
     white = crop.crop(shown.white, RigidTransform())
-    segmented = segment_person(_exposed(white))
+    landmarks, segmented = find_mesh_landmarks(_exposed(white)), segment_person(_exposed(white))
     filmed = pattern_frames(
         recording, shown.plateaus, crop, lambda done, total: progress("Averaging the frames", done, total)
     )
@@ -146,6 +146,8 @@ def measure_desk_samples(recording: DeskRecording, progress: Progress = lambda s
     alone, room = demultiplex(pictures[mixed], light[mixed])
     white_light = alone.sum(axis=0)[on_face].mean()
     room = np.maximum(room, 0) * np.float32(room[on_face].mean() > ROOM_TUNABLES.min_light * white_light)
+    brightest = pictures[int(light.mean(axis=1).argmax())]
+    in_room_light = _picture_in_room_light(recording, crop, brightest, np.maximum(on_face, np.float32(0.3) * body))
     warnings = [
         *scale_warnings(face, setup, recording.size[0]),
         *motion_warnings(transforms, scale),
@@ -155,7 +157,6 @@ def measure_desk_samples(recording: DeskRecording, progress: Progress = lambda s
     matte = estimate_flash_matte(alone, room) if segmented is None else segmented
     if float(matte[on_face].mean()) < MIN_FACE_IN_MATTE:
         raise CaptureError("the person cannot be told from the room", "sit farther from the wall, or darken the room")
-    landmarks = find_mesh_landmarks(_exposed(white))
     eyes = None if landmarks is None else eye_white_ratio(white, landmarks, landmark_scheme("mesh478"))
     if eyes is None:
         warnings.append("the whites of your eyes are not seen: your skin is taken to be neither light nor dark")
@@ -169,7 +170,21 @@ def measure_desk_samples(recording: DeskRecording, progress: Progress = lambda s
     distant = undo_near_field(alone, patches, head, matte)
     calm, mirrored = suppress_mirrored_patches(distant, patches.directions, matte)
     samples = OlatSamples(calm, patches.directions, matte)
-    return DeskSamples(samples, room, head, mirrored, skin_luminance_by_eyes(eyes), warnings)
+    seen = room if in_room_light is None else in_room_light
+    return DeskSamples(samples, seen, head, mirrored, skin_luminance_by_eyes(eyes), warnings)
+
+
+def _picture_in_room_light(
+    recording: DeskRecording, crop: HeadCrop, reference: LinearImage, weights: Mask
+) -> LinearImage | None:
+    """The recording's picture in the room's own light (size, size, 3), cropped and aligned to the cropped reference."""
+    if recording.room is None:
+        return None
+    room = np.asarray(cv2.LUT(recording.room, decode_table(recording.setup.camera_gamma)), np.float32)
+    both = np.stack([reference, crop.crop(room, RigidTransform())])
+    to_mean = find_motion(both, np.ones(2), weights)
+    aligned = to_mean[1].then(to_mean[0].inverse())
+    return np.maximum(crop.crop(room, aligned.scaled(1 / crop.scale)), 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,6 @@ import numpy as np
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_types import DisplayImage, Frame, Points
 from relit_camera.face.detection.installed_detector import open_face_detector
-from relit_camera.face.face_state import FaceState
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 from relit_camera.face.landmarks.rotated_crop import bounding_box
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker, track_still
@@ -123,18 +122,10 @@ def _track(frames: Sequence[DisplayImage]) -> list[SeenFace]:
         now = time.monotonic()
         states = [tracker.track(Frame(image, index, now, index / 10)) for index, image in enumerate(frames)]
     return [
-        SeenFace(image, state.landmarks, _turn_deg(state), float(np.mean(state.eyes)))
+        SeenFace(image, state.landmarks, state.pose.turn_deg, float(np.mean(state.eyes)))
         for image, state in zip(frames, states, strict=True)
-        if state.visible
+        if state.visible and state.pose is not None
     ]
-
-
-def _turn_deg(state: FaceState) -> float:
-    """Angle between the nose and the direction from the head to the camera, in degrees."""
-    assert state.pose is not None
-    nose = state.pose.rotation.as_matrix()[:, 2]
-    toward = -state.pose.translation / np.linalg.norm(state.pose.translation)
-    return float(np.degrees(np.arccos(np.clip(nose @ toward, -1, 1))))
 
 
 def _require_one_face(images: Sequence[DisplayImage], source: str) -> None:

@@ -50,7 +50,7 @@ class InstantTunables:
     """What a picture must be like.
 
     Attributes:
-        min_skin_luminance: linear mean of the skin, below which noise is most of it.
+        min_face_luminance: linear mean of the face, below which noise is most of it.
         clipped_code: from which a value counts as clipped.
         max_clipped: largest share of the skin in which two channels are: red alone often is.
         least_unclipped: pixels of skin, as a share, that the fit needs; else clipped ones count too.
@@ -59,7 +59,7 @@ class InstantTunables:
         body_gloss: gloss of hair and clothes, where skin has 1.
     """
 
-    min_skin_luminance: float = 0.008
+    min_face_luminance: float = 0.008
     clipped_code: int = 250
     max_clipped: float = 0.25
     least_unclipped: float = 0.3
@@ -121,6 +121,7 @@ def capture_from_picture(
         CaptureError: the face in it is in the dark or over-exposed, or the matte does not show it.
     """
     progress(STAGE, 0, 3)
+    _require_light(picture, source)
     side = len(picture.matte) // 2
     half = np.asarray(cv2.resize(picture.matte, (side, side), interpolation=cv2.INTER_AREA), np.float32)
     shape = fit_head_shape((picture.landmarks / 2).astype(np.float32), half)
@@ -134,13 +135,20 @@ def capture_from_picture(
     return InstantCapture(subject, warnings, picture.frames)
 
 
+def _require_light(picture: MedianPicture, source: str) -> None:
+    """Raise CaptureError where the face is nearly black, before its matte is looked at, which fails in the dark too."""
+    face = np.zeros(picture.matte.shape, np.uint8)
+    cv2.fillConvexPoly(face, cv2.convexHull(np.round(picture.landmarks).astype(np.int32)), 1)
+    seen = linear_from_uint8(picture.image[face > 0])
+    if float(luminance(seen[None]).mean()) < TUNABLES.min_face_luminance:
+        raise CaptureError(f"it is too dark in {source}: the face is nearly black", "switch a light on")
+
+
 def _require_exposed(picture: MedianPicture, shape: HeadShape, source: str) -> None:
     skin = _doubled(shape.skin)
     codes = picture.image[skin]
     if len(codes) == 0:
         raise CaptureError(f"no skin can be seen in {source}", "take from your face what covers it")
-    if float(luminance(linear_from_uint8(codes)[None]).mean()) < TUNABLES.min_skin_luminance:
-        raise CaptureError(f"it is too dark in {source}: the face is nearly black", "switch a light on")
     clipped = float((np.median(codes, axis=1) >= TUNABLES.clipped_code).mean())
     if clipped > TUNABLES.max_clipped:
         raise CaptureError(

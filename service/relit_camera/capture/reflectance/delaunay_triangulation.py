@@ -9,10 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from relit_camera.base.errors import LightsError
-
-MAX_GAP_DEG = 60.0
-"""Largest angular radius of a triangle's circumscribed circle. Wider triangles span unsampled directions, and are left
-out: they bound the sampled region."""
+from relit_camera.subject.measured_light import MAX_GAP_DEG
 
 TOLERANCE = np.radians(0.1)
 """Directions this far outside the sampled region, in radians, count as on its edge: files round directions."""

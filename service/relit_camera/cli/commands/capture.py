@@ -298,19 +298,26 @@ def build(
 
 @app.command("desk")
 def desk(
+    context: typer.Context,
     frames: Annotated[
         Path, typer.Option(help="A folder of webcam frames and desk.json, as docs/formats.md describes.")
     ],
     out: Annotated[Path, typer.Option(help="The subject file to write (.relit).")],
+    pull: Pull = None,
 ) -> None:
     """Build a subject from frames filmed while your own screen lit you in patterns: see docs/desk.md."""
+    from relit_camera.base.concurrency.threads import limit_threads
     from relit_camera.base.storage.atomic_files import atomic_path
     from relit_camera.capture.desk.desk_capture import build_desk_subject
     from relit_camera.capture.desk.desk_recording import read_desk_recording
+    from relit_camera.cli.arguments import load_command_settings
+    from relit_camera.cli.model_offer import offer_models
     from relit_camera.cli.progress import progress_bar, stage_reporter
     from relit_camera.subject.subject_file import write_subject
 
     recording = read_desk_recording(frames)
+    offer_models("mesh", "selfie", pull, load_command_settings(context).pull_models)
+    limit_threads()
     with atomic_path(out) as subject_file, progress_bar() as progress:
         subject, warnings = build_desk_subject(recording, frames.resolve().name, stage_reporter(progress))
         write_subject(subject_file, subject)

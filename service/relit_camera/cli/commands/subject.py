@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from relit_camera.subject.subject import Subject
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -24,10 +27,13 @@ def info(
     context: typer.Context,
     subject: Annotated[str, typer.Argument(help="A stored subject's name, or a .relit file.")],
     as_json: Annotated[bool, typer.Option("--json", help="Machine-readable.")] = False,
+    places: Annotated[
+        bool, typer.Option("--places", help="Tell how much of each built-in place's light was measured; takes seconds.")
+    ] = False,
 ) -> None:
-    """Show what a subject file holds."""
+    """Show what a subject file holds, and how far to trust it."""
     from relit_camera.cli.arguments import load_command_settings
-    from relit_camera.subject.rungs import describe_rung
+    from relit_camera.subject.rungs import describe_places, describe_rung
     from relit_camera.subject.subject_store import SubjectStore
 
     name, opened = SubjectStore(load_command_settings(context).storage.subjects).resolve(subject)
@@ -36,13 +42,26 @@ def info(
     shown["geometry"] = [name for name in GEOMETRY if getattr(opened, name) is not None]
     shown["stills"] = len(opened.stills)
     shown["bytes"] = opened.basis.nbytes + opened.coefficients.nbytes + opened.light_coefficients.nbytes
+    if places:
+        shown["measured_of_places"] = _measured_of_places(opened)
     if as_json:
         typer.echo(json.dumps(shown, indent=2))
         return
     meta = opened.metadata
     typer.echo(describe_rung(meta.rung, meta.expected_db, meta.measured_fraction))
+    if places:
+        typer.echo(describe_places(shown.pop("measured_of_places")))
     for key, value in shown.items():
         typer.echo(f"{key:17} {value}")
+
+
+def _measured_of_places(subject: Subject) -> dict[str, float]:
+    """The measured fraction of each built-in place's light."""
+    from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+    from relit_camera.subject.measured_light import share_of_light
+
+    maps = {name: builtin_environment(name).light_map for name in BUILTIN_NAMES}
+    return {name: round(share_of_light(each, subject.measured_texels), 3) for name, each in maps.items()}
 
 
 @app.command()

@@ -38,7 +38,6 @@ class Keeper:
 
     Attributes:
         has_camera: whether one is there.
-        node: of what is held; empty while nothing is.
     """
 
     def __init__(
@@ -50,7 +49,8 @@ class Keeper:
         """Set up; nothing is held yet.
 
         Args:
-            version: of the program; a camera of another one is not served.
+            version: of the program, and the number of what is said to it. A camera of another version is told so, that
+                it may replace this keeper; where the number is the same, only if that ends nobody's call.
             open_output: opens what a camera names.
             clock: to measure by.
         """
@@ -60,13 +60,15 @@ class Keeper:
         self._output: KeptOutput | None = None
         self._limits = KeeperLimits(1.0, 0.0)
         self._memory = self._placeholder = self._last = memoryview(b"")
+        self._last_slot = -1
+        """Where the last picture lies in the memory; -1 where it is not of this memory."""
         self._told: dict[str, Any] = {}
         self._state: KeeperState | None = None
 
     @property
-    def node(self) -> str:
-        """The device file of what is held; empty while nothing is."""
-        return "" if self._output is None else str(self._output.describe()["id"])
+    def place(self) -> str:
+        """Where what is held shows pictures, in words; empty while nothing is held."""
+        return "" if self._output is None else self._output.place or "a virtual camera"
 
     def handle(self, message: Message, memory: memoryview | None = None) -> Message | None:
         """Do what the camera asks for, and return the answer; None for none.
@@ -130,11 +132,13 @@ class Keeper:
                 output.close()
 
     def _greet(self, message: Message) -> Message:
-        if message["hello"] != self._version:
+        is_bound = self._output is not None and self._output.is_bound
+        version = str(message["hello"])
+        if version != self._version and not (is_bound and _protocol(version) == _protocol(self._version)):
             self.has_camera = False
             return {"other_version": self._version}
         options = _options(message["output"])
-        if options != self._options or self._output is None:
+        if self._output is None or (options != self._options and not is_bound):
             self.close()
             self._output, self._options = self._open(options), options
         self._limits = KeeperLimits(1 / options.fps, float(message["keep_s"]))
@@ -142,7 +146,7 @@ class Keeper:
             # The last picture is another camera's, which cannot take it back any more.
             self._state = replace(self._state, connected=True)
         self._told = self._output.describe()
-        return {"info": self._told, "layout": self._output.layout}
+        return {"info": self._told, "layout": self._output.layout, "size": self._output.size}
 
     def _use(self, memory: memoryview) -> Message:
         """Take the memory in which the camera's pictures will lie. The last picture of the one before stays."""
@@ -151,6 +155,7 @@ class Keeper:
         ):
             return {"error": ["DeviceError", "the keeper holds nothing of that size", ""]}
         self._memory, self._placeholder = memory, self._slot(memory, PICTURE_SLOTS)
+        self._last_slot = -1
         if self._state is None:  # the placeholder, until the first picture comes
             now = self._clock.now()
             self._state = KeeperState(now - LAST_PICTURE_S, now - self._limits.repeat_s, True, False)
@@ -159,10 +164,11 @@ class Keeper:
     def _show(self, slot: int, repeatable: bool) -> Message:
         if self._output is None or not len(self._memory):
             return {"error": ["DeviceError", "the keeper holds no virtual camera", ""]}
-        picture = self._slot(self._memory, slot)
+        # A camera writes no new picture where the last one lies, so that is the same again.
+        picture = self._last if slot == self._last_slot else self._slot(self._memory, slot)
         self._output.send(picture)
         now = self._clock.now()
-        self._last = picture
+        self._last, self._last_slot = picture, slot
         self._state = KeeperState(now, now, connected=True, repeatable=repeatable)
         info = self._output.describe()
         if info == self._told:
@@ -174,6 +180,11 @@ class Keeper:
         assert self._output is not None
         count = picture_bytes(self._output.size, self._output.layout)
         return memory[slot * count : (slot + 1) * count]
+
+
+def _protocol(version: str) -> str:
+    """What is said, of a version such as `1.2.0 3`."""
+    return version.rpartition(" ")[2]
 
 
 def _options(values: Mapping[str, Any]) -> OutputOptions:

@@ -18,9 +18,10 @@ from relit_camera import __version__
 from relit_camera.devices.keeper.keeper import Keeper
 from relit_camera.devices.keeper.keeper_socket import LockedListener, MessageSocket
 
-PROTOCOL = 1
+PROTOCOL = 2
+"""Another number where cameras and keepers say other things to each other than before."""
 VERSION = f"{__version__} {PROTOCOL}"
-"""A camera of another version starts a keeper of its own in place of this one."""
+"""A camera of another version starts a keeper of its own in place of this one, where that ends nobody's call."""
 
 
 class KeeperProcess:
@@ -49,7 +50,7 @@ class KeeperProcess:
                 # Whether the camera has left is heard before the next one is answered.
                 if camera is not None and camera.socket in ready and not self._serve(camera):
                     self._keeper.camera_left()
-                    if self._keeper.node:  # else this ends, and the camera hears of it last
+                    if self._keeper.place:  # else this ends, and the camera hears of it last
                         camera.close()
                         self._camera = None
                 if listening is not None and listening.listener in ready:
@@ -71,7 +72,7 @@ class KeeperProcess:
             self._keeper.has_camera = True
         else:
             with suppress(OSError):
-                other.send({"busy": self._keeper.node})
+                other.send({"busy": self._keeper.place})
             other.close()
 
     def _serve(self, camera: MessageSocket) -> bool:

@@ -1,9 +1,9 @@
-"""What the keeper holds: a v4l2loopback device, which needs Python's own library alone, or any other sink."""
+"""What the keeper holds: a v4l2loopback device, which needs Python's own library alone, or a sink."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from typing import Any, Protocol
@@ -47,19 +47,29 @@ class KeptOutput(Protocol):
     """An open virtual camera.
 
     Attributes:
-        size: (width, height) that it takes.
+        size: (width, height) of the pictures that it takes.
         layout: of its pictures.
     """
 
     size: tuple[int, int]
     layout: str
 
+    @property
+    def place(self) -> str:
+        """Where it shows pictures, in words."""
+        ...
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether programs read it that would lose it if it was closed, even if it was opened again at once."""
+        ...
+
     def describe(self) -> dict[str, Any]:
-        """The fields of its `SinkInfo`, of which all but the size may change."""
+        """Its `SinkInfo` as JSON has it; may change with each picture."""
         ...
 
     def send(self, picture: memoryview) -> None:
-        """Show a picture of `size` in `layout`.
+        """Show a picture of `size` in `layout`; the same object again is the same picture.
 
         Raises:
             RelitError: it is not taken.
@@ -102,9 +112,19 @@ class LoopbackOutput:
         self._device: LoopbackDevice = self._camera.open()
         self.size = self._device.size
 
+    @property
+    def place(self) -> str:
+        """Its node."""
+        return self._device.node
+
+    @property
+    def is_bound(self) -> bool:
+        """False: the device is there whoever writes to it."""
+        return False
+
     def describe(self) -> dict[str, Any]:
-        """The fields of its `SinkInfo`."""
-        return {"kind": "camera", "id": self._device.node, "size": self.size}
+        """Its `SinkInfo` as JSON has it."""
+        return {"kind": "camera", "id": self._device.node, "size": self.size, "pipewire": None, "trouble": None}
 
     def send(self, picture: memoryview) -> None:
         """Show a picture.
@@ -123,7 +143,7 @@ class LoopbackOutput:
 
 
 class SinkOutput:
-    """Any sink. Its pictures are copied, for a sink may hold one for longer than the shared memory does."""
+    """A sink. Its pictures are copied, for a sink may hold one for longer than the shared memory does."""
 
     layout = RGB
 
@@ -131,18 +151,39 @@ class SinkOutput:
         import numpy as np
 
         self._sink: Any = _sink_opener(options)()
-        self.size: tuple[int, int] = self._sink.describe().size
+        self.size = options.size
         self._array: Callable[[memoryview], Any] = lambda picture: np.array(picture, np.uint8).reshape(
             self.size[1], self.size[0], 3
         )
+        self._last: tuple[memoryview, Any] | None = None
+
+    @property
+    def place(self) -> str:
+        """Where the sink shows pictures, in words."""
+        return str(self._sink.describe().place)
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether programs read it through PipeWire, where it is another camera each time that it is opened."""
+        readers = self._sink.describe().pipewire
+        return readers is not None and bool(readers.count)
 
     def describe(self) -> dict[str, Any]:
-        """The fields of its `SinkInfo`."""
-        return asdict(self._sink.describe())
+        """Its `SinkInfo` as JSON has it."""
+        info = self._sink.describe()
+        return {
+            "kind": info.kind,
+            "id": info.id,
+            "size": info.size,
+            "pipewire": None if info.pipewire is None else [info.pipewire.count, info.pipewire.names],
+            "trouble": None if info.trouble is None else [info.trouble.what, info.trouble.cure],
+        }
 
     def send(self, picture: memoryview) -> None:
-        """Show a picture; raises what the sink raises."""
-        self._sink.write(self._array(picture))
+        """Show a picture; raises what the sink raises. The same object again is the same picture, for the sink too."""
+        if self._last is None or self._last[0] is not picture:
+            self._last = picture, self._array(picture)
+        self._sink.write(self._last[1])
 
     def close(self) -> None:
         """Close it."""
@@ -150,7 +191,7 @@ class SinkOutput:
 
 
 def _sink_opener(options: OutputOptions) -> Callable[[], Any]:
-    from relit_camera.devices.sinks.sink_factory import SinkOptions
+    from relit_camera.devices.sinks.sink import SinkOptions
 
     module, _, function = options.sink.partition(":")
     opener = getattr(import_module(module), function)

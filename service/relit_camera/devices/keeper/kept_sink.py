@@ -8,7 +8,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,18 +21,18 @@ from relit_camera.base.images.color import rgb_to_i420
 from relit_camera.base.images.image_types import DisplayImage, check_image
 from relit_camera.base.images.resize import crop_to_fill
 from relit_camera.devices.keeper.keeper import PICTURE_SLOTS
+from relit_camera.devices.keeper.keeper_process import VERSION
 from relit_camera.devices.keeper.keeper_socket import shared_memory
 from relit_camera.devices.keeper.kept_output import I420, OutputOptions, picture_bytes
 from relit_camera.devices.keeper.sink_keeper import SinkKeeper
-from relit_camera.devices.sinks.sink import Sink, SinkInfo
-from relit_camera.devices.sinks.sink_factory import device_node
+from relit_camera.devices.sinks.sink import Readers, Sink, SinkInfo
+from relit_camera.devices.sinks.sink_factory import SINKS, device_node
 
 log = logging.getLogger(__name__)
 
-KEPT_SINKS = {"camera": ""}
-"""The sinks that a keeper holds, by name, besides device nodes: `module:function` that opens each with `SinkOptions`;
-empty for a v4l2loopback device, which the keeper opens without any library. Of `camera` it holds that device alone: a
-camera in PipeWire ends with its process."""
+KEPT_SINKS = {"camera": "", "pipewire": "pipewire"}
+"""The sinks that a keeper holds, by name: what tells its keeper from others, which never changes. Device nodes, which
+the keeper opens without any library, come beside them."""
 MAX_STARTS, FORGIVEN_AFTER = 3, 2000
 """Keepers that are started for one camera; then it does without. The count begins anew where one has shown so many
 pictures."""
@@ -52,26 +52,39 @@ class KeeperParts:
 
 
 def kept_options(settings: OutputSettings) -> OutputOptions | None:
-    """What a keeper is to hold for these settings; None where there is to be none."""
+    """What a keeper is to hold for these settings; None where there is to be none.
+
+    Raises:
+        InputError: the sink takes no argument.
+    """
     if not sys.platform.startswith("linux") or not settings.keep_s:
         return None
-    name, _, argument = settings.sink.partition(":")
-    node = device_node(settings.sink)
-    if name not in KEPT_SINKS and not node:
-        return None
     size = settings.width, settings.height
-    return OutputOptions(size, settings.fps, settings.label, node, "" if node else KEPT_SINKS[name], argument)
+    if _sink_name(settings) in KEPT_SINKS:
+        opener, argument = SINKS.load(settings.sink)
+        sink = f"{opener.__module__}:{opener.__qualname__}"
+        return OutputOptions(size, settings.fps, settings.label, sink=sink, argument=argument)
+    node = device_node(settings.sink)
+    return OutputOptions(size, settings.fps, settings.label, node) if node else None
 
 
-def keeper_for(settings: OutputSettings) -> SinkKeeper | None:
-    """The keeper of the virtual camera that the settings name; None where there is to be none."""
+def keeper_for(settings: OutputSettings, version: str = VERSION) -> SinkKeeper | None:
+    """The keeper of the virtual camera that the settings name; None where there is to be none.
+
+    Args:
+        settings: of the output.
+        version: of this program, as the keeper is told.
+
+    Raises:
+        InputError: the sink takes no argument.
+    """
     options = kept_options(settings)
     if options is None:
         return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of a session without a folder for this: one below /tmp is as good
         folder = user_runtime_path("relit-camera", appauthor=False)
-    return SinkKeeper(options, settings.keep_s, folder)
+    return SinkKeeper(options, settings.keep_s, folder, version, KEPT_SINKS.get(_sink_name(settings), ""))
 
 
 class KeptSink:
@@ -94,10 +107,11 @@ class KeptSink:
         self._keeper, self._parts, self._open_directly = keeper, parts, open_directly
         self._direct: Sink | None = None
         self._slots: list[NDArray[np.uint8]] = []
-        self._next = self._shown = 0
+        self._image: DisplayImage | None = None
+        self._slot = self._shown = 0
         self._may_repeat = False
-        self._layout = I420
-        self._info = SinkInfo("camera", "", (0, 0))
+        self._layout, self._size = I420, (0, 0)
+        self._info = SinkInfo("camera", "", self._size)
         self._opened()
 
     def write(self, image: DisplayImage) -> None:
@@ -138,14 +152,16 @@ class KeptSink:
         except KeeperLostError as error:
             what = f"the virtual camera is published without a keeper: {error.what}"
             log.warning("%s; %s", what, error.cure)
-            self._keeper.leave()
+            self._keeper.end()
             self._direct = self._open_directly()
             self._keeper.report(DeviceError(what, error.cure))
 
     def _open(self) -> None:
         held = self._keeper.greet()
         self._info, self._layout = _info(held["info"]), str(held["layout"])
-        size, layout = self._info.size, self._layout
+        width, height = held["size"]
+        self._size = size = width, height
+        layout = self._layout
         shape = (size[1] * 3 // 2, size[0]) if layout == I420 else (size[1], size[0], 3)
         try:
             descriptor = shared_memory((PICTURE_SLOTS + 1) * picture_bytes(size, layout))
@@ -160,25 +176,28 @@ class KeptSink:
             raise KeeperLostError(
                 f"no memory can be shared with it: {error.strerror}", "close other programs"
             ) from error
-        self._slots = slots
+        self._slots, self._image = slots, None
 
     def _show(self, image: DisplayImage) -> None:
         if self._direct is not None:
             self._direct.write(image)
             return
-        if image.shape[1::-1] != self._info.size:
-            image = crop_to_fill(image, self._info.size)
-        self._lay(np.ascontiguousarray(image), self._slots[self._next])
+        # Pictures are never modified once they are shown, so the same object is the same picture, and lies there.
+        if image is not self._image:
+            slot = (self._slot + 1) % PICTURE_SLOTS
+            fitting = image if image.shape[1::-1] == self._size else crop_to_fill(image, self._size)
+            self._lay(np.ascontiguousarray(fitting), self._slots[slot])
+            self._slot, self._image = slot, image
         # Not where it was different when the picture was made, which may have been before the last one was shown.
         before, self._may_repeat = self._may_repeat, self._parts.may_repeat()
         try:
-            answer = self._keeper.show(self._next, before and self._may_repeat)
+            answer = self._keeper.show(self._slot, before and self._may_repeat)
         except KeeperLostError:
             raise
         except DeviceError:
             self._slots = []  # the keeper has closed it: the next picture opens it again
+            self._info = replace(self._info, pipewire=None, trouble=None)
             raise
-        self._next = (self._next + 1) % PICTURE_SLOTS
         self._shown += 1
         if self._shown == FORGIVEN_AFTER:
             self._keeper.starts = 1
@@ -192,6 +211,18 @@ class KeptSink:
             slot[:] = image
 
 
+def _sink_name(settings: OutputSettings) -> str:
+    return settings.sink.partition(":")[0]
+
+
 def _info(fields: Mapping[str, Any]) -> SinkInfo:
+    """What `KeptOutput.describe` has made JSON of."""
     width, height = fields["size"]
-    return SinkInfo(**{**fields, "size": (width, height)})
+    readers, trouble = fields["pipewire"], fields["trouble"]
+    return SinkInfo(
+        str(fields["kind"]),
+        str(fields["id"]),
+        (width, height),
+        None if readers is None else Readers(readers[0], tuple(readers[1])),
+        None if trouble is None else DeviceError(*trouble),
+    )

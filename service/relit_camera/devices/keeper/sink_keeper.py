@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
 import socket
 import subprocess
 import sys
@@ -15,6 +14,8 @@ from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
+
+import psutil
 
 from relit_camera.base import errors
 from relit_camera.base.errors import DeviceError, KeeperLostError, RelitError
@@ -33,7 +34,7 @@ END_S = 1.0
 ENDING_S = 0.2
 _TRIES = 3
 _NO_KEEPER = "switch the keeper off: output.keep_s: 0"
-_ASKED_FOR = "stop that one (relit doctor names its process), or give this one a device of its own"
+_OWN_DEVICE, _OWN_NAME = "a device of its own: output.sink", "a name of its own: output.label"
 
 
 class SinkKeeper:
@@ -46,7 +47,9 @@ class SinkKeeper:
         on_trouble: called with that when it comes.
     """
 
-    def __init__(self, options: OutputOptions, keep_s: float, folder: Path, version: str = VERSION) -> None:
+    def __init__(
+        self, options: OutputOptions, keep_s: float, folder: Path, version: str = VERSION, sink: str = ""
+    ) -> None:
         """Set up; nothing is started.
 
         Args:
@@ -54,13 +57,16 @@ class SinkKeeper:
             keep_s: how long it shows something without a camera.
             folder: for its socket; made if it is missing.
             version: of this program; a keeper of another one is replaced.
+            sink: tells keepers of the same label and device apart: the same in all versions of the program, unlike the
+                function that opens it, or the keeper of another version would not be found.
         """
-        name = sha256("\0".join((options.label, options.device, options.sink, options.argument)).encode()).hexdigest()
+        name = sha256("\0".join((options.label, options.device, sink, options.argument)).encode()).hexdigest()
         self._options, self._keep_s, self._version = options, keep_s, version
         self._path = folder / f"keeper-{name[:12]}"
         self._connection: MessageSocket | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._pid = 0
+        self._holder: psutil.Process | None = None
+        """The keeper, whoever has started it; None where it cannot be seen, as in another container."""
         self.hands_over = False
         self.starts = 0
         self.trouble: DeviceError | None = None
@@ -72,7 +78,10 @@ class SinkKeeper:
         self.on_trouble(trouble)
 
     def greet(self) -> Mapping[str, Any]:
-        """Let the keeper hold the virtual camera; returns its `layout`, and as `info` the fields of its `SinkInfo`.
+        """Let the keeper hold the virtual camera.
+
+        Returns:
+            `layout` and `size` of its pictures, and as `info` what `KeptOutput.describe` says.
 
         Raises:
             KeeperLostError: there can be no keeper.
@@ -90,11 +99,14 @@ class SinkKeeper:
                 continue
             if "busy" in answer:
                 self._drop(connection)
+                self._holder = None  # another camera's
                 if not answer["busy"] and attempt < _TRIES - 1:
                     time.sleep(ENDING_S)  # one that holds nothing is about to end
                     continue
                 at = f" to {answer['busy']}" if answer["busy"] else ""
-                raise DeviceError(f"another Relit Camera publishes{at} already", _ASKED_FOR)
+                own = _OWN_DEVICE if self._options.device else _OWN_NAME
+                cure = f"stop that one (relit doctor names its process), or give this one {own}"
+                raise DeviceError(f"another Relit Camera publishes{at} already", cure)
             return self._checked(answer)
         raise KeeperLostError("the keeper does not start", _NO_KEEPER)
 
@@ -120,16 +132,33 @@ class SinkKeeper:
         return self._checked(self._ask(self._present(), {"picture": slot, "repeatable": repeatable}, ANSWER_S))
 
     def leave(self) -> None:
-        """Say goodbye: the keeper ends, or with `hands_over` waits for the next camera. Harmless when repeated."""
+        """Say goodbye: the keeper waits for the next camera with `hands_over`, or else ends. Harmless when repeated."""
+        if not self.hands_over:
+            self.end()
+        elif self._connection is not None:
+            with suppress(OSError):
+                self._connection.send({"goodbye": "hand-over"})
+            self._connection.close()
+            self._connection = None
+
+    def end(self) -> None:
+        """End the keeper, whatever state it is in: the virtual camera is free then. Harmless when repeated."""
         connection, self._connection = self._connection, None
+        is_free = False
         if connection is not None:
-            with suppress(OSError, EOFError, ValueError):
-                connection.send({"goodbye": "hand-over" if self.hands_over else "end"})
-                if not self.hands_over:
-                    connection.socket.settimeout(END_S)
-                    connection.receive()  # its end, when the virtual camera is free
+            connection.socket.settimeout(END_S)
+            try:
+                connection.send({"goodbye": "end"})
+                connection.receive()
+            except EOFError:
+                is_free = True  # it says goodbye when it has closed the virtual camera
+            except (OSError, ValueError):
+                pass
             connection.close()
-        if self._process is not None and not self.hands_over:
+        if is_free:
+            self._holder = None
+        self._kill()
+        if self._process is not None:
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(END_S)
 
@@ -158,7 +187,7 @@ class SinkKeeper:
         try:
             other.connect(str(self._path))
             found = MessageSocket(other)
-            self._pid, user = found.peer()
+            process, user = found.peer()
         except (FileNotFoundError, ConnectionRefusedError):
             other.close()
             return None
@@ -168,6 +197,7 @@ class SinkKeeper:
         if user != os.getuid():
             other.close()
             raise KeeperLostError(f"{self._path} is another user's", "delete it")
+        self._holder = _process(process)
         return found
 
     def _started(self) -> MessageSocket:
@@ -190,22 +220,24 @@ class SinkKeeper:
         finally:
             of_keeper.close()
         self.starts += 1
-        self._pid = self._process.pid
+        self._holder = _process(self._process.pid)
         return MessageSocket(own)
 
     def _replace(self) -> None:
         """End the keeper, once another has started: so it takes over within a few milliseconds."""
+        old = self._holder
         fresh = self._started()
         try:
             self._ask(fresh, {"prepare": asdict(self._options)}, START_S)
         except RelitError:
             fresh.close()  # which ends it
+            self._holder = old
             raise
         log.info("the keeper is of another version, and is replaced")
-        self.hands_over, before = False, self.hands_over
-        started, self._process = self._process, None
-        self.leave()
-        self.hands_over, self._process, self._connection = before, started, fresh
+        started = self._process, self._holder
+        self._process, self._holder = None, old
+        self.end()
+        (self._process, self._holder), self._connection = started, fresh
 
     def _ask(
         self, connection: MessageSocket, message: Mapping[str, Any], timeout_s: float, descriptor: int | None = None
@@ -224,14 +256,24 @@ class SinkKeeper:
             except ConnectionResetError:
                 return connection.receive()[0]  # the reset is told before what was said before it
         except TimeoutError as error:
-            if self._pid > 1:  # 0 would be this process and its group, which is where it is of another container
-                with suppress(ProcessLookupError, PermissionError):
-                    os.kill(self._pid, signal.SIGKILL)  # it hangs
+            self._kill()  # it hangs
             self._drop(connection)
             raise KeeperLostError("the virtual camera does not answer", "see what holds it: relit doctor") from error
-        except (EOFError, OSError, ValueError) as error:
+        except ValueError as error:
+            self._kill()  # else it would go on, and hold the virtual camera
+            self._drop(connection)
+            raise KeeperLostError("the keeper's answer cannot be read", "please report it") from error
+        except (EOFError, OSError) as error:
             self._drop(connection)
             raise KeeperLostError("the keeper has ended", "it is started again by itself") from error
+
+    def _kill(self) -> None:
+        """End the keeper's process if it lives, and not another one that has its number by now."""
+        holder, self._holder = self._holder, None
+        if holder is not None:
+            with suppress(psutil.Error):
+                holder.kill()
+                holder.wait(END_S)
 
     def _drop(self, connection: MessageSocket) -> None:
         connection.close()
@@ -239,6 +281,11 @@ class SinkKeeper:
             self._connection = None
         if self._process is not None:
             self._process.poll()
+
+    @property
+    def path(self) -> Path:
+        """Of the socket at which the keeper is found."""
+        return self._path
 
     @property
     def connected(self) -> bool:
@@ -252,3 +299,10 @@ class SinkKeeper:
             kind = getattr(errors, name, None)
             raise (kind if isinstance(kind, type) and issubclass(kind, RelitError) else DeviceError)(what, cure)
         return answer
+
+
+def _process(number: int) -> psutil.Process | None:
+    """A process by its number, which is 0 for one of another container; None where there is none."""
+    with suppress(psutil.Error):
+        return psutil.Process(number) if number > 1 else None
+    return None

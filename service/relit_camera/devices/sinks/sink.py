@@ -7,6 +7,26 @@ from typing import Protocol
 
 from relit_camera.base.errors import DeviceError
 from relit_camera.base.images.image_types import DisplayImage
+from relit_camera.devices.device_discovery import SYSTEM_FOLDERS, DeviceFolders
+
+
+@dataclass(frozen=True)
+class SinkOptions:
+    """What every sink is opened with.
+
+    Attributes:
+        argument: what follows the colon in `NAME:ARGUMENT`.
+        size: (width, height) of all pictures that it will get.
+        fps: pictures a second that it will get.
+        label: name under which call apps shall show it.
+        tree: where virtual cameras are looked for.
+    """
+
+    argument: str
+    size: tuple[int, int]
+    fps: float
+    label: str
+    tree: DeviceFolders = SYSTEM_FOLDERS
 
 
 @dataclass(frozen=True)
@@ -41,10 +61,14 @@ class SinkInfo:
     trouble: DeviceError | None = None
 
     @property
+    def place(self) -> str:
+        """Where it shows pictures, in words, such as `/dev/video10 and PipeWire`; empty where it does not."""
+        return " and ".join(filter(None, (self.id, "PipeWire" if self.pipewire is not None else "")))
+
+    @property
     def name(self) -> str:
         """Kind and place in words, such as `camera /dev/video10 and PipeWire`."""
-        places = " and ".join(filter(None, (self.id, "PipeWire" if self.pipewire is not None else "")))
-        return f"{self.kind} {places}".strip()
+        return f"{self.kind} {self.place}".strip()
 
 
 class Sink(Protocol):

@@ -63,7 +63,8 @@ class FaceMotion:
 
     Attributes:
         status: of the frame.
-        presence: 1 while the face is followed, 0 at neutral because it is lost or out of reach, eased between.
+        presence: 1 while the face is followed, 0 at neutral because it is lost or out of reach, eased between; at once
+            1 in the first frame of all.
         rotation: takes head-frame vectors to world-frame vectors, identity at neutral.
         translation: (3,) float64 centimetres relative to neutral, camera axes.
         expression: (count, 3) float64 centimetres: head-space points minus the neutral ones.
@@ -182,9 +183,10 @@ class FaceFollower:
         return abs(yaw) <= share * self._settings.reach_yaw_deg and abs(pitch) <= share * self._settings.reach_pitch_deg
 
     def _ease_presence(self, time_s: float) -> float:
-        passed = 0.0 if self._time_s is None else max(time_s - self._time_s, 0.0)
+        first, passed = self._time_s is None, 0.0 if self._time_s is None else max(time_s - self._time_s, 0.0)
         self._time_s = time_s
-        step = passed / self._settings.ease_s
+        # Nothing was shown before the first frame that a face in it would have to be eased from.
+        step = 1.0 if first else passed / self._settings.ease_s
         self._presence = min(max(self._presence + (step if self._followed else -step), 0.0), 1.0)
         return float(smoothstep(self._presence)) if 0 < self._presence < 1 else self._presence
 

@@ -143,6 +143,7 @@ def simulate_desk_recording(
     webcam: SimulatedWebcam | None = None,
     said: DeskSetup | None = None,
     room: LinearImage | None = None,
+    room_picture: bool = False,
 ) -> DeskRecording:
     """What a webcam films of a person while the screen shows the setup's patterns.
 
@@ -152,6 +153,7 @@ def simulate_desk_recording(
         webcam: how it is filmed.
         said: the setup that the recording states, where it is not the true one.
         room: (height, width, 3) the person in the room's light, at the size of the field; None for soft light.
+        room_picture: whether the webcam takes a picture in the room's light alone, with an exposure of its own.
     """
     webcam = webcam or SimulatedWebcam()
     pictures = person.patch_pictures(setup)
@@ -161,7 +163,7 @@ def simulate_desk_recording(
     stated = (said or setup).model_copy(
         update={"face": FacePlace(x=face[0], y=face[1], radius=face[2]), "pixels_per_cm": frames.pixels_per_cm}
     )
-    return DeskRecording(stated, frames)
+    return DeskRecording(stated, frames, frames.in_room_light() if room_picture else None)
 
 
 @dataclass(frozen=True)
@@ -270,6 +272,14 @@ class SimulatedFrames:
         variance = unit * (frame + 0.05 * self._gain_over_single_patch)
         frame += random.standard_normal(frame.shape, np.float32) * np.sqrt(np.maximum(variance, 0))
         return self.change(index, np.rint(srgb_encode(frame) * 255).astype(np.uint8))
+
+    def in_room_light(self) -> DisplayImage:
+        """The person before the black screen, in the middle of the places where their head will be."""
+        frame = self.linear(np.zeros(self.lights.shape[1], np.float32), RigidTransform())
+        frame *= self.webcam.exposure / max(float(np.percentile(frame, 99.5)), 1e-9)
+        noise = np.random.default_rng([self.webcam.seed, len(self)]).standard_normal(frame.shape, np.float32)
+        codes = srgb_encode(np.maximum(frame, 0)) * 255 + self.webcam.noise * noise
+        return np.asarray(np.clip(np.rint(codes), 0, 255), np.uint8)
 
     @cached_property
     def _gain_over_single_patch(self) -> float:

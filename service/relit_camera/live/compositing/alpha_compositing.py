@@ -24,6 +24,10 @@ _WINDOW = 7
 
 _EPSILON = np.float32(1e-4)
 
+_TELLING_CONTRAST = np.float32(0.2)
+"""How much more light the room must send than the person (linear, all channels together) for a pixel's colour to tell
+as much about its alpha as the matte does. `python -m tests.rim_accuracy` measures it."""
+
 
 def split_alpha(image: RgbaImage) -> tuple[DisplayImage, Alpha]:
     """The colors (height, width, 3) and the alpha (height, width) of a picture."""
@@ -67,7 +71,8 @@ def replace_room(matted: MattedFrame, background: DisplayImage, in_place: bool =
 
     At the edge the camera saw C = αF + (1 - α)B. F and B are first guessed as the colors of surely person and surely
     room nearby; then F takes up what is left of C: F + α(C - αF - (1 - α)B), the closed-form step of Forte,
-    "Approximate Fast Foreground Colour Estimation" (2021). Pixels with alpha 255 stay as they are.
+    "Approximate Fast Foreground Colour Estimation" (2021). Pixels with alpha 255 stay as they are. Before that, alpha
+    is corrected where the colours tell it, see `_share_by_color`.
 
     Args:
         matted: the live frame, and the person's matte in it.
@@ -84,7 +89,8 @@ def replace_room(matted: MattedFrame, background: DisplayImage, in_place: bool =
     image, alpha = np.ascontiguousarray(image), np.ascontiguousarray(alpha)
     edge = _partial_pixels(alpha)
     person, room = _mean_layer_colors(matted, edge)
-    share, left_over = _share_at(alpha, edge), _light_at(image, edge)
+    left_over = _light_at(image, edge)
+    share = _share_by_color(_share_at(alpha, edge), left_over, person, room)
     left_over -= room
     left_over -= share * (person - room)
     left_over *= share
@@ -153,6 +159,32 @@ def _mean_layer_colors(
         for certainty in (share, 1 - share)
     )
     return person, room
+
+
+def _share_by_color(
+    share: NDArray[np.float32], light: NDArray[np.float32], person: NDArray[np.float32], room: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """The alpha (count,) of edge pixels, corrected by where their colours lie between those of person and room.
+
+    The matte knows no single hair, and its edge is some pixels wide. Only a room that is brighter than the person
+    tells: what is bright there is room, while a dark pixel may be the person's own shaded rim as well as a dark room.
+    Near 0 and 1 the matte is sure.
+
+    Args:
+        share: alpha of the matte, 0..1.
+        light: (3, count) linear, of the pixels.
+        person: (3, count) of what is surely person nearby, see `_mean_layer_colors`.
+        room: the same of what is surely room.
+    """
+    beyond = np.maximum(room - person, 0)
+    contrast = np.einsum("ci,ci->i", beyond, beyond)
+    seen = np.einsum("ci,ci->i", room - light, beyond)
+    seen /= np.maximum(contrast, 1e-6)
+    np.clip(seen, 0, 1, out=seen)
+    seen -= share
+    seen *= contrast / (contrast + _TELLING_CONTRAST**2)
+    seen *= 4 * share * (1 - share)
+    return np.asarray(share + seen, np.float32)
 
 
 def _halvings(rows: int) -> int:

@@ -70,7 +70,10 @@ class IdentityCheck:
         self._since_s, self._shape_cm, self._measured_s = None, np.inf, -np.inf
 
     def recognized(self, time_s: float) -> float:
-        """How far a frame may be shown relit: 0 until its face has passed for the subject's, then eased to 1."""
+        """How far a frame may be shown relit: 0 until its face has passed for the subject's, then eased to 1.
+
+        At once 1 where it passed in the first frame that was checked: nothing was shown before.
+        """
         if self._passed_s is None:
             return 0.0
         since_s = time_s - self._passed_s
@@ -86,6 +89,7 @@ class IdentityCheck:
             time_s: of the frame.
         """
         limits = self._tunables
+        first = self._checked_s == -np.inf
         if time_s - self._checked_s > limits.gap_s:
             self.forget()
         self._checked_s = time_s
@@ -104,7 +108,8 @@ class IdentityCheck:
             distance_cm = self._distance_cm(motion.neutral, motion)
             self._shape_cm = min(self._shape_cm, distance_cm)
             if unlikeness(distance_cm, residual, limits) <= limits.at_once:
-                self._passed_s = time_s if self._passed_s is None else self._passed_s
+                if self._passed_s is None:
+                    self._passed_s = -np.inf if first else time_s
                 self._most = limits.kept
         if time_s - self._since_s < limits.delay_s:
             return None

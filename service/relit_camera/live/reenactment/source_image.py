@@ -112,6 +112,11 @@ FLANN_INDEX_KDTREE_SINGLE, FLANN_CHECKS_UNLIMITED = 4, -1
 """FLANN's names, which OpenCV does not export, for a search that is exact."""
 BEYOND = cv2.BORDER_REPLICATE
 """The lower edge goes on below, where shoulders are cut off; the others are feathered to nothing."""
+PINHOLE_SIDE = 0.02
+"""Side, as a share of the source image's width, of a square as large as the largest hole that is filled."""
+PINHOLE_BOUNDS = (0.9, 0.99)
+"""Mattes from which a pixel bounds such a hole, one after the other: single hairs at the outline do not, and a lamp
+shines through a twentieth."""
 REACH = 4
 """Pixels beyond the matte that have a color: the enlargement and the warp look that far."""
 
@@ -125,7 +130,7 @@ class Cutout:
     """
 
     def __init__(self, subject: Subject) -> None:
-        self.alpha = feather_edges(subject.matte)
+        self.alpha = feather_edges(fill_pinholes(subject.matte))
         self.whole = shows_whole_head(subject.matte)
         self._edge = _edge_colors(subject.matte, subject.metadata.over_black)
         self._alpha_codes = np.rint(self.alpha * 255).astype(np.uint8)
@@ -238,6 +243,28 @@ def _around(matte: Mask) -> Mask:
 def shows_whole_head(matte: Mask) -> bool:
     """Whether there is background beside the head; else the picture's border cuts the face off."""
     return bool(matte[: len(matte) // 2, [0, -1]].mean() < 0.5)
+
+
+def fill_pinholes(matte: Mask) -> Mask:
+    """The matte without holes of a few pixels, as between hair and ear.
+
+    What is seen through them lies there only while the head looks ahead. Moved with the picture, they are dots of the
+    background that glide along with the face.
+    """
+    for bound in PINHOLE_BOUNDS:
+        matte = np.where(_small_holes(matte < bound), 1, matte)
+    return np.asarray(matte, np.float32)
+
+
+def _small_holes(thin: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which pixels (height, width) lie in pieces of a few thin ones, off the picture's border."""
+    height, width = thin.shape
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(thin.astype(np.uint8), connectivity=8)
+    left, top, across, down, area = stats[:, : cv2.CC_STAT_MAX].T
+    inside = (left > 0) & (top > 0) & (left + across < width) & (top + down < height)
+    holes = inside & (area <= (PINHOLE_SIDE * width) ** 2)
+    holes[0] = False  # what is not thin
+    return np.asarray(holes[labels], np.bool_)
 
 
 def feather_edges(matte: Mask) -> Mask:

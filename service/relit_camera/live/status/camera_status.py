@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from relit_camera.devices.sinks.sink import Readers
 from relit_camera.live.status.setup_status import SpeedAdvice
+from relit_camera.subject.light_trust import LightTrust
 
 
 class CameraState(StrEnum):
@@ -145,5 +146,7 @@ class CameraStatus:
     """Programs that take pictures from the virtual camera."""
     advice: SpeedAdvice | None = None
     """What to do where the computer has not kept up for some seconds."""
+    light: LightTrust | None = None
+    """How far the subject is to be trusted in the present light; null without a subject, and where no light is on."""
     version: str = ""
     uptime_s: float = 0.0

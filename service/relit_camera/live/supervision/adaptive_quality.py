@@ -19,19 +19,24 @@ class QualityLimits:
     Attributes:
         late_s: mean latency of the last pictures above which quality is lowered.
         early_s: mean latency below which it is raised: far enough below `late_s` that a level up stays below that.
+        probe_after_s: how long pictures must have been bearable, if not early, until a level up is tried all the same,
+            as on a slow computer they may never be early.
         idle_s: mean latency below which the load has surely gone, and raising is not delayed.
         lower_after_s: how long pictures must be late, and how long a level is given to show what it saves.
         raise_after_s: how long pictures must be early. All levels up within two seconds.
         max_raise_delay_s: each time a raised level proves too costly the wait before the next try doubles, up to this.
+        last_level_s: how long pictures must be late at the last level until one up is tried all the same.
         smoothing_s: time constant of the mean.
     """
 
     late_s: float = 0.080
     early_s: float = 0.055
+    probe_after_s: float = 2.0
     idle_s: float = 0.040
     lower_after_s: float = 0.4
     raise_after_s: float = 0.35
     max_raise_delay_s: float = 16.0
+    last_level_s: float = 20.0
     smoothing_s: float = 0.15
 
 
@@ -45,8 +50,10 @@ class QualityState:
         seen_at: when the last picture was rendered, in seconds on the clock.
         since: since when pictures have been late or early without a break; None while they are neither.
         late: which of the two.
+        bearable_since: since when they have not been late for `lower_after_s` without a break; None while they are, and
+            after a change of level or a pause.
         raised_at: when quality was last raised; None when it was not, or when that has proved right.
-        raise_delay_s: how long pictures must be early before quality is raised.
+        raise_delay_s: how long pictures must be early or bearable before quality is raised.
     """
 
     level: int = 0
@@ -54,6 +61,7 @@ class QualityState:
     seen_at: float = 0.0
     since: float | None = None
     late: bool = False
+    bearable_since: float | None = None
     raised_at: float | None = None
     raise_delay_s: float = 0.0
 
@@ -75,17 +83,39 @@ def next_quality(state: QualityState, rendered_at: float, latency_s: float, limi
     state = _with_latency(state, rendered_at, latency_s, limits)
     latency = state.latency_s or 0.0
     late, early = latency > limits.late_s, latency < limits.early_s
+    if state.bearable_since is None and not late:
+        state = replace(state, bearable_since=rendered_at)
     if not late and not early:
-        return replace(state, since=None)
+        return _probed(replace(state, since=None), rendered_at, limits)
     since = rendered_at if state.since is None or late is not state.late else state.since
     state, lasted = replace(state, since=since, late=late), rendered_at - since
-    if late and lasted >= limits.lower_after_s and state.level + 1 < len(QUALITY_LEVELS):
-        return _lowered(state, rendered_at, limits)
+    if late and lasted >= limits.lower_after_s:
+        state = replace(state, bearable_since=None)
+        if state.level + 1 < len(QUALITY_LEVELS):
+            return _lowered(state, rendered_at, limits)
+        if lasted >= limits.last_level_s:  # perhaps it is this level that is slow, and not the load that is large
+            return _raised(state, rendered_at)
+        # What was tried before says nothing of a load that lasts.
+        return state if lasted < limits.probe_after_s else replace(state, raise_delay_s=0.0)
     idle = latency < limits.idle_s
     delay = limits.raise_after_s if idle else max(limits.raise_after_s, state.raise_delay_s)
     if early and lasted >= delay and state.level > 0:
-        return replace(state, level=state.level - 1, since=None, raised_at=rendered_at)
+        return _raised(state, rendered_at)
     return state
+
+
+def _probed(state: QualityState, now: float, limits: QualityLimits) -> QualityState:
+    """One level up, where pictures have not been late for so long; if that proves too costly, later the next time."""
+    delay = max(limits.probe_after_s, state.raise_delay_s)
+    if state.raised_at is not None and now - state.raised_at >= 2 * (delay + limits.lower_after_s):
+        state = replace(state, raised_at=None, raise_delay_s=0.0)  # the level has proved right
+    if state.level == 0 or state.bearable_since is None or now - state.bearable_since < delay:
+        return state
+    return replace(_raised(state, now), raise_delay_s=delay)
+
+
+def _raised(state: QualityState, now: float) -> QualityState:
+    return replace(state, level=state.level - 1, since=None, bearable_since=None, raised_at=now)
 
 
 def _with_latency(state: QualityState, now: float, latency_s: float, limits: QualityLimits) -> QualityState:
@@ -93,10 +123,11 @@ def _with_latency(state: QualityState, now: float, latency_s: float, limits: Qua
     latency_s = min(latency_s, 2 * limits.late_s)  # one that is very late, while models are opened, is still but one
     if state.latency_s is None or now < state.seen_at:
         return replace(state, latency_s=latency_s, seen_at=now)
-    weight = min(1.0, (now - state.seen_at) / limits.smoothing_s)
+    mean_s, weight = state.latency_s, min(1.0, (now - state.seen_at) / limits.smoothing_s)
     # Nothing is known of a pause. Between pictures that take long there is none: the frame of the next has waited.
-    since = None if captured_at - state.seen_at > limits.lower_after_s else state.since
-    return replace(state, latency_s=state.latency_s + weight * (latency_s - state.latency_s), seen_at=now, since=since)
+    if captured_at - state.seen_at > limits.lower_after_s:
+        state = replace(state, since=None, bearable_since=None)
+    return replace(state, latency_s=mean_s + weight * (latency_s - mean_s), seen_at=now)
 
 
 def _lowered(state: QualityState, now: float, limits: QualityLimits) -> QualityState:
@@ -104,4 +135,4 @@ def _lowered(state: QualityState, now: float, limits: QualityLimits) -> QualityS
     delay = state.raise_delay_s or limits.raise_after_s
     tried = state.raised_at is not None and now - state.raised_at < 2 * delay + 2 * limits.lower_after_s
     delay = min(2 * delay, limits.max_raise_delay_s) if tried else limits.raise_after_s
-    return replace(state, level=state.level + 1, since=None, raised_at=None, raise_delay_s=delay)
+    return replace(state, level=state.level + 1, since=None, bearable_since=None, raised_at=None, raise_delay_s=delay)

@@ -46,6 +46,8 @@ class LocalBasis:
             ValueError: they do not; the message says how.
         """
         count = len(self.values)
+        if self.pixels.size == 0:
+            raise ValueError("there is no cluster with a pixel")
         if self.pixels.ndim != 2 or self.values.shape[1:] != (3, self.pixels.shape[1]):
             raise ValueError(f"values have shape {self.values.shape} for pixels of shape {self.pixels.shape}")
         if self.scales.shape != (count,) or self.mixes.ndim != 2 or len(self.mixes) != count:

@@ -1,30 +1,28 @@
-"""Writing small ONNX graphs, in the wire format of onnx.proto and without the package `onnx`.
+"""Small ONNX graphs of large matrices: they are written in the wire format of onnx.proto, and opened on the CPU.
 
-Every subject has a graph of its own, and the package would cost the running camera 8 MB and a tenth of a second. What
-is written here the tests read with it.
+Every subject has graphs of its own, and the package `onnx` would cost the running camera 8 MB and a tenth of a second.
+What is written here the tests read with it. The matrices are not copied into a graph, which only names them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 from numpy.typing import NDArray
 
-ELEMENT_TYPES = {"float32": 1, "uint8": 2, "int8": 3, "int64": 7}
+from relit_camera.base.models.session_with_fallback import Session, SessionOptions, open_session
+
+OPSET, IR_VERSION = 21, 9
+ELEMENT_TYPES = {"float32": 1, "uint8": 2, "int8": 3, "int32": 6}
 """TensorProto.DataType by NumPy's names."""
-_ATTRIBUTE_INT, _ATTRIBUTE_INTS = 2, 7
+_ATTRIBUTE_INT, _EXTERNAL = 2, 1
 
 
-def node(operator: str, inputs: Sequence[str], outputs: Sequence[str], **attributes: int | Sequence[int]) -> bytes:
+def node(operator: str, inputs: Sequence[str], outputs: Sequence[str], **attributes: int) -> bytes:
     """An operator with its named values and integer attributes (NodeProto)."""
     parts = [_text(1, name) for name in inputs] + [_text(2, name) for name in outputs] + [_text(4, operator)]
     for name, value in attributes.items():
-        if isinstance(value, int):
-            given = _number(3, value) + _number(20, _ATTRIBUTE_INT)
-        else:
-            given = b"".join(_number(8, each) for each in value) + _number(20, _ATTRIBUTE_INTS)
-        parts.append(_message(5, _text(1, name) + given))
+        parts.append(_message(5, _text(1, name) + _number(3, value) + _number(20, _ATTRIBUTE_INT)))
     return b"".join(parts)
 
 
@@ -39,22 +37,35 @@ def model(
     name: str,
     nodes: Sequence[bytes],
     inputs: Sequence[bytes],
-    output: bytes,
+    outputs: Sequence[bytes],
     constants: Mapping[str, NDArray],
-    opset: int,
-    ir_version: int,
 ) -> bytes:
-    """A model of one graph (ModelProto), for `open_session`."""
+    """A model of one graph (ModelProto), for `open_session`, which must be given the constants too."""
     graph = [*(_message(1, each) for each in nodes), _text(2, name)]
-    graph += [_message(5, _tensor(each, value)) for each, value in constants.items()]
-    graph += [*(_message(11, each) for each in inputs), _message(12, output)]
-    return _number(1, ir_version) + _message(7, b"".join(graph)) + _message(8, _text(1, "") + _number(2, opset))
+    graph += [_message(5, _external_tensor(each, value)) for each, value in constants.items()]
+    graph += [_message(11, each) for each in inputs] + [_message(12, each) for each in outputs]
+    return _number(1, IR_VERSION) + _message(7, b"".join(graph)) + _message(8, _text(1, "") + _number(2, OPSET))
 
 
-def _tensor(name: str, value: NDArray) -> bytes:
+def cpu_session(
+    name: str,
+    nodes: Sequence[bytes],
+    inputs: Sequence[bytes],
+    outputs: Sequence[bytes],
+    constants: Mapping[str, NDArray],
+    threads: int,
+) -> Session:
+    """A session on the CPU for the graph of these nodes, inputs, outputs and constants."""
+    written = model(name, nodes, inputs, outputs, constants)
+    return open_session(written, name, SessionOptions("cpu", threads), constants)
+
+
+def _external_tensor(name: str, value: NDArray) -> bytes:
+    """A tensor whose numbers are elsewhere (TensorProto)."""
+    where = {"location": name, "offset": "0", "length": str(value.nbytes)}
+    entries = b"".join(_message(13, _text(1, key) + _text(2, text)) for key, text in where.items())
     sizes = b"".join(_number(1, size) for size in value.shape)
-    raw = np.ascontiguousarray(value, value.dtype.newbyteorder("<")).tobytes()
-    return sizes + _number(2, ELEMENT_TYPES[value.dtype.name]) + _text(8, name) + _message(9, raw)
+    return sizes + _number(2, ELEMENT_TYPES[value.dtype.name]) + _text(8, name) + entries + _number(14, _EXTERNAL)
 
 
 def _number(field: int, value: int) -> bytes:
@@ -70,8 +81,7 @@ def _message(field: int, content: bytes) -> bytes:
 
 
 def _varint(value: int) -> bytes:
-    """Seven bits a byte, the lowest first; negative numbers as 64 bits."""
-    value &= (1 << 64) - 1
+    """Seven bits a byte, the lowest first."""
     encoded = bytearray()
     while value > 127:
         encoded.append(value & 127 | 128)

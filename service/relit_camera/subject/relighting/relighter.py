@@ -86,4 +86,5 @@ def open_relighter(name: str, subject: Subject, session: SessionOptions | None =
 def weighted_light(light_maps: NDArray[np.float32]) -> NDArray[np.float32]:
     """E[l] · ω_l of light maps (..., 32, 64, 3) as float32 (..., 2048, 3): the right-hand side of the product."""
     omega = texel_solid_angles().astype(np.float32)
-    return np.ascontiguousarray((light_maps * omega[..., None]).reshape(*light_maps.shape[:-3], TEXELS, 3))
+    weighted = (light_maps * omega[..., None]).reshape(*light_maps.shape[:-3], TEXELS, 3)
+    return np.ascontiguousarray(weighted, np.float32)

@@ -36,8 +36,16 @@ def test_shut_eyes_tell_nothing() -> None:
 
 
 def test_brighter_eye_whites_mean_darker_skin_within_the_limits_of_skin() -> None:
-    light, medium, dark = (skin_luminance_by_eyes(ratio) for ratio in (0.8, 1.4, 2.4))
+    light, medium, dark = (skin_luminance_by_eyes(ratio) for ratio in (0.9, 1.4, 2.7))
     assert dark < medium < light
-    assert light / dark == pytest.approx(3 ** (1.25 * 0.75), rel=1e-3)
-    assert skin_luminance_by_eyes(100.0) == skin_luminance_by_eyes(2.5)
+    assert light / dark == pytest.approx(3**1.25, rel=1e-3)
+    assert skin_luminance_by_eyes(100.0) == skin_luminance_by_eyes(3.0)
     assert dark < skin_luminance_by_eyes(None) < light
+
+
+@pytest.mark.parametrize(("whites_over_skin", "luminance"), [(1.01, 0.344), (1.35, 0.162), (2.74, 0.077)])
+def test_the_level_of_known_people_before_a_screen_is_right_within_half_a_stop(
+    whites_over_skin: float, luminance: float
+) -> None:
+    """Rendered people from light to dark; the one in the middle was not used to choose the level."""
+    assert abs(np.log2(skin_luminance_by_eyes(whites_over_skin) / luminance)) < 0.5

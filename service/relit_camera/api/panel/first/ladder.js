@@ -1,16 +1,18 @@
-// The ladder: how the present subject was captured, what may be trusted, the next rung, and its expression stills.
+// The ladder: how the present subject was captured, what may be trusted, in the present light too, the next rung, and
+// its expression stills.
 
 import { call, toast } from "../api.js";
 import { on } from "../stage/events.js";
 import { onScene, scene } from "../stage/scene.js";
-import { make } from "../widgets.js";
+import { make, setText } from "../widgets.js";
 import { captureFace, openDoors } from "./doors.js";
 
 const DEMO_NAME = "demo person";
+const MOSTLY = 0.6; // of a known man all places beyond it were worse than 23 dB before a screen (docs/desk.md)
 const RUNGS = {
   instant: {
     line: "captured in the light of a room",
-    trust: "Right in soft places: a room, a sky, a sunset. Lamps from the side and behind are softened.",
+    trust: "Right in soft places: a room, a sky, a sunset. Lamps from behind are softened.",
     next: ["Better: by this screen’s light, a minute", "/desk"],
   },
   desk: {
@@ -18,7 +20,7 @@ const RUNGS = {
     trust: "Light from the front is measured, from behind it is a guess.",
     next: ["Best: film yourself with a lamp, an evening", "/film"],
   },
-  film: { line: "captured with a lamp and a mirror ball", trust: "Right in any light, a single hard lamp too." },
+  film: { line: "captured with a lamp and a mirror ball", trust: "Right in light from where the lamp was, a single hard lamp too." },
   pictures: { line: "captured under one light at a time", trust: "Right where there was light, modelled elsewhere." },
 };
 const OLD = { line: "captured by an older version, which did not note how", trust: "" };
@@ -30,8 +32,9 @@ const DEMO = {
 const ladder = document.getElementById("ladder");
 const line = make("p", { id: "ladder-line", role: "status" });
 const trust = make("p", { id: "ladder-trust", className: "hint" });
+const light = make("p", { id: "ladder-light", className: "notes", role: "status", hidden: true });
 const next = make("div", { className: "buttons" });
-ladder.append(line, trust, next);
+ladder.append(line, trust, light, next);
 
 const stills = make("button", { type: "button", id: "ladder-stills", hidden: true });
 stills.onclick = takeStills;
@@ -62,6 +65,16 @@ function nextRung(now, rung) {
   const button = make("button", { type: "button", id: "ladder-next" }, "My face now");
   button.onclick = captureFace;
   return button;
+}
+
+/** Says, as the light changes, where most of it is a guess for this face, and that it is shown softer than it is. */
+function tellLight({ light: trusted, subject: name }) {
+  const guessed = trusted !== null && trusted.behind > MOSTLY && name === scene()?.subject;
+  const told = ["Most of this light comes from behind: for this face that is a guess."];
+  if (trusted?.softened > MOSTLY) told.push("It is shown softer than it is.");
+  told.push("Turn the light to the front, or put a lamp before you.");
+  setText(light, guessed ? told.join(" ") : "");
+  light.hidden = !guessed;
 }
 
 function people() {
@@ -95,6 +108,7 @@ async function takeStills() {
 }
 
 onScene(show);
+on("status", tellLight);
 on("collection", ({ name }) => {
   if (name !== "subjects" || !scene()) return;
   known = ""; // perhaps its file has changed

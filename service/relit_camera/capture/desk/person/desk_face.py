@@ -24,8 +24,8 @@ MIN_FACE_PX = 90.0
 """Least height of a face, brow to chin: it fills a fifth of a VGA frame."""
 SECOND_FACE = 0.5
 """Height of another face, relative to the largest, from which there are two."""
-MAX_TURN = 0.25
-"""Of the nose from the middle of the eyes, in distances of the eyes."""
+MAX_TURN_DEG = 45.0
+"""Between nose and webcam, which may stand beside and above the screen that is looked at."""
 _MATTE_REPEATS = 3
 
 
@@ -79,14 +79,25 @@ def find_face(picture: DisplayImage, setup: DeskSetup) -> DeskFace:
 
 
 def find_mesh_landmarks(picture: DisplayImage) -> Points | None:
-    """Landmarks (478, 2) of the scheme `mesh478`; None where the tracker is not installed or sees no face."""
+    """Landmarks (478, 2) of the scheme `mesh478`; None where the tracker is not installed.
+
+    Raises:
+        CaptureError: the tracker sees no face, or one from the side.
+    """
     try:
         tracker = open_tracker("mesh", TrackerOptions(blendshapes=False))
     except ModelError as error:
         log.warning("the head's shape is taken to be an ellipsoid: %s", error)
         return None
     state = track_still(picture, tracker)
-    return state.landmarks if state.visible else None
+    if not state.visible or state.pose is None:
+        raise CaptureError(
+            "the face is seen from the side, or half hidden", "look at the screen, the webcam before you, face free"
+        )
+    if state.pose.turn_deg > MAX_TURN_DEG:
+        what = f"the face is turned away from the webcam by {state.pose.turn_deg:.0f} degrees"
+        raise CaptureError(what, "look at the screen, and put the webcam nearer to its middle")
+    return state.landmarks
 
 
 def segment_person(picture: DisplayImage) -> Mask | None:

@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from relit_camera.base.array_types import Float32Array
 from relit_camera.base.images.image_types import LinearImage, Mask
-from relit_camera.capture.desk.person.desk_field import DeskField
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.soft_lights import SoftLights, regularized_nnls
-from relit_camera.subject.reflectance_field import texel_vectors
+from relit_camera.subject.reflectance_field import ExactField, texel_vectors
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class RoomGainTunables:
 TUNABLES = RoomGainTunables()
 
 
-def room_gain(field: DeskField, room: LinearImage, skin: NDArray[np.bool_], matte: Mask) -> Float32Array | None:
+def room_gain(field: ExactField, room: LinearImage, skin: NDArray[np.bool_], matte: Mask) -> Float32Array | None:
     """Gain (height · width, 3) of the field, mean about 1 on the skin; None where the skin tells no room light.
 
     Args:

@@ -41,13 +41,12 @@ class SkinTunables:
             room are not in the same light.
         room_range: logarithmic limits of that exposure.
         percentile: of the skin's luminances which counts: skin that the light reaches.
-        like_eye_whites: luminance of skin that is seen as bright as the shaded whites of its eyes.
-        eye_slope: by how much darker skin is, in logarithms, whose eye whites are brighter than it. Both numbers were
-            found on four rendered people from light to dark.
+        like_eye_whites: luminance of skin that is seen as bright as the whites of its eyes, which the lids shade.
+        like_lit_eye_whites: the same in light from the front, as of a screen, which shades them less.
+        eye_slope: by how much darker skin is, in logarithms, whose eye whites are brighter than it. These numbers were
+            found on rendered people from light to dark.
         eye_range: limits of that ratio.
         eye_share, lone_eye_share: weight of the eye whites beside the exposure, and where nothing is known of it.
-        frontal_eye_share: the same beside the typical skin, in light from the front: whites are off by half a stop,
-            and skin by one from the typical.
     """
 
     typical: float = 0.2
@@ -59,11 +58,11 @@ class SkinTunables:
     room_range: tuple[float, float] = (-1.0, 1.0)
     percentile: float = 70.0
     like_eye_whites: float = 0.24
+    like_lit_eye_whites: float = 0.32
     eye_slope: float = 1.25
-    eye_range: tuple[float, float] = (0.5, 2.5)
+    eye_range: tuple[float, float] = (0.5, 3.0)
     eye_share: float = 0.2
     lone_eye_share: float = 0.6
-    frontal_eye_share: float = 0.75
 
 
 SKIN = SkinTunables()
@@ -104,7 +103,7 @@ def estimate_skin(
     known = (1 - SKIN.light_share) * np.log(apparent) + SKIN.light_share * np.log(SKIN.typical)
     if eye_whites is not None:
         share = SKIN.eye_share if frame_luminance is not None else SKIN.lone_eye_share
-        known = (1 - share) * known + share * _log_luminance_by_eyes(eye_whites)
+        known = (1 - share) * known + share * _log_luminance_by_eyes(eye_whites, SKIN.like_eye_whites)
     expected = skin_of_luminance(float(np.exp(known)))
     level = float(expected @ LUMINANCE)
     own = seen / float(seen @ LUMINANCE)
@@ -119,11 +118,11 @@ def skin_luminance_by_eyes(eye_whites: float | None) -> float:
     Such an exposure makes all skin equally bright, so the whites of the eyes alone tell it; typical skin, where these
     (see `eye_white_ratio`) are unknown.
     """
-    known = np.log(SKIN.typical)
-    if eye_whites is not None:
-        known += SKIN.frontal_eye_share * (_log_luminance_by_eyes(eye_whites) - known)
-    return float(np.clip(np.exp(known), DARKEST @ LUMINANCE, LIGHTEST @ LUMINANCE))
+    if eye_whites is None:
+        return SKIN.typical
+    told = np.exp(_log_luminance_by_eyes(eye_whites, SKIN.like_lit_eye_whites))
+    return float(np.clip(told, DARKEST @ LUMINANCE, LIGHTEST @ LUMINANCE))
 
 
-def _log_luminance_by_eyes(eye_whites: float) -> float:
-    return float(np.log(SKIN.like_eye_whites) - SKIN.eye_slope * np.log(np.clip(eye_whites, *SKIN.eye_range)))
+def _log_luminance_by_eyes(eye_whites: float, like_eye_whites: float) -> float:
+    return float(np.log(like_eye_whites) - SKIN.eye_slope * np.log(np.clip(eye_whites, *SKIN.eye_range)))

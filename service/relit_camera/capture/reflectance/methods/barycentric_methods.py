@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError
 
 from relit_camera.capture.reflectance.delaunay_triangulation import (
-    MAX_GAP_DEG,
     TOLERANCE,
     degenerate_directions_error,
     find_triangles,
@@ -17,6 +16,7 @@ from relit_camera.capture.reflectance.delaunay_triangulation import (
 from relit_camera.capture.reflectance.method_registry import factored_field
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import spherical_from_direction
+from relit_camera.subject.measured_light import MAX_GAP_DEG
 from relit_camera.subject.reflectance_field import FactoredField
 
 

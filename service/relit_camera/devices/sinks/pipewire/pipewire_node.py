@@ -107,8 +107,8 @@ class PipeWireNode:
         readers = self._readers
         if not self._streaming or readers is None:
             return Readers(0)
-        names = readers.names(self._number)
-        return Readers(max(1, len(names)), tuple(dict.fromkeys(names)))
+        found = readers.of_node(self._number)
+        return Readers(max(1, found.count or 0), found.names)  # it streams before the links are told
 
     def close(self) -> None:
         """Take the camera away. Harmless when repeated."""

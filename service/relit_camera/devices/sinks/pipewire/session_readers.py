@@ -1,12 +1,18 @@
-"""Names of the programs that read a node, from the registry of the PipeWire session."""
+"""The programs that read a node, from the registry of the PipeWire session."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from relit_camera.devices.sinks.pipewire import pipewire_library as library
+from relit_camera.devices.sinks.sink import Readers
 
+MAX_NAMES, MAX_NAME_LENGTH = 32, 100
+"""Of the readers that are named: what a program calls itself is its own affair, and is told with pictures."""
 NODE, LINK = "PipeWire:Interface:Node", "PipeWire:Interface:Link"
+Objects = Mapping[int, tuple[str, Mapping[str, str]]]
+"""Nodes and links of a session by their number: type and properties."""
 
 
 class SessionReaders:
@@ -30,14 +36,9 @@ class SessionReaders:
         if self._registry:
             library.listen_to_registry(self._registry, self._hook, self._events)
 
-    def names(self, node: int) -> tuple[str, ...]:
-        """Of the programs that are linked to a node, by its number; one for each link. From any thread."""
-        found = dict(self._found)
-        links = (properties for kind, properties in found.values() if kind == LINK)
-        readers = [link.get("link.input.node", "") for link in links if link.get("link.output.node") == str(node)]
-        # The node's own name: a client that came through the portal bears the portal's.
-        nodes = (found.get(int(reader), (NODE, {}))[1] for reader in readers if reader.isdigit())
-        return tuple(each.get("application.name") or each.get("node.name") or "a program" for each in nodes)
+    def of_node(self, node: int) -> Readers:
+        """Those that are linked to a node, by its number. From any thread."""
+        return readers_of_node(dict(self._found), node)
 
     def close(self) -> None:
         """Listen no longer; the loop is stopped."""
@@ -52,3 +53,16 @@ class SessionReaders:
 
     def _on_gone(self, _: Any, identifier: int) -> None:
         self._found.pop(identifier, None)
+
+
+def readers_of_node(objects: Objects, node: int) -> Readers:
+    """The programs that are linked to a node: how many links there are, and each name once.
+
+    There are `MAX_NAMES` of them at most, cut at `MAX_NAME_LENGTH` characters.
+    """
+    links = (properties for kind, properties in objects.values() if kind == LINK)
+    readers = [link.get("link.input.node", "") for link in links if link.get("link.output.node") == str(node)]
+    # The node's own name: a client that came through the portal bears the portal's.
+    nodes = [objects.get(int(reader), (NODE, {}))[1] for reader in readers if reader.isdigit()]
+    names = (each.get("application.name") or each.get("node.name") or "a program" for each in nodes)
+    return Readers(len(nodes), tuple(dict.fromkeys(name[:MAX_NAME_LENGTH] for name in names))[:MAX_NAMES])

@@ -178,7 +178,7 @@ def _build(
         return _Built(subject, None, seconds)
     relit = BasisRelighter(subject).relight(truth.maps)
     if rung.own_frame:
-        relit = _in_frame_of(truth.person, subject, relit, truth.relit, followed, scheme)
+        relit = in_frame_of(truth.person, subject, relit, truth.relit, followed, scheme)
     return _Built(subject, field_figures(relit, truth.relit, truth.person.counted), seconds)
 
 
@@ -241,7 +241,7 @@ def _tint(truth: _TrueLight, room: Environment, frames: RoomFrames) -> tuple[Run
     return RungFigures(*truth.shown_figures(room, pictures), field), pictures
 
 
-def _in_frame_of(
+def in_frame_of(
     person: KnownPerson, subject: Subject, relit: Pictures, truth: Pictures, followed: FollowedFrame, scheme: str
 ) -> Pictures:
     """Pictures (count, …) of a subject with a picture frame of its own, as they lie in the known pictures.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from relit_camera.doctor.browsers import check_browsers
+from relit_camera.doctor.readers.browsers import check_browsers
 from relit_camera.doctor.report import Severity
 from tests.doctor.fake_host import FakeMachine, expect
 
@@ -39,6 +39,22 @@ def test_an_override_opens_it(machine: FakeMachine, tmp_path: Path, name: str) -
     home = home.relative_to(machine.root)
     expect(check_browsers(machine.host, home), Severity.WARNING, CHROME)
     machine.write(f"home/me/.local/share/flatpak/overrides/{name}", "[Context]\ndevices=all;\n")
+    expect(check_browsers(machine.host, home), Severity.OK)
+
+
+def test_an_override_closes_it(machine: FakeMachine, tmp_path: Path) -> None:
+    home, overrides = Path("home/me"), "home/me/.local/share/flatpak/overrides"
+    flatpak(machine, CHROME, "all;")
+    machine.write(f"{overrides}/{CHROME}", "[Context]\ndevices=!all;dri;\n")
+    expect(check_browsers(machine.host, home), Severity.WARNING, CHROME)
+    # The user's have the last word, and those of an app before those of all.
+    machine.write(f"var/lib/flatpak/overrides/{CHROME}", "[Context]\ndevices=all;\n")
+    machine.write(f"{overrides}/global", "[Context]\ndevices=all;\n")
+    expect(check_browsers(machine.host, home), Severity.WARNING, CHROME)
+    machine.write(f"{overrides}/{CHROME}", "[Context]\ndevices=dri;\n")
+    machine.write(f"{overrides}/global", "[Context]\ndevices=!all;\n")
+    expect(check_browsers(machine.host, home), Severity.WARNING, CHROME)
+    machine.write(f"{overrides}/{CHROME}", "[Context]\ndevices=all;\n")
     expect(check_browsers(machine.host, home), Severity.OK)
 
 
@@ -130,3 +146,69 @@ def test_damaged_settings_are_as_none(bare: FakeMachine, tmp_path: Path) -> None
     for text in ("{", "[]", '{"browser": 3}'):
         bare.write(f"{str(tmp_path).lstrip('/')}/.config/chromium/Local State", text)
         expect(check_browsers(bare.host, tmp_path), Severity.WARNING, "Chromium 131 reads devices")
+
+
+# Profiles and sandboxes.
+
+
+def test_each_profile_of_firefox_is_named(bare: FakeMachine, tmp_path: Path) -> None:
+    bare.run_session()
+    firefox(bare, "140.1.0")
+    home = str(tmp_path).lstrip("/")
+    prefer_pipewire(bare, f"{home}/.mozilla/firefox/x1.default-esr/prefs.js")
+    bare.write(f"{home}/.mozilla/firefox/x2.work/prefs.js", 'user_pref("other", 1);\n')
+    finding = check_browsers(bare.host, tmp_path)
+    expect(
+        finding,
+        Severity.WARNING,
+        "Firefox 140.1.0, profile default-esr reads PipeWire, Firefox 140.1.0, profile work reads devices",
+        "in Firefox, profile work's about:config",
+    )
+    assert "default-esr" not in finding.cure
+    prefer_pipewire(bare, f"{home}/.mozilla/firefox/x2.work/user.js")
+    expect(check_browsers(bare.host, tmp_path), Severity.OK, "profile work reads PipeWire")
+
+
+def test_profiles_of_the_same_name_are_told_apart(bare: FakeMachine, tmp_path: Path) -> None:
+    bare.run_session()
+    firefox(bare, "140.1.0")
+    folder = f"{str(tmp_path).lstrip('/')}/.mozilla/firefox"
+    bare.write(f"{folder}/a1.default-release/prefs.js", "")
+    prefer_pipewire(bare, f"{folder}/b2.default-release/prefs.js")
+    prefer_pipewire(bare, f"{folder}/c3.work/prefs.js")
+    expect(
+        check_browsers(bare.host, tmp_path),
+        Severity.WARNING,
+        "profile a1.default-release reads devices",
+        "profile b2.default-release reads PipeWire",
+        "profile work reads PipeWire",
+        "in Firefox, profile a1.default-release's about:config",
+    )
+
+
+def test_sandboxed_browsers_have_settings_of_their_own(bare: FakeMachine, tmp_path: Path) -> None:
+    bare.run_session()
+    home = str(tmp_path).lstrip("/")
+    firefox(bare, "140.1.0")
+    prefer_pipewire(bare, f"{home}/.mozilla/firefox/x.default/prefs.js")
+    flatpak(bare, "org.mozilla.firefox", "dri;")
+    firefox(bare, "141.0", "var/lib/flatpak/app/org.mozilla.firefox/current/active/files/lib/firefox")
+    firefox(bare, "142.0", "snap/firefox/current/usr/lib/firefox")
+    flatpak(bare, CHROME, "dri;")
+    finding = check_browsers(bare.host, tmp_path)
+    expect(
+        finding,
+        Severity.WARNING,
+        "Firefox 140.1.0 reads PipeWire",
+        "Firefox (Snap) 142.0 reads devices",
+        "Firefox (Flatpak) 141.0 reads devices",
+        "Chrome (Flatpak) reads devices",
+        "in Chrome (Flatpak) set chrome://flags",
+    )
+    prefer_pipewire(bare, f"{home}/snap/firefox/common/.mozilla/firefox/x.default/prefs.js")
+    prefer_pipewire(bare, f"{home}/.var/app/org.mozilla.firefox/.mozilla/firefox/x.default/prefs.js")
+    bare.write(
+        f"{home}/.var/app/{CHROME}/config/google-chrome/Local State",
+        json.dumps({"browser": {"enabled_labs_experiments": ["enable-webrtc-pipewire-camera@1"]}}),
+    )
+    expect(check_browsers(bare.host, tmp_path), Severity.OK, "Firefox (Flatpak) 141.0 reads PipeWire")
