@@ -157,7 +157,7 @@ def nobody(codes: Codes) -> Shot:
 def board_before_the_ball(codes: Codes) -> Shot:
     """Its lower third is hidden; the camera's focal length is not known."""
     hidden = codes.copy()
-    hidden[:, 79:120, 150:] = codes[:, 79:120, :90]
+    hidden[:, 81:120, 150:] = codes[:, 81:120, :90]
     return Shot(hidden, {"focal-px": None, "method": "nearest"})
 
 
