@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cv2
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environments.environment_panorama import Environment
 from tests.api.api_client import Client, check_problem, decoded_picture, hdr, png
 from tests.api.fake_camera import FakeCamera
 from tests.generated_subject import generated_subject, small_subject
@@ -135,6 +138,31 @@ def test_a_place_on_the_person_who_is_shown(client: Client, camera: FakeCamera) 
     assert difference(picture[middle], other[middle]) > 5  # the person's light too, not only the place
     check_problem(client.get(f"{ENVIRONMENTS}/nowhere/on-me.jpg"), 404)
     assert client.get(path).content == first.content
+
+
+def test_other_pictures_do_not_wait_for_one_that_is_made_in_the_background(
+    client: Client, camera: FakeCamera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera.scene_controller.show_subject("small", small_subject())
+    begun, goes_on = threading.Event(), threading.Event()
+    load = camera.scene_controller.environments.load
+
+    def held_up(name: str) -> Environment:
+        if name == "window":  # as by programs that take all cores, for its thread has a low priority
+            begun.set()
+            assert goes_on.wait(30)
+        return load(name)
+
+    monkeypatch.setattr(camera.scene_controller.environments, "load", held_up)
+    with ThreadPoolExecutor(1) as other:
+        made = other.submit(client.get, f"{ENVIRONMENTS}/window/on-me.jpg")
+        try:
+            assert begun.wait(30)
+            assert client.get(f"{ENVIRONMENTS}/party/thumbnail.jpg").status_code == 200
+            assert not made.done()
+        finally:
+            goes_on.set()
+        assert made.result().status_code == 200
 
 
 def test_another_person_has_other_pictures(client: Client, camera: FakeCamera) -> None:
