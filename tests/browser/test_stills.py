@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Locator, expect
+from playwright.sync_api import Locator, Route, expect
 
 from relit_camera.app.demo import demo_files
 from relit_camera.live.status.expression_status import ExpressionReport, ExpressionStage
@@ -118,6 +118,23 @@ def test_a_page_that_is_closed_cancels_it(fake: FakeServer, open_page: OpenPage)
     panel, _dialog = open_card(fake, open_page)
     panel.page.keyboard.press("Enter")
     wait_until(lambda: stage(fake) is ExpressionStage.FILMING)  # the page says so before the camera has been asked
+    panel.page.goto("about:blank")
+    wait_until(lambda: stage(fake) is ExpressionStage.CANCELED)
+
+
+def test_a_page_that_is_closed_while_it_waits_for_an_answer_cancels_it(fake: FakeServer, open_page: OpenPage) -> None:
+    panel, _dialog = open_card(fake, open_page)
+
+    def withhold_answer(route: Route) -> None:
+        if route.request.method == "POST":
+            route.fetch()
+        else:
+            route.continue_()
+
+    panel.page.route("**/captures/expressions", withhold_answer)
+    panel.page.keyboard.press("Enter")
+    while stage(fake) is not ExpressionStage.FILMING:
+        panel.page.wait_for_timeout(20)  # the request passes through this thread
     panel.page.goto("about:blank")
     wait_until(lambda: stage(fake) is ExpressionStage.CANCELED)
 

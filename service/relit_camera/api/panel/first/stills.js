@@ -49,6 +49,7 @@ class StillsDialog {
   #step = "";
   #taken = false;
   #sending = null;
+  #filming = false; // also where no answer came: a page that is left gives up its requests first
 
   constructor(name) {
     this.subject = name;
@@ -86,7 +87,7 @@ class StillsDialog {
     const closed = new Promise((resolve) => {
       this.dialog.onclose = resolve;
     });
-    const leave = () => this.#step === "filming" && fetch(`/api/v1/${PATH}`, { method: "DELETE", keepalive: true });
+    const leave = () => this.#filming && fetch(`/api/v1/${PATH}`, { method: "DELETE", keepalive: true });
     addEventListener("pagehide", leave);
     this.dialog.showModal();
     this.#show("ready");
@@ -110,7 +111,7 @@ class StillsDialog {
   }
 
   get #running() {
-    return ["filming", "building", "sending"].includes(this.#step); // what was sent whole is worked on already
+    return this.#filming || ["building", "sending"].includes(this.#step); // what was sent whole is worked on already
   }
 
   #show(step) {
@@ -161,17 +162,20 @@ class StillsDialog {
   /** Shows how far the capture is that `begin` begins, until it ends. */
   async #work(step, begin) {
     this.#show(step);
+    this.#filming = step === "filming";
     try {
       let status = await begin();
       this.#sending = null;
       if (!this.dialog.open) return;
       while (RUNNING.includes(status.stage)) {
+        this.#filming = status.stage === "filming";
         if (status.stage !== this.#step) this.#show(status.stage);
         this.#tell(status);
         await new Promise((resolve) => setTimeout(resolve, POLL_MS));
         if (!this.dialog.open) return;
         status = await call("GET", PATH);
       }
+      this.#filming = false;
       if (!this.dialog.open) return;
       if (status.stage === "failed") throw status;
       if (status.stage !== "done") return this.#show("ready"); // canceled elsewhere
@@ -180,6 +184,7 @@ class StillsDialog {
       this.#report(status);
     } catch (error) {
       this.#sending = null;
+      if (error.status) this.#filming = false;
       if (!this.dialog.open) return;
       this.#show("failed");
       showProblem(this.problem, error);
