@@ -114,13 +114,15 @@ def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: 
         while not stop.is_set():
             recorder.offer(Frame(desk.picture(random), index, index / 20, index / 20))
             index += 1
+            if filming.status().stage is DeskStage.BUILDING:
+                stop.wait(0.5)  # nobody looks; a picture takes the time of a core
 
     threads = [threading.Thread(target=work) for work in (page, webcam)]
     for thread in threads:
         thread.start()
     try:
         filming.start("me", PLACE)
-        wait_until(lambda: not filming.status().stage.is_running, 180)
+        wait_until(lambda: not filming.status().stage.is_running, 300)
     finally:
         stop.set()
         for thread in threads:
