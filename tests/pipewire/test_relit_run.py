@@ -119,18 +119,24 @@ def test_kill_9_and_a_new_start_end_no_call(session: Session, suite: str, note_r
     note_row("a camera in PipeWire that is killed and started again", row)
 
 
-@pytest.mark.parametrize("browser", ["Firefox", "Chromium"])
-def test_a_browser_shows_what_is_published(
-    portal: PortalSession, tmp_path: Path, suite: str, browser: str, note_row: Notes
-) -> None:
-    program = firefox_program() if browser == "Firefox" else chromium_program()
-    call_in: Callable[[Session, str], Call] = call_in_firefox if browser == "Firefox" else call_in_chromium
+@pytest.fixture(scope="module")
+def frozen(portal: PortalSession) -> Iterator[RelitRun]:
+    """`relit run` in a session with the portal, which publishes one picture all the time."""
     with running(portal) as relit:
         state_is(relit, "live")
         relit.put("freeze", {"frozen": True})
         state_is(relit, "frozen")
-        call = call_in(portal, program)
-        cv2.imwrite(str(tmp_path / "call.png"), call.image[..., ::-1])
-        assert (call.label, call.labels) == (LABEL, (LABEL,))
-        off = check_picture(call.image, relit)
+        yield relit
+
+
+@pytest.mark.parametrize("browser", ["Firefox", "Chromium"])
+def test_a_browser_shows_what_is_published(
+    portal: PortalSession, frozen: RelitRun, tmp_path: Path, suite: str, browser: str, note_row: Notes
+) -> None:
+    program = firefox_program() if browser == "Firefox" else chromium_program()
+    call_in: Callable[[Session, str], Call] = call_in_firefox if browser == "Firefox" else call_in_chromium
+    call = call_in(portal, program)
+    cv2.imwrite(str(tmp_path / "call.png"), call.image[..., ::-1])
+    assert (call.label, call.labels) == (LABEL, (LABEL,))
+    off = check_picture(call.image, frozen)
     note_row("relit run in PipeWire", (suite, browser, f"{off:.1f}"))

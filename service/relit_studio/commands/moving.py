@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from relit_camera.base.config.look import Mode
+from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_files import write_display
 from relit_camera.base.storage.atomic_files import write_atomic
 from relit_camera.lab.evaluate.video.moving_face_accuracy import PARTS, PartFigures, figures_table
+from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import read_subject
 from relit_studio.commands.options import Out, load_person, load_room, shown_progress
-from relit_studio.drive.moving.moving_table import LIVE, error_sheet, evaluate_live, evaluate_mode, read_truth
+from relit_studio.drive.moving.moving_table import (
+    INSTANT,
+    LIVE,
+    capture_from_clip,
+    error_sheet,
+    evaluate_live,
+    evaluate_mode,
+    read_truth,
+)
 from relit_studio.drive.moving.moving_truth import (
     LAMP_ROOMS,
     SWITCHED,
@@ -38,6 +49,10 @@ def moving(
     every: Annotated[int, typer.Option(min=1, max=24, help="Render only every N-th frame.")] = 6,
     field_size: Annotated[int, typer.Option(min=32, max=4096, help="Of the subject, pixels.")] = 256,
     field_lights: Annotated[int, typer.Option(min=4, max=9999, help="That the subject is made of.")] = 96,
+    instant: Annotated[
+        bool,
+        typer.Option("--instant/--no-instant", help="Also ratio with an instant subject of each clip."),
+    ] = True,
 ) -> None:
     """Render people who talk and turn before webcams and in the light that is wanted, and compare; it can be resumed.
 
@@ -49,6 +64,7 @@ def moving(
         files = MovingTruth(out / name)
         _render(name, files, rooms.split(","), lights.split(","), settings)
         subject = read_subject(files.subject)
+        captured = {room: _captured(files.clip(room), name) for room in rooms.split(",")} if instant else {}
         for light in lights.split(","):
             truth, environment = read_truth(files.truth(light)), load_room(light, 0.0).environment
             for room in rooms.split(","):
@@ -56,12 +72,23 @@ def moving(
                 rows = {LIVE: evaluate_live(files.clip(room), truth)}
                 for mode in map(Mode, modes.split(",")):
                     rows[mode] = evaluate_mode(files.clip(room), truth, subject, environment, mode, tracker)
+                if own := captured.get(room):
+                    rows[INSTANT] = evaluate_mode(files.clip(room), truth, own, environment, Mode.RATIO, tracker)
                 figures += [(f"{title}, {row}", found) for row, (found, _) in rows.items()]
                 sheet = error_sheet(truth, {row: shown for row, (_, shown) in rows.items()})
                 write_display(files.folder / f"{room}-{light}.png", sheet)
     typer.echo(figures_table(figures))
     parts = {title: {part: found.mean(part) for part in PARTS if part in found.decibels} for title, found in figures}
     write_atomic(out / "moving.json", json.dumps(parts, indent=1))
+
+
+def _captured(clip: Path, name: str) -> Subject | None:
+    """An instant subject of a clip; None, with a line on stderr, where it can be none, as for its user."""
+    try:
+        return capture_from_clip(clip)
+    except CaptureError as error:
+        typer.echo(f"{name}, {clip.name}: no instant subject: {error}", err=True)
+        return None
 
 
 def _render(name: str, files: MovingTruth, rooms: list[str], lights: list[str], settings: MovingSettings) -> None:

@@ -15,7 +15,17 @@ from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.light.environments.environment_store import EnvironmentStore
 from relit_camera.subject.subject_file import read_subject
-from relit_studio.drive.moving.moving_table import FIRST_FRAME, error_sheet, evaluate_live, evaluate_mode, read_truth
+from relit_studio.drive.moving.moving_table import (
+    FIRST_FRAME,
+    capture_from_clip,
+    error_sheet,
+    evaluate_live,
+    evaluate_mode,
+    read_truth,
+)
+from tests.capture.instant.conftest import models, pulled_models
+
+__all__ = ["models", "pulled_models"]
 
 DEMO = Path(str(files("relit_camera.app.demo") / "data"))
 FRAMES = 6
@@ -52,3 +62,12 @@ def test_a_mode_is_compared_frame_by_frame(clip: Path) -> None:
     assert 8 < figures.mean("face") < 40  # another light than the clip's
     sheet = error_sheet(truth, {"ratio": shown})
     assert sheet.shape[1] > 4 * 100
+
+
+@pytest.mark.usefixtures("models")
+def test_an_instant_subject_is_of_the_person_in_the_clip(clip: Path) -> None:
+    subject = capture_from_clip(clip)
+    assert subject.metadata.rung == "instant"
+    true = read_subject(DEMO / "adam.relit")
+    own, measured = (np.median(each.neutral[np.asarray(each.matte) > 0.5], axis=0) for each in (subject, true))
+    assert np.abs(np.diff(own / own.sum() - measured / measured.sum())).max() < 0.1  # skin, as of the same person

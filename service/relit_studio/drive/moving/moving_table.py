@@ -11,10 +11,12 @@ import numpy as np
 from relit_camera.app.replay.video_replay import replay
 from relit_camera.app.wiring import make_pipeline, make_tracker
 from relit_camera.base.config.look import Lighting, Look, Mode
-from relit_camera.base.config.settings import RelitSettings, TrackerSettings
+from relit_camera.base.config.settings import RelitSettings, SourceSettings, TrackerSettings
 from relit_camera.base.images.contact_sheet import contact_sheet
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.capture.instant.frame_reading import read_frames
+from relit_camera.capture.instant.instant_capture import capture_instant
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.tracking.track_recording import RecordedTracker
 from relit_camera.face.tracking.trackers import TrackerOptions
@@ -24,8 +26,8 @@ from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject
 
-LIVE = "live"
-"""The row of the live picture itself."""
+LIVE, INSTANT = "live", "ratio, instant"
+"""The rows of the live picture itself, and of mode ratio with a subject made of the clip."""
 FIRST_FRAME = 2
 """From here on frames count: before, mode ratio eases in from the picture as filmed."""
 SHEET_FRAMES = 6
@@ -56,6 +58,18 @@ def read_truth(folder: Path) -> list[TrueFrame]:
             person = np.asarray(matte.image[..., 1] / 255, np.float32)
             frames.append(TrueFrame(frame.image, person_regions(person, state.landmarks, scheme, state.pose)))
     return frames
+
+
+def capture_from_clip(clip: Path) -> Subject:
+    """An instant subject made of a person before a webcam, as they would make it in their own room.
+
+    Raises:
+        VideoError: the clip cannot be read.
+        CaptureError: nobody can be captured from it, such as in too little light.
+        ModelError: the networks are not there.
+    """
+    read = read_frames(str(clip / "clip.mp4"), SourceSettings())
+    return capture_instant(read.frames, clip.name).subject
 
 
 def evaluate_mode(
