@@ -54,8 +54,10 @@ class Vivid:
         self._number = number
 
     def unplug(self) -> None:
-        """Have its calls fail, as an unplugged webcam's do, and take its module away as soon as nobody holds it."""
+        """Have its calls fail and its node go, as an unplugged webcam's do, and its module as soon as nobody holds it."""
+        # Were its node still there, the camera would try it again and again, and rmmod meet it open each time.
         disconnect = f"v4l2-ctl -d /dev/video{self._number} -c disconnect=1"
+        disconnect += "; echo vivid.0 > /sys/bus/platform/drivers/vivid/unbind"
         unload = "while grep -q '^vivid ' /proc/modules; do rmmod vivid 2>/dev/null || sleep 0.2; done"
         self._machine.run(f"{disconnect}; {unload}", timeout_s=RECOVERY_S)
 
