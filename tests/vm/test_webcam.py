@@ -54,7 +54,7 @@ class Vivid:
         self._number = number
 
     def unplug(self) -> None:
-        """Have its calls fail and its node go, as an unplugged webcam's do, and its module as soon as nobody holds it."""
+        """Have its calls fail and its node go, as an unplugged webcam's do; its module as soon as nobody holds it."""
         # Were its node still there, the camera would try it again and again, and rmmod meet it open each time.
         disconnect = f"v4l2-ctl -d /dev/video{self._number} -c disconnect=1"
         disconnect += "; echo vivid.0 > /sys/bus/platform/drivers/vivid/unbind"
