@@ -122,7 +122,7 @@ def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: 
         thread.start()
     try:
         filming.start("me", PLACE)
-        wait_until(lambda: not filming.status().stage.is_running, 300)
+        wait_until(lambda: not filming.status().stage.is_running, 180)
     finally:
         stop.set()
         for thread in threads:

@@ -52,6 +52,8 @@ class ApiContext:
     def exclusive_image_work(self) -> Iterator[None]:
         """Do the block's work on pictures alone: one at a time, so that the camera keeps its cores.
 
+        Only `subject_in_places` works beside it, in its one thread of low priority, for which nobody should wait.
+
         Raises:
             NotReadyError: the camera is stopping, or `MAX_IMAGE_WORK` others work or wait.
         """
@@ -59,11 +61,15 @@ class ApiContext:
             raise NotReadyError(f"{MAX_IMAGE_WORK} other requests work on pictures", "try again in a few seconds")
         try:
             with self.image_work_lock:
-                if self.is_stopping():
-                    raise NotReadyError("the camera is stopping", "start it again")
+                self.require_running()
                 yield
         finally:
             self.image_work_places.release()
+
+    def require_running(self) -> None:
+        """Raise NotReadyError where the camera is stopping."""
+        if self.is_stopping():
+            raise NotReadyError("the camera is stopping", "start it again")
 
     def publish_collection_changed(self, collection: str) -> None:
         """Send an event that the content of a stored collection, such as `environments`, has changed."""

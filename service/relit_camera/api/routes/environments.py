@@ -16,7 +16,7 @@ from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response, thumbn
 from relit_camera.api.middleware.body_limits import uploaded_file
 from relit_camera.api.problem_details import error_responses
 from relit_camera.base.config.look import ImageBackground, StoredName
-from relit_camera.base.errors import ConflictError, NotFoundError, NotReadyError
+from relit_camera.base.errors import ConflictError, NotFoundError
 from relit_camera.base.images.image_files import encode_display
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
 from relit_camera.light.environments.environment_panorama import Environment
@@ -90,8 +90,7 @@ async def get_environment_on_subject(api: ApiContextDep, request: Request, name:
 
     def load() -> Environment:
         # Not exclusive: that thread has a low priority, and where the cores are busy others would wait for it.
-        if api.is_stopping():
-            raise NotReadyError("the camera is stopping", "start it again")
+        api.require_running()
         return _environment(api, name)
 
     return jpeg_response(request, await asyncio.wrap_future(api.subject_in_places.jpeg(subject, name, load)))

@@ -111,8 +111,7 @@ async def get_health() -> Health:
 @probe_router.get("/readyz", responses=error_responses(503))
 def get_readiness(api: ApiContextDep) -> Readiness:
     """Whether pictures are being published, be they new, held or the placeholder."""
-    if api.is_stopping():
-        raise NotReadyError("the camera is stopping", "start it again")
+    api.require_running()
     if api.camera.status().fps.published == 0:
         raise NotReadyError("no picture was published for three seconds", "GET /api/v1/status says why")
     return Readiness()

@@ -29,7 +29,7 @@ from relit_camera.subject.subject import Subject
 LIVE, INSTANT = "live", "ratio, instant"
 """The rows of the live picture itself, and of mode ratio with a subject made of the clip."""
 FIRST_FRAME = 2
-"""From here on frames count: before, mode ratio eases in from the picture as filmed."""
+"""From here on frames count, so that the rows compare with those of a mode ratio that eased in at the start."""
 SHEET_FRAMES = 6
 
 
