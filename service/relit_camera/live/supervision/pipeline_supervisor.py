@@ -180,6 +180,8 @@ class PipelineSupervisor:
                 self.load = next_quality(self.load, picture.at, latency_s, self._quality_limits)
             else:
                 self._apply(message)
+        # Counted at each look, not at each frame: a worker counts when it takes a frame, after which none may follow.
+        self.dropped = self._passed_over + self._dropped_by_retired + (self._worker.dropped if self._worker else 0)
         return shown
 
     def submit_frame(self, frame: Frame) -> bool:
@@ -195,7 +197,6 @@ class PipelineSupervisor:
             self.pipeline = self._worker.pipeline or self.pipeline
         if self.pipeline is not None:
             self.pipeline.quality = self.load.quality
-        self.dropped = self._passed_over + self._dropped_by_retired + (self._worker.dropped if self._worker else 0)
         return ShowFallback() not in actions
 
     def replace_pipeline(self, first: Callable[[], Pipeline] | None = None) -> None:
