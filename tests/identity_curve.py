@@ -1,8 +1,8 @@
 """How well a subject is told from strangers: `python -m tests.identity_curve SUBJECT=CLIP[,CLIP…] … --others CLIP …`.
 
 Each subject is shown its own clips, those of the other subjects, and the others. Printed are, for each pair, the
-unlikeness of the first frame and the least shape with the median residual after the check's delay; then, for
-thresholds, the share of subjects and of strangers that the first frames and the watched ones let pass.
+unlikeness of the first frame and the least until the check's delay is over; then, for thresholds, the share of subjects
+and of strangers that the first frames and the watched ones let pass.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.reenactment.source_image import find_source_face
 from relit_camera.subject.subject_file import read_subject
 
-WATCHED_S, LOOKED_AT_S = IdentityTunables().delay_s, 4.0
-THRESHOLDS = (0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 2.0)
+WATCHED_S = IdentityTunables().delay_s
+THRESHOLDS = (0.4, 0.65, 0.8, 1.0, 1.2, 1.4, 1.6, 2.0)
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,11 @@ class Likeness:
 
     Attributes:
         first: unlikeness of the first frame with a face.
-        most: the largest after `WATCHED_S`, with the least shape distance so far, as the check has it; NaN where the
-            clip is shorter.
+        least: the least until `WATCHED_S`.
     """
 
     first: float
-    most: float
+    least: float
 
 
 def measure(subject: Path, clip: Path) -> Likeness | None:
@@ -49,22 +48,24 @@ def measure(subject: Path, clip: Path) -> Likeness | None:
     face = find_source_face(person, tracker)
     follower = make_follower(TrackerSettings(name="mesh"), tracker)
     room, limits = RoomLightEstimator(person, face), IdentityTunables()
-    first, most, least_cm, began_s = None, np.nan, np.inf, 0.0
+    first, least, began_s, measured_s = None, np.inf, 0.0, -np.inf
     with VideoReader(clip, accurate=False) as frames:
         for frame in islice(frames, 300):
             motion = follower.follow(tracker.track(frame), frame.size, frame.time_s)
             if motion.pose is None or motion.neutral is None or motion.presence <= 0:
                 continue
             seen = room.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
+            if frame.time_s - measured_s < limits.interval_s:
+                continue
+            measured_s = frame.time_s
             distance_cm = shape_distance_cm(motion.neutral.points + motion.expression, face)
+            now = unlikeness(distance_cm, seen.residual, limits)
             if first is None:
-                first, began_s = unlikeness(distance_cm, seen.residual, limits), frame.time_s
-            least_cm = min(least_cm, distance_cm)
+                first, began_s = now, frame.time_s
+            least = np.fmin(least, now)
             if frame.time_s - began_s >= WATCHED_S:
-                most = np.fmax(most, unlikeness(least_cm, seen.residual, limits))
-            if frame.time_s - began_s > LOOKED_AT_S:
                 break
-    return None if first is None else Likeness(first, float(most))
+    return None if first is None else Likeness(first, float(least))
 
 
 def main() -> None:
@@ -87,13 +88,13 @@ def main() -> None:
                 found[same].append(likeness)
                 who = "same" if same else "other"
                 name = f"{clip.parent.name}/{clip.name}"
-                print(f"{subject.stem:10} {name:34} {who:6} {likeness.first:6.2f} {likeness.most:6.2f}", flush=True)
+                print(f"{subject.stem:10} {name:34} {who:6} {likeness.first:6.2f} {likeness.least:6.2f}", flush=True)
     print(f"\n{len(found[True])} pairs of the same person, {len(found[False])} of others; of them pass")
     print(f"up to    first frame: same, others; after {WATCHED_S} s: same, others")
     for threshold in THRESHOLDS:
         shares = [
             np.mean([value <= threshold for each in found[same] if not np.isnan(value := getattr(each, moment))])
-            for moment in ("first", "most")
+            for moment in ("first", "least")
             for same in (True, False)
         ]
         print(f"{threshold:8.1f}   " + "  ".join(f"{100 * share:5.1f} %" for share in shares))

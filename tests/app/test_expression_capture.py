@@ -15,7 +15,7 @@ from relit_camera.live.reenactment.source_image import SourceFace
 from tests.capture.expressions.talking_film import SCHEME, film, moved_points, tracked
 from tests.live.people import close_up, face_of
 
-UNLIKE, ALIKE = 0.2, 0.05
+UNLIKE, ALIKE = 0.5, 0.12
 """Residuals of the room's light."""
 
 

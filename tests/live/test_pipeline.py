@@ -152,7 +152,9 @@ def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None
         def track(self, frame: Frame) -> FaceState:
             state = super().track(frame)
             middle = state.landmarks.mean(axis=0)
-            return replace(state, landmarks=middle + (state.landmarks - middle) * np.array([1, 1.2], np.float32))
+            x, y = (state.landmarks - middle).T
+            narrow = np.stack([np.where(y > 0, 0.75, 1.1) * x, 1.2 * y], axis=1)
+            return replace(state, landmarks=middle + narrow.astype(np.float32))
 
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     image = np.ascontiguousarray(noise.repeat(4, axis=0).repeat(4, axis=1))

@@ -12,8 +12,8 @@ from relit_camera.live.modes.mode import FaceMismatch
 from tests.live.people import close_up, face_of
 from tests.live.rooms import before_the_camera
 
-NO_LIGHT_EXPLAINS = 0.3
-"""A residual of the fit of the room's light: 0.1 is usual for the subject."""
+NO_LIGHT_EXPLAINS = 0.75
+"""A residual of the fit of the room's light: 0.1 to 0.3 is usual for the subject."""
 
 
 def stranger_points() -> np.ndarray:
@@ -32,7 +32,7 @@ def test_a_stranger_is_found_out_after_a_while_and_not_before() -> None:
     found = check.check(stranger, NO_LIGHT_EXPLAINS, 1.01 * delay_s)
     assert isinstance(found, FaceMismatch)
     assert "the live face is not the subject's" in found.why
-    assert "deviation 0.30" in found.why
+    assert "deviation 0.75" in found.why
     assert "mode reenact" in found.cure
 
 
@@ -76,9 +76,9 @@ def test_one_measure_alone_decides_only_when_it_is_far_off() -> None:
     check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
     shape = shape_distance_cm(stranger_points(), face_of(close_up())) / IdentityTunables().shape_cm
     limit = IdentityTunables().residual / shape
-    check.check(stranger, limit, 0.0)
-    assert check.check(stranger, 0.99 * limit, 1.9) is None
+    check.check(stranger, 1.1 * limit, 0.0)
     assert check.check(stranger, 1.01 * limit, 1.9) is not None
+    assert check.check(stranger, 0.99 * limit, 2.2) is None
 
 
 def test_the_subject_is_recognized_from_the_first_frame_and_a_stranger_never() -> None:
@@ -124,16 +124,31 @@ def test_one_who_comes_after_the_subject_with_its_neutral_face_is_not_recognized
         assert check.recognized(0.1 + index / 30) == 0
 
 
-def test_a_face_that_passed_at_once_goes_on_to_pass_in_a_hard_room_and_no_further() -> None:
+def test_a_face_that_has_passed_goes_on_to_pass_in_a_hard_room_and_no_further() -> None:
     tunables = IdentityTunables()
     shape = shape_distance_cm(stranger_points(), face_of(close_up())) / tunables.shape_cm
     residual = tunables.residual / shape  # at which its unlikeness is 1
-    for first, later, passes in ((0.6, 1.5, True), (0.6, 1.7, False), (0.8, 1.1, False), (0.8, 0.9, True)):
+    for first, later, passes in (
+        (0.6, 1.9, True),
+        (0.6, 2.1, False),
+        (0.8, 0.9, True),
+        (0.8, 1.9, True),
+        (1.1, 1.2, False),
+    ):
         check, person = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
         check.check(person, first * residual, 0.0)
         assert (check.recognized(1.0) > 0) is (first == 0.6)
         assert (check.check(person, later * residual, 1.9) is None) is passes
         assert (check.recognized(3.0) > 0) is passes
+
+
+def test_one_moment_in_which_it_is_alike_is_enough() -> None:
+    """A turned or talking face is less like its subject's than it was a moment before."""
+    check, person = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
+    shape = shape_distance_cm(stranger_points(), face_of(close_up())) / IdentityTunables().shape_cm
+    for time_s, unlike in ((0.0, 1.8), (0.5, 0.9), (1.0, 1.8), (1.6, 1.8)):
+        assert check.check(person, unlike * IdentityTunables().residual / shape, time_s) is None
+        assert (check.recognized(time_s + 0.1) > 0) is (time_s == 1.6), "it was watched for long enough"
 
 
 def test_a_face_that_is_not_tracked_with_confidence_is_not_judged() -> None:

@@ -16,6 +16,7 @@ from relit_camera.live.modes.room_light_estimator import (
     TUNABLES,
     RoomLightEstimate,
     RoomLightEstimator,
+    relative_deviation,
 )
 from tests.live.people import close_up, face_of
 from tests.live.rooms import EVENING, WINDOW, before_the_camera, live_picture, relighter, still_under
@@ -51,7 +52,7 @@ def seen(room: RoomLightEstimate, turn: Rotation | None = None) -> np.ndarray:
 def test_it_recovers_the_relit_picture_of_a_known_room(light: LightMap) -> None:
     room = watched(fresh_probe(), live_picture(light))
     assert psnr(seen(room), still_under(light)) > 30
-    assert room.residual < 0.05
+    assert room.residual < 0.1
     np.testing.assert_allclose(room.gain, 1, atol=0.05)
 
 
@@ -117,7 +118,22 @@ def test_a_hand_before_part_of_the_face_hardly_matters() -> None:
 def test_what_no_light_explains_has_a_large_residual() -> None:
     noise = np.random.default_rng(1).integers(20, 220, live_picture(WINDOW).shape).astype(np.uint8)
     coarse = np.asarray(cv2.resize(noise[::24, ::24], noise.shape[1::-1]), np.uint8)
-    assert watched(fresh_probe(), coarse).residual > 0.15
+    assert watched(fresh_probe(), coarse).residual > 0.5
+
+
+def test_the_same_errors_count_less_in_light_that_makes_shading_strong() -> None:
+    """An error is a share of the light that falls on a point, so hard light makes all of them larger."""
+    rng = np.random.default_rng(2)
+    shading = rng.uniform(-0.4, 0.4, (500, 1)).astype(np.float32)
+    errors = rng.normal(0, 0.1, (500, 3)).astype(np.float32)
+
+    def found(contrast: float, color: tuple[float, float, float] = (1, 1, 1)) -> float:
+        tint = np.array(color, np.float32)
+        return relative_deviation((1 + contrast * shading) * tint, (1 + contrast * shading * (1 + errors)) * tint)
+
+    assert found(2.0) == pytest.approx(found(1.0), rel=0.3)
+    assert found(1.0, (1, 0.05, 0.4)) == pytest.approx(found(1.0), rel=1e-4), "nor does its color count"
+    assert found(0.1) < 0.7 * found(1.0), "of a face in flat light little but noise is left"
 
 
 def test_black_white_and_absent_faces_are_no_trouble() -> None:

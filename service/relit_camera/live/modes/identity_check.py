@@ -16,38 +16,35 @@ from relit_camera.live.reenactment.source_image import SourceFace
 
 @dataclass(frozen=True)
 class IdentityTunables:
-    """Thresholds of the check, measured on recorded and generated faces.
+    """Thresholds of the check, measured on recorded and rendered faces (docs/evaluate.md, "The subject and strangers").
 
-    The same person reached a shape distance of 0.04 cm and a residual of 0.08 to 0.10 (a generated one 0.18 cm and
-    0.08), other people 0.14 to 0.29 cm and 0.10 to 0.20. Either alone can mislead (a beard, a cap), so the product of
-    both, each divided by its threshold, decides. A grimace changes the shape by up to 0.5 cm, so the least distance
-    counts that was seen so far. On five recorded people before eleven subjects it was 0.02 to 0.07 cm for the same
-    person (residual 0.03 to 0.07 in the room of the capture) and 0.09 to 0.42 cm for others (0.10 to 0.35).
+    A person differs from their own subject by 0.03 to 0.17 cm of shape and a residual of 0.08 to 0.34, the most in
+    coloured light, other people by 0.10 to 0.40 cm and 0.13 to 1.1. Either alone can mislead (a beard, a cap, a grimace
+    of up to 0.5 cm), so the product of both, each divided by its threshold, decides; and it is the least that was seen
+    in some moments that tells people apart.
 
     Attributes:
         shape_cm: RMS distance of the landmarks from the subject's, seen from the front.
         return_shape_cm: the distance at which the face of a stranger is the subject's after all: they came back, or had
             grimaced until then.
-        residual: relative deviation of the live face from the relit one under the best light, 0..1.
+        residual: deviation of the live face from the relit one under the best light, relative to its contrast.
         delay_s: how long a face is watched before it is judged.
         interval_s: time between two measurements of its shape.
         gap_s: after so long without a frame whoever comes may be another person.
         ease_s: time over which a face that passes comes to be shown relit.
-        at_once: the product up to which a face passes as soon as it is followed: on eight recordings of four subjects
-            it began with 0.1 to 0.61, on 56 of other people with 0.74 or more.
-        kept: the product up to which such a face goes on to pass, while it is followed: in a hard room a subject's own
-            reached 1.4 when it turned.
+        at_once: the product up to which a face passes before it was watched for so long.
+        kept: the product up to which a face that has passed goes on to pass, while it is followed.
     """
 
     shape_cm: float = 0.14
     return_shape_cm: float = 0.08
-    residual: float = 0.12
+    residual: float = 0.23
     delay_s: float = 1.5
     interval_s: float = 0.25
     gap_s: float = 2.0
     ease_s: float = 0.2
     at_once: float = 0.65
-    kept: float = 1.6
+    kept: float = 2.0
 
 
 class IdentityCheck:
@@ -57,17 +54,16 @@ class IdentityCheck:
         """`face` is the subject's, in the source image."""
         self._face = face
         self._tunables = tunables or IdentityTunables()
-        self._since_s: float | None = None
         self._neutral: NeutralFace | None = None
-        self._measured_s = self._checked_s = -np.inf
-        self._shape_cm = np.inf
-        self.forget()
+        self._since_s: float | None = None
+        self._measured_s, self._shape_cm, self._least = -np.inf, np.inf, np.inf
+        self._checked_s = -np.inf
+        self._passed_s: float | None = None
 
     def forget(self) -> None:
         """Nobody is followed: whoever comes next may be another person."""
-        self._passed_s: float | None = None
-        self._most = 1.0  # up to which unlikeness it passes
-        self._since_s, self._shape_cm, self._measured_s = None, np.inf, -np.inf
+        self._passed_s = None
+        self._watch_anew()
 
     def recognized(self, time_s: float) -> float:
         """How far a frame may be shown relit: 0 until its face has passed for the subject's, then eased to 1.
@@ -94,9 +90,8 @@ class IdentityCheck:
             self.forget()
         self._checked_s = time_s
         if motion.neutral is None or motion.presence < 1 or motion.neutral is not self._neutral:
-            # Whoever comes next may be another person.
-            self._neutral, self._since_s, self._most = motion.neutral, None, 1.0
-            self._shape_cm, self._measured_s = np.inf, -np.inf
+            self._neutral = motion.neutral
+            self._watch_anew()  # whoever comes next may be another person
         if motion.neutral is None or motion.presence <= 0:
             self.forget()
         # Only where presence is 1 is the expression the face's own, and not on its way from the neutral one's.
@@ -107,23 +102,23 @@ class IdentityCheck:
             self._measured_s = time_s
             distance_cm = self._distance_cm(motion.neutral, motion)
             self._shape_cm = min(self._shape_cm, distance_cm)
-            if unlikeness(distance_cm, residual, limits) <= limits.at_once:
-                if self._passed_s is None:
-                    self._passed_s = -np.inf if first else time_s
-                self._most = limits.kept
-        if time_s - self._since_s < limits.delay_s:
+            self._least = min(self._least, unlikeness(distance_cm, residual, limits))
+        watched = time_s - self._since_s >= limits.delay_s
+        if self._passed_s is None and self._least <= (1.0 if watched else limits.at_once):
+            self._passed_s = -np.inf if first else time_s
+        passes = self._passed_s is not None and unlikeness(self._shape_cm, residual, limits) <= limits.kept
+        if passes or not watched:
             return None
-        shape_cm = self._shape_cm
-        differs = what_differs(shape_cm, residual, limits, self._most)
-        if differs is None:
-            self._passed_s = time_s if self._passed_s is None else self._passed_s
-            return None
-        self._passed_s, self._most = None, 1.0
+        self._passed_s = None
         return FaceMismatch(
-            f"the live face is not the subject's: {differs}",
+            f"the live face is not the subject's: {_differences(self._shape_cm, residual)}",
             "choose your own subject, or mode reenact",
-            partial(self._has_changed_into_the_subjects, shape_cm),
+            partial(self._has_changed_into_the_subjects, self._shape_cm),
         )
+
+    def _watch_anew(self) -> None:
+        self._since_s = None
+        self._measured_s, self._shape_cm, self._least = -np.inf, np.inf, np.inf
 
     def _has_changed_into_the_subjects(self, found_cm: float, motion: FaceMotion) -> bool:
         """Whether a face that was found out at `found_cm` has the subject's shape now."""
@@ -141,17 +136,18 @@ def unlikeness(shape_cm: float, residual: float, limits: IdentityTunables) -> fl
     return (shape_cm / limits.shape_cm) * (residual / limits.residual)
 
 
-def what_differs(shape_cm: float, residual: float, limits: IdentityTunables, most: float = 1.0) -> str | None:
+def what_differs(shape_cm: float, residual: float, limits: IdentityTunables) -> str | None:
     """What tells a face from the subject's, in words; None where it passes for it.
 
     Args:
         shape_cm: its distance from the subject's, see `shape_distance_cm`.
-        residual: how badly any light explains it, see `RoomLightEstimate`.
+        residual: how badly any light explains it, relative to its contrast, see `RoomLightEstimate`.
         limits: the thresholds.
-        most: the unlikeness up to which it passes.
     """
-    if unlikeness(shape_cm, residual, limits) <= most:
-        return None
+    return None if unlikeness(shape_cm, residual, limits) <= 1 else _differences(shape_cm, residual)
+
+
+def _differences(shape_cm: float, residual: float) -> str:
     return f"it has another shape ({10 * shape_cm:.1f} mm) and looks so under no light (deviation {residual:.2f})"
 
 

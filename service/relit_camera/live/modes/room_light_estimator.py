@@ -74,6 +74,8 @@ class RoomLightTunables:
 TUNABLES = RoomLightTunables()
 LIGHTS = SoftLights()
 """The soft lights whose amounts are fitted."""
+LEAST_CONTRAST = 0.1
+"""Of a face in flat light, relative to its mean."""
 BLUR_CELLS = 3
 """A large live picture is reduced until a sample is the mean of so many by so many pixels; odd: none is displaced."""
 CELLS_PER_BOX = 3.3
@@ -88,8 +90,8 @@ class RoomLightEstimate:
         light_map: (32, 64, 3) float32 room radiance in units of the live picture's linear values.
         in_head_frame: gives the same as a head sees it under a rotation, head → room.
         gain: (3,) float32 by which this frame's exposure differs from the fit's.
-        residual: median relative deviation of the live face from the relit one, 0..1: how badly the light explains it;
-            NaN where too little of the face was seen so far.
+        residual: deviation of the live face from the relit one, relative to its contrast (see `relative_deviation`):
+            how badly the light explains it; NaN where too little of the face was seen so far.
     """
 
     light_map: LightMap
@@ -149,8 +151,7 @@ class RoomLightEstimator:
             self._seen = self._predict_under(rotation)
         gain = _exposure_gain(live, self._seen.samples, usable)
         if due and usable.sum() >= TUNABLES.min_samples:
-            deviation = np.abs(self._seen.samples * gain - live)[usable] / np.maximum(live[usable].mean(axis=0), 1e-4)
-            now = float(np.median(deviation))
+            now = relative_deviation(live[usable], self._seen.samples[usable] * gain)
             self._residual = (
                 now if self._residual is None else self._residual + TUNABLES.residual_smoothing * (now - self._residual)
             )
@@ -187,6 +188,17 @@ class RoomLightEstimator:
 def _soft_light_map(amounts: NDArray[np.float32], rotation: Rotation | None = None) -> LightMap:
     """The light map of soft lights of these amounts (count, 3), in the room or as a head sees it under a rotation."""
     return (LIGHTS.maps(rotation) @ amounts).reshape(MAP_HEIGHT, MAP_WIDTH, 3)
+
+
+def relative_deviation(live: NDArray[np.float32], relit: NDArray[np.float32]) -> float:
+    """Median deviation of relit samples (count, 3) from the live ones, relative to the contrast of the live face.
+
+    A channel's contrast is its median absolute deviation, and a tenth of its mean for faces in flat light, of which
+    little but noise is left. So hard and coloured light, which makes every error larger, does not count against a face.
+    """
+    middle, mean = np.median(live, axis=0), live.mean(axis=0)
+    contrast = np.median(np.abs(live - middle), axis=0) + LEAST_CONTRAST * mean
+    return float(np.median(np.abs(relit - live) / np.maximum(contrast, 1e-5)))
 
 
 def _exposure_gain(

@@ -55,7 +55,7 @@ class RungFigures:
             subject (see `ratio_confidence`).
         brightness_ev: how much brighter than the truth the pictures are, mean over the environments, in stops.
         field: figures of the field; None where it is the truth's own.
-        residual: how badly the room's estimated light explains the face, 0..1.
+        residual: how badly the room's estimated light explains the face, see `RoomLightEstimate`.
         build_s: seconds that building the subject took, where it is made of the room's frames.
         failure: why there is no subject; empty where there is.
     """

@@ -57,7 +57,7 @@ class LiveRatio:
     """Mode ratio with one subject, after it has seen some frames.
 
     Attributes:
-        residual: how badly the estimated light explains the face, 0..1 (see `RoomLightEstimate`).
+        residual: how badly the estimated light explains the face (see `RoomLightEstimate`).
     """
 
     def __init__(self, subject: Subject, tracker: Tracker, followed: Sequence[FollowedFrame]) -> None:
