@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import struct
 import zlib
 from pathlib import Path
@@ -23,12 +22,13 @@ def png_bomb(width: int = 20_000, height: int = 10_000) -> bytes:
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    packer, rows = zlib.compressobj(9), io.BytesIO()
-    for _ in range(height):
-        rows.write(packer.compress(bytes(1 + 3 * width)))
-    rows.write(packer.flush())
+    row = bytes(1 + 3 * width)
+    packer = zlib.compressobj(9, wbits=-zlib.MAX_WBITS)
+    packed = packer.compress(row) + packer.flush(zlib.Z_FULL_FLUSH)  # stands alone, so that it can be repeated
+    adler32 = struct.pack(">HH", len(row) * height % 65521, 1)  # of zeros
+    data = b"\x78\xda" + packed * height + packer.flush() + adler32
     head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
-    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", rows.getvalue()) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", data) + chunk(b"IEND", b"")
 
 
 def png_of_size(width: int, height: int) -> bytes:
@@ -92,11 +92,11 @@ def exr(width: int = 64, height: int = 32, channels: int = 3, written: bool = Tr
     """An OpenEXR file of half floats, or its header with hardly a pixel."""
     import OpenEXR
 
-    planes = {f"layer{index}.R": np.ones((height, width), np.float16) for index in range(channels - 1)}
-    planes["R"] = np.ones((height, width), np.float16)
+    plane = np.ones((height, width), np.float16)
+    planes = {"R": plane} | {f"layer{index}.R": plane for index in range(channels - 1)}
     with TemporaryDirectory() as folder:
         path = Path(folder) / "a.exr"
-        with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, planes) as file:
+        with OpenEXR.File({"compression": OpenEXR.PXR24_COMPRESSION, "type": OpenEXR.scanlineimage}, planes) as file:
             file.write(str(path))
         return path.read_bytes()
 

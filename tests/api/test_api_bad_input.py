@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from time import process_time
 
@@ -56,6 +57,9 @@ NAMES = ["..", ".", "", "/etc/passwd", "../evil", "..\\evil", "a/b", "a\\b", "a\
          "x" * 65, "é", "a\nb", "%2e%2e", "a:b", "con", "NUL", "com1", "Lpt9.x", "aux .hdr",
          "trailing.", "trailing "]  # fmt: skip
 
+PATH_NAMES = ["%2e%2e", "..%2f..%2fevil", "..%5cevil", "%00", "a%00b", "%2fetc%2fpasswd", "con", "a%0ab",
+              "%252e%252e%252fevil", "x" * 65]  # fmt: skip
+
 
 def stored(camera: FakeCamera) -> set[str]:
     folder = camera.scene_controller.environments.folder.parent
@@ -93,29 +97,30 @@ def test_of_an_animation_the_first_frame_is_kept(client: Client, camera: FakeCam
     assert stored(camera) == {"backgrounds/room.jpg"}
 
 
-@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("collection", ["environments", "backgrounds"])
-def test_a_name_that_is_none(client: Client, camera: FakeCamera, collection: str, name: str) -> None:
-    check_problem(client.upload(f"/api/v1/{collection}", name, hdr(), "a.hdr"), 422)
-    assert stored(camera) == set()
+def test_a_name_that_is_none(client: Client, camera: FakeCamera, collection: str) -> None:
+    for name in NAMES:
+        answer = client.upload(f"/api/v1/{collection}", name, hdr(), "a.hdr")
+        assert answer.status_code == 422, name
+        check_problem(answer, 422)
+        assert stored(camera) == set(), name
 
 
-@pytest.mark.parametrize("name", ["%2e%2e", "..%2f..%2fevil", "..%5cevil", "%00", "a%00b", "%2fetc%2fpasswd", "con",
-                                  "a%0ab", "%252e%252e%252fevil", "x" * 65])  # fmt: skip
 @pytest.mark.parametrize("path", ["presets", "environments", "backgrounds", "subjects"])
-@pytest.mark.parametrize("method", ["GET", "PUT", "DELETE"])
-def test_a_path_leads_nowhere_else(server: ApiServer, camera: FakeCamera, path: str, method: str, name: str) -> None:
+def test_a_path_leads_nowhere_else(server: ApiServer, camera: FakeCamera, path: str) -> None:
     """Over a real connection: no client of ours tidies the path."""
     outside = camera.scene_controller.environments.folder.parent.parent / "evil.yaml"
     outside.write_text("{}")
     place = f"{server.address.host}:{server.address.port}"
-    head = f"{method} /api/v1/{path}/{name} HTTP/1.1\r\nHost: {place}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
-    with socket.create_connection((server.address.host, server.address.port), 5) as connection:
-        connection.sendall(head.encode())
-        status = int(connection.recv(1000).split()[1])
-    assert status in (404, 405, 422)
-    assert outside.read_text() == "{}"
-    assert stored(camera) == set()
+    for method, name in product(("GET", "PUT", "DELETE"), PATH_NAMES):
+        target = f"{method} /api/v1/{path}/{name}"
+        head = f"{target} HTTP/1.1\r\nHost: {place}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
+        with socket.create_connection((server.address.host, server.address.port), 5) as connection:
+            connection.sendall(head.encode())
+            status = int(connection.recv(1000).split()[1])
+        assert status in (404, 405, 422), target
+        assert outside.read_text() == "{}", target
+        assert stored(camera) == set(), target
 
 
 @pytest.mark.parametrize("path", ["/panel/../app.py", "/panel/..%2fapp.py", "/panel/%2e%2e/app.py",
