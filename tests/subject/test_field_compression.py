@@ -18,7 +18,7 @@ from relit_camera.light.environments.builtin.builtin_environments import builtin
 from relit_camera.light.environments.environment_panorama import read_panorama
 from relit_camera.light.light_map import LightMap, resample_to_light_map
 from relit_camera.subject.compression.accuracy_target import DARK_LIGHT_FRACTION, CompressionTarget
-from relit_camera.subject.compression.field_compression import CompressedField, compress_field
+from relit_camera.subject.compression.field_compression import CompressedField, _largest_threshold, compress_field
 from relit_camera.subject.compression.field_tiles import CLUSTER_PIXELS, TILE_HEIGHT, TILE_WIDTH, tiles
 from relit_camera.subject.compression.principal_components import PixelCluster
 from relit_camera.subject.reflectance_field import TEXELS, ReflectanceField
@@ -65,14 +65,19 @@ def found(samples: OlatSamples) -> CompressedField:
     return compress_field(SharpVisibilityInterpolation().build(samples), samples.pictures, samples.matte, TARGET)
 
 
+@pytest.fixture(scope="module")
+def rows(found: CompressedField) -> NDArray[np.float64]:
+    """The row of every pixel and channel, by the definition: (pixels, 3, components)."""
+    return rows_by_hand(found.basis, SIZE**2)
+
+
 def picture(colours: NDArray) -> NDArray[np.float32]:
     return np.ascontiguousarray(colours, np.float32).reshape(SIZE, SIZE, 3)
 
 
 def test_every_texel_and_light_comes_back_as_asked(
-    samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField
+    samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField, rows: NDArray[np.float64]
 ) -> None:
-    rows = rows_by_hand(found.basis, SIZE**2)
     restored = (rows @ found.coefficients).transpose(0, 2, 1)
     inside = samples.matte.ravel() > 0.5
     peaks = np.percentile(dense[inside].transpose(1, 0, 2).reshape(TEXELS, -1), 99.5, axis=1)
@@ -88,36 +93,65 @@ def test_every_texel_and_light_comes_back_as_asked(
     assert found.quality.light_db == pytest.approx(min(each), abs=0.1)
 
 
-def psnr_under(light_map: LightMap, samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField) -> float:
+def psnr_under(
+    light_map: LightMap,
+    samples: OlatSamples,
+    dense: NDArray[np.float32],
+    found: CompressedField,
+    rows: NDArray[np.float64],
+) -> float:
     weighted = (light_map * texel_solid_angles()[..., None]).reshape(TEXELS, 3)
-    restored = np.einsum(
-        "pcg,gl,lc->pc", rows_by_hand(found.basis, SIZE**2), found.coefficients, weighted, optimize=True
-    )
+    restored = np.einsum("pcg,gl,lc->pc", rows, found.coefficients, weighted, optimize=True)
     expected = np.einsum("plc,lc->pc", dense, weighted, optimize=True)
     return psnr(picture(restored), picture(expected), samples.matte)
 
 
-def test_the_worst_map_is_told(samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField) -> None:
-    reached = psnr_under(MAP, samples, dense, found)
+def test_the_worst_map_is_told(
+    samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField, rows: NDArray[np.float64]
+) -> None:
+    reached = psnr_under(MAP, samples, dense, found, rows)
     assert found.quality.map_db == pytest.approx(reached, abs=0.1)
     assert reached > 45
 
 
 def test_real_places_that_it_was_not_tried_on_come_back(
-    shared: Path, samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField
+    shared: Path,
+    samples: OlatSamples,
+    dense: NDArray[np.float32],
+    found: CompressedField,
+    rows: NDArray[np.float64],
 ) -> None:
     """Suns, soft boxes, a single bright pixel."""
     files = sorted((shared / "light").glob("*.hdr"))
     assert files
     maps = {file.stem: resample_to_light_map(read_panorama(file).radiance) for file in files}
-    reached = {name: psnr_under(light_map, samples, dense, found) for name, light_map in maps.items()}
+    reached = {name: psnr_under(light_map, samples, dense, found, rows) for name, light_map in maps.items()}
     assert min(reached.values()) > 45, reached
 
 
-def test_it_is_small_and_black_outside(samples: OlatSamples, found: CompressedField) -> None:
+def test_it_is_small_and_black_outside(samples: OlatSamples, found: CompressedField, rows: NDArray[np.float64]) -> None:
     kept = found.basis.nbytes + found.coefficients.nbytes + found.light_coefficients.nbytes
     assert found.quality.bytes_share == pytest.approx(kept / (SIZE**2 * 3 * TEXELS * 4))
-    assert not rows_by_hand(found.basis, SIZE**2)[samples.matte.ravel() == 0].any()
+    assert not rows[samples.matte.ravel() == 0].any()
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0, 1.6])
+@pytest.mark.parametrize("wanted", [0.5, 3.0, 7000.0, 2e5])
+def test_the_largest_threshold_is_found_in_few_steps(wanted: float, power: float) -> None:
+    tried: list[float] = []
+
+    def error(threshold: float) -> float:
+        tried.append(threshold)
+        return 0.55 * (threshold / wanted) ** power * (1 + 0.002 * np.sin(30 * np.log(threshold)))
+
+    found = _largest_threshold(error, 0.55)
+    assert 0.975 * 0.55 < error(found) <= 0.55
+    assert len(tried) <= 7
+
+
+@pytest.mark.parametrize(("error", "found"), [(0.6, 1e-2), (0.1, 1e6)])
+def test_where_every_threshold_is_too_large_it_is_the_least_and_else_the_largest(error: float, found: float) -> None:
+    assert _largest_threshold(lambda threshold: error, 0.55) == pytest.approx(found, rel=0.02)
 
 
 def test_more_is_kept_where_more_is_asked(samples: OlatSamples, found: CompressedField) -> None:

@@ -46,16 +46,22 @@ def coloured_light() -> np.ndarray:
     return rng.gamma(0.5, 1.0, (32, 64, 3)).astype(np.float32)
 
 
+@pytest.fixture(scope="module")
+def sphere_field(sphere: Subject) -> np.ndarray:
+    return _field_by_hand(sphere)
+
+
 def relit(name: str, subject: Subject, light: np.ndarray) -> np.ndarray:
     """The subject under one light map."""
     return open_relighter(name, subject).relight(light[None])[0]
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_agrees_with_the_field_summed_by_hand(sphere: Subject, coloured_light: np.ndarray, name: str) -> None:
-    field = _field_by_hand(sphere)
+def test_agrees_with_the_field_summed_by_hand(
+    sphere: Subject, sphere_field: np.ndarray, coloured_light: np.ndarray, name: str
+) -> None:
     weighted = (coloured_light * texel_solid_angles()[..., None]).reshape(-1, 3)
-    expected = np.einsum("hwlc,lc->hwc", field, weighted).astype(np.float32)
+    expected = np.einsum("hwlc,lc->hwc", sphere_field, weighted).astype(np.float32)
     picture = relit(name, sphere, coloured_light)
     assert picture.dtype == np.float32
     assert psnr(picture, expected, sphere.matte) > ACCURACY_DB[name]
@@ -152,9 +158,8 @@ def test_a_lit_sphere_reads_its_irradiance(sphere: Subject, name: str) -> None:
     assert picture[24, 8].mean() == pytest.approx(np.pi, rel=0.03)
 
 
-def test_white_light_gives_the_sum_picture(sphere: Subject) -> None:
-    field = _field_by_hand(sphere)
-    summed = (field * texel_solid_angles().ravel()[:, None]).sum(axis=2).astype(np.float32)
+def test_white_light_gives_the_sum_picture(sphere: Subject, sphere_field: np.ndarray) -> None:
+    summed = (sphere_field * texel_solid_angles().ravel()[:, None]).sum(axis=2).astype(np.float32)
     assert psnr(relit("basis", sphere, np.ones((32, 64, 3), np.float32)), summed, sphere.matte) > ACCURACY_DB["basis"]
 
 

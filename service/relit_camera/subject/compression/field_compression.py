@@ -36,10 +36,14 @@ SAMPLE_CLUSTERS = 64
 CLUSTER_ERROR_SHARE, SHARED_BASIS_ERROR_SHARE = 0.55, 0.35
 """Shares of the allowed squared error for the clusters' components and for the shared basis; the rest is a reserve for
 what the sample misses."""
-THRESHOLD_RANGE = (1e-2, 1e6)
-"""Range in which the threshold is searched."""
-BISECTION_STEPS = 10
-"""Bisections of that range, to an accuracy of 2 %."""
+THRESHOLD_RANGE, FIRST_THRESHOLD = (1e-2, 1e6), 3e3
+"""Range in which the threshold is searched, and where: most faces have one of a few thousand."""
+LEAST_POWER = 0.01
+"""Of the threshold by which the error grows: where it is less, 8 bits do not allow what is asked."""
+LEAST_OF_ALLOWED = 0.98
+"""Share of the allowed error with which a threshold is taken without looking for a larger one."""
+MOST_STEPS = 12
+"""Thresholds that are tried at most; four to six are enough where the error grows as smoothly as it should."""
 
 
 @dataclass(frozen=True)
@@ -194,11 +198,34 @@ def _threshold_from_sample(
         errors = pool.map(lambda part: part.error(part.cluster.components(threshold)), parts)
         return float(np.sum(list(errors), axis=0).max()) / count
 
+    return allowed, _largest_threshold(worst, CLUSTER_ERROR_SHARE)
+
+
+def _largest_threshold(error: Callable[[float], float], allowed: float) -> float:
+    """The largest threshold whose error, which grows with it, is allowed, or one with nearly that error.
+
+    The error is nearly a power of the threshold: each step goes where the power through the last two errors reaches
+    what is allowed, if that lies between the thresholds known to be too small and too large, and else between these.
+    Where no threshold is small enough it is the least one.
+    """
     low, high = np.log(THRESHOLD_RANGE)
-    for _ in range(BISECTION_STEPS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if worst(np.exp(middle)) <= CLUSTER_ERROR_SHARE else (low, middle)
-    return allowed, float(np.exp(low))
+    goal = np.log(allowed * (1 + LEAST_OF_ALLOWED) / 2)
+    at, power = np.log(FIRST_THRESHOLD), 1.0
+    before: tuple[float, float] | None = None
+    for _ in range(MOST_STEPS):
+        found = error(float(np.exp(at)))
+        low, high = (at, high) if found <= allowed else (low, at)
+        if LEAST_OF_ALLOWED * allowed <= found <= allowed:
+            break
+        now = at, float(np.log(max(found, 1e-30)))
+        if before is not None and before[0] != now[0]:
+            power = (now[1] - before[1]) / (now[0] - before[0])
+            if found > allowed and power < LEAST_POWER:
+                break
+        before = now
+        step = (goal - now[1]) / power if power > 0 else np.inf
+        at = at + step if low < at + step < high else (low + high) / 2
+    return float(np.exp(low))
 
 
 def _assemble_basis(
