@@ -8,7 +8,7 @@ PROCESSES ?= 2
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest fuzz coverage browser test-browser pipewire test-pipewire vm test-vm vm-picture clean
+.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest studies fuzz coverage browser test-browser pipewire test-pipewire vm test-vm vm-picture clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -66,6 +66,9 @@ pytest: setup ## the tests alone, in two processes; make pytest PROCESSES=4
 	$(BIN)/python -m pytest tests/pipewire
 	$(BIN)/python -m pytest -n $(PROCESSES) --dist worksteal tests/browser
 	$(BIN)/python -m pytest tests/vm
+
+studies: setup ## the long tests that `make test` leaves out
+	$(BIN)/python -m pytest -m study tests
 
 fuzz: setup ## mutated files on every reader, for an hour; make fuzz FUZZ="--seconds 60 --seed 3"
 	$(BIN)/python -m tests.fuzz.fuzzing $(FUZZ)

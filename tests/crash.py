@@ -3,7 +3,7 @@
 A camera is driven over HTTP (presets are replaced, environments and backgrounds come and go) while another process
 writes a subject into the same folder. Both are killed at a random moment. Then everything stored must be whole, and
 either what was there before the change under way or what it was to become; the camera must start again, and find no
-leftovers of killed writers. 10 kills run in CI.
+leftovers of killed writers. 3 kills run in CI.
 """
 
 from __future__ import annotations

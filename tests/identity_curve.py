@@ -97,7 +97,7 @@ def main() -> None:
             for moment in ("first", "least")
             for same in (True, False)
         ]
-        print(f"{threshold:8.1f}   " + "  ".join(f"{100 * share:5.1f} %" for share in shares))
+        print(f"{threshold:8.2f}   " + "  ".join(f"{100 * share:5.1f} %" for share in shares))
 
 
 if __name__ == "__main__":

@@ -37,11 +37,13 @@ def mesh_runs(measure: Callable[[], Taken]) -> float:
     return 1e3 * taken.processor_s / mesh.ms
 
 
+@pytest.mark.study
 def test_an_instant_subject_is_made_of_a_clip(tmp_path: Path) -> None:
     assert mesh_runs(lambda: capture("instant", demo_files.CLIP, folder=tmp_path)) < MOST * INSTANT_RUNS
     assert read_metadata(tmp_path / "me.relit").rung == "instant"
 
 
+@pytest.mark.study
 def test_a_desk_recording_becomes_a_subject(tmp_path: Path) -> None:
     frames = film_bundled_person(tmp_path / "frames", 5, 2)
     assert mesh_runs(lambda: capture("desk", "--frames", frames, folder=tmp_path)) < MOST * DESK_RUNS
@@ -49,6 +51,7 @@ def test_a_desk_recording_becomes_a_subject(tmp_path: Path) -> None:
     assert (metadata.rung, metadata.lights) == ("desk", 15)
 
 
+@pytest.mark.study
 def test_somebody_who_begins_sees_themselves_relit(tmp_path: Path) -> None:
     assert mesh_runs(lambda: first_relit_picture(tmp_path)) < MOST * FIRST_PICTURE_RUNS
 

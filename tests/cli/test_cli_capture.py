@@ -89,6 +89,7 @@ def test_options_are_followed_and_told(built: Built) -> None:
     assert files(built.folder) == {"me.relit", "me.json"}
 
 
+@pytest.mark.study
 def test_a_build_that_is_killed_goes_on_to_the_same_subject(built: Built, tmp_path: Path) -> None:
     process = start(*command(built.film, tmp_path, *KNOWN), folder=built.film.parent)
     samples = tmp_path / "me.relit.partial" / SAMPLES_FILE_NAME

@@ -41,6 +41,8 @@ def test_a_recorded_folder_becomes_a_subject(tmp_path: Path, monkeypatch: pytest
     assert "6 patches" in answer.out
     metadata = read_metadata(out)
     assert (metadata.rung, metadata.source, metadata.lights) == ("desk", "evening", 6)
+    assert 0.01 < (metadata.measured_fraction or 0) < 0.3
+    assert "the whites of your eyes are not seen" in answer.err
 
 
 def test_what_is_missing_or_wrong_is_named_and_nothing_is_left(tmp_path: Path) -> None:

@@ -15,7 +15,6 @@ from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.rotations import Rotation
 from relit_camera.capture.desk import desk_capture
 from relit_camera.capture.desk.desk_capture import (
-    build_desk_subject,
     fit_field,
     identify_patterns,
     measure_desk_samples,
@@ -128,17 +127,6 @@ def test_a_face_from_the_side_is_refused(
     else:
         with pytest.raises(CaptureError, match=words):
             find_mesh_landmarks(picture)
-
-
-def test_the_subject_says_how_it_was_captured(recording: DeskRecording) -> None:
-    stages: set[str] = set()
-    subject, warnings = build_desk_subject(recording, "evening", lambda stage, done, total: stages.add(stage))
-    assert subject.metadata.rung == "desk"
-    assert subject.metadata.source == "evening"
-    assert 0.01 < (subject.metadata.measured_fraction or 0) < 0.3
-    assert subject.metadata.lights == 6
-    assert warnings == [NO_EYES]
-    assert {"Reading the frames", "Averaging the frames", "Building the field"} <= stages
 
 
 def test_a_head_that_moves_is_aligned(person: SimulatedPerson) -> None:

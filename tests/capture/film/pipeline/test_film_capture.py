@@ -111,6 +111,7 @@ def test_a_face_outside_of_the_picture_is_refused_before_a_frame_is_read(tmp_pat
     assert not messages
 
 
+@pytest.mark.study
 def test_what_follows_the_flashes_in_constant_light_is_no_part_of_the_capture(
     built: CaptureResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
