@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import httpx
@@ -38,6 +38,17 @@ class SteadyTracker(SyntheticTracker):
 
     def track(self, frame: Frame) -> FaceState:
         return super().track(Frame(frame.image, frame.index, frame.captured_at, 0.0))
+
+
+class StrangerTracker(SteadyTracker):
+    """Sees another person: a face longer than the subject's, with a narrow chin."""
+
+    def track(self, frame: Frame) -> FaceState:
+        state = super().track(frame)
+        middle = state.landmarks.mean(axis=0)
+        x, y = (state.landmarks - middle).T
+        changed = np.stack([np.where(y > 0, 0.75, 1.1) * x, 1.2 * y], axis=1)
+        return replace(state, landmarks=middle + changed.astype(np.float32))
 
 
 def grey(value: int = 120, size: tuple[int, int] = SIZE) -> DisplayImage:

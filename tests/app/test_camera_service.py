@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import httpx
@@ -22,7 +21,16 @@ from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.live.supervision.camera_loop import LoopTimings
 from relit_camera.live.supervision.pipeline_health import HealthLimits
-from tests.small_camera import FPS, SIZE, SteadyTracker, difference, memory_source, running_camera, wait_until
+from tests.small_camera import (
+    FPS,
+    SIZE,
+    SteadyTracker,
+    StrangerTracker,
+    difference,
+    memory_source,
+    running_camera,
+    wait_until,
+)
 from tests.virtual_clock import VirtualClock
 
 pytestmark = pytest.mark.real_time
@@ -242,19 +250,10 @@ def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
         assert httpx.get(camera.http.base_url.join("/readyz")).json() == {"status": "ready"}
 
 
-class LongFaceTracker(SteadyTracker):
-    """Sees another person: a face a fifth longer than the subject's."""
-
-    def track(self, frame: Frame) -> FaceState:
-        state = super().track(frame)
-        middle = state.landmarks.mean(axis=0)
-        return replace(state, landmarks=middle + (state.landmarks - middle) * np.array([1, 1.2], np.float32))
-
-
 def test_ratio_falls_back_and_says_so_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     source = memory_source(noise.repeat(4, axis=0).repeat(4, axis=1))
-    with running_camera(tmp_path, source, LongFaceTracker(), look=Look(mode=Mode.RATIO)) as camera:
+    with running_camera(tmp_path, source, StrangerTracker(), look=Look(mode=Mode.RATIO)) as camera:
         wait_until(lambda: DegradationCode.FACE_MISMATCH in camera.degraded())
         assert camera.status()["mode"] == "ratio"
         degraded = camera.status()["degraded"]

@@ -18,12 +18,13 @@ from relit_camera.face.face_state import LOST, FaceState
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from tests.api.api_client import decoded_picture
-from tests.app.test_camera_service import IMPATIENT, LongFaceTracker
+from tests.app.test_camera_service import IMPATIENT
 from tests.small_camera import (
     FPS,
     SIZE,
     Camera,
     SteadyTracker,
+    StrangerTracker,
     memory_source,
     running_camera,
     wait_until,
@@ -110,7 +111,7 @@ def test_a_head_that_is_bowed_at_the_start(tmp_path: Path) -> None:
 def test_a_stranger(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     filmed = noise.repeat(4, axis=0).repeat(4, axis=1)
-    with running_camera(tmp_path, memory_source(filmed), LongFaceTracker(), look=RATIO) as camera:
+    with running_camera(tmp_path, memory_source(filmed), StrangerTracker(), look=RATIO) as camera:
         wait_until(lambda: DegradationCode.FACE_MISMATCH in camera.degraded())
         camera.sink.wait_for(len(camera.sink.new) + 3)
         assert not camera.status()["unlit"]

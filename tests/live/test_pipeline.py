@@ -34,7 +34,7 @@ from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.relighter import Relighter, open_relighter
 from relit_camera.subject.subject import Subject
 from tests.generated_subject import small_subject
-from tests.small_camera import SIZE, SteadyTracker, difference, grey
+from tests.small_camera import SIZE, SteadyTracker, StrangerTracker, difference, grey
 
 CPU = RelitSettings(inference=InferenceSettings(provider="cpu"))
 STUDIO = builtin_environment("studio")
@@ -148,23 +148,15 @@ def test_blend_goes_from_the_live_picture_to_the_relit_one() -> None:
 
 
 def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None:
-    class LongFace(SteadyTracker):
-        def track(self, frame: Frame) -> FaceState:
-            state = super().track(frame)
-            middle = state.landmarks.mean(axis=0)
-            x, y = (state.landmarks - middle).T
-            narrow = np.stack([np.where(y > 0, 0.75, 1.1) * x, 1.2 * y], axis=1)
-            return replace(state, landmarks=middle + narrow.astype(np.float32))
-
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     image = np.ascontiguousarray(noise.repeat(4, axis=0).repeat(4, axis=1))
-    made, ratio = pipeline(LongFace()), scene(mode=Mode.RATIO)
+    made, ratio = pipeline(StrangerTracker()), scene(mode=Mode.RATIO)
     for index in range(100):
         last = made.process(frame(index, image), ratio).image
     assert [trouble.what for trouble in made.troubles] == ["mode reenact is shown in place of mode ratio"]
     still = made.process(frame(100, image), scene()).image
     assert difference(last, still) < 2
-    private = pipeline(LongFace())
+    private = pipeline(StrangerTracker())
     first = [private.process(frame(index, image), replace(ratio, unlit_allowed=False)) for index in range(25)]
     assert max(difference(each.image, still) for each in first) < 2, "of a stranger nothing is shown relit"
     assert private.troubles == []

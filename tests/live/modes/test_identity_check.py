@@ -71,6 +71,14 @@ def test_a_mismatch_is_over_when_the_subject_is_back_and_not_before() -> None:
     assert found.is_over(before_the_camera())
 
 
+def test_when_a_stranger_is_gone_whoever_comes_next_is_judged_anew() -> None:
+    """Else somebody whose shape is never quite their subject's, refused for a grimace, would be refused for ever."""
+    check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
+    found = [check.check(stranger, NO_LIGHT_EXPLAINS, time_s) for time_s in (0.0, 1.9)][-1]
+    assert isinstance(found, FaceMismatch)
+    assert found.is_over(replace(stranger, presence=0.0))
+
+
 def test_one_measure_alone_decides_only_when_it_is_far_off() -> None:
     """A beard changes the shape, a cap the light: only the product of both counts."""
     check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())

@@ -121,7 +121,9 @@ class IdentityCheck:
         self._measured_s, self._shape_cm, self._least = -np.inf, np.inf, np.inf
 
     def _has_changed_into_the_subjects(self, found_cm: float, motion: FaceMotion) -> bool:
-        """Whether a face that was found out at `found_cm` has the subject's shape now."""
+        """Whether a face that was found out at `found_cm` has the subject's shape now, or is gone."""
+        if motion.presence <= 0:
+            return True  # whoever comes next may be the subject
         limit_cm = self._tunables.return_shape_cm
         if found_cm < limit_cm or motion.neutral is None or motion.presence < 1:
             return False
