@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from time import process_time
 
 import pytest
 
+from relit_camera.api.app import create_app
 from relit_camera.api.middleware.body_limits import MAX_UPLOAD_BYTES
-from relit_camera.api.server.http_server import ApiServer
+from relit_camera.api.server.http_server import start_api_server
+from relit_camera.base.config.settings import RelitSettings, ServerSettings, StorageSettings
 from tests import bad_pictures as bad
 from tests.api.api_client import Client, check_problem, hdr, png
 from tests.api.fake_camera import FakeCamera
@@ -55,6 +58,33 @@ PANORAMAS: dict[str, tuple[str, Callable[[], bytes], str]] = {
 NAMES = ["..", ".", "", "/etc/passwd", "../evil", "..\\evil", "a/b", "a\\b", "a\0b", "~root", "-x", ".hidden",
          "x" * 65, "é", "a\nb", "%2e%2e", "a:b", "con", "NUL", "com1", "Lpt9.x", "aux .hdr",
          "trailing.", "trailing "]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Served:
+    """A camera on a real port, to which requests go as they are written: no client of ours tidies the path."""
+
+    camera: FakeCamera
+    host: str
+    port: int
+
+    def status(self, method: str, target: str) -> int:
+        """The status of the answer to a request without a body."""
+        head = f"{method} {target} HTTP/1.1\r\nHost: {self.host}:{self.port}\r\nConnection: close\r\n"
+        with socket.create_connection((self.host, self.port), 5) as connection:
+            connection.sendall(f"{head}Content-Length: 0\r\n\r\n".encode())
+            return int(connection.recv(1000).split()[1])
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """One for all requests that must leave nothing behind: to start and stop one for each takes longer than all."""
+    folder = tmp_path_factory.mktemp("served") / "data"
+    camera = FakeCamera(folder)
+    settings = RelitSettings(storage=StorageSettings(data_dir=folder))
+    with start_api_server(create_app(camera, settings), ServerSettings(port=0)) as server:
+        yield Served(camera, server.address.host, server.address.port)
+    camera.stop()
 
 
 def stored(camera: FakeCamera) -> set[str]:
@@ -104,28 +134,19 @@ def test_a_name_that_is_none(client: Client, camera: FakeCamera, collection: str
                                   "a%0ab", "%252e%252e%252fevil", "x" * 65])  # fmt: skip
 @pytest.mark.parametrize("path", ["presets", "environments", "backgrounds", "subjects"])
 @pytest.mark.parametrize("method", ["GET", "PUT", "DELETE"])
-def test_a_path_leads_nowhere_else(server: ApiServer, camera: FakeCamera, path: str, method: str, name: str) -> None:
-    """Over a real connection: no client of ours tidies the path."""
-    outside = camera.scene_controller.environments.folder.parent.parent / "evil.yaml"
+def test_a_path_leads_nowhere_else(served: Served, path: str, method: str, name: str) -> None:
+    outside = served.camera.scene_controller.environments.folder.parent.parent / "evil.yaml"
     outside.write_text("{}")
-    place = f"{server.address.host}:{server.address.port}"
-    head = f"{method} /api/v1/{path}/{name} HTTP/1.1\r\nHost: {place}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
-    with socket.create_connection((server.address.host, server.address.port), 5) as connection:
-        connection.sendall(head.encode())
-        status = int(connection.recv(1000).split()[1])
-    assert status in (404, 405, 422)
+    assert served.status(method, f"/api/v1/{path}/{name}") in (404, 405, 422)
     assert outside.read_text() == "{}"
-    assert stored(camera) == set()
+    assert stored(served.camera) == set()
 
 
 @pytest.mark.parametrize("path", ["/panel/../app.py", "/panel/..%2fapp.py", "/panel/%2e%2e/app.py",
                                   "/panel//etc/passwd",
                                   "/panel/..%5capp.py", "/panel/%00", "/panel/.", "/panel/" + "x" * 300])  # fmt: skip
-def test_the_panel_s_folder_has_no_way_out(server: ApiServer, path: str) -> None:
-    head = f"GET {path} HTTP/1.1\r\nHost: {server.address.host}:{server.address.port}\r\nConnection: close\r\n\r\n"
-    with socket.create_connection((server.address.host, server.address.port), 5) as connection:
-        connection.sendall(head.encode())
-        assert connection.recv(1000).split()[1] == b"404"
+def test_the_panel_s_folder_has_no_way_out(served: Served, path: str) -> None:
+    assert served.status("GET", path) == 404
 
 
 JSON = {
