@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import zlib
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,6 +18,7 @@ def encoded(suffix: str, width: int = 64, height: int = 32) -> bytes:
     return bytes(cv2.imencode(suffix, np.full((height, width, 3), 128, np.uint8))[1])
 
 
+@cache
 def png_bomb(width: int = 20_000, height: int = 10_000) -> bytes:
     """A whole PNG file: 600 MB of zeros, which are 0.6 MB here."""
 

@@ -12,9 +12,7 @@ def rows_by_hand(basis: LocalBasis, pixels: int) -> NDArray[np.float64]:
     """The row of every pixel and channel, by the definition: (pixels, 3, components)."""
     rows = np.zeros((pixels, 3, basis.components))
     for cluster, places in enumerate(basis.pixels):
-        for place, pixel in enumerate(places):
-            rows[pixel] = 0
-            for j in range(basis.first[cluster], basis.first[cluster + 1]):
-                mix = basis.scales[j].astype(np.float64) * basis.mixes[j].astype(np.float64)
-                rows[pixel] += basis.values[j, :, place].astype(np.float64)[:, None] * mix
+        of_cluster = slice(basis.first[cluster], basis.first[cluster + 1])
+        mixes = basis.scales[of_cluster, None].astype(np.float64) * basis.mixes[of_cluster].astype(np.float64)
+        rows[places] = np.einsum("jcp,jg->pcg", basis.values[of_cluster].astype(np.float64), mixes, optimize=True)
     return rows

@@ -117,7 +117,7 @@ def test_one_that_cannot_be_made_is_tried_again() -> None:
 def sphere_of_many_lights() -> Subject:
     """A subject of more components than are relit without mixes."""
     return build_subject(
-        sphere_samples(100, 64), "barycentric", "sphere", landmarks={"none": np.zeros((1, 2), np.float32)}
+        sphere_samples(100, 32), "barycentric", "sphere", landmarks={"none": np.zeros((1, 2), np.float32)}
     )
 
 
@@ -144,7 +144,7 @@ def test_the_same_person_in_another_size_shares_the_mixes() -> None:
 
 
 def test_the_same_person_in_another_size_shares_the_coefficients_of_few_components() -> None:
-    shared, whole = SharedRelighters(), synthetic_subject(96, 80)
+    shared, whole = SharedRelighters(), synthetic_subject(48, 40)
     half = half_size_subject(whole)
     first, second = shared.get(whole), shared.get(half)
     assert second._coefficient_product is first._coefficient_product

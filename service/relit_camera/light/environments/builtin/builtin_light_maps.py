@@ -28,7 +28,8 @@ def builtin_light_map(name: str) -> LightMap:
     """
     if name not in BUILTIN_NAMES:
         raise KeyError(name)
-    return _all()[BUILTIN_NAMES.index(name)]
+    light_map: LightMap = _all()[BUILTIN_NAMES.index(name)]
+    return light_map
 
 
 def painted_light_maps() -> NDArray[np.float32]:
