@@ -46,7 +46,7 @@ PANORAMAS: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "exr of 2^39 pixels": ("a.exr", lambda: bad.exr_of_size(1 << 20, 1 << 19), "million values"),
     "exr without its pixels": ("a.exr", lambda: bad.exr_of_size(8000, 4000), "cannot be read"),
     "exr of a negative size": ("a.exr", lambda: bad.exr_of_size(-8000, -4000), "cannot be read"),
-    "exr of 130 channels": ("a.exr", lambda: bad.exr(2048, 1024, 130), "million values"),
+    "exr of 130 channels": ("a.exr", lambda: bad.exr_of_size(2048, 1024, 130), "million values"),
     "png, 600 MB in 0.6": ("a.png", bad.png_bomb, "more than 33.6 million"),
     "not twice as wide": ("a.png", lambda: png(64, 64), "not twice as wide"),
     "no suffix": ("a", hdr, "no panorama format"),
