@@ -16,6 +16,7 @@ from relit_camera.api.middleware.error_handlers import install_error_handlers
 from relit_camera.api.middleware.same_origin import AllowedHosts, SameOriginMiddleware
 from relit_camera.api.middleware.token_authentication import TokenAuthMiddleware
 from relit_camera.api.middleware.upload_limits import UploadLimitMiddleware
+from relit_camera.api.openapi.api_router import API_PREFIX
 from relit_camera.api.openapi.openapi_document import openapi_document, operation_id
 from relit_camera.api.routes import (
     backgrounds,
@@ -29,7 +30,6 @@ from relit_camera.api.routes import (
     subjects,
     whole_scene,
 )
-from relit_camera.api.routes.api_router import API_PREFIX
 from relit_camera.api.routes.jobs import captures, expression_captures, film_captures, replays
 from relit_camera.api.routes.setup import framing_help, model_pulling, source_and_tracker, system_checks
 from relit_camera.base.config.access_token import read_token

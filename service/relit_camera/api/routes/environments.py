@@ -14,8 +14,8 @@ from relit_camera.api.bodies.schemas import EnvironmentDetails, EnvironmentItem
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response, thumbnail_url_path
 from relit_camera.api.middleware.body_limits import uploaded_file
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.routes.api_router import api_router
 from relit_camera.base.config.look import ImageBackground, StoredName
 from relit_camera.base.errors import ConflictError, NotFoundError
 from relit_camera.base.images.image_files import encode_display

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.routes.api_router import api_router
 from relit_camera.base.config.look import Lighting
 
 router = api_router("lighting", "/lighting")

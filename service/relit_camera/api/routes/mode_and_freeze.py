@@ -8,8 +8,8 @@ from starlette.responses import Response
 
 from relit_camera.api.bodies.schemas import FreezeBody, ModeBody
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.routes.api_router import api_router
 
 router = api_router("control")
 

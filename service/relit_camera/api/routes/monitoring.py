@@ -17,9 +17,9 @@ from starlette.responses import Response
 
 from relit_camera.api.bodies.schemas import Health, Readiness
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.openapi.openapi_document import operation_id
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.routes.api_router import api_router
 from relit_camera.base.errors import NotReadyError
 from relit_camera.live.status.camera_status import CameraState, CameraStatus, Percentiles
 

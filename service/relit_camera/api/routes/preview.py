@@ -11,9 +11,9 @@ from starlette.responses import Response, StreamingResponse
 
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.preview_stream import FRAME_WAIT_S, PreviewVariant
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.routes.api_router import api_router
 from relit_camera.base.errors import NotReadyError
 from relit_camera.base.images.image_files import encode_display
 

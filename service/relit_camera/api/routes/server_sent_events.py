@@ -13,7 +13,7 @@ from starlette.responses import StreamingResponse
 
 from relit_camera.api.bodies.schemas import SceneBody
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
-from relit_camera.api.routes.api_router import api_router
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.event_hub import Event
 

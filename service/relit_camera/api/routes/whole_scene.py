@@ -10,8 +10,8 @@ from starlette.responses import Response
 
 from relit_camera.api.bodies.schemas import SceneBody, SceneChanges
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.routes.api_router import api_router
 from relit_camera.api.routes.server_sent_events import scene_body
 from relit_camera.base.config.look import Look
 from relit_camera.live.scene.scene import Scene

@@ -6,8 +6,8 @@ from http import HTTPStatus
 
 from relit_camera.api.bodies.schemas import DeskCaptureRequest, InstantCaptureRequest, ShownStep
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.routes.api_router import api_router
 from relit_camera.live.status.capture_status import CaptureStatus
 from relit_camera.live.status.desk_status import DeskCaptureStatus, DeskPlace
 

@@ -13,8 +13,8 @@ from relit_camera.api.bodies.job_schemas import FilmCaptureForm, FilmOptionField
 from relit_camera.api.dependencies import ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response
 from relit_camera.api.middleware.body_limits import MAX_FILM_BYTES
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.routes.api_router import api_router
 from relit_camera.api.routes.jobs.busy_jobs import require_no_replay
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
 from relit_camera.base.storage.upload import Upload

@@ -13,8 +13,8 @@ from starlette.responses import FileResponse
 from relit_camera.api.bodies.job_schemas import NameForm
 from relit_camera.api.dependencies import ApiContextDep
 from relit_camera.api.middleware.body_limits import MAX_FILM_BYTES
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
-from relit_camera.api.routes.api_router import api_router
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
 from relit_camera.base.config.look import StoredName
 from relit_camera.base.errors import ConflictError

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from relit_camera.api.dependencies import ApiContextDep
-from relit_camera.api.routes.api_router import api_router
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.live.status.setup_status import Check
 
 router = api_router("setup")
