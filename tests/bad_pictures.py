@@ -16,19 +16,23 @@ def encoded(suffix: str, width: int = 64, height: int = 32) -> bytes:
     return bytes(cv2.imencode(suffix, np.full((height, width, 3), 128, np.uint8))[1])
 
 
+def deflated_zeros(count: int) -> bytes:
+    """A zlib stream of so many zeros, made of one packed MiB over and over: to pack them all takes seconds."""
+    whole, rest = divmod(count, 1 << 20)
+    one, last = zlib.compressobj(9, wbits=-15), zlib.compressobj(9, wbits=-15)
+    packed = one.compress(bytes(1 << 20)) + one.flush(zlib.Z_FULL_FLUSH)
+    checksum = struct.pack(">I", (count % 65521) << 16 | 1)
+    return b"\x78\xda" + packed * whole + last.compress(bytes(rest)) + last.flush() + checksum
+
+
 def png_bomb(width: int = 20_000, height: int = 10_000) -> bytes:
     """A whole PNG file: 600 MB of zeros, which are 0.6 MB here."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
-    row = bytes(1 + 3 * width)
-    packer = zlib.compressobj(9, wbits=-zlib.MAX_WBITS)
-    packed = packer.compress(row) + packer.flush(zlib.Z_FULL_FLUSH)  # stands alone, so that it can be repeated
-    adler32 = struct.pack(">HH", len(row) * height % 65521, 1)  # of zeros
-    data = b"\x78\xda" + packed * height + packer.flush() + adler32
     head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))
-    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", data) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", deflated_zeros(height * (1 + 3 * width))) + chunk(b"IEND", b"")
 
 
 def png_of_size(width: int, height: int) -> bytes:
@@ -88,22 +92,22 @@ def hdr_of_two_sizes() -> bytes:
     return b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n" + hidden + b"\n-Y 32 +X 64\n" + bytes(1000)
 
 
-def exr(width: int = 64, height: int = 32, channels: int = 3, written: bool = True) -> bytes:
-    """An OpenEXR file of half floats, or its header with hardly a pixel."""
+def exr(width: int = 64, height: int = 32, channels: int = 3) -> bytes:
+    """An OpenEXR file of half floats."""
     import OpenEXR
 
-    plane = np.ones((height, width), np.float16)
-    planes = {"R": plane} | {f"layer{index}.R": plane for index in range(channels - 1)}
+    planes = {f"layer{index}.R": np.ones((height, width), np.float16) for index in range(channels - 1)}
+    planes["R"] = np.ones((height, width), np.float16)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "a.exr"
-        with OpenEXR.File({"compression": OpenEXR.PXR24_COMPRESSION, "type": OpenEXR.scanlineimage}, planes) as file:
+        with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, planes) as file:
             file.write(str(path))
         return path.read_bytes()
 
 
-def exr_of_size(width: int, height: int) -> bytes:
+def exr_of_size(width: int, height: int, channels: int = 3) -> bytes:
     """An OpenEXR file whose data window is of another size than its pixels."""
-    sound = exr()
+    sound = exr(channels=channels)
     there = struct.pack("<iiii", 0, 0, 63, 31)
     return sound.replace(there, struct.pack("<iiii", 0, 0, width - 1, height - 1))
 

@@ -159,15 +159,19 @@ def running_camera(
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = WAIT_S) -> None:
-    """Wait for a condition.
+    """Wait for a condition. One that takes long to ask for, over HTTP say, is asked for less often.
 
     Raises:
         AssertionError: it did not come about in time.
     """
     deadline = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline, "it did not come about in time"
-        time.sleep(0.01)
+    while True:
+        asked_at = time.monotonic()
+        if condition():
+            return
+        now = time.monotonic()
+        assert now < deadline, "it did not come about in time"
+        time.sleep(min(max(0.01, 4 * (now - asked_at)), 0.1))
 
 
 def difference(a: DisplayImage, b: DisplayImage) -> float:

@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MAX_BYTES = 2_000_000
 DEMO = ROOT / "service/relit_camera/app/demo/data"
 """The one exception to "no generated data": what `relit demo` shows."""
-PICTURES = {".png", ".jpg", ".mp4", ".onnx", ".hdr", ".exr", ".npz", ".relit"}
+PICTURES = {".png", ".jpg", ".mp4", ".onnx", ".hdr", ".exr", ".npy", ".npz", ".relit"}
 SEAMS = ("trackers", "methods", "relighters", "reenactors", "sources", "sinks")
 LINK = re.compile(r"\[[^\]]*\]\(([^)#\s]+)(?:#[^)]*)?\)")
 COMMAND = re.compile(r"(?:^\s*|[`/])relit ([a-z]+)\b(?! ─)", re.MULTILINE)

@@ -16,30 +16,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from relit_camera.base.concurrency.worker_process import NICENESS, Progress, run_in_worker_process
+from relit_camera.base.concurrency.worker_process import NICENESS, run_in_worker_process
 from relit_camera.base.errors import CaptureError, WorkerError
+from tests.base.work import add, count_up, die, fail, refuse, sleep, take_memory
 from tests.small_camera import wait_until
-
-
-def add(first: int, second: int) -> tuple[int, int, int]:
-    return first + second, os.getpid(), os.nice(0)
-
-
-def refuse() -> None:
-    raise CaptureError("no face is in the frames", "look at the camera")
-
-
-def fail() -> None:
-    raise ZeroDivisionError("one")
-
-
-def die() -> None:
-    os._exit(7)
-
-
-def sleep(file: Path) -> None:
-    file.write_text(str(os.getpid()))
-    time.sleep(60)
 
 
 def workers() -> list[psutil.Process]:
@@ -93,8 +73,9 @@ def test_a_worker_that_dies_at_its_start_does_not_block_large_arguments(monkeypa
 def test_a_worker_ends_with_the_process_that_started_it(tmp_path: Path) -> None:
     file = tmp_path / "process"
     code = (
-        "import sys; from pathlib import Path; from tests.base import test_worker_process as it\n"
-        "it.run_in_worker_process(it.sleep, Path(sys.argv[1]), timeout_s=60)"
+        "import sys; from pathlib import Path; from tests.base.work import sleep\n"
+        "from relit_camera.base.concurrency.worker_process import run_in_worker_process\n"
+        "run_in_worker_process(sleep, Path(sys.argv[1]), timeout_s=60)"
     )
     with subprocess.Popen([sys.executable, "-c", code, str(file)]) as parent:
         wait_until(lambda: file.exists() and file.read_text() != "")
@@ -103,20 +84,10 @@ def test_a_worker_ends_with_the_process_that_started_it(tmp_path: Path) -> None:
     wait_until(lambda: not worker.is_running() or worker.status() == psutil.STATUS_ZOMBIE)
 
 
-def count_up(last: int, tell: Progress) -> str:
-    for index in range(last):
-        tell("counting", index + 1, last)
-    return "done"
-
-
 def test_progress_is_told_in_order_and_at_once() -> None:
     told: list[tuple[str, int, int | None]] = []
     assert run_in_worker_process(count_up, 3, timeout_s=30, progress=lambda *stage: told.append(stage)) == "done"
     assert told == [("counting", 1, 3), ("counting", 2, 3), ("counting", 3, 3)]
-
-
-def take_memory(count: int) -> int:
-    return len(bytearray(count))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the limit is Linux's")
@@ -131,7 +102,8 @@ def test_ctrl_c_while_a_worker_starts_is_the_camera_s_alone() -> None:
     """The whole process group gets SIGINT at every moment of its start; nothing is printed, the work is done."""
     code = (
         "import os, signal, threading, time\n"
-        "from tests.base import test_worker_process as it\n"
+        "from tests.base.work import add\n"
+        "from relit_camera.base.concurrency.worker_process import run_in_worker_process\n"
         "signal.signal(signal.SIGINT, lambda *_: None)\n"
         "stop = threading.Event()\n"
         "def press():\n"
@@ -139,7 +111,7 @@ def test_ctrl_c_while_a_worker_starts_is_the_camera_s_alone() -> None:
         "presser = threading.Thread(target=press)\n"
         "presser.start()\n"
         "try:\n"
-        "    print(it.run_in_worker_process(it.add, 2, 3, timeout_s=60)[0])\n"
+        "    print(run_in_worker_process(add, 2, 3, timeout_s=60)[0])\n"
         "finally:\n"
         "    stop.set(); presser.join()\n"
     )

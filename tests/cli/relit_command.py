@@ -23,7 +23,8 @@ from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.subject.subject_file import write_subject
 from tests.generated_subject import small_subject
 
-COMMAND = [sys.executable, "-c", "import sys; sys.argv[0] = 'relit'; from relit_camera.cli.main import run; run()"]
+_PROGRAM = "import sys; sys.argv[0] = 'relit'; from relit_camera.cli.main import run; run()"
+COMMAND = [sys.executable, "-c", _PROGRAM]
 CLIP_SIZE, CLIP_FPS = (128, 96), 20.0
 
 
@@ -62,18 +63,26 @@ def call(*arguments: object) -> Answer:
     return Answer(code, out.getvalue(), err.getvalue())
 
 
-def start(*arguments: object, folder: Path, full_at: int | None = None) -> subprocess.Popen[str]:
+def start(
+    *arguments: object, folder: Path, full_at: int | None = None, check_period_s: float | None = None
+) -> subprocess.Popen[str]:
     """Start a command in a process of its own, which keeps its data in `folder`.
 
-    With `full_at` no file may grow beyond so many bytes: the kernel refuses to write them, as on a full disk.
+    With `full_at` no file may grow beyond so many bytes: the kernel refuses to write them, as on a full disk. With
+    `check_period_s` files are looked at each so many seconds.
     """
+    program = _PROGRAM
+    if check_period_s is not None:
+        program = (
+            f"from relit_camera.base.concurrency import regular_checks as r; r.PERIOD_S = {check_period_s}; {program}"
+        )
     limit = None if full_at is None else partial(resource.setrlimit, resource.RLIMIT_FSIZE, (full_at, full_at))
     variables = environment(folder)
     if limit is not None:
         # Coverage, where it is measured, could not write its file either, and would say so.
         variables = {name: value for name, value in variables.items() if not name.startswith("COVERAGE_")}
     return subprocess.Popen(
-        [*COMMAND, *map(str, arguments)],
+        [sys.executable, "-c", program, *map(str, arguments)],
         env=variables,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

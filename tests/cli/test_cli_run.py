@@ -33,10 +33,15 @@ def arguments(material: Material, *more: object) -> list[object]:
 
 @contextmanager
 def running(
-    material: Material, folder: Path, *more: object, full_at: int | None = None, config: Path | None = None
+    material: Material,
+    folder: Path,
+    *more: object,
+    full_at: int | None = None,
+    config: Path | None = None,
+    check_period_s: float | None = None,
 ) -> Iterator[tuple[subprocess.Popen[str], httpx.Client]]:
     first = ("--config", config) if config else ()
-    process = start(*first, *arguments(material, *more), folder=folder, full_at=full_at)
+    process = start(*first, *arguments(material, *more), folder=folder, full_at=full_at, check_period_s=check_period_s)
     try:
         assert process.stdout is not None
         line = process.stdout.readline()
@@ -222,7 +227,7 @@ def test_the_configuration_is_edited_while_it_runs(material: Material, tmp_path:
     def told(process_http: httpx.Client) -> str:
         return " ".join(f"{each['what']}: {each['why']}" for each in process_http.get("status").json()["degraded"])
 
-    with running(material, tmp_path, config=config) as (process, http):
+    with running(material, tmp_path, config=config, check_period_s=0.2) as (process, http):
         assert http.put("background", json={"kind": "color", "color": "#102030"}).status_code == 200
         for wrong, why in (
             ("look: {lighting: {environment", "line 1"),

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -35,8 +36,12 @@ from tests.small_camera import SIZE, SteadyTracker, difference, grey, memory_sou
 
 pytestmark = pytest.mark.real_time
 
-IMPATIENT = CameraTimings(pipeline=HealthLimits(retry_s=0.1, hang_timeout_s=0.4, abandon_timeout_s=1.0))
-"""What takes seconds in life takes tenths here."""
+IMPATIENT = CameraTimings(
+    pipeline=HealthLimits(retry_s=0.1, max_backoff_doublings=1, hang_timeout_s=0.4, abandon_timeout_s=1.0)
+)
+"""What takes seconds in life takes tenths here, and no pause grows."""
+MORE = 10
+"""Frames that go on while there is a fault: half a second of them."""
 
 watched_camera = partial(unhurried_camera, timings=IMPATIENT)
 
@@ -74,7 +79,7 @@ def test_a_tracker_that_raises(tracker: FaultyTracker, error: Exception, tmp_pat
         tracker.error = error
         watched.reports(str(error))
         watched.state("standing-in")
-        watched.goes_on(20)
+        watched.goes_on(MORE)
         # The source image, at rest: the subject is where it was, lit as it was.
         assert difference(watched.sink.new[-1], live) < 6
         lit = watched.sink.new[-1]
@@ -153,9 +158,11 @@ def test_a_tracker_that_starves_is_not_replaced(tmp_path: Path, survived: Surviv
 
 
 def test_trackers_that_all_hang_leave_the_fallback(tracker: FaultyTracker, tmp_path: Path, survived: Survived) -> None:
-    with watched_camera(tmp_path, tracker=tracker) as watched:
+    # All have the same patience, so that the last of them has been given up long before the frames are counted.
+    limits = replace(IMPATIENT.pipeline, max_backoff_doublings=0, first_frame_factor=1)
+    with watched_camera(tmp_path, tracker=tracker, timings=replace(IMPATIENT, pipeline=limits)) as watched:
         tracker.release.clear()
-        most = IMPATIENT.pipeline.max_abandoned_workers
+        most = limits.max_abandoned_workers
         wait_until(lambda: tracker.hanging == most)
         watched.goes_on(40)
         assert tracker.hanging == most  # and no more
@@ -173,7 +180,7 @@ def test_what_is_late_does_not_break_a_held_picture(tracker: FaultyTracker, tmp_
         watched.goes_on(5)
         held, count = watched.sink.new[-1], len(watched.sink.new)
         tracker.release.set()
-        watched.goes_on(20)
+        watched.goes_on(MORE)
         assert watched.sink.new[-1] is held
         assert len(watched.sink.new) == count
 
@@ -234,7 +241,7 @@ def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, mo
         fault.set()
         watched.reports("a bug in the warp" if how == "raises" else f"in: {half}")
         watched.state("standing-in")
-        watched.goes_on(20)
+        watched.goes_on(MORE)
         fault.clear()
         released.set()
         watched.recovers()
@@ -256,7 +263,7 @@ def test_not_even_the_source_image_can_be_relit(
             watched.reports("no memory for a picture")
             shown = grey() if fallback is Fallback.LIVE else placeholder(SIZE, "the picture has failed: see the panel")
             wait_until(lambda: difference(watched.sink.new[-1], shown) == 0)
-            watched.goes_on(20)
+            watched.goes_on(MORE)
         watched.recovers()
         survived(f"relighting raises, output.fallback is {fallback}", watched)
 
@@ -274,7 +281,7 @@ def test_a_provider_that_fails_on_the_way(tmp_path: Path, survived: Survived, mo
     with watched_camera(tmp_path) as watched:
         fault.set()
         watched.reports("719")
-        watched.goes_on(20)
+        watched.goes_on(MORE)
         fault.clear()
         watched.recovers()
         survived("the network's provider fails", watched)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relit_camera.app.camera_service import DEFAULT_TIMINGS, CameraTimings
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.devices.sources import webcam_source
 from relit_camera.devices.sources.webcam_source import WebcamSource
@@ -22,8 +23,10 @@ from tests.small_camera import SIZE, difference, wait_until
 
 pytestmark = pytest.mark.real_time
 
-STALL_S = float(os.environ.get("FAULT_STALL_S", "6"))
-"""The table of docs/reliability.md is made with 30."""
+STALL_S = float(os.environ.get("FAULT_STALL_S", "2"))
+"""The table of docs/reliability.md is made with 30. In two seconds the webcam is opened again three times."""
+SOON_STALE = CameraTimings(stale_after_s=1.0)
+"""For tests that wait until the placeholder says that the webcam is waited for."""
 
 
 @pytest.fixture(autouse=True)
@@ -54,9 +57,11 @@ class Cameras:
         return self.opened[-1]
 
 
-def watched_webcam(tmp_path: Path, tree: FakeTree, cameras: Cameras) -> AbstractContextManager[Watched]:
+def watched_webcam(
+    tmp_path: Path, tree: FakeTree, cameras: Cameras, timings: CameraTimings = DEFAULT_TIMINGS
+) -> AbstractContextManager[Watched]:
     source = WebcamSource("webcam", SIZE, 30, tree=tree, open_capture=cameras, stall_timeout_s=0.5)
-    return watched_camera(tmp_path / "data", source=source)
+    return watched_camera(tmp_path / "data", source=source, timings=timings)
 
 
 def waiting(watched: Watched) -> None:
@@ -67,7 +72,7 @@ def waiting(watched: Watched) -> None:
 
 def test_unplugged_and_back_under_another_number(tmp_path: Path, tree: FakeTree, survived: Survived) -> None:
     cameras = Cameras()
-    with watched_webcam(tmp_path, tree, cameras) as watched:
+    with watched_webcam(tmp_path, tree, cameras, SOON_STALE) as watched:
         tree.remove(0)
         cameras.opened[-1].mode = "silent"
         watched.reports("unplugged")
@@ -81,7 +86,7 @@ def test_unplugged_and_back_under_another_number(tmp_path: Path, tree: FakeTree,
 @pytest.mark.parametrize("mode", ["silent", "stuck"])
 def test_a_stall(mode: str, tmp_path: Path, tree: FakeTree, survived: Survived) -> None:
     cameras = Cameras()
-    with watched_webcam(tmp_path, tree, cameras) as watched:
+    with watched_webcam(tmp_path, tree, cameras, SOON_STALE) as watched:
         stalled = cameras.opened[-1]
         stalled.mode = mode
         cameras.make = lambda: FakeCapture(mode="silent")  # opening it again does not help

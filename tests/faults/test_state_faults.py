@@ -66,7 +66,7 @@ def test_a_subject_file_is_spoilt_while_in_use(
     write_subject(file, small_subject())
     with watched_camera(tmp_path / "data") as watched:
         watched.camera.scene_controller.load_configured_subject(str(file))
-        watched.goes_on(20)
+        watched.goes_on(10)
         watched.begin()
         spoil(file)
         # Every picture of the field is asked for again under another light.
@@ -85,7 +85,7 @@ def test_the_clock_jumps(jump_s: float, tmp_path: Path, survived: Survived, monk
     with watched_camera(tmp_path) as watched:
         monkeypatch.setattr(time, "time", lambda: real() + jump_s)
         time.sleep(0.5)
-        watched.goes_on(20)
+        watched.goes_on(10)
         assert watched.reports_nothing()
         assert 0 < watched.camera.camera_service.status().latency_ms.p95 < 5000
         survived(f"the clock jumps by {jump_s / 3600:+.0f} h", watched)
@@ -138,12 +138,13 @@ def test_the_end_of_a_recording_is_waited_for(tmp_path: Path) -> None:
         def describe(self) -> SinkInfo:
             return SinkInfo("file", "rec.mp4", SIZE)
 
-    for seconds, lost in ((1.5, False), (60.0, True)):
+    for seconds, disk_timeout_s, lost in ((1.5, 20.0, False), (60.0, 0.5, True)):
+        timings = CameraTimings(stop_timeout_s=0.5, disk_timeout_s=disk_timeout_s)
         sink = Recording()
         with ExitStack() as ended:
             if lost:
                 ended.enter_context(pytest.raises(StorageError, match="the disk does not answer"))
-            with running_camera(tmp_path, sink=sink, timings=CameraTimings(disk_timeout_s=2.0)) as camera:
+            with running_camera(tmp_path, sink=sink, timings=timings) as camera:
                 sink.wait_for(3)
                 sink.release.clear()
                 time.sleep(0.2)

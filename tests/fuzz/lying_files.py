@@ -19,7 +19,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from tests.bad_pictures import encoded
+from tests.bad_pictures import deflated_zeros, encoded
 
 MIB = 1 << 20
 
@@ -46,19 +46,11 @@ def png_chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def deflated_rows(rows: int, row_bytes: int) -> bytes:
-    """Zeros as a PNG file's rows, each behind its filter byte, without holding them."""
-    packer, packed = zlib.compressobj(1), io.BytesIO()
-    for _ in range(rows):
-        packed.write(packer.compress(bytes(1 + row_bytes)))
-    return packed.getvalue() + packer.flush()
-
-
 def png_of_zeros(width: int, height: int, bits: int = 8, color_type: int = 2) -> bytes:
     """A whole PNG file of black."""
     channels = {0: 1, 2: 3, 6: 4}[color_type]
     head = png_chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, color_type, 0, 0, 0))
-    rows = deflated_rows(height, width * channels * bits // 8)
+    rows = deflated_zeros(height * (1 + width * channels * bits // 8))
     return b"\x89PNG\r\n\x1a\n" + head + png_chunk(b"IDAT", rows) + png_chunk(b"IEND", b"")
 
 
@@ -82,7 +74,7 @@ def png_of_a_text_bomb() -> bytes:
 
 def apng(frames: int, width: int, height: int) -> bytes:
     """An animated PNG: each frame is a full picture of zeros."""
-    rows = deflated_rows(height, width * 3)
+    rows = deflated_zeros(height * (1 + width * 3))
     parts = [png_chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0))]
     parts.append(png_chunk(b"acTL", struct.pack(">II", frames, 0)))
     for index in range(frames):

@@ -15,7 +15,7 @@ from relit_camera.lab.evaluate.field.field_report import field_json, field_page,
 from relit_camera.lab.evaluate.field.ghost_shadows import find_shadow_transitions, mid_tone_fraction
 from relit_camera.lab.evaluate.field.ground_truth import GroundTruth
 from relit_camera.lab.evaluate.field.sample_points import SamplePoint, face_sample_points, parse_sample_point
-from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from tests.lab.html_outline import Outline
 from tests.lab.lit_sphere import cap, grid, shadowed
 
@@ -27,7 +27,7 @@ SPOTS = [SamplePoint("beside the shadow", 20, 20), SamplePoint("middle", 24, 24)
 @pytest.fixture(scope="module")
 def report() -> FieldReport:
     samples, truth = shadowed(cap(40, 60)), GroundTruth(shadowed(grid(16)))
-    environments = {name: builtin_environment(name).light_map for name in ("studio", "party")}
+    environments = {name: builtin_light_map(name) for name in ("studio", "party")}
     candidates = method_candidates(samples, truth.inside, METHODS)
     return evaluate_field(candidates, samples.directions, samples, truth, environments, SPOTS)
 

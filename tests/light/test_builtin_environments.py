@@ -9,6 +9,7 @@ import pytest
 from relit_camera.base.images.color import LUMINANCE
 from relit_camera.light.directions import direction_from_degrees, texel_directions
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from relit_camera.light.environments.builtin.builtin_thumbnails import builtin_thumbnail, drawn_thumbnail
 from relit_camera.light.environments.builtin.canvas import bearings, directions
 from relit_camera.light.environments.environment_store import EnvironmentStore
@@ -69,6 +70,14 @@ def test_each_thumbnail_of_the_package_is_what_is_drawn(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BUILTIN_NAMES)
+def test_each_light_map_of_the_package_is_the_painted_one_s(name: str) -> None:
+    painted = builtin_environment(name).light_map
+    cure = "write them again: python -m relit_camera.light.environments.builtin.builtin_light_maps"
+    # Processors round differently: by less than a hundred thousandth of the brightest.
+    np.testing.assert_allclose(builtin_light_map(name), painted, rtol=1e-4, atol=1e-5 * painted.max(), err_msg=cure)
+
+
+@pytest.mark.parametrize("name", BUILTIN_NAMES)
 def test_each_thumbnail_shows_something(name: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     data = EnvironmentStore(tmp_path_factory.mktemp("store")).thumbnail(name)
     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE)
@@ -124,3 +133,5 @@ def test_overcast_light_is_soft_neutral_and_from_above() -> None:
 def test_unknown_names_are_refused() -> None:
     with pytest.raises(KeyError):
         builtin_environment("beach")
+    with pytest.raises(KeyError):
+        builtin_light_map("beach")

@@ -14,7 +14,7 @@ from relit_camera.capture.reflectance.methods.barycentric_methods import Spheric
 from relit_camera.capture.reflectance.methods.shadow_aware_interpolation import SharpVisibilityInterpolation
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import texel_solid_angles
-from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from relit_camera.light.environments.environment_panorama import read_panorama
 from relit_camera.light.light_map import LightMap, resample_to_light_map
 from relit_camera.subject.compression.accuracy_target import DARK_LIGHT_FRACTION, CompressionTarget
@@ -26,7 +26,7 @@ from tests.lab.lit_sphere import cap, shadowed
 from tests.subject.handmade_basis import rows_by_hand
 
 SIZE = 48
-MAP = builtin_environment("sunset").light_map
+MAP = builtin_light_map("sunset")
 TARGET = CompressionTarget(texel_db=42, light_db=45, maps=[MAP])
 
 

@@ -13,7 +13,7 @@ from safetensors.numpy import load_file, save_file
 from relit_camera.base.errors import InputError, SubjectError
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.capture.subject_builder import build_subject
-from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from relit_camera.subject.compression.webp_packing import decode_basis, encode_basis, light_psnrs_db, pack_subject
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.subject import Subject
@@ -27,7 +27,7 @@ def subject() -> Subject:
 
 
 def under(subject: Subject, environment: str) -> np.ndarray:
-    return BasisRelighter(subject).relight(builtin_environment(environment).light_map[None])[0]
+    return BasisRelighter(subject).relight(builtin_light_map(environment)[None])[0]
 
 
 def test_a_basis_comes_back_within_half_a_step() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from fastapi import Depends, FastAPI
+from fastapi import FastAPI
 from starlette.responses import FileResponse, HTMLResponse
 from starlette.staticfiles import StaticFiles
 
@@ -13,10 +13,10 @@ from relit_camera import __version__
 from relit_camera.api.dependencies import create_context
 from relit_camera.api.middleware.body_limits import BodyLimitMiddleware, HeadRequestMiddleware
 from relit_camera.api.middleware.error_handlers import install_error_handlers
-from relit_camera.api.middleware.json_bodies import require_strict_json
 from relit_camera.api.middleware.same_origin import AllowedHosts, SameOriginMiddleware
 from relit_camera.api.middleware.token_authentication import TokenAuthMiddleware
 from relit_camera.api.middleware.upload_limits import UploadLimitMiddleware
+from relit_camera.api.openapi.api_router import API_PREFIX
 from relit_camera.api.openapi.openapi_document import openapi_document, operation_id
 from relit_camera.api.routes import (
     backgrounds,
@@ -36,7 +36,6 @@ from relit_camera.base.config.access_token import read_token
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.live.camera_control import CameraControl
 
-API_PREFIX = "/api/v1"
 PANEL_FOLDER = Path(__file__).with_name("panel")
 
 
@@ -94,8 +93,8 @@ def create_app_without_camera() -> FastAPI:
         server_sent_events,
         monitoring,
     ):
-        app.include_router(topic.router, prefix=API_PREFIX, dependencies=[Depends(require_strict_json)])
-    app.include_router(monitoring.probe_router)
+        app.router.routes += topic.router.routes
+    app.router.routes += monitoring.probe_router.routes
     app.add_api_route("/", _panel_page, include_in_schema=False)
     app.add_api_route("/desk", _desk_page, include_in_schema=False)
     app.add_api_route("/film", _film_page, include_in_schema=False)

@@ -17,7 +17,8 @@ from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD, ope
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.subject_landmarks import find_landmarks
 from relit_camera.light.directions import texel_directions, texel_solid_angles
-from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.compression.field_compression import CompressedField, compress_field
 from relit_camera.subject.measured_light import measured_fraction
@@ -88,7 +89,7 @@ def subject_from_field(
         accuracy: of the compression; the default one where None.
         progress: called with the number of tiles that are compressed and the total.
     """
-    maps = [builtin_environment(name).light_map for name in BUILTIN_NAMES]
+    maps = [builtin_light_map(name) for name in BUILTIN_NAMES]
     target = replace(accuracy or CompressionTarget(), maps=maps)
     compressed = compress_field(field, samples.pictures, samples.matte, target, progress)
     quality = compressed.quality

@@ -30,7 +30,8 @@ from relit_camera.base.images.image_files import read_display, write_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.storage.atomic_files import make_folder, write_atomic
 from relit_camera.base.video.video_readers import VideoReader
-from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from relit_studio.mannequin.outputs.driving_clip import CLIP_SIZE, write_clip
 from relit_studio.mannequin.outputs.mannequin_field import write_field
 from relit_studio.mannequin.outputs.mannequin_performance import FPS, FRAMES, frame_times, posture_at
@@ -93,7 +94,7 @@ def generate(
                 write_relit(
                     temporary / f"relit-{name}.mp4",
                     temporary / "matte.mp4",
-                    builtin_environment(name).light_map,
+                    builtin_light_map(name),
                     frames,
                     lambda done, _, task=relit_task: shown.update(task, completed=done),  # type: ignore[misc]
                 )

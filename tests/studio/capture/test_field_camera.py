@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from relit_studio.cameras.pinhole import Pinhole
 from relit_studio.cameras.studio_camera import Camera
 from relit_studio.capture.persons.field_person import FieldPerson
@@ -33,5 +33,5 @@ def test_a_solved_field_is_filmed_at_its_distance(tmp_path: Path) -> None:
     write_solver_field(
         tmp_path, SolverSettings(width=32, height=24, map_rows=4, bundles=8, rays=32, supersampling=1, shadow=96)
     )
-    filmed = FieldPerson(tmp_path, 24, builtin_environment("window").light_map)
+    filmed = FieldPerson(tmp_path, 24, builtin_light_map("window"))
     assert abs(filmed.origin[2] + DISTANCE_CM) < 2

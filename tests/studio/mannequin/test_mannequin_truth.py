@@ -11,7 +11,7 @@ from relit_camera.base.images.tone_mapping import linear_from_display
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.capture.picture_import import import_samples
 from relit_camera.light.directions import texel_directions
-from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
+from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_studio.mannequin.__main__ import main
 from relit_studio.mannequin.outputs.driving_clip import CLIP_SIZE, render_clip
@@ -38,7 +38,7 @@ def test_the_field_has_a_linear_picture_for_every_texel(made: Path) -> None:
 
 
 def test_the_relit_video_is_the_clip_under_that_light(made: Path) -> None:
-    light_map = builtin_environment("overcast").light_map
+    light_map = builtin_light_map("overcast")
     with VideoReader(made / "relit-overcast.mp4") as relit, VideoReader(made / "matte.mp4") as outline:
         frames = [frame.image for frame in relit]
         mattes = [frame.image[..., 0] > 250 for frame in outline]

@@ -1,1 +1,1 @@
-"""The OpenAPI description of the REST API, as served and as written to a file."""
+"""The OpenAPI description of the REST API, as served and as written to a file, and what all operations share."""

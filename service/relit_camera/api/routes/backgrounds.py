@@ -5,18 +5,19 @@ from __future__ import annotations
 from http import HTTPStatus
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Form, Request, UploadFile
+from fastapi import Body, Form, Request, UploadFile
 from starlette.responses import Response
 
 from relit_camera.api.bodies.schemas import BackgroundPicture
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, encode_thumbnail, jpeg_response, thumbnail_url_path
 from relit_camera.api.middleware.body_limits import uploaded_file
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.base.config.look import Background, ImageBackground, StoredName
 from relit_camera.base.errors import ConflictError
 
-router = APIRouter(tags=["background"])
+router = api_router("background")
 
 
 @router.get("/background")

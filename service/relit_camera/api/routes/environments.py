@@ -7,13 +7,14 @@ from http import HTTPStatus
 from pathlib import PurePath
 from typing import Annotated
 
-from fastapi import APIRouter, Form, Request, UploadFile
+from fastapi import Form, Request, UploadFile
 from starlette.responses import Response
 
 from relit_camera.api.bodies.schemas import EnvironmentDetails, EnvironmentItem
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response, thumbnail_url_path
 from relit_camera.api.middleware.body_limits import uploaded_file
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.base.config.look import ImageBackground, StoredName
 from relit_camera.base.errors import ConflictError, NotFoundError
@@ -23,7 +24,7 @@ from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.environments.environment_store import RESERVED_NAMES
 from relit_camera.light.environments.environment_thumbnail import thumbnail_image
 
-router = APIRouter(prefix="/environments", tags=["environments"])
+router = api_router("environments", "/environments")
 
 
 @router.get("")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
-
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.base.config.look import Lighting
 
-router = APIRouter(prefix="/lighting", tags=["lighting"])
+router = api_router("lighting", "/lighting")
 
 
 @router.get("")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from http import HTTPStatus
 
-from fastapi import APIRouter
 from starlette.responses import Response
 
 from relit_camera.api.bodies.schemas import FreezeBody, ModeBody
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 
-router = APIRouter(tags=["control"])
+router = api_router("control")
 
 
 @router.get("/mode")

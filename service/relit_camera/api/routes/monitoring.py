@@ -17,6 +17,8 @@ from starlette.responses import Response
 
 from relit_camera.api.bodies.schemas import Health, Readiness
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
+from relit_camera.api.openapi.openapi_document import operation_id
 from relit_camera.api.problem_details import error_responses
 from relit_camera.base.errors import NotReadyError
 from relit_camera.live.status.camera_status import CameraState, CameraStatus, Percentiles
@@ -92,8 +94,8 @@ def _quantiles(times_ms: Percentiles) -> tuple[tuple[str, float], ...]:
     return ("0.5", times_ms.p50 / 1000), ("0.95", times_ms.p95 / 1000)
 
 
-router = APIRouter(tags=["status"])
-probe_router = APIRouter(tags=["probes"])
+router = api_router("status")
+probe_router = APIRouter(tags=["probes"], generate_unique_id_function=operation_id)
 
 
 @router.get("/status")

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from http import HTTPStatus
 
-from fastapi import APIRouter
 from starlette.responses import Response
 
 from relit_camera.api.bodies.schemas import PresetChanges, PresetItem
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.base.config.look import Look, Preset, StoredName
 from relit_camera.live.scene.scene_controller import ChosenSubject
 
-router = APIRouter(prefix="/presets", tags=["presets"])
+router = api_router("presets", "/presets")
 
 
 @router.get("")

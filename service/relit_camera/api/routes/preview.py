@@ -6,17 +6,18 @@ from collections.abc import AsyncIterator
 from contextlib import suppress
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
+from fastapi import Query
 from starlette.responses import Response, StreamingResponse
 
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.preview_stream import FRAME_WAIT_S, PreviewVariant
 from relit_camera.api.problem_details import error_responses
 from relit_camera.base.errors import NotReadyError
 from relit_camera.base.images.image_files import encode_display
 
-router = APIRouter(tags=["preview"])
+router = api_router("preview")
 
 MULTIPART_BOUNDARY = "picture"
 FIRST_FRAME_TIMEOUT_S = 2.0

@@ -7,17 +7,17 @@ import queue
 import time
 from collections.abc import AsyncIterator
 
-from fastapi import APIRouter
 from pydantic_core import to_json
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.responses import StreamingResponse
 
 from relit_camera.api.bodies.schemas import SceneBody
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.event_hub import Event
 
-router = APIRouter(tags=["status"])
+router = api_router("status")
 
 SCENE_POLL_S = 0.05
 STATUS_INTERVAL_S = 1.0

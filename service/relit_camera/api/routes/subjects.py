@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from http import HTTPStatus
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from starlette.responses import Response
 
 from relit_camera.api.bodies.job_schemas import NameForm, NewName
@@ -16,6 +16,7 @@ from relit_camera.api.bodies.schemas import CurrentSubject, SubjectChoice, Subje
 from relit_camera.api.dependencies import ApiContext, ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, encode_thumbnail, jpeg_response, thumbnail_url_path
 from relit_camera.api.middleware.body_limits import MAX_SUBJECT_BYTES
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
 from relit_camera.base.config.look import StoredName
@@ -23,7 +24,7 @@ from relit_camera.base.errors import ConflictError
 from relit_camera.base.storage.upload import Upload
 from relit_camera.subject.subject_file import count_stills, read_metadata, read_neutral
 
-router = APIRouter(tags=["subjects"])
+router = api_router("subjects")
 
 DEMO_NAME = "demo person"
 """Under which the person who is shipped with the program is stored."""

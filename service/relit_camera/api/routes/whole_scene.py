@@ -5,18 +5,19 @@ from __future__ import annotations
 import re
 from typing import Annotated
 
-from fastapi import APIRouter, Header
+from fastapi import Header
 from starlette.responses import Response
 
 from relit_camera.api.bodies.schemas import SceneBody, SceneChanges
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.api.routes.server_sent_events import scene_body
 from relit_camera.base.config.look import Look
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.scene.scene_controller import ChosenSubject
 
-router = APIRouter(prefix="/scene", tags=["scene"])
+router = api_router("scene", "/scene")
 
 IfMatch = Annotated[
     str | None,

@@ -57,10 +57,11 @@ def info(
 
 def _measured_of_places(subject: Subject) -> dict[str, float]:
     """The measured fraction of each built-in place's light."""
-    from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+    from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+    from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
     from relit_camera.subject.measured_light import share_of_light
 
-    maps = {name: builtin_environment(name).light_map for name in BUILTIN_NAMES}
+    maps = {name: builtin_light_map(name) for name in BUILTIN_NAMES}
     return {name: round(share_of_light(each, subject.measured_texels), 3) for name, each in maps.items()}
 
 
@@ -78,7 +79,8 @@ def pack(
 
     from relit_camera.base.images.image_quality import psnr
     from relit_camera.cli.arguments import load_command_settings
-    from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
+    from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
+    from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
     from relit_camera.subject.compression.webp_packing import light_psnrs_db, pack_subject
     from relit_camera.subject.relighting.basis_relighter import BasisRelighter
     from relit_camera.subject.subject_file import read_subject, write_subject
@@ -88,7 +90,7 @@ def pack(
     write_subject(out, pack_subject(full, components), small=True)
     small = read_subject(out)
     before, after = BasisRelighter(full), BasisRelighter(small)
-    maps = np.stack([builtin_environment(name).light_map for name in BUILTIN_NAMES])
+    maps = np.stack([builtin_light_map(name) for name in BUILTIN_NAMES])
     worst = min(psnr(*pair, full.matte) for pair in zip(after.relight(maps), before.relight(maps), strict=True))
     lights = light_psnrs_db(small, full)
     typer.echo(f"{out}: {out.stat().st_size / 1e6:.1f} MB, {components} of {full.metadata.components} components")

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from http import HTTPStatus
 
-from fastapi import APIRouter
-
 from relit_camera.api.bodies.schemas import DeskCaptureRequest, InstantCaptureRequest, ShownStep
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.live.status.capture_status import CaptureStatus
 from relit_camera.live.status.desk_status import DeskCaptureStatus, DeskPlace
 
-router = APIRouter(tags=["subjects"])
+router = api_router("subjects")
 
 
 @router.get("/captures/instant")

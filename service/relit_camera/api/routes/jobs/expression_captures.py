@@ -6,18 +6,19 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from http import HTTPStatus
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 
 from relit_camera.api.bodies.job_schemas import ExpressionCaptureRequest
 from relit_camera.api.dependencies import ApiContextDep
 from relit_camera.api.middleware.body_limits import MAX_FILM_BYTES
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.api.routes.jobs.busy_jobs import require_no_replay
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
 from relit_camera.base.storage.upload import Upload
 from relit_camera.live.status.expression_status import ExpressionCaptureStatus
 
-router = APIRouter(prefix="/captures/expressions", tags=["subjects"])
+router = api_router("subjects", "/captures/expressions")
 
 
 @router.get("")

@@ -6,20 +6,21 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from http import HTTPStatus
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from starlette.responses import Response
 
 from relit_camera.api.bodies.job_schemas import FilmCaptureForm, FilmOptionFields
 from relit_camera.api.dependencies import ApiContextDep
 from relit_camera.api.jpeg_responses import JPEG_RESPONSE, jpeg_response
 from relit_camera.api.middleware.body_limits import MAX_FILM_BYTES
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.api.routes.jobs.busy_jobs import require_no_replay
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
 from relit_camera.base.storage.upload import Upload
 from relit_camera.live.status.film_status import FilmCaptureStatus
 
-router = APIRouter(prefix="/captures/film", tags=["subjects"])
+router = api_router("subjects", "/captures/film")
 
 
 @router.get("")

@@ -7,12 +7,13 @@ from contextlib import contextmanager
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import Request
 from starlette.responses import FileResponse
 
 from relit_camera.api.bodies.job_schemas import NameForm
 from relit_camera.api.dependencies import ApiContextDep
 from relit_camera.api.middleware.body_limits import MAX_FILM_BYTES
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.api.streamed_forms import form_description, read_fields, receive_form
 from relit_camera.base.config.look import StoredName
@@ -27,7 +28,7 @@ VIDEO_RESPONSE: dict[int | str, dict[str, Any]] = {
     }
 }
 
-router = APIRouter(prefix="/replays", tags=["replays"])
+router = api_router("replays", "/replays")
 
 
 @router.get("")

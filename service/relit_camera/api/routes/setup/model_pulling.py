@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from http import HTTPStatus
 
-from fastapi import APIRouter
-
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.live.status.setup_status import ModelPullStatus
 
-router = APIRouter(tags=["setup"])
+router = api_router("setup")
 
 
 @router.get("/models")

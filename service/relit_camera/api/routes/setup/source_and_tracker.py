@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
-
 from relit_camera.api.bodies.setup_bodies import SourceChange, TrackerBody
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.api.problem_details import error_responses
 from relit_camera.live.status.setup_status import DeviceList, SourceStatus, TrackerChoice
 
-router = APIRouter(tags=["setup"])
+router = api_router("setup")
 
 
 @router.get("/devices")

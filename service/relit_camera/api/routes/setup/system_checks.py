@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter
-
 from relit_camera.api.dependencies import ApiContextDep
+from relit_camera.api.openapi.api_router import api_router
 from relit_camera.live.status.setup_status import Check
 
-router = APIRouter(tags=["setup"])
+router = api_router("setup")
 
 
 @router.get("/checks")

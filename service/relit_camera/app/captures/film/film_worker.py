@@ -67,7 +67,7 @@ def draw_pictures(subject: Subject, folder: Path) -> list[str]:
     from relit_camera.base.storage.atomic_files import make_folder, write_atomic
     from relit_camera.capture.reflectance.directional_light import relight_from_direction
     from relit_camera.light.directions import direction_from_degrees
-    from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
+    from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
     from relit_camera.light.exposure import auto_exposure_scale
     from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 
@@ -80,7 +80,7 @@ def draw_pictures(subject: Subject, folder: Path) -> list[str]:
         written.append(name)
 
     for name in ENVIRONMENTS:
-        light = builtin_environment(name).light_map
+        light = builtin_light_map(name)
         draw(name, relighter.relight(light[None])[0], auto_exposure_scale(light))
     for name, (azimuth, elevation) in LAMPS.items():
         draw(name, relight_from_direction(subject, direction_from_degrees(azimuth, elevation)), 1.0)

@@ -11,8 +11,9 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import cast
 
-from relit_camera.api.app import API_PREFIX, create_app_without_camera
+from relit_camera.api.app import create_app_without_camera
 from relit_camera.api.dependencies import ApiContext
+from relit_camera.api.openapi.api_router import API_PREFIX
 from relit_camera.api.preview_stream import PreviewBroadcaster
 from relit_camera.api.server.http_server import ApiServer, ServerAddress, start_api_server
 from relit_camera.base.config.preset_store import PresetStore

@@ -54,11 +54,12 @@ def color_ramp(value: NDArray, stops: Sequence[float], colors: list[NDArray[np.f
 
 def blend_over(canvas: Canvas, mask: Canvas, paint: NDArray[np.float32]) -> Canvas:
     """`paint` (3,) or (512, 1024, 3) laid over the canvas where the mask (512, 1024) is 1."""
-    covered = canvas.copy()
-    inside = np.nonzero(mask)  # a panel covers a twentieth of the canvas
-    below = canvas[inside]
-    covered[inside] += mask[inside][:, None] * ((paint[inside] if paint.ndim > 1 else paint) - below)
-    return covered
+    covered = canvas.reshape(-1, 3).copy()
+    inside = np.flatnonzero(mask)  # a panel covers a twentieth of the canvas
+    below = covered[inside]
+    over = paint.reshape(-1, 3)[inside] if paint.ndim > 1 else paint
+    covered[inside] = below + mask.ravel()[inside][:, None] * (over - below)
+    return covered.reshape(canvas.shape)
 
 
 def angle_from(azimuth_deg: float, elevation_deg: float) -> Canvas:
