@@ -17,7 +17,7 @@ from relit_camera.api.middleware.same_origin import AllowedHosts, SameOriginMidd
 from relit_camera.api.middleware.token_authentication import TokenAuthMiddleware
 from relit_camera.api.middleware.upload_limits import UploadLimitMiddleware
 from relit_camera.api.openapi.api_router import API_PREFIX
-from relit_camera.api.openapi.openapi_document import openapi_document, operation_id
+from relit_camera.api.openapi.openapi_document import openapi_document
 from relit_camera.api.routes import (
     backgrounds,
     environments,
@@ -71,7 +71,6 @@ def create_app_without_camera() -> FastAPI:
         openapi_url=f"{API_PREFIX}/openapi.json",
         docs_url=None,  # FastAPI's pages load their scripts from other sites
         redoc_url=None,
-        generate_unique_id_function=operation_id,
     )
     for topic in (
         whole_scene,

@@ -43,7 +43,7 @@ LEAST_POWER = 0.01
 LEAST_OF_ALLOWED = 0.98
 """Share of the allowed error with which a threshold is taken without looking for a larger one."""
 MOST_STEPS = 12
-"""Thresholds that are tried at most; four to six are enough where the error grows as smoothly as it should."""
+"""Thresholds that are tried at most; two to six are enough where the error grows as smoothly as it should."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,8 @@ def _largest_threshold(error: Callable[[float], float], allowed: float) -> float
 
     The error is nearly a power of the threshold: each step goes where the power through the last two errors reaches
     what is allowed, if that lies between the thresholds known to be too small and too large, and else between these.
-    Where no threshold is small enough it is the least one.
+    Where no threshold is small enough it is the least one. (SciPy's root finders begin at both ends of the range, of
+    which the lower one costs most, and may end above what is allowed.)
     """
     low, high = np.log(THRESHOLD_RANGE)
     goal = np.log(allowed * (1 + LEAST_OF_ALLOWED) / 2)
@@ -218,7 +219,7 @@ def _largest_threshold(error: Callable[[float], float], allowed: float) -> float
         if LEAST_OF_ALLOWED * allowed <= found <= allowed:
             break
         now = at, float(np.log(max(found, 1e-30)))
-        if before is not None and before[0] != now[0]:
+        if before is not None:
             power = (now[1] - before[1]) / (now[0] - before[0])
             if found > allowed and power < LEAST_POWER:
                 break
