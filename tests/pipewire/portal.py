@@ -46,17 +46,24 @@ async function opened(tries) {
     return opened(tries - 1);
   }
 }
+async function named() {
+  // Chromium may have no list yet where a camera has just come.
+  for (let tries = 0; ; tries++) {
+    const devices = await navigator.mediaDevices.enumerateDevices();
+    const labels = devices.filter(({ kind }) => kind === "videoinput").map(({ label }) => label);
+    if (labels.length || tries === 20) return labels;
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+}
 async function call() {
   const stream = await opened(3);
-  const devices = await navigator.mediaDevices.enumerateDevices();
   video.srcObject = stream;
   await new Promise((resolve) => (video.onplaying = resolve));
   await new Promise((resolve) => setTimeout(resolve, 1000));
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [video.videoWidth, video.videoHeight];
   canvas.getContext("2d").drawImage(video, 0, 0);
-  const labels = devices.filter(({ kind }) => kind === "videoinput").map(({ label }) => label);
-  return { label: stream.getVideoTracks()[0].label, labels, picture: canvas.toDataURL("image/png") };
+  return { label: stream.getVideoTracks()[0].label, labels: await named(), picture: canvas.toDataURL("image/png") };
 }
 call()
   .catch((error) => ({ error: String(error) }))

@@ -22,7 +22,7 @@ from relit_camera.live.reenactment.control_points import (
 from relit_camera.live.reenactment.dense_motion import DenseMotion, box_around
 from relit_camera.live.reenactment.face_mesh import FaceMesh, triangulate_face
 from relit_camera.live.reenactment.motion_transfer import transfer_motion, transfer_motion_in_place
-from relit_camera.live.reenactment.mouth_interior import MouthInterior
+from relit_camera.live.reenactment.mouth.mouth_interior import MouthInterior
 from relit_camera.live.reenactment.reenactor import ReenactorContext, WarpedLayer, WarpTask
 from relit_camera.live.reenactment.source_image import Cutout
 from relit_camera.live.reenactment.stills.still_drawing import StillDrawing

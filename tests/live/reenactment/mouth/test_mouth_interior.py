@@ -6,11 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.live.reenactment.motion_transfer import FACE_CENTER, rotate_about
-from relit_camera.live.reenactment.mouth_interior import MouthInterior
+from relit_camera.live.reenactment.mouth.mouth_interior import MouthInterior, _Opening
 from relit_camera.live.reenactment.source_image import SourceFace
 from tests.live.people import SCHEME, face_of, person
 
@@ -20,23 +22,25 @@ SKIN = np.array([0.4, 0.25, 0.2], np.float32)
 
 
 @pytest.fixture(scope="module")
-def face():
+def face() -> SourceFace:
     return face_of(person())
 
 
 @pytest.fixture(scope="module")
-def mouth(face: SourceFace):
+def mouth(face: SourceFace) -> MouthInterior:
     return MouthInterior(face, person().neutral)
 
 
-def opened(face: SourceFace, pixels: float):
+def opened(face: SourceFace, pixels: float) -> NDArray[np.float64]:
     """Landmarks with the lower lip down by some still pixels."""
     landmarks = face.landmarks.astype(np.float64)
     landmarks[list(SCHEME.lower_lip_inner[1:-1]), 1] += pixels
     return landmarks
 
 
-def draw(mouth: MouthInterior, face: SourceFace, landmarks: np.ndarray, light: float = 1.0, alpha: int = 255):
+def draw(
+    mouth: MouthInterior, face: SourceFace, landmarks: np.ndarray, light: float = 1.0, alpha: int = 255
+) -> tuple[LinearImage, LinearImage]:
     """A picture of plain skin with the mouth drawn, linear; and the skin."""
     shape = int(face.size[1] * SCALE), int(face.size[0] * SCALE)
     relit = np.broadcast_to(SKIN * np.float32(light), (face.size[1], face.size[0], 3))
@@ -47,7 +51,7 @@ def draw(mouth: MouthInterior, face: SourceFace, landmarks: np.ndarray, light: f
     return linear_from_display(np.ascontiguousarray(image[..., :3])), linear_from_display(np.ascontiguousarray(skin))
 
 
-def changed(picture: np.ndarray, skin: np.ndarray):
+def changed(picture: np.ndarray, skin: np.ndarray) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
     rows, columns = np.nonzero(np.abs(picture - skin).max(axis=2) > 0.01)
     return (columns + 0.5) / SCALE, (rows + 0.5) / SCALE
 
@@ -72,7 +76,7 @@ def test_it_is_drawn_between_the_lips_and_nowhere_else(mouth: MouthInterior, fac
 def test_the_middle_is_dark_and_red(mouth: MouthInterior, face: SourceFace) -> None:
     landmarks = opened(face, 8)
     picture, skin = draw(mouth, face, landmarks)
-    x, y = landmarks[[SCHEME.lip_gap[1][0]]].mean(axis=0) - [0, 2]
+    x, y = landmarks[[SCHEME.lip_gap[1][0]]].mean(axis=0) - [0, 4]
     inside = picture[int(y * SCALE), int(x * SCALE)]
     assert inside.max() < 0.35 * skin.max()
     assert inside[0] > inside[1] > 0
@@ -118,20 +122,51 @@ def test_a_mouth_beyond_the_picture_is_no_trouble(mouth: MouthInterior, face: So
         np.testing.assert_array_equal(image, 200)
 
 
+def inside_rows(mouth: MouthInterior, face: SourceFace, landmarks: np.ndarray) -> NDArray[np.float32]:
+    """Blue of the rows between the lips beside the middle of the mouth, from the upper lip down, skin as nan."""
+    picture, _ = draw(mouth, face, landmarks)
+    x = landmarks[list(SCHEME.lips), 0].mean() + 0.7
+    top, bottom = (landmarks[list(edge), 1].mean() for edge in SCHEME.lip_gap)
+    return picture[int((top + 0.5) * SCALE) : int((bottom - 0.5) * SCALE), int(x * SCALE), 2]
+
+
+def test_an_opened_jaw_parts_the_teeth_and_a_smile_does_not(mouth: MouthInterior, face: SourceFace) -> None:
+    jaw = opened(face, 9)
+    smile = opened(face, 4.5)
+    smile[list(SCHEME.upper_lip_inner[1:-1]), 1] -= 4.5
+    parted, together = inside_rows(mouth, face, jaw), inside_rows(mouth, face, smile)
+    teeth = 0.1
+    assert parted[:4].max() > teeth
+    assert (parted[len(parted) // 4 : len(parted) // 2] < teeth / 2).any()
+    assert np.median(together) > teeth
+    assert (together > teeth).mean() > (parted > teeth).mean() + 0.3
+
+
+def test_lower_teeth_show_at_the_lower_lip(mouth: MouthInterior, face: SourceFace) -> None:
+    rows = inside_rows(mouth, face, opened(face, 12))
+    third = len(rows) // 3
+    assert rows[-third:].max() > 2 * rows[third:-third].min()
+
+
 def test_teeth_turn_with_the_head(mouth: MouthInterior, face: SourceFace) -> None:
     """They are points of the skull, projected by the pose that they are drawn under."""
-    turned = rotate_about(FACE_CENTER, face.pose, rotation_from_angles(0, 0, 15))
-    band, rolled = (mouth._teeth(pose, TO_OUTPUT) for pose in (face.pose, turned))
-    half = len(band) // 2
-    slope, tilt = ((p[half - 1] - p[0]) for p in (band, rolled))
-    angle = np.degrees(np.arctan2(slope[1], slope[0]) - np.arctan2(tilt[1], tilt[0]))
-    assert angle == pytest.approx(15, abs=2)
+    pose = rotate_about(FACE_CENTER, face.pose, rotation_from_angles(0, 0, 15))
+    upright, rolled = mouth._view(face.pose, TO_OUTPUT), mouth._view(pose, TO_OUTPUT)
+    across = np.array([[0.0, 0.0], [40.0, 0.0]])
+    (x, y), (x_rolled, y_rolled) = (
+        np.diff(view.points(view.place + across)[:2], axis=1).ravel() for view in (upright, rolled)
+    )
+    assert np.degrees(np.arctan2(y, x) - np.arctan2(y_rolled, x_rolled)) == pytest.approx(15, abs=2)
 
 
-def test_teeth_part_in_the_middle_and_darken_to_the_sides(mouth: MouthInterior, face: SourceFace) -> None:
-    x = face.landmarks[list(SCHEME.lips), 0]
-    columns = np.linspace(x.min(), x.max(), 401) * SCALE
-    row = mouth._row(face.pose, TO_OUTPUT, columns)
-    middle = 200 - 10 + int(row[190:211].argmin())
-    assert row[middle - 20] > row[middle] + 0.1 < row[middle + 20]
-    assert row[[middle - 20, middle + 20]].min() > row[[0, -1]].max() + 0.2
+def test_light_through_the_lips_falls_with_depth_and_toward_their_edges() -> None:
+    x = np.linspace(-2, 2, 9, dtype=np.float32)
+    edge = np.stack([x, np.full_like(x, 0.5), np.zeros_like(x)])
+    opening = _Opening(edge, edge * np.array([[1], [-1], [1]], np.float32))
+    depths = np.array([0.0, 0.5, 1.0, 3.0], np.float32)
+    middle = opening.light(np.stack([0 * depths, 0 * depths, -depths]))
+    assert (np.diff(middle) < 0).all()
+    assert middle[1] == pytest.approx(1 / np.sqrt(2), abs=1e-3)  # a strip under 45° up and down: its form factor
+    high = opening.light(np.array([[0, 0], [0.0, 0.5], [-0.5, -0.5]], np.float32))
+    assert high[1] < 0.7 * high[0]
+    assert opening.light(np.array([[0], [2.0], [-0.01]], np.float32)) == pytest.approx(0, abs=0.05)

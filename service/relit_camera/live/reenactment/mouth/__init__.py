@@ -1,0 +1,1 @@
+"""The inside of a mouth that was never captured: teeth, gums and tongue, drawn where the lips part."""
