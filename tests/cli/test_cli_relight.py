@@ -25,7 +25,7 @@ from tests.replay.materials import subject_file
 from tests.synthetic import render_sphere, sphere_samples, sphere_surface, write_lights
 
 SETS = {"yaleB02/lights_clean.lp": "linear", "adam/lights.lp": "srgb"}
-PICKED = 10
+PICKED = 4
 
 
 def done(answer: Answer) -> None:

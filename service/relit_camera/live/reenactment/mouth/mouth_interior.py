@@ -22,17 +22,15 @@ from relit_camera.live.reenactment.source_image import SourceFace
 
 TEETH = np.array([0.78, 0.7, 0.58], np.float32)
 GUMS = np.array([0.42, 0.18, 0.16], np.float32)
-TONGUE = np.array([0.5, 0.21, 0.19], np.float32)
+TONGUE = np.array([0.55, 0.25, 0.23], np.float32)
 CAVITY = np.array([0.035, 0.014, 0.012], np.float32)
 """Linear, in the exposure of the source image, as white light from the front shows them. Of the cavity only light that
 its walls have reflected is seen: it is dark, and red rather than black."""
 REFLECTED = np.array([0.14, 0.08, 0.07], np.float32)
 """Of the light before the lips, what lips and walls reflect to anything within."""
 _COLORS = np.stack([TEETH, GUMS, TONGUE, *(color * REFLECTED for color in (TEETH, GUMS, TONGUE)), CAVITY])
-UPPER_FRONT_CM, LOWER_FRONT_CM = (-0.2, -0.4), (-0.1, -0.65)
+UPPER_FRONT_CM, LOWER_FRONT_CM = (-0.2, -0.4), (-0.2, -0.65)
 """Y and z of the biting edges of the front teeth, jaws closed, from the line at which closed lips meet, head axes."""
-JAW_OF_LIP = 1.1
-"""How much further the lower front teeth go down than the lower lip, which is stretched by them."""
 JAW_JOINT_CM = np.array([[0.0], [3.5], [-9.5]], np.float32)
 """A point of the axis about which the jaw turns, from that line."""
 MOST_JAW_TURN = np.radians(28.0)
@@ -237,7 +235,7 @@ class MouthInterior:
         closed = project(self._face.head_points[self._middle], pose, self._face.size)
         moved = (landmarks[self._middle] - closed).reshape(2, -1, 2).mean(axis=1) @ to_output[:, :2].T
         upper, lower = (view.drop(each) for each in moved)
-        angle = float(np.clip((JAW_OF_LIP * lower - max(-upper, 0.0)) / -JAW_JOINT_CM[2, 0], 0, MOST_JAW_TURN))
+        angle = float(np.clip((lower - max(-upper, 0.0)) / -JAW_JOINT_CM[2, 0], 0, MOST_JAW_TURN))
         cos, sin = np.cos(angle), np.sin(angle)
         return np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]], np.float32)
 
