@@ -1,13 +1,14 @@
-"""Draws docs/pictures/ladder.jpg: `python scripts/ladder_pictures.py LIGHTS.lp [OUT.jpg]`.
+"""Draws the pictures of the ladder: `python scripts/ladder_pictures.py LIGHTS.lp [LIGHTS.lp …] --out OUT.jpg`.
 
-One person whose reflectance field is known sits before a webcam by a window; below, the live picture in other places
-by the subject of each rung, and the truth. LIGHTS.lp are pictures from directions all round: the person of `relit demo`
-as `python -m relit_studio field --person adam --out adam` renders them. Public models must be installed.
+People whose reflectance field is known sit before a webcam by a window. Of one person the live picture is shown in
+other places by the subject of each rung, and the truth (docs/pictures/ladder.jpg); of several, side by side, in two
+places (docs/pictures/ladder-people.jpg). LIGHTS.lp are pictures from directions all round, as
+`python -m relit_studio field --person adam --out adam` renders them. Public models must be installed.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import cv2
@@ -32,6 +33,7 @@ from relit_camera.live.compositing.environment_view import EnvironmentView
 ROOM = "window"
 ENVIRONMENTS = ("studio", "sunset", "night-street", "party", "overcast")
 SHOWN = tuple(name for name in ("instant", "desk", "film") if name in RUNGS)
+PLACES_OF_PEOPLE = ("sunset", "studio")
 SIZE = 192
 CELL_PX = 240
 QUALITY = 85
@@ -39,28 +41,52 @@ QUALITY = 85
 
 def main() -> None:
     """Draw the picture."""
-    lights, out = Path(sys.argv[1]), Path(sys.argv[2] if len(sys.argv) > 2 else "docs/pictures/ladder.jpg")
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("lights", type=Path, nargs="+")
+    parser.add_argument("--out", type=Path, default=Path("docs/pictures/ladder.jpg"))
+    arguments = parser.parse_args()
+    several = len(arguments.lights) > 1
+    environments = [builtin_environment(name) for name in (PLACES_OF_PEOPLE if several else ENVIRONMENTS)]
+    results = {lights.parent.name: by_the_window(lights, environments) for lights in arguments.lights}
+    sheet = people_sheet(results, environments) if several else ladder_sheet(next(iter(results.values())), environments)
+    write_atomic(arguments.out, encode_display(sheet, ".jpg", QUALITY))
+
+
+def by_the_window(lights: Path, environments: list[Environment]) -> RoomResult:
+    """A person before their webcam, and in the environments by every rung."""
     subjects = SubjectFolder(Path("build/ladder"))
     person = known_person(lights.parent.name, import_samples(lights), SIZE, subjects)
     tracker = open_tracker("mesh", TrackerOptions(blendshapes=False))
-    room, environments = builtin_environment(ROOM), [builtin_environment(name) for name in ENVIRONMENTS]
-    result = next(iter(evaluate_person(person, [room], environments, SHOWN, tracker, subjects)))
-    write_atomic(out, encode_display(ladder_sheet(result, environments), ".jpg", QUALITY))
+    return next(iter(evaluate_person(person, [builtin_environment(ROOM)], environments, SHOWN, tracker, subjects)))
+
+
+def people_sheet(results: dict[str, RoomResult], environments: list[Environment]) -> DisplayImage:
+    """A column a person: the live picture, then in each environment the rungs and the truth."""
+    rows: list[list[DisplayImage | None]] = [[result.pictures.live for result in results.values()]]
+    names = ["webcam"]
+    for each in environments:
+        behind = view_of(each)
+        for rung in (*SHOWN, "truth"):
+            names.append(f"{each.name}: {rung}")
+            rows.append([shown_in(result, each, behind, rung) for result in results.values()])
+    return contact_sheet(rows, names, list(results), CELL_PX)
 
 
 def ladder_sheet(result: RoomResult, environments: list[Environment]) -> DisplayImage:
     """The live picture, and rows of the rungs and the truth, each in front of the environment that lights it."""
-    pictures, behind = result.pictures, [view_of(each) for each in environments]
+    behind = [view_of(each) for each in environments]
     rows: list[list[DisplayImage | None]] = []
     for name in (*SHOWN, "truth"):
-        relit = pictures.truths if name == "truth" else pictures.relit[name]
-        before = pictures.live if name == SHOWN[0] else None
-        shown = [
-            put_before(relit[each.name], view, pictures.matte, name == "truth")
-            for each, view in zip(environments, behind, strict=True)
-        ]
-        rows.append([before, *shown])
+        before = result.pictures.live if name == SHOWN[0] else None
+        rows.append([before, *(shown_in(result, *place, name) for place in zip(environments, behind, strict=True))])
     return contact_sheet(rows, [*SHOWN, "truth"], ["webcam", *ENVIRONMENTS], CELL_PX)
+
+
+def shown_in(result: RoomResult, environment: Environment, behind: DisplayImage, name: str) -> DisplayImage:
+    """The person in an environment and before it, by the subject of a rung or in "truth"."""
+    pictures = result.pictures
+    relit = pictures.truths if name == "truth" else pictures.relit[name]
+    return put_before(relit[environment.name], behind, pictures.matte, name == "truth")
 
 
 def view_of(environment: Environment) -> DisplayImage:

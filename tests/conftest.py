@@ -23,6 +23,8 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "relit"))
 
 REAL_TIME = "real time"
 MACHINE = "virtual machine"
+GIVES_WAY = 5
+_BEGUN = pytest.StashKey[bool]()
 
 
 def pytest_configure() -> None:
@@ -36,6 +38,18 @@ def pytest_configure() -> None:
 def pytest_make_parametrize_id(val: object) -> str | None:
     """Name a test after the length of a file's content, not after megabytes of it."""
     return f"{len(val)} bytes" if isinstance(val, bytes) and len(val) > 60 else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Let a process of pytest-xdist that begins with tests which hold at any speed give way to those of real time.
+
+    There is one process more than cores, since tests of real time wait most of theirs.
+    """
+    if "PYTEST_XDIST_WORKER" in os.environ and not item.config.stash.get(_BEGUN, False):
+        item.config.stash[_BEGUN] = True
+        if not item.get_closest_marker("real_time"):
+            os.nice(GIVES_WAY)
 
 
 @pytest.hookimpl(tryfirst=True)

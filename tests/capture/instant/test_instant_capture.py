@@ -88,6 +88,22 @@ def test_in_another_light_it_looks_as_the_person_does_there(subject: Subject, az
         assert psnr(relit * gain, truth, matte) > psnr(tinted.astype(np.float32), truth, matte) + 5
 
 
+def test_light_that_the_head_does_not_explain_is_not_kept_as_color() -> None:
+    light = window(-45)
+    light *= 0.7 / facing_irradiance(light)
+    picture = picture_of(SKIN, light)
+    sides = np.exp(np.interp(np.arange(SIDE), [0.35 * SIDE, 0.65 * SIDE], np.log([1.3, 0.4]))).astype(np.float32)
+    lit = linear_from_uint8(picture.image) * sides[None, :, None]
+    subject = capture_from_picture(replace(picture, image=uint8_from_linear(lit)), "webcam").subject
+    ahead = (window(0, 10).reshape(32, 64, 3) / texel_solid_angles()[..., None]).astype(np.float32)
+    relit = BasisRelighter(subject).relight(ahead[None])[0]
+    left, right = (
+        relit[SIDE // 2 - 10 : SIDE // 2 + 10, SIDE // 2 + column : SIDE // 2 + column + 8].mean()
+        for column in (-20, 12)
+    )
+    assert left / right == pytest.approx(1, abs=0.15)
+
+
 def test_a_harsh_room_is_noticed() -> None:
     soft, harsh = window(0), window(85, 5, 30, around=0.0)
     assert not capture_from_picture(picture_of(SKIN, soft * np.float32(0.7 / facing_irradiance(soft))), "a").warnings

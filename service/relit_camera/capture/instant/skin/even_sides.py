@@ -76,7 +76,7 @@ def even_sides(
     found[rest] = (direction * np.clip(direction * wanted, 0, most))[rest]
     known = np.maximum(np.minimum(known, 1), rest)
     smooth = cv2.GaussianBlur(pull_push_fill(found, known), (0, 0), TUNABLES.face_blur * max(skin.shape))
-    return np.clip(np.exp(smooth), *TUNABLES.range).astype(np.float32)
+    return np.asarray(np.clip(np.exp(smooth), *TUNABLES.range), np.float32)
 
 
 def _change_of_face(
