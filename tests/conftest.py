@@ -57,9 +57,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Group the tests for `pytest -n 2 --dist loadgroup`, and order the groups.
 
     A group runs in one process, one test after another: the tests of a file, which share its fixtures; all tests marked
-    `real_time`, which would else slow each other; and all that use the virtual machine. The longest groups come first,
-    so that no process waits for the other at the end; `--no-loadscope-reorder` keeps that order. First of all hooks, as
-    pytest-xdist's reads the groups.
+    `real_time`, which would else slow each other; those in PipeWire of one version; and all that use the virtual
+    machine. The longest groups come first, so that no process waits for the other at the end;
+    `--no-loadscope-reorder` keeps that order. First of all hooks, as pytest-xdist's reads the groups.
     """
     slow = {_group(item) for item in items if item.get_closest_marker("slow")}
     for item in items:
@@ -70,6 +70,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def _group(item: pytest.Item) -> str:
     if item.path.parent.name == "vm":
         return MACHINE
+    if item.path.parent.name == "pipewire":
+        case = getattr(item, "callspec", None)
+        return f"PipeWire {case.params.get('suite') if case else ''}"
     return REAL_TIME if item.get_closest_marker("real_time") else item.nodeid.partition("::")[0]
 
 
