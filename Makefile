@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
-PROCESSES ?= 3
+PROCESSES ?= $(shell expr $$(nproc) + 1)
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
@@ -59,11 +59,11 @@ tool-install: setup ## the wheel as users install it, used from an empty home; m
 
 # What is compiled once need not be by each of the hundreds of processes that tests start.
 pytest: export PYTHONDONTWRITEBYTECODE =
-pytest: setup ## the tests alone, in three processes, of which two give way; make pytest PROCESSES=4
+pytest: setup ## the tests alone, in one process more than there are cores; make pytest PROCESSES=4
 	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire
 	# By themselves: browser and emulated machine take both cores, and tests that hold in real time would not.
 	# Of the browser's tests each may run in any process: those of a file take up to four minutes.
-	$(BIN)/python -m pytest -n 2 --dist loadgroup --no-loadscope-reorder tests/pipewire
+	$(BIN)/python -m pytest tests/pipewire
 	$(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
 	$(BIN)/python -m pytest tests/vm
 

@@ -43,7 +43,7 @@ def main() -> None:
     """Draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("lights", type=Path, nargs="+")
-    parser.add_argument("--out", type=Path, default=Path("docs/pictures/ladder.jpg"))
+    parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
     several = len(arguments.lights) > 1
     environments = [builtin_environment(name) for name in (PLACES_OF_PEOPLE if several else ENVIRONMENTS)]

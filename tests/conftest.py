@@ -42,11 +42,12 @@ def pytest_make_parametrize_id(val: object) -> str | None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Let a process of pytest-xdist that begins with tests which hold at any speed give way to those of real time.
+    """Let each process give way that begins with tests which hold at any speed, where others hold in real time.
 
-    There is one process more than cores, since tests of real time wait most of theirs.
+    Those are all in one process (see below), and wait most of their time: so there is a process more than cores.
     """
-    if "PYTEST_XDIST_WORKER" in os.environ and not item.config.stash.get(_BEGUN, False):
+    several = os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1") != "1"
+    if several and not item.config.stash.get(_BEGUN, False):
         item.config.stash[_BEGUN] = True
         if not item.get_closest_marker("real_time"):
             os.nice(GIVES_WAY)
@@ -54,12 +55,12 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Group the tests for `pytest -n 2 --dist loadgroup`, and order the groups.
+    """Group the tests for `pytest -n 3 --dist loadgroup`, and order the groups.
 
     A group runs in one process, one test after another: the tests of a file, which share its fixtures; all tests marked
-    `real_time`, which would else slow each other; those in PipeWire of one version; and all that use the virtual
-    machine. The longest groups come first, so that no process waits for the other at the end;
-    `--no-loadscope-reorder` keeps that order. First of all hooks, as pytest-xdist's reads the groups.
+    `real_time`, which would else slow each other; and all that use the virtual machine. The longest groups come first,
+    so that no process waits for the others at the end; `--no-loadscope-reorder` keeps that order. First of all hooks,
+    as pytest-xdist's reads the groups.
     """
     slow = {_group(item) for item in items if item.get_closest_marker("slow")}
     for item in items:
@@ -70,9 +71,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def _group(item: pytest.Item) -> str:
     if item.path.parent.name == "vm":
         return MACHINE
-    if item.path.parent.name == "pipewire":
-        case = getattr(item, "callspec", None)
-        return f"PipeWire {case.params.get('suite') if case else ''}"
     return REAL_TIME if item.get_closest_marker("real_time") else item.nodeid.partition("::")[0]
 
 

@@ -30,6 +30,7 @@ from relit_camera.capture.instant.room_shadows import with_room_shadows
 from relit_camera.capture.instant.skin.bare_skin import below_nose, find_bare_skin
 from relit_camera.capture.instant.skin.even_sides import even_sides
 from relit_camera.capture.instant.skin.eye_whites import eye_white_ratio
+from relit_camera.capture.instant.skin.skin_albedo import TUNABLES as ALBEDO
 from relit_camera.capture.instant.skin.skin_albedo import estimate_albedo
 from relit_camera.capture.instant.skin.skin_prior import estimate_skin
 from relit_camera.capture.subject_builder import quantize_geometry
@@ -178,11 +179,10 @@ def _reflectance(
     lit = lit.reshape(*picture.matte.shape, 6)
     gloss = np.where(_doubled(shape.face), 1.0, TUNABLES.body_gloss).astype(np.float32)
     gloss = np.asarray(cv2.GaussianBlur(gloss, (0, 0), 0.01 * width), np.float32)
-    found = estimate_albedo(linear, lit[..., :3], gloss[..., None] * lit[..., 3:], _doubled(shape.skin))
-    own = found.albedo * even_sides(
-        found.albedo, _doubled(shape.skin), picture.matte, picture.landmarks, landmark_scheme(SCHEME)
-    )
-    albedo = np.where(picture.matte[..., None] > 0, own, 0).astype(np.float32)
+    whole_skin = _doubled(shape.skin)
+    found = estimate_albedo(linear, lit[..., :3], gloss[..., None] * lit[..., 3:], whole_skin)
+    evened = found.albedo * even_sides(found.albedo, whole_skin, picture.landmarks, landmark_scheme(SCHEME))
+    albedo = np.where(picture.matte[..., None] > 0, np.clip(evened, *ALBEDO.limits), 0).astype(np.float32)
     warnings: tuple[str, ...] = ()
     if found.dark_fraction > TUNABLES.harsh_dark_fraction:
         warnings = (

@@ -56,7 +56,7 @@ class IdentityCheck:
         self._tunables = tunables or IdentityTunables()
         self._neutral: NeutralFace | None = None
         self._since_s: float | None = None
-        self._measured_s, self._shape_cm, self._least, self._alike = -np.inf, np.inf, np.inf, False
+        self._measured_s, self._shape_cm, self._least = -np.inf, np.inf, np.inf
         self._checked_s = -np.inf
         self._passed_s: float | None = None
 
@@ -104,10 +104,9 @@ class IdentityCheck:
             self._shape_cm = min(self._shape_cm, distance_cm)
             self._least = min(self._least, unlikeness(distance_cm, residual, limits))
         watched = time_s - self._since_s >= limits.delay_s
-        self._alike = self._alike or self._least <= (1.0 if watched else limits.at_once)
-        if self._alike and self._passed_s is None:
+        if self._passed_s is None and self._least <= (1.0 if watched else limits.at_once):
             self._passed_s = -np.inf if first else time_s
-        passes = self._alike and unlikeness(self._shape_cm, residual, limits) <= limits.kept
+        passes = self._passed_s is not None and unlikeness(self._shape_cm, residual, limits) <= limits.kept
         if passes or not watched:
             return None
         self._passed_s = None
@@ -119,7 +118,7 @@ class IdentityCheck:
 
     def _watch_anew(self) -> None:
         self._since_s = None
-        self._measured_s, self._shape_cm, self._least, self._alike = -np.inf, np.inf, np.inf, False
+        self._measured_s, self._shape_cm, self._least = -np.inf, np.inf, np.inf
 
     def _has_changed_into_the_subjects(self, found_cm: float, motion: FaceMotion) -> bool:
         """Whether a face that was found out at `found_cm` has the subject's shape now, or is gone."""

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
-from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.base.rotations import Rotation, rotation_from_angles
+from relit_camera.face.head_pose import project
 from relit_camera.live.reenactment.motion_transfer import FACE_CENTER, rotate_about
 from relit_camera.live.reenactment.mouth.mouth_interior import MouthInterior, _Opening
 from relit_camera.live.reenactment.source_image import SourceFace
@@ -123,7 +124,7 @@ def test_a_mouth_beyond_the_picture_is_no_trouble(mouth: MouthInterior, face: So
 
 
 def inside_rows(mouth: MouthInterior, face: SourceFace, landmarks: np.ndarray) -> NDArray[np.float32]:
-    """Blue of the rows between the lips beside the middle of the mouth, from the upper lip down, skin as nan."""
+    """Blue of the rows between the lips beside the middle of the mouth, from the upper lip down."""
     picture, _ = draw(mouth, face, landmarks)
     x = landmarks[list(SCHEME.lips), 0].mean() + 0.7
     top, bottom = (landmarks[list(edge), 1].mean() for edge in SCHEME.lip_gap)
@@ -148,15 +149,37 @@ def test_lower_teeth_show_at_the_lower_lip(mouth: MouthInterior, face: SourceFac
     assert rows[-third:].max() > 2 * rows[third:-third].min()
 
 
-def test_teeth_turn_with_the_head(mouth: MouthInterior, face: SourceFace) -> None:
-    """They are points of the skull, projected by the pose that they are drawn under."""
-    pose = rotate_about(FACE_CENTER, face.pose, rotation_from_angles(0, 0, 15))
-    upright, rolled = mouth._view(face.pose, TO_OUTPUT), mouth._view(pose, TO_OUTPUT)
-    across = np.array([[0.0, 0.0], [40.0, 0.0]])
-    (x, y), (x_rolled, y_rolled) = (
-        np.diff(view.points(view.place + across)[:2], axis=1).ravel() for view in (upright, rolled)
-    )
-    assert np.degrees(np.arctan2(y, x) - np.arctan2(y_rolled, x_rolled)) == pytest.approx(15, abs=2)
+def turned_mouth(mouth: MouthInterior, face: SourceFace, turn: Rotation) -> NDArray[np.float32]:
+    """A wide open mouth of a head turned about its middle, and nothing else, over black."""
+    pose = rotate_about(FACE_CENTER, face.pose, turn)
+    open_by = np.zeros((SCHEME.count, 3))
+    open_by[list(SCHEME.lower_lip_inner[1:-1]), 1] = -1.5
+    landmarks = project(face.head_points + open_by, pose, face.size).astype(np.float64)
+    image = np.zeros((int(face.size[1] * SCALE), int(face.size[0] * SCALE), 4), np.uint8)
+    mouth.draw(image, np.ones((face.size[1], face.size[0], 3), np.float32), landmarks, pose, TO_OUTPUT)
+    return linear_from_display(np.ascontiguousarray(image[..., :3]))
+
+
+def test_a_mouth_turned_to_one_side_is_the_mirror_image_of_one_turned_to_the_other(
+    mouth: MouthInterior, face: SourceFace
+) -> None:
+    left, right = (turned_mouth(mouth, face, rotation_from_angles(yaw)) for yaw in (-30, 30))
+    assert left.max() > 0.2
+    ahead = turned_mouth(mouth, face, rotation_from_angles(0))
+    mirrored = np.abs(left - right[:, ::-1]).mean()
+    assert mirrored < 0.35 * np.abs(left - ahead).mean()
+    assert mirrored < 0.35 * np.abs(left - right).mean()
+
+
+def test_a_head_that_leans_has_the_same_mouth(mouth: MouthInterior, face: SourceFace) -> None:
+    upright, upside_down = (turned_mouth(mouth, face, rotation_from_angles(0, 0, roll)) for roll in (0, 180))
+    assert upside_down.sum() == pytest.approx(upright.sum(), rel=0.1)
+
+
+@pytest.mark.parametrize("angles", [(60, 0, 0), (85, 0, 0), (120, 0, 0), (0, 40, 0), (0, -80, 0), (30, 20, 90)])
+@pytest.mark.filterwarnings("error")
+def test_no_turn_breaks_it(mouth: MouthInterior, face: SourceFace, angles: tuple[float, float, float]) -> None:
+    assert np.isfinite(turned_mouth(mouth, face, rotation_from_angles(*angles))).all()
 
 
 def test_light_through_the_lips_falls_with_depth_and_toward_their_edges() -> None:

@@ -1,9 +1,9 @@
 """A person's color without what the room's light has left in it: one side brighter or redder than the other.
 
-Both sides of a face have the same skin. Where an albedo that was told from one picture differs between a point and its
-mirror image in low frequencies, that is light which shape and room did not explain; kept, the lit side of a face by a
-window would stay lit in any other light. Hair, neck and clothes may well differ: they are corrected about as far as the
-face is, and toward the same side only.
+Both sides of a face have the same skin, but for marks and hair that hangs over it. Where an albedo that was told from
+one picture differs between a point and its mirror image by what varies smoothly over the face, that is light which
+shape and room did not explain; kept, the lit side of a face by a window would stay lit in any other light. Neck, hair
+and clothes are corrected as the face next to them, the less the further they are from it.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from relit_camera.base.array_types import Float32Array
-from relit_camera.base.images.image_types import LinearImage, Mask, Points
-from relit_camera.capture.geometry.normal_completion import pull_push_fill
+from relit_camera.base.images.image_types import LinearImage, Points
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
 
 
@@ -25,105 +25,102 @@ class SideTunables:
     """Constants of the correction, chosen on two rendered people by a side window.
 
     Attributes:
-        face_blur, blur: standard deviations of what counts as a low frequency, on the face and beside it, in sides of
-            the picture.
-        known: share of a blur's weight that must be skin, or of the person beside the face.
-        sure_matte: from which a pixel is the person's.
-        most: percentile of the face's corrections that counts as how far it is corrected.
-        beside: how far the rest may be, relative to that.
+        blur: standard deviation of the blur of the albedo that is compared, in sides of the picture.
+        known: share of the blur's weight that must be skin.
+        outlier: deviation from what varies smoothly, in logarithms, from which a pair of points hardly counts.
+        ridge: pull of the correction toward none, relative to the pairs.
+        step: width of the step in the middle of the face over which one side becomes the other, in half faces.
+        fade: distance from the face, in half faces, over which the correction fades out.
         range: limits of the factor.
     """
 
-    face_blur: float = 0.02
-    blur: float = 0.04
+    blur: float = 0.02
     known: float = 0.25
-    sure_matte: float = 0.9
-    most: float = 90.0
-    beside: float = 1.5
+    outlier: float = 0.1
+    ridge: float = 0.01
+    step: float = 0.25
+    fade: float = 0.6
     range: tuple[float, float] = (0.25, 4.0)
 
 
 TUNABLES = SideTunables()
 
 
-def even_sides(
-    albedo: LinearImage, skin: NDArray[np.bool_], matte: Mask, landmarks: Points, scheme: LandmarkScheme
-) -> LinearImage:
+def even_sides(albedo: LinearImage, skin: NDArray[np.bool_], landmarks: Points, scheme: LandmarkScheme) -> LinearImage:
     """The factor (height, width, 3) of an albedo that makes both sides of a person alike.
 
     Args:
         albedo: (height, width, 3) of the person.
-        skin: (height, width) where it is that of the face's skin.
-        matte: (height, width) of the person.
+        skin: (height, width) where it is that of the face, without eyes, brows and lips.
         landmarks: (count, 2) of the face, pixels.
         scheme: of the landmarks.
     """
-    height, width = skin.shape
-    logarithms = np.log(np.maximum(albedo, 1e-4)).astype(np.float32)
-    at, change = _change_of_face(logarithms, skin, landmarks, scheme)
+    at, change = _change_at_landmarks(albedo, skin, landmarks, scheme)
     if not len(at):
         return np.ones_like(albedo)
-    columns, rows = np.clip(landmarks[at].astype(int), 0, [width - 1, height - 1]).T
-    known = np.zeros((height, width), np.float32)
-    np.add.at(known, (rows, columns), 1)
-    found = np.zeros((height, width, 3), np.float32)
-    np.add.at(found, (rows, columns), change / known[rows, columns][:, None])
-    # How far each channel of the face is corrected, positive where the half at the picture's left becomes brighter.
-    toward_left = np.sign(change[scheme.canonical[at, 0] < 0].sum(axis=0))
-    most = TUNABLES.beside * np.percentile(np.abs(change), TUNABLES.most, axis=0)
-    rest, wanted, left = _change_beside_face(logarithms, matte, landmarks, scheme)
-    direction = np.where(left[..., None], toward_left, -toward_left)
-    found[rest] = (direction * np.clip(direction * wanted, 0, most))[rest]
-    known = np.maximum(np.minimum(known, 1), rest)
-    smooth = cv2.GaussianBlur(pull_push_fill(found, known), (0, 0), TUNABLES.face_blur * max(skin.shape))
-    return np.asarray(np.clip(np.exp(smooth), *TUNABLES.range), np.float32)
+    face = scheme.canonical[:, :2]
+    design = _odd_functions((face[at] - _center(face)) / _radii(face))
+    pull = np.sqrt(TUNABLES.ridge * len(at)) * np.eye(design.shape[1])
+    amounts = [_robust_fit(np.vstack([design, pull]), np.append(each, np.zeros(len(pull)))) for each in change.T]
+    # Pixels as places of the mean face; what is beside the face is corrected as where it ends.
+    height, width = skin.shape
+    places = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1).reshape(-1, 2)
+    to_face = np.linalg.lstsq(_with_one(landmarks), (face - _center(face)) / _radii(face))[0]
+    seen = _with_one(places) @ to_face
+    on_face = np.clip(seen, -1, 1)
+    share = np.exp(-((seen - on_face) ** 2).sum(axis=1) / TUNABLES.fade**2)
+    factor = np.exp(share[:, None] * (_odd_functions(on_face) @ np.stack(amounts, axis=1))).reshape(height, width, 3)
+    return np.asarray(np.clip(factor, *TUNABLES.range), np.float32)
 
 
-def _change_of_face(
-    logarithms: Float32Array, skin: NDArray[np.bool_], landmarks: Points, scheme: LandmarkScheme
+def _change_at_landmarks(
+    albedo: LinearImage, skin: NDArray[np.bool_], landmarks: Points, scheme: LandmarkScheme
 ) -> tuple[NDArray[np.intp], Float32Array]:
-    """Landmarks (some,) on skin whose mirror image is on skin too, and by how much their logarithm is to change."""
-    soft, share = _soft(logarithms, skin, TUNABLES.face_blur * max(skin.shape))
+    """Landmarks (some,) on skin whose mirror image is on skin too, and by how much the logarithm there is to change."""
+    sigma = TUNABLES.blur * max(skin.shape)
+    weight = skin.astype(np.float32)
+    share = cv2.GaussianBlur(weight, (0, 0), sigma)
+    logarithms = np.log(np.maximum(albedo, 1e-4)).astype(np.float32) * weight[..., None]
+    soft = cv2.GaussianBlur(logarithms, (0, 0), sigma) / np.maximum(share, 1e-6)[..., None]
     places = (landmarks - 0.5).astype(np.float32)[None]
     values, known = (cv2.remap(each, places, None, cv2.INTER_LINEAR)[0] for each in (soft, share))
     mirror = mirrored_landmarks(scheme)
-    at = np.flatnonzero(np.minimum(known, known[mirror]) > TUNABLES.known)
+    at = np.flatnonzero((np.minimum(known, known[mirror]) > TUNABLES.known) & (mirror != np.arange(len(mirror))))
     return at, (values[mirror[at]] - values[at]) / 2
 
 
-def _change_beside_face(
-    logarithms: Float32Array, matte: Mask, landmarks: Points, scheme: LandmarkScheme
-) -> tuple[NDArray[np.bool_], Float32Array, NDArray[np.bool_]]:
-    """The same for the person's pixels beside the face, which are compared with their reflection at its axis.
-
-    Returns:
-        Masks and images (height, width): for which pixels it is known; the change (height, width, 3); which pixels lie
-        at the picture's left of the axis.
-    """
-    height, width = matte.shape
-    face = cv2.fillConvexPoly(
-        np.zeros((height, width), np.uint8), cv2.convexHull(np.round(landmarks).astype(np.int32)), 1
-    )
-    beside = (matte > TUNABLES.sure_matte) & (face == 0)
-    middle = landmarks[np.abs(scheme.canonical[:, 0]) < 1e-6].astype(np.float64)
-    center = middle.mean(axis=0)
-    along = np.linalg.svd(middle - center)[2][0]
-    right = np.array([along[1], -along[0]]) * np.sign(along[1])
-    places = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
-    aside = (places - center) @ right
-    reflected = (places - 2 * aside[..., None] * right - 0.5).astype(np.float32)
-    soft, share = _soft(logarithms, beside, TUNABLES.blur * max(matte.shape))
-    soft_there, share_there = (cv2.remap(each, reflected, None, cv2.INTER_LINEAR) for each in (soft, share))
-    known = beside & (np.minimum(share, share_there) > TUNABLES.known)
-    return known, np.asarray((soft_there - soft) / 2, np.float32), aside < 0
+def _odd_functions(places: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Smooth functions (count, 7) of places (count, 2) of a face, -1..1 across and up, odd across it."""
+    x, y = places.T.astype(np.float64)
+    side = np.tanh(x / TUNABLES.step)
+    return np.stack([x, x * y, x * y * y, x**3, x**3 * y, side, side * y], axis=1)
 
 
-def _soft(values: Float32Array, chosen: NDArray[np.bool_], sigma: float) -> tuple[Float32Array, Float32Array]:
-    """Means of the chosen values round each pixel, and the share of what is chosen there."""
-    weight = chosen.astype(np.float32)
-    share = cv2.GaussianBlur(weight, (0, 0), sigma)
-    soft = cv2.GaussianBlur(values * weight[..., None], (0, 0), sigma) / np.maximum(share, 1e-6)[..., None]
-    return np.asarray(soft, np.float32), np.asarray(share, np.float32)
+def _robust_fit(design: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Amounts (functions,) with which `design` (count, functions) gives most of the values (count,)."""
+
+    def deviation(amounts: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(design @ amounts - values)
+
+    def slope(_: NDArray[np.float64]) -> NDArray[np.float64]:
+        return design
+
+    start = np.zeros(design.shape[1])
+    return np.asarray(least_squares(deviation, start, jac=slope, loss="cauchy", f_scale=TUNABLES.outlier).x)
+
+
+def _center(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The middle of a face (count, 2): on its axis, half way from top to bottom."""
+    return np.array([0.0, (points[:, 1].min() + points[:, 1].max()) / 2])
+
+
+def _radii(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Half its width and height."""
+    return np.asarray(np.ptp(points, axis=0) / 2)
+
+
+def _with_one(points: NDArray[np.floating]) -> NDArray[np.float64]:
+    return np.column_stack([points, np.ones(len(points))])
 
 
 def mirrored_landmarks(scheme: LandmarkScheme) -> NDArray[np.intp]:

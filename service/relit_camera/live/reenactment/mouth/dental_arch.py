@@ -1,7 +1,7 @@
 """A row of teeth as a curved wall before the mouth's cavity: where a ray meets it, and how much of a pixel teeth fill.
 
-Axes are the head's, see `HeadPose`. Sizes are means of adults (Nelson, Wheeler's Dental Anatomy, 11th edition, tables
-of crown dimensions), rounded.
+Axes are the head's, see `HeadPose`. Widths are means of adults (Nelson, Wheeler's Dental Anatomy, 11th edition),
+rounded; crowns are as much of theirs as the gum usually leaves, the rest was chosen by eye.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ PAPILLA_CM = 0.22
 """How much further the gum reaches between two teeth than at the middle of one."""
 LINE_CM, LINE_SHADE = 0.055, 0.4
 """Half width of the shade between two teeth, and how dark it is."""
+EDGE_ON = 0.25
+"""Cosine between a wall and the line of sight below which the wall fades out: else its outline would be a staircase."""
 PLACES = 1024
 """Places along one side of a row for which its shape is tabulated."""
 
@@ -76,7 +78,6 @@ class DentalArch:
         across = np.abs(length - (ends[tooth] - width / 2)) / (width / 2)
         edge = np.array(self.shorter)[tooth] + ROUNDING_CM * across**6
         gum = np.array(self.shorter)[tooth] + np.array(self.crowns)[tooth] - PAPILLA_CM * across**2
-        gum[length > ends[-1]] = -np.inf  # behind the last tooth
         normal = x / self.half_width**2, z / self.depth**2
         shade = 1 - LINE_SHADE * np.exp(-(((1 - across) * width / 2 / LINE_CM) ** 2))
         return np.stack([edge, gum, normal[1] / np.hypot(*normal), shade]).astype(np.float32)
@@ -108,7 +109,9 @@ class DentalArch:
         # The tangent of half the angle from the front.
         x, z = start + steps * along[:, None]
         place = np.abs(x) / np.maximum(1 + z, np.float32(1e-3))
-        met = (inside > 0) & (place <= 1)
+        across, ahead = x / radii[0], z / radii[1]
+        toward_camera = -(across * direction[0] + ahead * direction[2]) / np.sqrt(across**2 + ahead**2 + 1e-9)
+        met = np.clip(toward_camera / np.float32(EDGE_ON), 0, 1) * ((inside > 0) & (place <= 1))
         column = (np.minimum(place, 1) * np.float32(PLACES - 1)).astype(np.intp)
         edge, gum, toward_front, shade = (row.take(column) for row in self._shape)
         height = np.float32(self.up) * (points[1] - np.float32(front[0]))
@@ -119,7 +122,7 @@ class DentalArch:
             points=points,
             toward_front=toward_front,
             teeth=above_edge * below_gum,
-            gum=above_edge * (1 - below_gum) * (gum > -np.inf),
+            gum=above_edge * (1 - below_gum),
             shade=shade,
         )
 

@@ -17,7 +17,7 @@ from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, RgbaImage
 from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
 from relit_camera.face.head_pose import HeadPose, project
-from relit_camera.live.reenactment.mouth.dental_arch import LOWER_TEETH, UPPER_TEETH
+from relit_camera.live.reenactment.mouth.dental_arch import EDGE_ON, LOWER_TEETH, UPPER_TEETH
 from relit_camera.live.reenactment.source_image import SourceFace
 
 TEETH = np.array([0.78, 0.7, 0.58], np.float32)
@@ -54,7 +54,8 @@ class _MouthView:
     Attributes:
         lips: (3,) where closed lips meet in the middle, head axes, cm: the origin of all points here.
         place: (2,) the same in the output, pixels.
-        to_head: (3, 2) float32 cm a pixel, head axes, onto the plane through the origin across the line of sight.
+        to_head: (3, 2) float32: from a displacement in the output, pixels, to that in head axes, cm, at right angles to
+            the line of sight.
         direction: (3,) float32 unit vector in head axes, away from the camera.
         pixel_cm: size of a pixel there.
     """
@@ -114,7 +115,7 @@ class MouthInterior:
         scheme = face.scheme
         self._face = face
         self._upper, self._lower = list(scheme.upper_lip_inner), list(scheme.lower_lip_inner)
-        self._middle = [index for pair in scheme.lip_gap for index in pair]
+        self._middle = [index for edge in scheme.lip_gap for index in edge]
         self._source_gap = self._gap(face.landmarks)
         lips = np.round(face.landmarks[list(scheme.lips)] - 0.5).astype(int)
         self._lips = np.clip(lips, 0, np.array(face.size) - 1)
@@ -179,7 +180,7 @@ class MouthInterior:
         jaw_rays, jaw_direction = jaw.T @ (rays - JAW_JOINT_CM) + JAW_JOINT_CM, jaw.T @ direction
         upper = UPPER_TEETH.seen(rays, direction, UPPER_FRONT_CM, view.pixel_cm)
         lower = LOWER_TEETH.seen(jaw_rays, jaw_direction, LOWER_FRONT_CM, view.pixel_cm)
-        tongue, tongue_facing = _meet_tongue(jaw_rays, jaw_direction)
+        tongue, tongue_facing, tongue_share = _meet_tongue(jaw_rays, jaw_direction)
         on_upper = opening.light(upper.points) * upper.toward_front
         on_lower, on_tongue = (
             opening.light(jaw @ (points - JAW_JOINT_CM) + JAW_JOINT_CM) * facing
@@ -190,7 +191,7 @@ class MouthInterior:
         behind_lower = behind_upper * (1 - lower.teeth - lower.gum)
         teeth = upper.teeth * upper.shade, behind_upper * lower.teeth * lower.shade
         gums = upper.gum, behind_upper * lower.gum
-        tongue_share = behind_lower * (tongue_facing > 0)
+        tongue_share = behind_lower * tongue_share
         amounts = np.stack(
             [
                 teeth[0] * on_upper + teeth[1] * on_lower,
@@ -242,16 +243,18 @@ class MouthInterior:
 
 def _meet_tongue(
     rays: NDArray[np.float32], direction: NDArray[np.float32]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Where rays meet the tongue, (3, count), and how far it faces forward there, 0 beside it."""
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Where rays meet the tongue, (3, count), how far it faces forward there, and which share of a pixel it fills."""
     start, along = (rays - TONGUE_CENTER_CM) / TONGUE_RADII_CM, direction / TONGUE_RADII_CM[:, 0]
     a, b, c = along @ along, along @ start, np.einsum("ij,ij->j", start, start) - np.float32(1)
     inside = b * b - a * c
     sphere = start + ((-b - np.sqrt(np.maximum(inside, 0))) / a) * along[:, None]
     normal = sphere / TONGUE_RADII_CM
-    forward = normal[2] / np.sqrt(np.einsum("ij,ij->j", normal, normal) + np.float32(1e-9))
-    facing = np.clip(np.float32(0.3) + np.float32(0.7) * forward, 0, 1) * (inside > 0)
-    return np.asarray(sphere * TONGUE_RADII_CM + TONGUE_CENTER_CM, np.float32), np.asarray(facing, np.float32)
+    normal /= np.sqrt(np.einsum("ij,ij->j", normal, normal) + np.float32(1e-9))
+    facing = np.clip(np.float32(0.3) + np.float32(0.7) * normal[2], 0, 1)
+    share = np.clip(-(direction @ normal) / np.float32(EDGE_ON), 0, 1) * (inside > 0)
+    points = sphere * TONGUE_RADII_CM + TONGUE_CENTER_CM
+    return np.asarray(points, np.float32), np.asarray(facing, np.float32), np.asarray(share, np.float32)
 
 
 def _transform(affine: NDArray[np.float64], points: NDArray[np.floating]) -> NDArray[np.float64]:
