@@ -58,14 +58,14 @@ def even_sides(albedo: LinearImage, skin: NDArray[np.bool_], landmarks: Points, 
     at, change = _change_at_landmarks(albedo, skin, landmarks, scheme)
     if not len(at):
         return np.ones_like(albedo)
-    face = scheme.canonical[:, :2]
-    design = _odd_functions((face[at] - _center(face)) / _radii(face))
+    face = _in_half_faces(scheme.canonical[:, :2])
+    design = _odd_functions(face[at])
     pull = np.sqrt(TUNABLES.ridge * len(at)) * np.eye(design.shape[1])
     amounts = [_robust_fit(np.vstack([design, pull]), np.append(each, np.zeros(len(pull)))) for each in change.T]
     # Pixels as places of the mean face; what is beside the face is corrected as where it ends.
     height, width = skin.shape
     places = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1).reshape(-1, 2)
-    to_face = np.linalg.lstsq(_with_one(landmarks), (face - _center(face)) / _radii(face))[0]
+    to_face = np.linalg.lstsq(_with_one(landmarks), face)[0]
     seen = _with_one(places) @ to_face
     on_face = np.clip(seen, -1, 1)
     share = np.exp(-((seen - on_face) ** 2).sum(axis=1) / TUNABLES.fade**2)
@@ -109,14 +109,10 @@ def _robust_fit(design: NDArray[np.float64], values: NDArray[np.float64]) -> NDA
     return np.asarray(least_squares(deviation, start, jac=slope, loss="cauchy", f_scale=TUNABLES.outlier).x)
 
 
-def _center(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The middle of a face (count, 2): on its axis, half way from top to bottom."""
-    return np.array([0.0, (points[:, 1].min() + points[:, 1].max()) / 2])
-
-
-def _radii(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Half its width and height."""
-    return np.asarray(np.ptp(points, axis=0) / 2)
+def _in_half_faces(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The mean face's points (count, 2), -1..1 across, from its axis, and up, from half way between top and bottom."""
+    (_, bottom), (_, top) = points.min(axis=0), points.max(axis=0)
+    return np.asarray((points - [0, (bottom + top) / 2]) / (np.ptp(points, axis=0) / 2))
 
 
 def _with_one(points: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -12,14 +12,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.live.reenactment.mouth.ray_crossing import first_crossing, share_at_outline
+
 ROUNDING_CM = 0.09
 """How much shorter a crown is at its corners than in its middle."""
 PAPILLA_CM = 0.22
 """How much further the gum reaches between two teeth than at the middle of one."""
 LINE_CM, LINE_SHADE = 0.055, 0.4
 """Half width of the shade between two teeth, and how dark it is."""
-EDGE_ON = 0.25
-"""Cosine between a wall and the line of sight below which the wall fades out: else its outline would be a staircase."""
 PLACES = 1024
 """Places along one side of a row for which its shape is tabulated."""
 
@@ -99,24 +99,19 @@ class DentalArch:
         """
         radii = np.array([[self.half_width], [self.depth]], np.float32)
         center = np.array([[0], [front[1] - self.depth]], np.float32)
-        # In units of the radii the row is a circle, which each ray crosses first at s: a · s² + 2 b · s + c = 0.
+        # In units of the radii the row is a circle.
         start, along = (origins[::2] - center) / radii, direction[::2] / radii[:, 0]
-        a = np.float32(max(float(along @ along), 1e-6))
-        b, c = along @ start, start[0] * start[0] + start[1] * start[1] - np.float32(1)
-        inside = b * b - a * c
-        steps = (-b - np.sqrt(np.maximum(inside, 0))) / a
+        steps, met = first_crossing(start, along)
         points = origins + steps * direction[:, None]
+        x, z = on_circle = start + steps * along[:, None]
         # The tangent of half the angle from the front.
-        x, z = start + steps * along[:, None]
         place = np.abs(x) / np.maximum(1 + z, np.float32(1e-3))
-        across, ahead = x / radii[0], z / radii[1]
-        toward_camera = -(across * direction[0] + ahead * direction[2]) / np.sqrt(across**2 + ahead**2 + 1e-9)
-        met = np.clip(toward_camera / np.float32(EDGE_ON), 0, 1) * ((inside > 0) & (place <= 1))
+        shown = share_at_outline(on_circle / radii, direction[::2]) * (met & (place <= 1))
         column = (np.minimum(place, 1) * np.float32(PLACES - 1)).astype(np.intp)
         edge, gum, toward_front, shade = (row.take(column) for row in self._shape)
         height = np.float32(self.up) * (points[1] - np.float32(front[0]))
         per_pixel = np.float32(1 / max(pixel_cm, 1e-3))
-        above_edge = np.clip((height - edge) * per_pixel + np.float32(0.5), 0, 1) * met
+        above_edge = np.clip((height - edge) * per_pixel + np.float32(0.5), 0, 1) * shown
         below_gum = np.clip((gum - height) * per_pixel + np.float32(0.5), 0, 1)
         return TeethInView(
             points=points,

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, RgbaImage
 from relit_camera.base.images.tone_mapping import display_from_linear, linear_from_display
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose, project
-from relit_camera.live.reenactment.mouth.dental_arch import EDGE_ON, LOWER_TEETH, UPPER_TEETH
+from relit_camera.live.reenactment.mouth.dental_arch import LOWER_TEETH, UPPER_TEETH
+from relit_camera.live.reenactment.mouth.ray_crossing import first_crossing, share_at_outline
 from relit_camera.live.reenactment.source_image import SourceFace
 
 TEETH = np.array([0.78, 0.7, 0.58], np.float32)
@@ -237,8 +239,7 @@ class MouthInterior:
         moved = (landmarks[self._middle] - closed).reshape(2, -1, 2).mean(axis=1) @ to_output[:, :2].T
         upper, lower = (view.drop(each) for each in moved)
         angle = float(np.clip((lower - max(-upper, 0.0)) / -JAW_JOINT_CM[2, 0], 0, MOST_JAW_TURN))
-        cos, sin = np.cos(angle), np.sin(angle)
-        return np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]], np.float32)
+        return Rotation.from_rotvec(np.array([angle, 0, 0])).as_matrix().astype(np.float32)
 
 
 def _meet_tongue(
@@ -246,15 +247,13 @@ def _meet_tongue(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
     """Where rays meet the tongue, (3, count), how far it faces forward there, and which share of a pixel it fills."""
     start, along = (rays - TONGUE_CENTER_CM) / TONGUE_RADII_CM, direction / TONGUE_RADII_CM[:, 0]
-    a, b, c = along @ along, along @ start, np.einsum("ij,ij->j", start, start) - np.float32(1)
-    inside = b * b - a * c
-    sphere = start + ((-b - np.sqrt(np.maximum(inside, 0))) / a) * along[:, None]
-    normal = sphere / TONGUE_RADII_CM
-    normal /= np.sqrt(np.einsum("ij,ij->j", normal, normal) + np.float32(1e-9))
-    facing = np.clip(np.float32(0.3) + np.float32(0.7) * normal[2], 0, 1)
-    share = np.clip(-(direction @ normal) / np.float32(EDGE_ON), 0, 1) * (inside > 0)
+    steps, met = first_crossing(start, along)
+    sphere = start + steps * along[:, None]
+    normals = sphere / TONGUE_RADII_CM
+    normals /= np.linalg.norm(normals, axis=0) + np.float32(1e-9)
+    facing = np.clip(np.float32(0.3) + np.float32(0.7) * normals[2], 0, 1)
     points = sphere * TONGUE_RADII_CM + TONGUE_CENTER_CM
-    return np.asarray(points, np.float32), np.asarray(facing, np.float32), np.asarray(share, np.float32)
+    return np.asarray(points, np.float32), np.asarray(facing, np.float32), share_at_outline(normals, direction) * met
 
 
 def _transform(affine: NDArray[np.float64], points: NDArray[np.floating]) -> NDArray[np.float64]:
