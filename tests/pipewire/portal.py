@@ -26,7 +26,9 @@ STORE = "org.freedesktop.impl.portal.PermissionStore", "/org/freedesktop/impl/po
 CALL_S = 60.0
 """How long a browser may take to start and show the camera."""
 MOST_STARTS = 3
-"""Of a browser that finds no camera at all."""
+"""Of a browser that finds no camera at all, gets no picture of it or ends by itself."""
+ENDED = "Ended"
+"""What is told of a browser that ended before its page had sent anything."""
 FIREFOX_PREFERENCES = {
     "media.webrtc.camera.allow-pipewire": True,
     "media.navigator.permission.disabled": True,  # of Firefox's own question
@@ -36,15 +38,28 @@ FIREFOX_PREFERENCES = {
     "app.update.enabled": False,
 }
 PAGE = """<!doctype html><title>call</title><video id="video" autoplay muted></video><script>
-// Chromium at times gives up a camera that has only just appeared; a person would press the button once more.
+// Chromium at times gives up a camera that has only just appeared, at once or when it is to show it; a person would
+// press the button once more.
 async function opened(tries) {
   try {
-    return await navigator.mediaDevices.getUserMedia({ video: true });
+    const stream = await navigator.mediaDevices.getUserMedia({ video: true });
+    await shown(stream);
+    return stream;
   } catch (error) {
     if (tries <= 1 || !["NotReadableError", "NotFoundError", "AbortError"].includes(error.name)) throw error;
     await new Promise((resolve) => setTimeout(resolve, 2000));
     return opened(tries - 1);
   }
+}
+async function shown(stream) {
+  video.srcObject = stream;
+  // Until the camera's first picture has come, Chromium plays one of its own: black, 2 x 2 pixels.
+  for (let tries = 0; video.paused || video.videoWidth <= 2; tries++) {
+    const ended = stream.getVideoTracks()[0].readyState === "ended";
+    if (ended || tries === 100) throw new DOMException(ended ? "given up" : "no picture in 10 s", "AbortError");
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+  await new Promise((resolve) => setTimeout(resolve, 1000));
 }
 async function named() {
   // Chromium may have no list yet where a camera has just come.
@@ -57,9 +72,6 @@ async function named() {
 }
 async function call() {
   const stream = await opened(3);
-  video.srcObject = stream;
-  await new Promise((resolve) => (video.onplaying = resolve));
-  await new Promise((resolve) => setTimeout(resolve, 1000));
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [video.videoWidth, video.videoHeight];
   canvas.getContext("2d").drawImage(video, 0, 0);
@@ -172,8 +184,8 @@ def _call(session: Session, program: str, *arguments: str) -> Call:
     """Open the page, and wait for what it found."""
     for _ in range(MOST_STARTS):
         answer = _answer(session, program, *arguments)
-        # Chromium, rarely, finds no camera of PipeWire as long as it runs; a person would start it again.
-        if not answer.get("error", "").startswith("NotFoundError"):
+        # Chromium, rarely, finds no camera of PipeWire as long as it runs, or shows none; a person would start again.
+        if not answer.get("error", "").startswith(("NotFoundError", "AbortError", ENDED)):
             break
     assert "error" not in answer, answer
     data = np.frombuffer(base64.b64decode(answer["picture"].partition(",")[2]), np.uint8)
@@ -191,8 +203,7 @@ def _answer(session: Session, program: str, *arguments: str) -> dict[str, Any]:
         finally:
             browser.terminate()
             _, said = browser.communicate()
-    assert found, said.decode(errors="replace")[-2000:]
-    return found[0]
+    return found[0] if found else {"error": f"{ENDED}: {said.decode(errors='replace')[-2000:]}"}
 
 
 @contextmanager
