@@ -14,6 +14,7 @@ from relit_studio.commands.compare import compare
 from relit_studio.commands.drive import drive
 from relit_studio.commands.fetch import fetch
 from relit_studio.commands.field import field
+from relit_studio.commands.learn import learn
 from relit_studio.commands.moving import moving
 from relit_studio.commands.person import person
 from relit_studio.commands.setup import setup
@@ -25,7 +26,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Renders people whose truth is known. Begin with `setup` and `fetch`.",
 )
-for command in (setup, fetch, person, sheet, check, field, compare, capture, drive, moving, bundle):
+for command in (setup, fetch, person, sheet, check, field, compare, capture, drive, moving, learn, bundle):
     app.command()(command)
 
 

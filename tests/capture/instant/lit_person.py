@@ -9,9 +9,11 @@ import numpy as np
 
 from relit_camera.base.array_types import Float32Array, Float64Array
 from relit_camera.base.images.color import LUMINANCE, uint8_from_linear
-from relit_camera.capture.instant.generic_reflectance import GenericField, ShapeResponse, shape_response
+from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
 from relit_camera.capture.instant.median_picture import MedianPicture
+from relit_camera.capture.instant.response.generic_reflectance import GenericField, ShapeResponse, shape_response
+from relit_camera.capture.instant.response.learned_response import with_learned_response
 from relit_camera.light.directions import direction_from_degrees, texel_directions, texel_solid_angles
 from tests.capture.instant.canonical_person import canonical_landmarks, canonical_pose, person_matte
 
@@ -20,13 +22,20 @@ SKIN = np.array([0.40, 0.26, 0.20])
 
 
 @lru_cache(maxsize=1)
-def person() -> tuple[HeadShape, ShapeResponse]:
-    """The head at half of the picture's resolution, and how it answers light."""
+def generic_person() -> tuple[HeadShape, ShapeResponse, Mask]:
+    """The head at half of the picture's resolution, how its shape alone answers light, and its matte."""
     half = SIDE // 2
     pose = canonical_pose(half, pixels_per_cm=1.5)
     matte = person_matte(half, 1.5)
     shape = fit_head_shape(canonical_landmarks(pose, half), matte)
-    return shape, shape_response(shape.geometry, shape.certainty, matte)
+    return shape, shape_response(shape.geometry, shape.certainty, matte), matte
+
+
+@lru_cache(maxsize=1)
+def person() -> tuple[HeadShape, ShapeResponse]:
+    """The same head, which answers light as people do."""
+    shape, response, matte = generic_person()
+    return shape, with_learned_response(response, shape, matte)
 
 
 def field_of(albedo: Float64Array) -> GenericField:

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from relit_camera.base.images.image_quality import psnr
-from relit_camera.capture.instant.generic_compression import compress_generic_field
-from relit_camera.capture.instant.generic_reflectance import AMOUNTS, GenericField
+from relit_camera.capture.instant.response.generic_compression import compress_generic_field
+from relit_camera.capture.instant.response.generic_reflectance import AMOUNTS, GenericField
 from relit_camera.capture.reflectance.appearance_model import distant_terms
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES, builtin_environment
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.reflectance_field import TEXELS, texel_vectors
 from tests.capture.instant.canonical_person import person_matte
-from tests.capture.instant.lit_person import SIDE, SKIN, person, window
+from tests.capture.instant.lit_person import SIDE, SKIN, generic_person, person, window
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def test_a_picture_under_light_is_the_sum_of_its_rows(field: GenericField) -> No
 
 
 def test_on_the_face_it_is_the_appearance_model_with_softer_shadows() -> None:
-    shape, response = person()
+    shape, response, _ = generic_person()
     cheek = np.flatnonzero((shape.skin & (shape.certainty > 0.999)).ravel())[::40]
     chosen = np.searchsorted(response.pixels, cheek)
     terms = distant_terms(shape.geometry, texel_vectors(), cheek)
@@ -51,7 +51,7 @@ def test_on_the_face_it_is_the_appearance_model_with_softer_shadows() -> None:
 
 def test_hair_and_clothes_have_no_shadow_edges(field: GenericField) -> None:
     """Lit from the side that they face they are never black, and their light changes slowly with its direction."""
-    shape, response = person()
+    shape, response, _ = generic_person()
     vague = np.flatnonzero(shape.certainty.ravel()[response.pixels] < 0.01)
     assert len(vague) > 50
     facing = shape.geometry.cosines(texel_vectors(), response.pixels[vague])

@@ -21,10 +21,11 @@ from relit_camera.capture.geometry.normal_completion import pull_push_fill
 from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.instant.back_light import soften_back_light
 from relit_camera.capture.instant.face_selection import SCHEME, select_faces
-from relit_camera.capture.instant.generic_compression import compress_generic_field
-from relit_camera.capture.instant.generic_reflectance import GenericField, ShapeResponse, shape_response
 from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
 from relit_camera.capture.instant.median_picture import MedianPicture, median_picture
+from relit_camera.capture.instant.response.generic_compression import compress_generic_field
+from relit_camera.capture.instant.response.generic_reflectance import GenericField, ShapeResponse, shape_response
+from relit_camera.capture.instant.response.learned_response import with_learned_response
 from relit_camera.capture.instant.room_light import fit_room_light
 from relit_camera.capture.instant.room_shadows import with_room_shadows
 from relit_camera.capture.instant.skin.bare_skin import below_nose, find_bare_skin
@@ -65,7 +66,7 @@ class InstantTunables:
     clipped_code: int = 250
     max_clipped: float = 0.25
     least_unclipped: float = 0.3
-    harsh_dark_fraction: float = 0.2
+    harsh_dark_fraction: float = 0.15
     sure_matte: float = 0.9
     body_gloss: float = 0.5
 
@@ -129,7 +130,7 @@ def capture_from_picture(
     shape = fit_head_shape((picture.landmarks / 2).astype(np.float32), half)
     _require_exposed(picture, shape, source)
     progress(STAGE, 1, 3)
-    response = shape_response(shape.geometry, shape.certainty, half)
+    response = with_learned_response(shape_response(shape.geometry, shape.certainty, half), shape, half)
     field, room, warnings = _reflectance(picture, shape, response)
     progress(STAGE, 2, 3)
     subject = _subject(picture, shape, field, room, source)

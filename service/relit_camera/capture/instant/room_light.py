@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.array_types import Float32Array, Float64Array
 from relit_camera.base.images.color import LUMINANCE
-from relit_camera.capture.instant.generic_reflectance import ShapeResponse
+from relit_camera.capture.instant.response.generic_reflectance import ShapeResponse
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.soft_lights import SoftLights, regularized_nnls
 

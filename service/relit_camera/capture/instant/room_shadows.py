@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.array_types import Float32Array, Float64Array
 from relit_camera.base.images.color import LUMINANCE, luminance
-from relit_camera.capture.instant.generic_reflectance import ShapeResponse
+from relit_camera.capture.instant.response.generic_reflectance import ShapeResponse
 from relit_camera.light.directions import texel_solid_angles
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relit_camera.base.array_types import Float32Array, Float64Array
 from relit_camera.base.images.color import LUMINANCE, luminance
 from relit_camera.base.images.image_types import Points
-from relit_camera.capture.instant.generic_reflectance import ShapeResponse
+from relit_camera.capture.instant.response.generic_reflectance import ShapeResponse
 from relit_camera.capture.instant.room_light import fit_room_light
 
 FOREHEAD, UNDER_NOSE, CHIN = 10, 2, 152

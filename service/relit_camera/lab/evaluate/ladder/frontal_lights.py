@@ -19,8 +19,14 @@ from relit_camera.capture.alignment.picture_set_alignment import align_if_better
 from relit_camera.capture.desk.person.desk_field import fit_desk_field, hold_geometry, skin_mask
 from relit_camera.capture.desk.person.generic_head import GenericHead
 from relit_camera.capture.geometry.shape_estimation import Geometry
-from relit_camera.capture.instant.generic_reflectance import AMOUNTS
 from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
+from relit_camera.capture.instant.response.generic_reflectance import AMOUNTS, shape_response
+from relit_camera.capture.instant.response.learned_response import (
+    DEGREE,
+    LEAST_SHARE,
+    learned_network,
+    response_inputs,
+)
 from relit_camera.capture.instant.skin.skin_prior import skin_luminance_by_eyes
 from relit_camera.capture.reflectance.appearance_model import TERM_COUNT, distant_terms
 from relit_camera.capture.reflectance.methods.appearance_field import AppearanceMethod
@@ -32,6 +38,7 @@ from relit_camera.lab.evaluate.field.ground_truth import select_lights
 from relit_camera.lab.evaluate.field.relighting_metrics import MAX_DB, Colors
 from relit_camera.lab.evaluate.ladder.known_person import reduced
 from relit_camera.light.directions import spherical_from_direction
+from relit_camera.light.spherical_harmonics import basis, coefficient_count
 
 AZIMUTH_DEG, ELEVATION_DEG = 30.0, 21.0
 """Lights within these angles of the camera's axis are frontal: those of a large screen half a meter away."""
@@ -176,14 +183,32 @@ def _nearest(known: FrontalSet) -> Colors:
 
 def _generic_head(known: FrontalSet) -> Colors:
     """The frontal picture divided by the generic head's shading in it, times that under each light."""
+    return _relit_head(known, np.zeros((known.captured.matte.size, coefficient_count(DEGREE)), np.float32))
+
+
+def _instant(known: FrontalSet) -> Colors:
+    """The same with the head's learned response, as instant has it."""
+    head, matte = known.head, known.captured.matte
+    response = shape_response(head.geometry, head.certainty, matte)
+    added = np.zeros((matte.size, coefficient_count(DEGREE)), np.float32)
+    added[response.pixels] = learned_network().corrections(response_inputs(response, head, matte))
+    return _relit_head(known, added)
+
+
+def _relit_head(known: FrontalSet, added: NDArray[np.float32]) -> Colors:
+    """Pictures of the generic head to whose response harmonics (pixels, 9) are added."""
     amounts, gloss = np.array(_TIED, np.float32), np.array(_GLOSS, np.float32)
     pixels = np.arange(known.captured.matte.size)
-    toward = known.captured.directions[[known.frontal]]
-    shading = distant_terms(known.head.geometry, toward, pixels)[..., 0] @ amounts
-    picture = known.captured.pictures[known.frontal].reshape(-1, 3)
-    albedo = picture / np.maximum(shading, _LEAST_SHADING)[:, None]
-    terms = distant_terms(known.head.geometry, known.asked, pixels)
-    shaded, shiny = np.einsum("ptl,t->lp", terms, amounts), np.einsum("ptl,t->lp", terms, gloss)
+
+    def shading(directions: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        terms = distant_terms(known.head.geometry, directions, pixels)
+        generic, shiny = (np.einsum("ptl,t->lp", terms, each) for each in (amounts, gloss))
+        learned = generic + basis(directions, DEGREE).astype(np.float32) @ added.T
+        return np.maximum(learned, LEAST_SHARE * generic), shiny
+
+    frontal, _ = shading(known.captured.directions[[known.frontal]])
+    albedo = known.captured.pictures[known.frontal].reshape(-1, 3) / np.maximum(frontal[0], _LEAST_SHADING)[:, None]
+    shaded, shiny = shading(known.asked)
     return _pictures(known, shaded[..., None] * albedo + shiny[..., None])
 
 
@@ -231,6 +256,7 @@ PREDICTORS: Mapping[str, Callable[[FrontalSet], Colors]] = {
     "frontal picture": _frontal_only,
     "nearest light": _nearest,
     "generic head": _generic_head,
+    "instant": _instant,
     "model": _model,
     "blend": _blend,
     "desk": _desk,

@@ -16,7 +16,7 @@ from relit_camera.base.array_types import Float32Array
 from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import Mask
-from relit_camera.capture.instant.generic_reflectance import GenericField
+from relit_camera.capture.instant.response.generic_reflectance import GenericField
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.compression.compression_quality import CompressionQuality, dense_bytes
 from relit_camera.subject.compression.field_tiles import tiles

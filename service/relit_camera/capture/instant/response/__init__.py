@@ -1,0 +1,1 @@
+"""How a generic head answers light, and what rendered people taught about it."""

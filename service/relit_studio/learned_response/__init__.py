@@ -1,0 +1,1 @@
+"""Training the network by which instant capture knows how heads answer light."""

@@ -1,0 +1,181 @@
+"""Fitting the network of the learned response to people whose response is known.
+
+What counts is by which factor a pixel changes from one light to another: mode ratio multiplies by it, whatever the
+pixel's albedo is. So the error is that of logarithms, a constant for each pixel apart. Skin is of one color within a
+person, or nearly, and the light of a room is told by it: there a part of that constant counts too, robustly, since
+brows, beards and make-up are among it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from relit_camera.base.array_types import Float32Array, Float64Array
+from relit_camera.capture.instant.response.learned_response import INPUTS, LEAK, ResponseNetwork, mirror_signs
+from relit_studio.learned_response.known_response import KnownResponse
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """Settings of the fit; none of them matters much.
+
+    Attributes:
+        hidden: units of the layers between.
+        pixels: of each person that are used.
+        rounds: of the optimizer (L-BFGS).
+        decay: weight of the squared weights.
+        small: of the squared harmonics.
+        skin: of the constant of a pixel of skin, where its other errors have 1.
+        believed: share of that constant that is learned. For rendered people all of it would be right; on real faces
+            (Extended Yale Face Database B) the forehead is hardly lighter than the cheeks, and eye sockets no darker.
+        outlier: of that constant, in units of the logarithm, from which it loses weight (Cauchy).
+        brightness: exponent of a pixel's brightness relative to skin by which it is weighed, about that of the display;
+            pixels count up to `brightest` times as much as skin.
+        jitter: deviation of noise that is added to the inputs, in units of their own.
+        least: share of the generic response that stays, however much is taken away.
+        seed: of weights, noise and the choice of pixels.
+    """
+
+    hidden: tuple[int, ...] = (48, 48)
+    pixels: int = 3000
+    rounds: int = 400
+    decay: float = 1e-5
+    small: float = 1e-3
+    skin: float = 1.0
+    believed: float = 0.5
+    outlier: float = 0.15
+    brightness: float = 0.8
+    brightest: float = 3.0
+    jitter: float = 0.1
+    least: float = 0.15
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """All pixels that are fitted, those mirrored included."""
+
+    inputs: Float32Array
+    expected: Float32Array
+    truth: Float32Array
+    skin: Float32Array
+    weight: Float32Array
+    harmonics: Float32Array
+    mirrored: NDArray[np.bool_]
+
+
+def fit_network(people: Sequence[KnownResponse], settings: FitSettings | None = None) -> ResponseNetwork:
+    """The network with the least error on these people and their mirror images; their lights must be the same."""
+    settings = settings or FitSettings()
+    rng = np.random.default_rng(settings.seed)
+    of_inputs, of_harmonics = mirror_signs()
+    batch = _batch(people, settings, rng)
+    mean = np.where(of_inputs < 0, 0, batch.inputs.mean(axis=0)).astype(np.float32)
+    blank = ResponseNetwork(mean, (batch.inputs.std(axis=0) + 1e-3).astype(np.float32), ())
+    inputs = blank.scaled(batch.inputs)
+    inputs = np.where(batch.mirrored[:, None], inputs * of_inputs, inputs)
+    inputs += np.float32(settings.jitter) * rng.standard_normal(inputs.shape, np.float32)
+    signs = np.where(batch.mirrored[:, None], of_harmonics, np.float32(1))
+    sizes = (INPUTS, *settings.hidden, len(of_harmonics))
+    shapes = [shape for rows, columns in pairwise(sizes) for shape in ((rows, columns), (columns,))]
+
+    def layers_of(flat: Float64Array) -> list[Float32Array]:
+        ends = np.cumsum([int(np.prod(shape)) for shape in shapes])[:-1]
+        return [
+            part.reshape(shape).astype(np.float32) for part, shape in zip(np.split(flat, ends), shapes, strict=True)
+        ]
+
+    def loss(flat: Float64Array) -> tuple[float, Float64Array]:
+        layers = layers_of(flat)
+        values = [inputs]
+        for weights, offsets in zip(layers[:-2:2], layers[1:-2:2], strict=True):
+            reached = values[-1] @ weights + offsets
+            values.append(np.maximum(reached, LEAK * reached))
+        given = (values[-1] @ layers[-2] + layers[-1]) * signs
+        error, slope = _error(given, batch, settings)
+        back = (slope + 2 * settings.small / len(given) * given) * signs
+        slopes: list[NDArray[np.floating]] = []
+        for index in range(len(values) - 1, -1, -1):
+            weights = layers[2 * index]
+            slopes[:0] = [values[index].T @ back + 2 * settings.decay * weights, back.sum(axis=0)]
+            if index:
+                back = (back @ weights.T) * np.where(values[index] > 0, np.float32(1), LEAK)
+        error += settings.small * float((given**2).sum()) / len(given)
+        error += settings.decay * sum(float((each**2).sum()) for each in layers[::2])
+        return error, np.concatenate([each.ravel() for each in slopes]).astype(np.float64)
+
+    start = [rng.normal(0, np.sqrt(2 / shape[0]), shape) if len(shape) == 2 else np.zeros(shape) for shape in shapes]
+    start[-2] *= 0.1
+    found = minimize(
+        loss,
+        np.concatenate([each.ravel() for each in start]),
+        jac=True,
+        method="L-BFGS-B",
+        options={"maxiter": settings.rounds, "maxfun": 2 * settings.rounds},
+    )
+    layers = layers_of(found.x)
+    return ResponseNetwork(mean, blank.spread, tuple(zip(layers[::2], layers[1::2], strict=True)))
+
+
+def mean_error(network: ResponseNetwork | None, person: KnownResponse, settings: FitSettings | None = None) -> float:
+    """How wrong the response of a person is, as a root mean square of logarithms; None is the generic one."""
+    settings = settings or FitSettings()
+    batch = _weighed(person, settings)
+    added = network.corrections(person.inputs) if network else np.zeros((len(person.inputs), 9), np.float32)
+    return float(np.sqrt(_error(added, batch, settings)[0]))
+
+
+def _error(given: Float32Array, batch: _Batch, settings: FitSettings) -> tuple[float, Float32Array]:
+    """The mean square error of harmonics (pixels, 9), and its slope by them."""
+    reached = batch.expected + given @ batch.harmonics.T
+    least = np.float32(settings.least) * batch.expected
+    free = reached > least
+    reached = np.where(free, reached, least)
+    wrong = np.log(reached) - batch.truth
+    constant = wrong.mean(axis=1, keepdims=True)
+    wrong -= constant
+    generic = (np.log(batch.expected) - batch.truth).mean(axis=1, keepdims=True)
+    constant = constant - (1 - settings.believed) * generic
+    farther = 1 + (constant / settings.outlier) ** 2
+    skin = settings.skin * batch.skin[:, None]
+    weight = (batch.weight / batch.weight.sum())[:, None]
+    error = float((weight * (wrong**2).mean(axis=1, keepdims=True)).sum())
+    error += float((weight * skin * settings.outlier**2 * np.log(farther)).sum())
+    wrong += skin * constant / farther
+    slope = (2 / wrong.shape[1] * weight * wrong / reached * free) @ batch.harmonics
+    return error, np.asarray(slope, np.float32)
+
+
+def _weighed(person: KnownResponse, settings: FitSettings) -> _Batch:
+    bright = np.exp(person.truth).mean(axis=1)
+    bright /= np.median(bright[person.skin > 0])
+    weight = np.minimum(bright**settings.brightness, settings.brightest).astype(np.float32)
+    return _Batch(
+        person.inputs,
+        person.expected,
+        person.truth,
+        person.skin,
+        weight,
+        person.harmonics,
+        np.zeros(len(weight), bool),
+    )
+
+
+def _batch(people: Sequence[KnownResponse], settings: FitSettings, rng: np.random.Generator) -> _Batch:
+    """Some pixels of all people, each once as it is and once mirrored."""
+    chosen = []
+    for person in people:
+        whole = _weighed(person, settings)
+        pixels = rng.permutation(len(whole.weight))[: settings.pixels]
+        chosen.append([
+            part[pixels] for part in (whole.inputs, whole.expected, whole.truth, whole.skin, whole.weight)
+        ])  # fmt: skip
+    parts = [np.concatenate([part, part]) for part in (np.concatenate(each) for each in zip(*chosen, strict=True))]
+    mirrored = np.arange(len(parts[0])) >= len(parts[0]) // 2
+    return _Batch(parts[0], parts[1], parts[2], parts[3], parts[4], people[0].harmonics, mirrored)
