@@ -12,7 +12,7 @@ SERVICE = Path(__file__).resolve().parents[1] / "service"
 PACKAGES = (SERVICE / "relit_camera", SERVICE / "relit_studio")
 MAX_ENTRIES = 12
 MAX_LINES = 400
-ONE_A_COMMAND = {"relit_camera/cli/commands"}
+ONE_A_COMMAND = {"relit_camera/cli/commands", "relit_studio/commands"}
 """Folders that hold one module for each command line command, however many there are."""
 SHARED_NAMES = {"__init__", "__main__", "main"}
 SAME_WORD = {

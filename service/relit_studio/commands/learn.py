@@ -13,9 +13,9 @@ from relit_camera.capture.picture_import import import_samples
 from relit_studio.commands.options import Out, Threads, load_person, shown_progress
 from relit_studio.cycles.job import Quality
 from relit_studio.field.field_renderer import FieldSettings, render_field
-from relit_studio.learned_response.known_response import KnownResponse, known_response
-from relit_studio.learned_response.network_fit import fit_network, mean_error
-from relit_studio.learned_response.training_lights import training_lights
+from relit_studio.field.learned_response.known_response import KnownResponse, known_response
+from relit_studio.field.learned_response.network_fit import fit_network, mean_error
+from relit_studio.field.learned_response.training_lights import training_lights
 
 LAMP_DEG = 30.0
 LIGHTS = 24

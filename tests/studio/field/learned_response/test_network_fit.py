@@ -20,10 +20,10 @@ from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.subject_file import read_subject
 from relit_studio.__main__ import app
 from relit_studio.commands import learn
-from relit_studio.learned_response import network_fit
-from relit_studio.learned_response.known_response import KnownResponse, known_response
-from relit_studio.learned_response.network_fit import FitSettings, fit_network, mean_error
-from relit_studio.learned_response.training_lights import training_lights
+from relit_studio.field.learned_response import network_fit
+from relit_studio.field.learned_response.known_response import KnownResponse, known_response
+from relit_studio.field.learned_response.network_fit import FitSettings, fit_network, mean_error
+from relit_studio.field.learned_response.training_lights import training_lights
 
 LAMP_DEG = 30.0
 QUICK = FitSettings(hidden=(16,), pixels=400, rounds=150, jitter=0.0)

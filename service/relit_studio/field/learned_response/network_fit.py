@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 
 from relit_camera.base.array_types import Float32Array, Float64Array
 from relit_camera.capture.instant.response.learned_response import INPUTS, LEAK, ResponseNetwork, mirror_signs
-from relit_studio.learned_response.known_response import KnownResponse
+from relit_studio.field.learned_response.known_response import KnownResponse
 
 
 @dataclass(frozen=True)
