@@ -41,11 +41,13 @@ PAGE = """<!doctype html><title>call</title><video id="video" autoplay muted></v
 // Chromium at times gives up a camera that has only just appeared, at once or when it is to show it; a person would
 // press the button once more.
 async function opened(tries) {
+  let stream;
   try {
-    const stream = await navigator.mediaDevices.getUserMedia({ video: true });
+    stream = await navigator.mediaDevices.getUserMedia({ video: true });
     await shown(stream);
     return stream;
   } catch (error) {
+    stream?.getTracks().forEach((track) => track.stop());
     if (tries <= 1 || !["NotReadableError", "NotFoundError", "AbortError"].includes(error.name)) throw error;
     await new Promise((resolve) => setTimeout(resolve, 2000));
     return opened(tries - 1);

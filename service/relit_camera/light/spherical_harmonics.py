@@ -56,7 +56,7 @@ def project(light_map: LightMap, degree: int) -> Floats:
     A least-squares fit, which for the exact integral is the projection; over texels it also returns exactly what has
     no more than these harmonics.
     """
-    harmonics, weights = _texel_basis(degree), np.sqrt(texel_solid_angles().reshape(-1, 1))
+    harmonics, weights = texel_basis(degree), np.sqrt(texel_solid_angles().reshape(-1, 1))
     fitted = np.linalg.lstsq(harmonics * weights, light_map.reshape(-1, 3).astype(np.float64) * weights, rcond=None)
     return np.asarray(fitted[0], np.float64)
 
@@ -68,12 +68,15 @@ def reconstruct(coefficients: Floats) -> LightMap:
     more a series rings, the more brightness the cut alone would add.
     """
     degree = int(np.sqrt(len(coefficients))) - 1
-    radiance = np.maximum(_texel_basis(degree) @ coefficients, 0)
+    radiance = np.maximum(texel_basis(degree) @ coefficients, 0)
     energy, wanted = texel_solid_angles().ravel() @ radiance, np.sqrt(4 * np.pi) * np.maximum(coefficients[0], 0)
     radiance *= np.divide(wanted, energy, out=np.zeros(3), where=energy > 0)
     return radiance.reshape(*texel_directions().shape).astype(np.float32)
 
 
 @lru_cache(maxsize=8)
-def _texel_basis(degree: int) -> Floats:
-    return basis(texel_directions().reshape(-1, 3), degree)
+def texel_basis(degree: int) -> Floats:
+    """Harmonics (2048, (degree + 1)²) of the texels' directions; not to be written to."""
+    harmonics = basis(texel_directions().reshape(-1, 3), degree)
+    harmonics.setflags(write=False)
+    return harmonics

@@ -8,7 +8,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from relit_camera.base.errors import InputError
+from relit_camera.base.errors import CaptureError, InputError
+from relit_camera.base.storage.atomic_files import atomic_path
 from relit_camera.capture.picture_import import import_samples
 from relit_studio.commands.options import Out, Threads, load_person, shown_progress
 from relit_studio.cycles.job import Quality
@@ -39,7 +40,7 @@ def learn(
         _render(number, folder, threads)
         try:
             known[number] = known_response(import_samples(folder / "lights.lp"), lights, LAMP_DEG)
-        except InputError as error:
+        except CaptureError as error:
             typer.echo(f"{number} is left out: {error}")
     if len(known) < 2:
         raise InputError("too few people are left to learn from", "name more of them by --people")
@@ -50,7 +51,8 @@ def learn(
         typer.echo(f"{number}, held out: error {generic:.3f} as a generic head, {learned:.3f} as learned")
     network = fit_network(list(known.values()))
     errors = np.mean([[mean_error(each, person) for each in (None, network)] for person in known.values()], axis=0)
-    network.write(out / RESULT)
+    with atomic_path(out / RESULT) as temporary:
+        network.write(temporary)
     typer.echo(f"all {len(known)}, trained on: {errors[0]:.3f}, {errors[1]:.3f}; {out / RESULT}")
 
 

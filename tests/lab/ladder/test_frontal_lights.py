@@ -10,9 +10,17 @@ import pytest
 from relit_camera.base.errors import LightsError, ModelError
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.face.face_state import Tracker
-from relit_camera.lab.evaluate.ladder.frontal_lights import PREDICTORS, FrontalResult, evaluate_frontal, split_frontal
+from relit_camera.lab.evaluate.ladder.frontal_lights import (
+    PREDICTORS,
+    FrontalResult,
+    FrontalSet,
+    evaluate_frontal,
+    split_frontal,
+)
 from relit_camera.lab.evaluate.ladder.frontal_report import frontal_json, frontal_page, frontal_text
 from relit_camera.light.directions import direction_from_degrees, fibonacci_directions
+from relit_camera.subject.reflectance_field import TEXELS, texel_vectors
+from tests.capture.instant.lit_person import SKIN, generic_person, person
 from tests.lab.html_outline import Outline
 from tests.lab.lit_sphere import lambert
 
@@ -68,3 +76,21 @@ def test_without_a_face_the_other_predictors_still_count(result: FrontalResult) 
     outline.feed(frontal_page([result]))
     assert outline.fetched == outline.open == []
     assert len(outline.images) == 1
+
+
+def test_a_person_who_answers_as_learned_is_known_by_instant() -> None:
+    shape, _, matte = generic_person()
+    _, response = person()
+    texels = np.array([TEXELS // 2 + 31, *range(5, TEXELS, 400)])
+    rows = np.zeros((len(texels), matte.size, 3), np.float32)
+    rows[:, response.pixels] = response.diffuse[:, texels].T[..., None] * SKIN + response.glossy[:, texels].T[..., None]
+    pictures, toward = rows.reshape(len(texels), *matte.shape, 3), texel_vectors()[texels].astype(np.float64)
+    known = FrontalSet("person", OlatSamples(pictures[:1], toward[:1], matte), toward[1:], pictures[1:], no_models)
+    vars(known)["head"] = shape
+    inside = shape.skin
+    errors = {
+        name: np.abs(PREDICTORS[name](known)[:, inside] - pictures[1:, inside]).mean()
+        for name in ("instant", "generic head")
+    }
+    assert errors["instant"] < 0.1 * pictures[1:, inside].mean()
+    assert errors["instant"] < 0.6 * errors["generic head"]

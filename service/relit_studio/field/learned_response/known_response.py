@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.array_types import Float32Array
+from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.color import luminance, uint8_from_linear
 from relit_camera.capture.instant.face_selection import select_faces
 from relit_camera.capture.instant.head_shape import fit_head_shape
 from relit_camera.capture.instant.median_picture import median_picture
 from relit_camera.capture.instant.response.generic_reflectance import shape_response
-from relit_camera.capture.instant.response.learned_response import response_inputs, texel_harmonics
+from relit_camera.capture.instant.response.learned_response import DEGREE, response_inputs
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import texel_directions, texel_solid_angles
+from relit_camera.light.spherical_harmonics import texel_basis
 
 FRAME_PX = 480
 """Side of the picture in which the face is found."""
@@ -24,7 +26,7 @@ BRIGHT, BEHIND = 0.7, 0.25
 """Linear value of the person's 95th percentile in that picture, and of what is behind them."""
 OPAQUE, ON_SKIN = 0.8, 0.95
 """Mattes from which pixels are compared, and skin is."""
-LEAST_LIGHT = 1e-4
+LEAST_LIGHT, LEAST_ALBEDO = 1e-4, 1e-2
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ def known_response(samples: OlatSamples, lights: NDArray[np.float32], lamp_size_
         lamp_size_deg: full angle of those lamps.
 
     Raises:
-        CaptureError: no face is found.
+        CaptureError: no face is found, or no bare skin.
         ModelError: the networks are not there.
     """
     face = select_faces([_frame(samples)], "the picture in even light")[0]
@@ -81,14 +83,17 @@ def known_response(samples: OlatSamples, lights: NDArray[np.float32], lamp_size_
     weights = _lamp_weights(samples.directions, lights)
     inside, true_matte = matte.ravel()[response.pixels], at_pixels(samples.matte)
     skin = shape.skin.ravel()[response.pixels] & (np.minimum(inside, true_matte) > ON_SKIN)
+    if not skin.any():
+        raise CaptureError("no bare skin is seen of the person", "leave them out")
     albedo = np.median(((seen - glossy) * diffuse)[skin].sum(axis=1) / (diffuse[skin] ** 2).sum(axis=1))
+    albedo = max(float(albedo), LEAST_ALBEDO)
     kept = np.minimum(inside, true_matte) > OPAQUE
     return KnownResponse(
         inputs=response_inputs(response, shape, matte)[kept],
         expected=((diffuse + glossy / albedo) @ weights)[kept].astype(np.float32),
         truth=np.log(np.maximum((seen @ weights)[kept] / albedo, LEAST_LIGHT)).astype(np.float32),
         skin=skin[kept].astype(np.float32),
-        harmonics=(weights.T @ (lamps.T @ texel_harmonics())).astype(np.float32),
+        harmonics=(weights.T @ (lamps.T @ texel_basis(DEGREE))).astype(np.float32),
     )
 
 
@@ -102,7 +107,7 @@ def _frame(samples: OlatSamples) -> NDArray[np.uint8]:
 
 
 def _lamp_maps(directions: NDArray[np.float64], size_deg: float) -> NDArray[np.float32]:
-    """Solid angle (2048, lamps) of the texels that each lamp covers, over that of all of them: unit irradiance."""
+    """Solid angle (2048, lamps) of the texels that each lamp covers, over that of all of them: the sums are 1."""
     inside = texel_directions().reshape(-1, 3) @ directions.T > np.cos(np.radians(size_deg / 2))
     measured = inside * texel_solid_angles().reshape(-1, 1)
     return np.asarray(measured / measured.sum(axis=0), np.float32)

@@ -17,13 +17,19 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from relit_camera.base.array_types import Float32Array, Float64Array
-from relit_camera.capture.instant.response.learned_response import INPUTS, LEAK, ResponseNetwork, mirror_signs
+from relit_camera.capture.instant.response.learned_response import (
+    INPUTS,
+    LEAK,
+    LEAST_SHARE,
+    ResponseNetwork,
+    mirror_signs,
+)
 from relit_studio.field.learned_response.known_response import KnownResponse
 
 
 @dataclass(frozen=True)
 class FitSettings:
-    """Settings of the fit; none of them matters much.
+    """Settings of the fit; only `believed` matters much.
 
     Attributes:
         hidden: units of the layers between.
@@ -38,7 +44,6 @@ class FitSettings:
         brightness: exponent of a pixel's brightness relative to skin by which it is weighed, about that of the display;
             pixels count up to `brightest` times as much as skin.
         jitter: deviation of noise that is added to the inputs, in units of their own.
-        least: share of the generic response that stays, however much is taken away.
         seed: of weights, noise and the choice of pixels.
     """
 
@@ -53,7 +58,6 @@ class FitSettings:
     brightness: float = 0.8
     brightest: float = 3.0
     jitter: float = 0.1
-    least: float = 0.15
     seed: int = 0
 
 
@@ -124,7 +128,7 @@ def fit_network(people: Sequence[KnownResponse], settings: FitSettings | None = 
 
 
 def mean_error(network: ResponseNetwork | None, person: KnownResponse, settings: FitSettings | None = None) -> float:
-    """How wrong the response of a person is, as a root mean square of logarithms; None is the generic one."""
+    """How wrong the response of a person is, as the root of what the fit makes least; None is the generic one."""
     settings = settings or FitSettings()
     batch = _weighed(person, settings)
     added = network.corrections(person.inputs) if network else np.zeros((len(person.inputs), 9), np.float32)
@@ -134,7 +138,7 @@ def mean_error(network: ResponseNetwork | None, person: KnownResponse, settings:
 def _error(given: Float32Array, batch: _Batch, settings: FitSettings) -> tuple[float, Float32Array]:
     """The mean square error of harmonics (pixels, 9), and its slope by them."""
     reached = batch.expected + given @ batch.harmonics.T
-    least = np.float32(settings.least) * batch.expected
+    least = LEAST_SHARE * batch.expected
     free = reached > least
     reached = np.where(free, reached, least)
     wrong = np.log(reached) - batch.truth

@@ -23,8 +23,8 @@ from relit_camera.base.array_types import Float32Array
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.instant.head_shape import HeadShape
 from relit_camera.capture.instant.response.generic_reflectance import ShapeResponse
-from relit_camera.light.directions import fibonacci_directions, texel_directions, texel_solid_angles
-from relit_camera.light.spherical_harmonics import basis, coefficient_count
+from relit_camera.light.directions import fibonacci_directions, texel_solid_angles
+from relit_camera.light.spherical_harmonics import basis, coefficient_count, texel_basis
 
 DEGREE = 2
 """Of the harmonics: what is left of a face's answer to the light of a room beyond them is small."""
@@ -36,8 +36,8 @@ MOST_SPREADS = 4.0
 """Limit of an input, in standard deviations of what the network was trained with."""
 LEAK = np.float32(0.1)
 """Slope of the network's units below zero."""
-LEAST_SHARE, LEAST = np.float32(0.1), np.float32(0.01)
-"""Of the generic response, and in all, that stays however much is taken away."""
+LEAST_SHARE = np.float32(0.15)
+"""Of the generic response, that stays however much is taken away."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class ResponseNetwork:
     """A network of fully connected layers, leaky rectifiers between them.
 
     Attributes:
-        mean, spread: (12,) float32 by which inputs are brought to zero mean and unit deviation.
+        mean, spread: (12,) float32: inputs are taken relative to them.
         layers: weights (inputs, outputs) and offsets (outputs,) float32 of each layer; the last one has 9 outputs.
     """
 
@@ -108,14 +108,10 @@ def mirror_signs() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     return np.concatenate([np.array([-1, 1, 1], np.float32), harmonics]), harmonics
 
 
-@lru_cache(maxsize=1)
-def texel_harmonics() -> NDArray[np.float32]:
-    """Harmonics (2048, 9) of each texel."""
-    return basis(texel_directions().reshape(-1, 3), DEGREE).astype(np.float32)
-
-
 def response_inputs(response: ShapeResponse, shape: HeadShape, matte: Mask) -> Float32Array:
     """What the network sees of each pixel of a response: (pixels, 12) float32.
+
+    The place is in the head's axes; the harmonics stay in the picture's, since heads were upright when it was trained.
 
     Args:
         response: of the shape alone.
@@ -133,8 +129,8 @@ def response_inputs(response: ShapeResponse, shape: HeadShape, matte: Mask) -> F
         up * across[0] - right * across[1],
         np.minimum(inside / shape.pixels_per_cm, DEEPEST_CM),
     )
-    measured = texel_harmonics() * texel_solid_angles().reshape(-1, 1).astype(np.float32)
-    return np.column_stack([*place, response.diffuse @ measured]).astype(np.float32)
+    measured = texel_basis(DEGREE) * texel_solid_angles().reshape(-1, 1)
+    return np.column_stack([*place, response.diffuse @ measured.astype(np.float32)]).astype(np.float32)
 
 
 def with_learned_response(
@@ -142,7 +138,7 @@ def with_learned_response(
 ) -> ShapeResponse:
     """A response of the generic head, as heads of its kind were found to answer light; see `response_inputs`."""
     added = (network or learned_network()).corrections(response_inputs(response, shape, matte))
-    diffuse = added @ texel_harmonics().T
+    diffuse = added @ texel_basis(DEGREE).astype(np.float32).T
     diffuse += response.diffuse
-    np.maximum(diffuse, LEAST_SHARE * response.diffuse + LEAST, out=diffuse)
+    np.maximum(diffuse, LEAST_SHARE * response.diffuse, out=diffuse)
     return replace(response, diffuse=diffuse)

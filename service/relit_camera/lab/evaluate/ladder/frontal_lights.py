@@ -21,12 +21,7 @@ from relit_camera.capture.desk.person.generic_head import GenericHead
 from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
 from relit_camera.capture.instant.response.generic_reflectance import AMOUNTS, shape_response
-from relit_camera.capture.instant.response.learned_response import (
-    DEGREE,
-    LEAST_SHARE,
-    learned_network,
-    response_inputs,
-)
+from relit_camera.capture.instant.response.learned_response import with_learned_response
 from relit_camera.capture.instant.skin.skin_prior import skin_luminance_by_eyes
 from relit_camera.capture.reflectance.appearance_model import TERM_COUNT, distant_terms
 from relit_camera.capture.reflectance.methods.appearance_field import AppearanceMethod
@@ -38,7 +33,7 @@ from relit_camera.lab.evaluate.field.ground_truth import select_lights
 from relit_camera.lab.evaluate.field.relighting_metrics import MAX_DB, Colors
 from relit_camera.lab.evaluate.ladder.known_person import reduced
 from relit_camera.light.directions import spherical_from_direction
-from relit_camera.light.spherical_harmonics import basis, coefficient_count
+from relit_camera.subject.reflectance_field import texel_vectors
 
 AZIMUTH_DEG, ELEVATION_DEG = 30.0, 21.0
 """Lights within these angles of the camera's axis are frontal: those of a large screen half a meter away."""
@@ -183,32 +178,36 @@ def _nearest(known: FrontalSet) -> Colors:
 
 def _generic_head(known: FrontalSet) -> Colors:
     """The frontal picture divided by the generic head's shading in it, times that under each light."""
-    return _relit_head(known, np.zeros((known.captured.matte.size, coefficient_count(DEGREE)), np.float32))
+    amounts, gloss = np.array(_TIED, np.float32), np.array(_GLOSS, np.float32)
+    pixels = np.arange(known.captured.matte.size)
+    toward = known.captured.directions[[known.frontal]]
+    shading = distant_terms(known.head.geometry, toward, pixels)[..., 0] @ amounts
+    terms = distant_terms(known.head.geometry, known.asked, pixels)
+    shaded, shiny = (np.einsum("ptl,t->lp", terms, each) for each in (amounts, gloss))
+    return _shaded_again(known, shading, shaded, shiny)
 
 
 def _instant(known: FrontalSet) -> Colors:
-    """The same with the head's learned response, as instant has it."""
+    """The same with the response that instant gives to the head, in the texels nearest to the lights."""
     head, matte = known.head, known.captured.matte
-    response = shape_response(head.geometry, head.certainty, matte)
-    added = np.zeros((matte.size, coefficient_count(DEGREE)), np.float32)
-    added[response.pixels] = learned_network().corrections(response_inputs(response, head, matte))
-    return _relit_head(known, added)
+    response = with_learned_response(shape_response(head.geometry, head.certainty, matte), head, matte)
+
+    def under(rows: NDArray[np.float32], directions: NDArray[np.float64]) -> NDArray[np.float32]:
+        nearest = (directions @ texel_vectors().T).argmax(axis=1)
+        found = np.zeros((len(directions), matte.size), np.float32)
+        found[:, response.pixels] = rows[:, nearest].T
+        return found
+
+    shading = under(response.diffuse, known.captured.directions[[known.frontal]])[0]
+    return _shaded_again(known, shading, *(under(each, known.asked) for each in (response.diffuse, response.glossy)))
 
 
-def _relit_head(known: FrontalSet, added: NDArray[np.float32]) -> Colors:
-    """Pictures of the generic head to whose response harmonics (pixels, 9) are added."""
-    amounts, gloss = np.array(_TIED, np.float32), np.array(_GLOSS, np.float32)
-    pixels = np.arange(known.captured.matte.size)
-
-    def shading(directions: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        terms = distant_terms(known.head.geometry, directions, pixels)
-        generic, shiny = (np.einsum("ptl,t->lp", terms, each) for each in (amounts, gloss))
-        learned = generic + basis(directions, DEGREE).astype(np.float32) @ added.T
-        return np.maximum(learned, LEAST_SHARE * generic), shiny
-
-    frontal, _ = shading(known.captured.directions[[known.frontal]])
-    albedo = known.captured.pictures[known.frontal].reshape(-1, 3) / np.maximum(frontal[0], _LEAST_SHADING)[:, None]
-    shaded, shiny = shading(known.asked)
+def _shaded_again(
+    known: FrontalSet, shading: NDArray[np.float32], shaded: NDArray[np.float32], shiny: NDArray[np.float32]
+) -> Colors:
+    """The frontal picture by its shading (pixels,), times that (lights, pixels) of other lights, and their gloss."""
+    picture = known.captured.pictures[known.frontal].reshape(-1, 3)
+    albedo = picture / np.maximum(shading, _LEAST_SHADING)[:, None]
     return _pictures(known, shaded[..., None] * albedo + shiny[..., None])
 
 
