@@ -87,7 +87,7 @@ class ResponseNetwork:
 
 def read_network(path: Path) -> ResponseNetwork:
     """The network that `ResponseNetwork.write` has written."""
-    with np.load(path) as stored:
+    with np.load(path, allow_pickle=False) as stored:
         count = sum(name.startswith("weights") for name in stored.files)
         layers = tuple((stored[f"weights{index}"], stored[f"offsets{index}"]) for index in range(count))
         return ResponseNetwork(stored["mean"], stored["spread"], layers)
