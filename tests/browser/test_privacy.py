@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from functools import cache
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from playwright.sync_api import expect
 from relit_camera.app.demo import demo_files
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.live.scene.scene_history import SAME_STEP_S
 from tests.browser.browser_pages import OpenPage
 from tests.browser.cameras import START_S, Api, FakeServer, camera_on_clip
 from tests.browser.panel import COLOR, Panel, open_panel
@@ -92,6 +94,7 @@ def test_nothing_raw_is_published_without_a_confirmed_choice(tmp_path: Path, ope
 def test_undo_and_reset_bring_no_raw_picture_back(fake: FakeServer, open_page: OpenPage) -> None:
     fake.show_raw_picture()
     panel = open_panel(open_page, fake.url)
+    time.sleep(SAME_STEP_S)  # or both would be one step where the page opens fast
     panel.page.locator("#unlit-stop").click()
     wait_until(lambda: not fake.get("scene")["unlit_allowed"])
     for button in ("#undo", "#reset"):
