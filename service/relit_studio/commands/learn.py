@@ -53,7 +53,8 @@ def learn(
     errors = np.mean([[mean_error(each, person) for each in (None, network)] for person in known.values()], axis=0)
     with atomic_path(out / RESULT) as temporary:
         network.write(temporary)
-    typer.echo(f"all {len(known)}, trained on: {errors[0]:.3f}, {errors[1]:.3f}; {out / RESULT}")
+    typer.echo(f"all {len(known)}, trained on: error {errors[0]:.3f} as generic heads, {errors[1]:.3f} as learned")
+    typer.echo(f"{out / RESULT}")
 
 
 def _render(number: str, folder: Path, threads: int) -> None:

@@ -27,6 +27,7 @@ BRIGHT, BEHIND = 0.7, 0.25
 OPAQUE, ON_SKIN = 0.8, 0.95
 """Mattes from which pixels are compared, and skin is."""
 LEAST_LIGHT, LEAST_ALBEDO = 1e-4, 1e-2
+"""What a pixel is taken to send at least, so that it has a logarithm; and the least albedo of skin."""
 
 
 @dataclass(frozen=True)

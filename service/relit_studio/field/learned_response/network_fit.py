@@ -61,31 +61,19 @@ class FitSettings:
     seed: int = 0
 
 
-@dataclass(frozen=True)
-class _Batch:
-    """All pixels that are fitted, those mirrored included."""
-
-    inputs: Float32Array
-    expected: Float32Array
-    truth: Float32Array
-    skin: Float32Array
-    weight: Float32Array
-    harmonics: Float32Array
-    mirrored: NDArray[np.bool_]
-
-
 def fit_network(people: Sequence[KnownResponse], settings: FitSettings | None = None) -> ResponseNetwork:
     """The network with the least error on these people and their mirror images; their lights must be the same."""
     settings = settings or FitSettings()
     rng = np.random.default_rng(settings.seed)
     of_inputs, of_harmonics = mirror_signs()
-    batch = _batch(people, settings, rng)
-    mean = np.where(of_inputs < 0, 0, batch.inputs.mean(axis=0)).astype(np.float32)
-    blank = ResponseNetwork(mean, (batch.inputs.std(axis=0) + 1e-3).astype(np.float32), ())
-    inputs = blank.scaled(batch.inputs)
-    inputs = np.where(batch.mirrored[:, None], inputs * of_inputs, inputs)
+    known, weight = _some_pixels_twice(people, settings, rng)
+    mirrored = (np.arange(len(known.inputs)) >= len(known.inputs) // 2)[:, None]
+    mean = np.where(of_inputs < 0, 0, known.inputs.mean(axis=0)).astype(np.float32)
+    blank = ResponseNetwork(mean, (known.inputs.std(axis=0) + 1e-3).astype(np.float32), ())
+    inputs = blank.scaled(known.inputs)
+    inputs = np.where(mirrored, inputs * of_inputs, inputs)
     inputs += np.float32(settings.jitter) * rng.standard_normal(inputs.shape, np.float32)
-    signs = np.where(batch.mirrored[:, None], of_harmonics, np.float32(1))
+    signs = np.where(mirrored, of_harmonics, np.float32(1))
     sizes = (INPUTS, *settings.hidden, len(of_harmonics))
     shapes = [shape for rows, columns in pairwise(sizes) for shape in ((rows, columns), (columns,))]
 
@@ -102,7 +90,7 @@ def fit_network(people: Sequence[KnownResponse], settings: FitSettings | None = 
             reached = values[-1] @ weights + offsets
             values.append(np.maximum(reached, LEAK * reached))
         given = (values[-1] @ layers[-2] + layers[-1]) * signs
-        error, slope = _error(given, batch, settings)
+        error, slope = _error(given, known, weight, settings)
         back = (slope + 2 * settings.small / len(given) * given) * signs
         slopes: list[NDArray[np.floating]] = []
         for index in range(len(values) - 1, -1, -1):
@@ -130,56 +118,49 @@ def fit_network(people: Sequence[KnownResponse], settings: FitSettings | None = 
 def mean_error(network: ResponseNetwork | None, person: KnownResponse, settings: FitSettings | None = None) -> float:
     """How wrong the response of a person is, as the root of what the fit makes least; None is the generic one."""
     settings = settings or FitSettings()
-    batch = _weighed(person, settings)
-    added = network.corrections(person.inputs) if network else np.zeros((len(person.inputs), 9), np.float32)
-    return float(np.sqrt(_error(added, batch, settings)[0]))
+    nothing = np.zeros((len(person.inputs), person.harmonics.shape[1]), np.float32)
+    added = network.corrections(person.inputs) if network else nothing
+    return float(np.sqrt(_error(added, person, _weights(person, settings), settings)[0]))
 
 
-def _error(given: Float32Array, batch: _Batch, settings: FitSettings) -> tuple[float, Float32Array]:
-    """The mean square error of harmonics (pixels, 9), and its slope by them."""
-    reached = batch.expected + given @ batch.harmonics.T
-    least = LEAST_SHARE * batch.expected
+def _error(
+    given: Float32Array, known: KnownResponse, weight: Float32Array, settings: FitSettings
+) -> tuple[float, Float32Array]:
+    """The mean square error of harmonics (pixels, 9), each pixel by its weight (pixels,), and its slope by them."""
+    reached = known.expected + given @ known.harmonics.T
+    least = LEAST_SHARE * known.expected
     free = reached > least
     reached = np.where(free, reached, least)
-    wrong = np.log(reached) - batch.truth
+    wrong = np.log(reached) - known.truth
     constant = wrong.mean(axis=1, keepdims=True)
     wrong -= constant
-    generic = (np.log(batch.expected) - batch.truth).mean(axis=1, keepdims=True)
+    generic = (np.log(known.expected) - known.truth).mean(axis=1, keepdims=True)
     constant = constant - (1 - settings.believed) * generic
     farther = 1 + (constant / settings.outlier) ** 2
-    skin = settings.skin * batch.skin[:, None]
-    weight = (batch.weight / batch.weight.sum())[:, None]
-    error = float((weight * (wrong**2).mean(axis=1, keepdims=True)).sum())
-    error += float((weight * skin * settings.outlier**2 * np.log(farther)).sum())
+    skin = settings.skin * known.skin[:, None]
+    share = (weight / weight.sum())[:, None]
+    error = float((share * (wrong**2).mean(axis=1, keepdims=True)).sum())
+    error += float((share * skin * settings.outlier**2 * np.log(farther)).sum())
     wrong += skin * constant / farther
-    slope = (2 / wrong.shape[1] * weight * wrong / reached * free) @ batch.harmonics
+    slope = (2 / wrong.shape[1] * share * wrong / reached * free) @ known.harmonics
     return error, np.asarray(slope, np.float32)
 
 
-def _weighed(person: KnownResponse, settings: FitSettings) -> _Batch:
+def _weights(person: KnownResponse, settings: FitSettings) -> Float32Array:
+    """How much each pixel (pixels,) counts, by its brightness."""
     bright = np.exp(person.truth).mean(axis=1)
     bright /= np.median(bright[person.skin > 0])
-    weight = np.minimum(bright**settings.brightness, settings.brightest).astype(np.float32)
-    return _Batch(
-        person.inputs,
-        person.expected,
-        person.truth,
-        person.skin,
-        weight,
-        person.harmonics,
-        np.zeros(len(weight), bool),
-    )
+    return np.asarray(np.minimum(bright**settings.brightness, settings.brightest), np.float32)
 
 
-def _batch(people: Sequence[KnownResponse], settings: FitSettings, rng: np.random.Generator) -> _Batch:
-    """Some pixels of all people, each once as it is and once mirrored."""
+def _some_pixels_twice(
+    people: Sequence[KnownResponse], settings: FitSettings, rng: np.random.Generator
+) -> tuple[KnownResponse, Float32Array]:
+    """Some pixels of all people, first as they are, then all once more to be mirrored; and their weights."""
     chosen = []
     for person in people:
-        whole = _weighed(person, settings)
-        pixels = rng.permutation(len(whole.weight))[: settings.pixels]
-        chosen.append([
-            part[pixels] for part in (whole.inputs, whole.expected, whole.truth, whole.skin, whole.weight)
-        ])  # fmt: skip
-    parts = [np.concatenate([part, part]) for part in (np.concatenate(each) for each in zip(*chosen, strict=True))]
-    mirrored = np.arange(len(parts[0])) >= len(parts[0]) // 2
-    return _Batch(parts[0], parts[1], parts[2], parts[3], parts[4], people[0].harmonics, mirrored)
+        pixels = rng.permutation(len(person.inputs))[: settings.pixels]
+        parts = person.inputs, person.expected, person.truth, person.skin, _weights(person, settings)
+        chosen.append([part[pixels] for part in parts])
+    inputs, expected, truth, skin, weight = (np.concatenate(each * 2) for each in zip(*chosen, strict=True))
+    return KnownResponse(inputs, expected, truth, skin, people[0].harmonics), weight

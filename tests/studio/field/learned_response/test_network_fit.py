@@ -65,14 +65,14 @@ def test_the_mirrored_person_has_left_and_right_changed() -> None:
 
 def test_the_slope_is_that_of_the_error() -> None:
     person = made_up(0)
-    batch = network_fit._weighed(person, QUICK)
+    weight = network_fit._weights(person, QUICK)
     given: Any = np.random.default_rng(1).normal(0, 0.05, (400, 9))
-    batch = replace(batch, expected=batch.expected.astype(np.float64))
-    _, slope = network_fit._error(given, batch, QUICK)
+    person = replace(person, expected=person.expected.astype(np.float64))
+    _, slope = network_fit._error(given, person, weight, QUICK)
     for pixel, harmonic in ((0, 0), (7, 3), (350, 8)):
         step = np.zeros_like(given)
         step[pixel, harmonic] = 1e-4
-        errors = [network_fit._error(given + sign * step, batch, QUICK)[0] for sign in (1, -1)]
+        errors = [network_fit._error(given + sign * step, person, weight, QUICK)[0] for sign in (1, -1)]
         assert slope[pixel, harmonic] == pytest.approx((errors[0] - errors[1]) / 2e-4, rel=0.02, abs=1e-8)
 
 

@@ -23,8 +23,8 @@ from relit_camera.base.array_types import Float32Array
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.instant.head_shape import HeadShape
 from relit_camera.capture.instant.response.generic_reflectance import ShapeResponse
-from relit_camera.light.directions import fibonacci_directions, texel_solid_angles
-from relit_camera.light.spherical_harmonics import basis, coefficient_count, texel_basis
+from relit_camera.light.directions import texel_solid_angles
+from relit_camera.light.spherical_harmonics import coefficient_count, texel_basis
 
 DEGREE = 2
 """Of the harmonics: what is left of a face's answer to the light of a room beyond them is small."""
@@ -99,13 +99,11 @@ def learned_network() -> ResponseNetwork:
     return read_network(Path(__file__).with_name("learned_response.npz"))
 
 
-@lru_cache(maxsize=1)
 def mirror_signs() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Signs of the inputs (12,) and of the harmonics (9,) of the mirrored person, whose left is this one's right."""
-    toward = fibonacci_directions(64)
-    odd = np.abs(basis(toward, DEGREE) + basis(toward * (-1, 1, 1), DEGREE)).max(axis=0) < 1e-6
-    harmonics = np.where(odd, -1, 1).astype(np.float32)
-    return np.concatenate([np.array([-1, 1, 1], np.float32), harmonics]), harmonics
+    # Those of negative order are odd across the picture.
+    harmonics = [-1 if order < 0 else 1 for degree in range(DEGREE + 1) for order in range(-degree, degree + 1)]
+    return np.array([-1, 1, 1, *harmonics], np.float32), np.array(harmonics, np.float32)
 
 
 def response_inputs(response: ShapeResponse, shape: HeadShape, matte: Mask) -> Float32Array:
