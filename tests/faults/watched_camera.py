@@ -64,9 +64,9 @@ class Watched:
         wait_until(lambda: self.camera.status()["state"] == state)
 
     def recovers(self) -> None:
-        """Wait until all is well: live, with no trouble left."""
+        """Wait until all is well: live, with no trouble left, and a new picture shown."""
         wait_until(lambda: self.camera.troubles() == "" and self.camera.status()["state"] == "live")
-        self.sink.wait_for(len(self.sink.new))
+        self.sink.wait_for(len(self.sink.new) + 1)
 
     def goes_on(self, frames: int = 5) -> None:
         """Wait for some more frames."""
@@ -85,5 +85,6 @@ def watched_camera(folder: Path, **arguments: Any) -> Iterator[Watched]:
     with running_camera(folder, sink=sink, **arguments) as camera:
         watched = Watched(camera, sink)
         watched.state("live")
+        sink.wait_for(2)  # the state is live once a picture is on its way; until it comes the placeholder is the newest
         watched.begin()
         yield watched
