@@ -2,7 +2,9 @@
 
 Every column of the field, a texel of the light map or a captured light, is divided by the error allowed in it. A
 cluster of pixels keeps the principal components that explain more than a threshold; the threshold is found on a sample
-of clusters, so that the worst column stays within its allowed error.
+of clusters, so that the worst column stays within its allowed error. What is allowed is relative to a column's peak,
+known for captured lights and estimated from lines of the picture for texels: in clusters, which lie far apart, some
+peaks were a tenth of what they are, and for the sake of these columns all had several decibels more than was asked.
 """
 
 from __future__ import annotations
@@ -32,7 +34,11 @@ from relit_camera.subject.reflectance_field import TEXELS, ReflectanceField
 Values = NDArray[np.float32]
 
 SAMPLE_CLUSTERS = 64
-"""Number of clusters from which the columns' peaks and the threshold are found."""
+"""Number of clusters from which the threshold is found."""
+PEAK_LINES, PEAK_PIXELS = 32, 4096
+"""Lines of the picture, and at most so many pixels of these, from which the texels' peaks are found."""
+PEAK_PERCENT = 99.5
+"""Percentile that is called the peak, as in `base.images.image_quality.psnr`."""
 CLUSTER_ERROR_SHARE, SHARED_BASIS_ERROR_SHARE = 0.55, 0.35
 """Shares of the allowed squared error for the clusters' components and for the shared basis; the rest is a reserve for
 what the sample misses."""
@@ -72,7 +78,7 @@ def compress_field(
 ) -> CompressedField:
     """The smallest compressed field that returns every texel and every captured light within the target's accuracy.
 
-    The field is read once, tile by tile, and a sample of it before that.
+    The field is read once, tile by tile, and two samples of it before that.
 
     Args:
         field: any reflectance field.
@@ -84,8 +90,9 @@ def compress_field(
     target = target or CompressionTarget()
     rows, work = FieldRowReader(field, captured), tiles(matte)
     inside = matte.ravel() > 0.5
+    allowed = target.allowed(_column_peaks(rows, inside))
     with worker_pool() as pool:
-        allowed, threshold = _threshold_from_sample(rows, np.concatenate(work), inside, target, pool)
+        threshold = _threshold_from_sample(rows, np.concatenate(work), inside, allowed, pool)
         compress_tile = _TileCompressor(rows, inside, allowed, threshold, target.light)
         done: list[_CompressedTile] = []
         for tile in pool.map(compress_tile, work):
@@ -169,36 +176,42 @@ class _CountedCluster:
         return np.asarray(np.einsum("rc,rc->c", residual, residual), np.float64)
 
 
+def _column_peaks(rows: FieldRowReader, inside: NDArray[np.bool_]) -> Values:
+    """The peak (columns,) of each column inside the matte: of all pixels for lights, of a sample for texels."""
+    pixels = np.flatnonzero(inside)
+    lines = np.split(pixels, np.flatnonzero(np.diff(pixels // rows.captured.shape[2])) + 1)
+    lines = lines[:: -(-len(lines) // PEAK_LINES)]
+    step = -(-sum(map(len, lines)) // PEAK_PIXELS)
+    read = [rows.read(line[::step])[:, :, :TEXELS] for line in lines]
+    # Under a light from behind only rims are bright, and a sample may have too many of them: the lowest peak counts.
+    thirds = [np.concatenate(read[first::3]) for first in range(min(len(read), 3))]
+    texels = np.min([np.percentile(third, PEAK_PERCENT, axis=(0, 1)) for third in thirds], axis=0)
+    lights = [np.percentile(picture.reshape(-1, 3)[inside], PEAK_PERCENT) for picture in rows.captured]
+    return np.concatenate([texels, lights], dtype=np.float32)
+
+
 def _threshold_from_sample(
     rows: FieldRowReader,
     clusters: NDArray[np.int32],
     inside: NDArray[np.bool_],
-    target: CompressionTarget,
+    allowed: Values,
     pool: ThreadPoolExecutor,
-) -> tuple[Values, float]:
-    """The allowed error of each column (columns,), and the threshold that meets it, from a sample of clusters."""
-    parts = []
+) -> float:
+    """The threshold that keeps to the error `allowed` in each column (columns,), from a sample of clusters."""
+    parts, count = [], 0
     counted = clusters[inside[clusters].any(axis=1)]
     for cluster in counted[:: -(-len(counted) // SAMPLE_CLUSTERS)]:
         pixels, places = np.unique(cluster, return_inverse=True)
-        parts.append(_CountedCluster.of(rows.read(pixels)[places], cluster, inside))
-    # A single cluster makes one half only.
-    halves = [
-        np.concatenate([part.cluster.rows[part.counted] for part in half]) for half in (parts[::2], parts[1::2]) if half
-    ]
-    # Under a light from behind only rims are bright, and a sample may have too many of them: the lower peak counts.
-    peaks = [np.percentile(half, 99.5, axis=0) for half in halves]
-    allowed = target.allowed(np.min(peaks, axis=0))
-    count = sum(map(len, halves))
-    del halves
-    for part in parts:
+        part = _CountedCluster.of(rows.read(pixels)[places], cluster, inside)
         part.cluster.rows[:] /= allowed
+        count += int(part.counted.sum())
+        parts.append(part)
 
     def worst(threshold: float) -> float:
         errors = pool.map(lambda part: part.error(part.cluster.components(threshold)), parts)
         return float(np.sum(list(errors), axis=0).max()) / count
 
-    return allowed, _largest_threshold(worst, CLUSTER_ERROR_SHARE)
+    return _largest_threshold(worst, CLUSTER_ERROR_SHARE)
 
 
 def _largest_threshold(error: Callable[[float], float], allowed: float) -> float:

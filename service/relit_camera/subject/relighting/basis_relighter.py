@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +18,7 @@ from relit_camera.base.models.session_with_fallback import Session
 from relit_camera.subject.compression.local_basis import LocalBasis
 from relit_camera.subject.relighting.component_pictures import ComponentPictures, component_bytes
 from relit_camera.subject.relighting.integer_product import (
+    CHANNEL_STEPS,
     HEAD_COLUMNS,
     ClusterProducts,
     IntegerProduct,
@@ -132,8 +134,9 @@ class ClusterPictures:
         else:
             self.mixes = same_mixes.mixes
         self._clusters = ClusterProducts([group.values for group in groups], threads)
-        # Where each value of the picture stands among the clusters' products; what is in no cluster is behind them.
-        self._source = np.full((size, 3), self._clusters.size, np.intp)
+        # Where each pixel's red stands among the clusters' products; that of no cluster is behind them. The places of
+        # all channels would be three times as large, 6 MB of a picture of 512 × 512.
+        self._source = np.full(size, self._clusters.size, np.intp)
         for group, positions in zip(groups, self._clusters.positions(), strict=True):
             self._source[group.pixels] = positions
         self.nbytes = self.mixes.nbytes + self._clusters.nbytes
@@ -141,8 +144,13 @@ class ClusterPictures:
     def __call__(self, amounts: NDArray[np.float32]) -> NDArray[np.float32]:
         """The picture (count, pixels, 3) for amounts (3, count, components) of each channel's light."""
         count = amounts.shape[1]
-        local = self.mixes(amounts.reshape(3 * count, -1)).reshape(3, count, -1)
-        return self._clusters(local).take(self._source, axis=1, mode="clip")
+        products = self._clusters(self.mixes(amounts.reshape(3 * count, -1)).reshape(3, count, -1))
+        pictures = np.empty((count, len(self._source), 3), np.float32)
+        for of_light, picture in zip(products, pictures, strict=True):
+            # Behind the end is the last one, 0.
+            planes = [of_light[step:].take(self._source, mode="clip")[None] for step in CHANNEL_STEPS]
+            cv2.merge(planes, picture[None])
+        return pictures
 
 
 class BasisRelighter:

@@ -26,6 +26,8 @@ DIGIT_BITS, DIGIT_ZERO = 7, 64
 MAX_FACTOR = (63 << DIGIT_BITS) + 63
 PLACES_PER_TILE = 64
 """Larger clusters are divided into tiles of this: matrices that are packed and multiplied within the cache."""
+CHANNEL_STEPS = range(0, 3 * PLACES_PER_TILE, PLACES_PER_TILE)
+"""How far behind a place's red its red, green and blue stand among the products of `ClusterProducts`."""
 FLOAT = ELEMENT_TYPES["float32"]
 _ZERO = {"zero": np.array(DIGIT_ZERO, np.uint8)}
 
@@ -184,11 +186,11 @@ class ClusterProducts:
         self._session = _cluster_session([group.values.shape for group in self._groups], threads)
 
     def positions(self) -> Iterator[NDArray[np.intp]]:
-        """Where each place's channels stand among the products: (clusters, places, 3) of each group."""
+        """Where each place's red stands among the products: (clusters, places) of each group; see `CHANNEL_STEPS`."""
         for group in self._groups:
             clusters, tiles, channels, _, places = group.values.shape
             order = np.arange(group.products.start, group.products.stop).reshape(clusters, tiles, channels, places)
-            yield order.transpose(0, 1, 3, 2).reshape(clusters, -1, channels)[:, : self._places]
+            yield order[:, :, 0].reshape(clusters, -1)[:, : self._places]
 
     def __call__(self, amounts: Values) -> Values:
         """The products with amounts (3, count, components of all clusters): (count, size + 1).
