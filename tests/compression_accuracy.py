@@ -15,32 +15,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.concurrency.threads import limit_threads
-from relit_camera.base.images.image_quality import psnr
 from relit_camera.capture.picture_import import import_samples
 from relit_camera.capture.reflectance.method_registry import DEFAULT_METHOD, open_method
-from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.environments.builtin.builtin_environments import BUILTIN_NAMES
 from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from relit_camera.light.environments.environment_panorama import read_panorama
 from relit_camera.light.light_map import LightMap, resample_to_light_map
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
-from relit_camera.subject.compression.field_compression import CompressedField, compress_field
+from relit_camera.subject.compression.compression_quality import worst_map_db
+from relit_camera.subject.compression.field_compression import compress_field
 from relit_camera.subject.compression.field_tiles import tiles
-from relit_camera.subject.reflectance_field import TEXELS, ReflectanceField
+from relit_camera.subject.reflectance_field import ReflectanceField
 
 Values = NDArray[np.float32]
 
 
-def relit_dense(field: ReflectanceField, pixels: NDArray[np.intp], light: Values) -> Values:
+def relit_dense(field: ReflectanceField, pixels: NDArray[np.int32], light: Values) -> Values:
     """The field's pictures (maps, some, 3) of ascending row-major pixels under light (maps, 2048, 3)."""
     rows = field.dense(int(pixels[0]), int(pixels[-1]) + 1)[pixels - pixels[0]]
     return np.asarray(np.einsum("plc,mlc->mpc", rows, light, optimize=True), np.float32)
-
-
-def relit_compressed(found: CompressedField, pixels: NDArray[np.intp], light: Values) -> Values:
-    """The compressed field's pictures (maps, some, 3) of row-major pixels under light (maps, 2048, 3)."""
-    channels = [found.basis.at(found.coefficients @ light[:, :, c].T, pixels)[..., c] for c in range(3)]
-    return np.stack(channels, axis=-1)
 
 
 def accuracy(lights: Path, maps: Sequence[LightMap]) -> list[str]:
@@ -49,14 +42,14 @@ def accuracy(lights: Path, maps: Sequence[LightMap]) -> list[str]:
     field = open_method(DEFAULT_METHOD).build(samples)
     target = CompressionTarget(maps=[builtin_light_map(name) for name in BUILTIN_NAMES])
     found = compress_field(field, samples.pictures, samples.matte, target)
-    weighted = [each * texel_solid_angles()[..., None] for each in maps]
-    light = np.asarray(weighted, np.float32).reshape(-1, TEXELS, 3)
-    inside = np.flatnonzero(samples.matte.ravel() > 0.5)
-    parts = [np.intersect1d(tile, inside) for tile in tiles(samples.matte)]
-    parts = [part for part in parts if len(part)]
-    truth = np.concatenate([relit_dense(field, part, light) for part in parts], axis=1)
-    seen = relit_compressed(found, np.concatenate(parts), light)
-    each = [psnr(a[None], b[None]) for a, b in zip(seen, truth, strict=True)]
+    light = CompressionTarget(maps=maps).light
+    truth = np.zeros((len(maps), samples.matte.size, 3), np.float32)
+    for pixels in (np.unique(tile) for tile in tiles(samples.matte)):
+        truth[:, pixels] = relit_dense(field, pixels, light)
+    each = [
+        worst_map_db(found.basis, found.coefficients, *pair, samples.matte)
+        for pair in zip(light[:, None], truth[:, None], strict=True)
+    ]
     quality = found.quality
     figures = [quality.texel_db, quality.light_db, quality.map_db, *each]
     return [*(f"{figure:.1f}" for figure in figures), f"{100 * quality.bytes_share:.1f} %"]

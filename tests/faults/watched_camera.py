@@ -85,6 +85,6 @@ def watched_camera(folder: Path, **arguments: Any) -> Iterator[Watched]:
     with running_camera(folder, sink=sink, **arguments) as camera:
         watched = Watched(camera, sink)
         watched.state("live")
-        sink.wait_for(2)  # the state is live once a picture is on its way; until it comes the placeholder is the newest
+        sink.wait_for(len(sink.new) + 1)  # the state is live once a picture is on its way; before it is the placeholder
         watched.begin()
         yield watched

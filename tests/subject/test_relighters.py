@@ -67,6 +67,10 @@ def test_agrees_with_the_field_summed_by_hand(
     assert psnr(picture, expected, sphere.matte) > ACCURACY_DB[name]
 
 
+def test_many_components_are_relit_by_clusters(sphere: Subject) -> None:
+    assert isinstance(BasisRelighter(sphere)._pictures, ClusterPictures)
+
+
 FEW = 40
 """Lights of a subject whose components are few enough for a picture each."""
 LAMP_DB = 70

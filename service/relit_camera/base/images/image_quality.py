@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
 
+PEAK_PERCENT = 99.5
+"""Percentile of a picture's values that is called its peak."""
+
 
 def psnr(picture: LinearImage, truth: LinearImage, matte: Mask | None = None, peak: float | None = None) -> float:
     """PSNR in dB of a linear picture against the truth, both (height, width, 3).
@@ -24,7 +27,7 @@ def psnr(picture: LinearImage, truth: LinearImage, matte: Mask | None = None, pe
     if not inside.any():
         raise ValueError("the matte is empty")
     expected, seen = truth[inside].astype(np.float64), picture[inside].astype(np.float64)
-    scale = peak if peak is not None else float(np.percentile(expected, 99.5))
+    scale = peak if peak is not None else float(np.percentile(expected, PEAK_PERCENT))
     scale = scale if scale > 0 else 1.0
     error = np.mean((np.clip(expected / scale, 0, 1) - np.clip(seen / scale, 0, 1)) ** 2)
     return float(-10 * np.log10(error)) if error > 0 else float("inf")

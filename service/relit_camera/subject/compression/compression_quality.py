@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.concurrency.threads import worker_pool
-from relit_camera.base.images.image_quality import psnr
+from relit_camera.base.images.image_quality import PEAK_PERCENT, psnr
 from relit_camera.base.images.image_types import Mask
 from relit_camera.subject.compression.accuracy_target import DARK_LIGHT_FRACTION
 from relit_camera.subject.compression.local_basis import LocalBasis
@@ -62,23 +62,25 @@ def worst_texel_db(basis: LocalBasis, coefficients: Values, errors: Values, matt
     for start in range(0, TEXELS, LIGHTS_PER_BATCH):
         part = slice(start, start + LIGHTS_PER_BATCH)
         pictures = basis.at(coefficients[:, part], inside)
-        peaks[part] = np.percentile(pictures.reshape(len(pictures), -1), 99.5, axis=1)
+        peaks[part] = np.percentile(pictures.reshape(len(pictures), -1), PEAK_PERCENT, axis=1)
     reference = np.maximum(peaks, DARK_LIGHT_FRACTION * peaks.max())
     return float(min(-10 * np.log10((errors / reference**2).max() + 1e-20), MAX_PSNR_DB))
 
 
-def worst_light_db(basis: LocalBasis, light_coefficients: Values, captured: Values, matte: Mask) -> float:
+def worst_light_db(
+    basis: LocalBasis, light_coefficients: Values, captured: Values, peaks: Values, matte: Mask
+) -> float:
     """Lowest PSNR in dB of the captured lights' pictures, inside the matte.
 
     Args:
         basis: the basis of the compressed field.
         light_coefficients: (components, lights).
         captured: (lights, height, width, 3) the captured pictures.
+        peaks: (lights,) of these.
         matte: (height, width).
     """
     inside = np.flatnonzero(matte.ravel() > 0.5)
     truth = captured.reshape(len(captured), -1, 3)
-    peaks = np.array([np.percentile(picture[inside], 99.5) for picture in truth])
     peaks = np.maximum(peaks, DARK_LIGHT_FRACTION * peaks.max())
 
     def worst_from(start: int) -> float:

@@ -2,9 +2,7 @@
 
 Every column of the field, a texel of the light map or a captured light, is divided by the error allowed in it. A
 cluster of pixels keeps the principal components that explain more than a threshold; the threshold is found on a sample
-of clusters, so that the worst column stays within its allowed error. What is allowed is relative to a column's peak,
-known for captured lights and estimated from lines of the picture for texels: in clusters, which lie far apart, some
-peaks were a tenth of what they are, and for the sake of these columns all had several decibels more than was asked.
+of clusters, so that the worst column stays within its allowed error.
 """
 
 from __future__ import annotations
@@ -19,6 +17,7 @@ from numpy.typing import NDArray
 from relit_camera.base.concurrency.threads import worker_pool
 from relit_camera.base.images.image_types import Mask
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
+from relit_camera.subject.compression.column_peaks import light_peaks, texel_peaks
 from relit_camera.subject.compression.compression_quality import (
     CompressionQuality,
     dense_bytes,
@@ -35,10 +34,6 @@ Values = NDArray[np.float32]
 
 SAMPLE_CLUSTERS = 64
 """Number of clusters from which the threshold is found."""
-PEAK_LINES, PEAK_PIXELS = 32, 4096
-"""Lines of the picture, and at most so many pixels of these, from which the texels' peaks are found."""
-PEAK_PERCENT = 99.5
-"""Percentile that is called the peak, as in `base.images.image_quality.psnr`."""
 CLUSTER_ERROR_SHARE, SHARED_BASIS_ERROR_SHARE = 0.55, 0.35
 """Shares of the allowed squared error for the clusters' components and for the shared basis; the rest is a reserve for
 what the sample misses."""
@@ -90,8 +85,9 @@ def compress_field(
     target = target or CompressionTarget()
     rows, work = FieldRowReader(field, captured), tiles(matte)
     inside = matte.ravel() > 0.5
-    allowed = target.allowed(_column_peaks(rows, inside))
     with worker_pool() as pool:
+        peaks = np.concatenate([texel_peaks(field, inside, pool), light_peaks(captured, inside, pool)])
+        allowed = target.allowed(peaks)
         threshold = _threshold_from_sample(rows, np.concatenate(work), inside, allowed, pool)
         compress_tile = _TileCompressor(rows, inside, allowed, threshold, target.light)
         done: list[_CompressedTile] = []
@@ -109,7 +105,7 @@ def compress_field(
     both = shared.vectors * allowed
     coefficients, lights = np.ascontiguousarray(both[:, :TEXELS]), np.ascontiguousarray(both[:, TEXELS:])
     quality = CompressionQuality(
-        light_db=worst_light_db(basis, lights, captured, matte),
+        light_db=worst_light_db(basis, lights, captured, peaks[TEXELS:], matte),
         texel_db=worst_texel_db(basis, coefficients, (error * allowed**2)[:TEXELS], matte),
         map_db=worst_map_db(basis, coefficients, target.light, truth, matte),
         bytes_share=(basis.nbytes + both.nbytes) / dense_bytes(matte),
@@ -174,20 +170,6 @@ class _CountedCluster:
         """Sum of squared residuals (columns,) of the rows that count."""
         residual = (self.cluster.rows - components.restored())[self.counted]
         return np.asarray(np.einsum("rc,rc->c", residual, residual), np.float64)
-
-
-def _column_peaks(rows: FieldRowReader, inside: NDArray[np.bool_]) -> Values:
-    """The peak (columns,) of each column inside the matte: of all pixels for lights, of a sample for texels."""
-    pixels = np.flatnonzero(inside)
-    lines = np.split(pixels, np.flatnonzero(np.diff(pixels // rows.captured.shape[2])) + 1)
-    lines = lines[:: -(-len(lines) // PEAK_LINES)]
-    step = -(-sum(map(len, lines)) // PEAK_PIXELS)
-    read = [rows.read(line[::step])[:, :, :TEXELS] for line in lines]
-    # Under a light from behind only rims are bright, and a sample may have too many of them: the lowest peak counts.
-    thirds = [np.concatenate(read[first::3]) for first in range(min(len(read), 3))]
-    texels = np.min([np.percentile(third, PEAK_PERCENT, axis=(0, 1)) for third in thirds], axis=0)
-    lights = [np.percentile(picture.reshape(-1, 3)[inside], PEAK_PERCENT) for picture in rows.captured]
-    return np.concatenate([texels, lights], dtype=np.float32)
 
 
 def _threshold_from_sample(

@@ -147,7 +147,7 @@ class ClusterPictures:
         products = self._clusters(self.mixes(amounts.reshape(3 * count, -1)).reshape(3, count, -1))
         pictures = np.empty((count, len(self._source), 3), np.float32)
         for of_light, picture in zip(products, pictures, strict=True):
-            # Behind the end is the last one, 0.
+            # Places beyond the end are clipped to the last product, which is 0.
             planes = [of_light[step:].take(self._source, mode="clip")[None] for step in CHANNEL_STEPS]
             cv2.merge(planes, picture[None])
         return pictures

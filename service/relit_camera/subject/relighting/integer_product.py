@@ -27,7 +27,7 @@ MAX_FACTOR = (63 << DIGIT_BITS) + 63
 PLACES_PER_TILE = 64
 """Larger clusters are divided into tiles of this: matrices that are packed and multiplied within the cache."""
 CHANNEL_STEPS = range(0, 3 * PLACES_PER_TILE, PLACES_PER_TILE)
-"""How far behind a place's red its red, green and blue stand among the products of `ClusterProducts`."""
+"""From where a pixel's red stands among the products of `ClusterProducts` to its red, green and blue."""
 FLOAT = ELEMENT_TYPES["float32"]
 _ZERO = {"zero": np.array(DIGIT_ZERO, np.uint8)}
 
@@ -195,7 +195,7 @@ class ClusterProducts:
     def __call__(self, amounts: Values) -> Values:
         """The products with amounts (3, count, components of all clusters): (count, size + 1).
 
-        `positions` says which is which; the number behind all others is 0.
+        `positions` and `CHANNEL_STEPS` say which is which; the number behind all others is 0.
         """
         by_light = np.ascontiguousarray(amounts.transpose(1, 0, 2))
         largest = np.maximum.reduceat(np.abs(by_light), self._first, axis=2)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.array_types import Float32Array
 from relit_camera.base.concurrency.threads import worker_pool
-from relit_camera.base.images.image_quality import psnr
+from relit_camera.base.images.image_quality import PEAK_PERCENT, psnr
 from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.instant.response.generic_reflectance import GenericField
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
@@ -98,7 +98,7 @@ def _allowed(field: GenericField, target: CompressionTarget) -> Float32Array:
     response = field.response
     some = slice(None, None, max(1, len(response.pixels) // 2000))
     bright = float(np.percentile(field.albedo, 95))
-    peaks = np.percentile(bright * response.diffuse[some] + response.glossy[some], 99.5, axis=0)
+    peaks = np.percentile(bright * response.diffuse[some] + response.glossy[some], PEAK_PERCENT, axis=0)
     return target.allowed(peaks)
 
 
