@@ -13,8 +13,9 @@ from statistics import median
 import numpy as np
 from onnx import NodeProto, TensorProto, helper, numpy_helper
 
-from relit_camera.base.models.model_store import model_path
+from relit_camera.base.models.model_store import installed_model, model_path
 from relit_camera.base.models.session_with_fallback import Model, SessionOptions, open_session
+from relit_camera.face.tracking.mediapipe_mesh_tracker import MESHES
 
 WARM_UP_RUNS = 2
 RUNS = 6
@@ -55,12 +56,12 @@ class MeshRun:
 
 
 def installed_mesh_runs() -> float:
-    """What a run of the installed network `face_mesh` costs, in mesh runs.
+    """What a run of the network that tracker `mesh` uses costs, in mesh runs.
 
     Raises:
-        ModelError: it is not installed.
+        ModelError: none is installed.
     """
-    installed, mesh = MeshRun(model_path("face_mesh")), MeshRun()
+    installed, mesh = MeshRun(model_path(installed_model(MESHES) or MESHES[0])), MeshRun()
     for _ in range(INSTALLED_SAMPLES):
         mesh.sample()
         installed.sample()
