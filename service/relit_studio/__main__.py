@@ -17,6 +17,7 @@ from relit_studio.commands.field import field
 from relit_studio.commands.learn import learn
 from relit_studio.commands.moving import moving
 from relit_studio.commands.person import person
+from relit_studio.commands.screen import screen
 from relit_studio.commands.setup import setup
 from relit_studio.commands.sheet import sheet
 
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Renders people whose truth is known. Begin with `setup` and `fetch`.",
 )
-for command in (setup, fetch, person, sheet, check, field, compare, capture, drive, moving, learn, bundle):
+for command in (setup, fetch, person, sheet, check, field, screen, compare, capture, drive, moving, learn, bundle):
     app.command()(command)
 
 

@@ -13,7 +13,7 @@ from relit_camera.base.errors import DeviceError, InputError
 from relit_studio.base.resume import keep_settings
 from relit_studio.cameras.studio_camera import Camera
 from relit_studio.cycles.cycles_environment import create_environment, environment_python
-from relit_studio.cycles.job import DistantLight, Mesh, Picture, Quality, Scene, Strands, write_job
+from relit_studio.cycles.job import DistantLight, Mesh, PatchLight, Picture, Quality, Scene, Strands, write_job
 from relit_studio.cycles.runner import render
 
 FAKE = """
@@ -54,6 +54,14 @@ def worker(tmp_path: Path) -> list[str]:
     program.write_text(FAKE)
     program.with_suffix(".limit").write_text("-1")
     return [sys.executable, str(program)]
+
+
+def test_a_job_says_what_lights_each_picture(tmp_path: Path) -> None:
+    lights = DistantLight((1.0, 0.0, 0.0)), PatchLight((1.0, 2.0, 60.0), (10.0, 8.0))
+    listed = [Picture(tmp_path / f"{light.kind}.exr", light) for light in lights]
+    job = json.loads(write_job(tmp_path / "job", scene(), Camera(64), Quality(), listed).read_text())
+    assert job["pictures"][1]["light"] == {"center_cm": [1, 2, 60], "size_cm": [10, 8], "kind": "patch"}
+    assert job["pictures"][0]["light"]["kind"] == "distant"
 
 
 def test_a_job_says_everything(tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from relit_camera.base.errors import LightsError
 
+LIGHTS_FILE_NAME = "lights.lp"
+"""What a list of lights is called in a folder of pictures."""
 NORM_TOLERANCE = 0.01
 """Largest deviation of a direction's length from 1."""
 MIN_LIGHTS = 4

@@ -116,6 +116,20 @@ class DistantLight:
 
 
 @dataclass(frozen=True)
+class PatchLight:
+    """Rectangle of light that shines along -Z by Lambert's law, as bright as a white wall that reads 1.
+
+    Attributes:
+        center_cm: in room axes.
+        size_cm: width and height.
+    """
+
+    center_cm: tuple[float, float, float]
+    size_cm: tuple[float, float]
+    kind: Literal["patch"] = "patch"
+
+
+@dataclass(frozen=True)
 class PanoramaLight:
     """Environment light from a panorama file in picture axes, its radiance times `strength`."""
 
@@ -136,7 +150,7 @@ class Picture:
     """
 
     path: Path
-    light: DistantLight | PanoramaLight
+    light: DistantLight | PatchLight | PanoramaLight
     shape: Shape | None = None
     all_passes: bool = False
 

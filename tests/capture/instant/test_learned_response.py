@@ -9,13 +9,12 @@ import numpy as np
 from relit_camera.capture.instant.response.learned_response import (
     INPUTS,
     LEAST_SHARE,
-    ResponseNetwork,
+    input_signs,
     learned_network,
-    mirror_signs,
-    read_network,
     response_inputs,
     with_learned_response,
 )
+from relit_camera.capture.instant.response.response_network import harmonic_signs, read_network
 from relit_camera.light.directions import texel_directions, texel_solid_angles
 from relit_camera.light.spherical_harmonics import basis, texel_basis
 from tests.capture.instant.lit_person import SIDE, generic_person
@@ -41,7 +40,7 @@ def test_a_network_that_adds_nothing_leaves_the_response() -> None:
     shape, response, matte = generic_person()
     known = learned_network()
     weights, offsets = known.layers[-1]
-    nothing = ResponseNetwork(known.mean, known.spread, (*known.layers[:-1], (0 * weights, 0 * offsets)))
+    nothing = known.with_layers((*known.layers[:-1], (0 * weights, 0 * offsets)))
     same = with_learned_response(response, shape, matte, nothing)
     np.testing.assert_array_equal(same.diffuse, response.diffuse)
 
@@ -52,7 +51,7 @@ def test_what_it_adds_is_the_harmonics_and_never_takes_all() -> None:
     weights, _ = known.layers[-1]
     shift = np.zeros(9, np.float32)
     shift[3] = -5.0  # much less from before, more from behind
-    steep = ResponseNetwork(known.mean, known.spread, (*known.layers[:-1], (0 * weights, shift)))
+    steep = known.with_layers((*known.layers[:-1], (0 * weights, shift)))
     changed = with_learned_response(response, shape, matte, steep).diffuse
     wanted = response.diffuse + shift @ basis(TOWARD, 2).T
     free = wanted > LEAST_SHARE * response.diffuse
@@ -64,16 +63,16 @@ def test_what_it_adds_is_the_harmonics_and_never_takes_all() -> None:
 def test_it_changes_a_response_a_little_and_both_sides_alike() -> None:
     shape, response, matte = generic_person()
     seen = response_inputs(response, shape, matte)
-    added = learned_network().corrections(seen)
-    of_inputs, of_harmonics = mirror_signs()
-    np.testing.assert_allclose(learned_network().corrections(seen * of_inputs) * of_harmonics, added, atol=1e-5)
+    added = learned_network().outputs(seen)
+    mirrored = learned_network().outputs(seen * input_signs()) * harmonic_signs()
+    np.testing.assert_allclose(mirrored, added, atol=1e-5)
     assert 0.01 < np.abs(added @ texel_basis(2).T).mean() < 0.3
 
 
 def test_written_it_is_read_again(tmp_path: Path) -> None:
     known = learned_network()
     known.write(tmp_path / "network.npz")
-    again = read_network(tmp_path / "network.npz")
+    again = read_network(tmp_path / "network.npz", input_signs(), harmonic_signs())
     inputs = np.random.default_rng(0).normal(0, 3, (20, INPUTS)).astype(np.float32)
-    np.testing.assert_array_equal(again.corrections(inputs), known.corrections(inputs))
+    np.testing.assert_array_equal(again.outputs(inputs), known.outputs(inputs))
     assert (tmp_path / "network.npz").stat().st_size < 1 << 16

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from relit_camera.base.array_types import Float32Array, Float64Array
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.color import luminance, uint8_from_linear
-from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
+from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask, Points
 from relit_camera.capture.alignment.rigid_transform import RigidTransform
 from relit_camera.capture.desk.desk_recording import DeskRecording, require_frame
 from relit_camera.capture.desk.patterns.pattern_matching import FaceCells, match_patterns
@@ -28,6 +28,7 @@ from relit_camera.capture.desk.person.desk_field import (
     skin_mask,
 )
 from relit_camera.capture.desk.person.generic_head import GenericHead, ellipsoid_head, head_from_landmarks
+from relit_camera.capture.desk.person.learned_field import with_learned_field
 from relit_camera.capture.desk.person.mirror_mask import suppress_mirrored_patches
 from relit_camera.capture.desk.person.near_field_rounds import undo_near_field
 from relit_camera.capture.desk.person.patch_light import Patches, place_patches
@@ -53,7 +54,7 @@ from relit_camera.capture.subject_builder import subject_from_field
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
-from relit_camera.subject.reflectance_field import texel_vectors
+from relit_camera.subject.reflectance_field import ReflectanceField, texel_vectors
 from relit_camera.subject.subject import Subject
 
 METHOD = "model"
@@ -75,6 +76,7 @@ class DeskSamples:
         samples: pictures under distant lights of unit irradiance, in the patches' directions.
         room: (height, width, 3) the person in the room's own light, of any exposure; black where it has next to none.
         head: generic head in the same picture.
+        landmarks: (478, 2) of the scheme `mesh478` in it, or None where no network finds them.
         mirrored: (height, width) mask of eyes and glasses that mirrored the screen.
         skin_luminance: of the person's skin, a white wall having 1.
         warnings: what was noticed, for the person.
@@ -83,6 +85,7 @@ class DeskSamples:
     samples: OlatSamples
     room: LinearImage
     head: GenericHead
+    landmarks: Points | None
     mirrored: NDArray[np.bool_]
     skin_luminance: float
     warnings: list[str]
@@ -171,7 +174,7 @@ def measure_desk_samples(recording: DeskRecording, progress: Progress = lambda s
     calm, mirrored = suppress_mirrored_patches(distant, patches.directions, matte)
     samples = OlatSamples(calm, patches.directions, matte)
     seen = room if in_room_light is None else in_room_light
-    return DeskSamples(samples, seen, head, mirrored, skin_luminance_by_eyes(eyes), warnings)
+    return DeskSamples(samples, seen, head, landmarks, mirrored, skin_luminance_by_eyes(eyes), warnings)
 
 
 def _picture_in_room_light(
@@ -266,8 +269,19 @@ def _stated_plateaus(recording: DeskRecording, cells: Float32Array) -> list[Plat
     return plateaus
 
 
-def fit_field(found: DeskSamples) -> tuple[AppearanceField, OlatSamples]:
-    """The field of measured samples, and the samples in its unit and with its geometry."""
+def fit_field(found: DeskSamples) -> tuple[ReflectanceField, OlatSamples]:
+    """The field of measured samples, and the samples in its unit and with its geometry.
+
+    Without landmarks it is that of the pictures alone; with them it is as rendered people taught.
+    """
+    field, samples, skin = measured_field(found)
+    if found.landmarks is None:
+        return field, samples
+    return with_learned_field(field, samples.directions, found.landmarks, skin, samples.matte), samples
+
+
+def measured_field(found: DeskSamples) -> tuple[AppearanceField, OlatSamples, Mask]:
+    """The field of the pictures alone, the samples in its unit and with its geometry, and what is skin."""
     geometry = found.samples.geometry
     skin = skin_mask(geometry.albedo, found.head.skin)
     held = hold_geometry(geometry, found.head, found.mirrored)
@@ -282,7 +296,7 @@ def fit_field(found: DeskSamples) -> tuple[AppearanceField, OlatSamples]:
         pictures = pictures * gain.reshape(*found.samples.matte.shape, 3)
     unit = np.float32(found.skin_luminance / _bright_skin(field, skin, found.samples.matte))
     samples = replace(found.samples, pictures=pictures * unit, known_geometry=replace(held, albedo=held.albedo * unit))
-    return AppearanceField(samples, field.amounts * unit, RESIDUAL_KERNEL), samples
+    return AppearanceField(samples, field.amounts * unit, RESIDUAL_KERNEL), samples, skin
 
 
 def _bright_skin(field: DeskField, skin: Mask, matte: Mask) -> float:

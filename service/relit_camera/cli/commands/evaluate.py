@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True)
 
-LIGHTS_FILE_NAME = "lights.lp"
-
 Out = Annotated[Path | None, typer.Option(help="Report to write: one .html file, pictures embedded.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable figures on stdout.")]
 GammaText = Annotated[str, typer.Option("--gamma", help="Curve of the pictures: srgb, linear, or an exponent.")]
@@ -125,6 +123,8 @@ def field(
 
 def _lights_file(path: Path) -> Path:
     """The .lp file of a path: the file itself, or lights.lp in a folder."""
+    from relit_camera.capture.lights_file import LIGHTS_FILE_NAME
+
     return path / LIGHTS_FILE_NAME if (path / LIGHTS_FILE_NAME).is_file() else path
 
 
@@ -233,6 +233,7 @@ def ladder(
     from relit_camera.cli.arguments import load_command_settings
     from relit_camera.cli.progress import progress_bar
     from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
+    from relit_camera.lab.evaluate.ladder.desk_rung import read_screens
     from relit_camera.lab.evaluate.ladder.known_person import SubjectFolder, known_person
     from relit_camera.lab.evaluate.ladder.ladder_evaluation import evaluate_person
     from relit_camera.lab.evaluate.ladder.ladder_report import (
@@ -254,15 +255,17 @@ def ladder(
     listed = {path.resolve().parent.name: path for path in map(_lights_file, lights)}
     if len(listed) < len(lights):
         raise typer.BadParameter("two lists of lights lie in folders of one name, which names the person")
-    for path in listed.values():
+    before = {}
+    for name, path in listed.items():
         read_lights(path)  # what is wrong with the last is told before the first one's hour begins
+        before[name] = read_screens(path.parent, names)
     subjects, tracker = SubjectFolder(out / "subjects"), open_tracker("mesh", TrackerOptions(blendshapes=False))
     results = []
     for name, path in listed.items():
         samples = _samples(path, gamma)
         with progress_bar() as progress:
             task = progress.add_task(name, total=len(rooms))
-            person = known_person(name, samples, size, subjects)
+            person = known_person(name, samples, size, subjects, before[name])
             for result in evaluate_person(person, rooms, environments, names, tracker, subjects):
                 sheet = room_sheet(result.pictures, result.room)
                 write_atomic(out / f"{result.person}-{result.room}.jpg", encode_display(sheet, ".jpg"))

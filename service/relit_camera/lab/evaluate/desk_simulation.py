@@ -6,7 +6,7 @@ its curve; the person moves, the room has light of its own, and the wall behind 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -28,6 +28,8 @@ MONITOR = DeskSetup(screen=Screen(width_cm=58.5, height_cm=34.4), distance_cm=60
 """A monitor of 27 inches, the webcam on top."""
 LAPTOP = DeskSetup(screen=Screen(width_cm=31, height_cm=19), distance_cm=50, camera=CameraPlace(up_cm=10.5))
 """A laptop of 14 inches, its own webcam."""
+SCREENS: Mapping[str, DeskSetup] = {"desk": MONITOR, "laptop": LAPTOP}
+"""Screens by the name of their rung."""
 
 _REACH_DEG, _GRID_SIDE = 54.0, 28
 _LINES_AT_A_TIME = 49
@@ -144,6 +146,7 @@ def simulate_desk_recording(
     said: DeskSetup | None = None,
     room: LinearImage | None = None,
     room_picture: bool = False,
+    patch_pictures: Float32Array | None = None,
 ) -> DeskRecording:
     """What a webcam films of a person while the screen shows the setup's patterns.
 
@@ -154,9 +157,11 @@ def simulate_desk_recording(
         said: the setup that the recording states, where it is not the true one.
         room: (height, width, 3) the person in the room's light, at the size of the field; None for soft light.
         room_picture: whether the webcam takes a picture in the room's light alone, with an exposure of its own.
+        patch_pictures: (patches, height, width, 3) of the person under each patch alone, of any unit; None has them
+            from the field, whose lights are interpolated.
     """
     webcam = webcam or SimulatedWebcam()
-    pictures = person.patch_pictures(setup)
+    pictures = person.patch_pictures(setup) if patch_pictures is None else patch_pictures
     lights = pattern_lights(setup.patterns, setup.patches.count, setup.screen.gamma, setup.screen.black)
     frames = SimulatedFrames(person, pictures, lights.astype(np.float32), webcam, room, setup)
     face = frames.face

@@ -50,13 +50,17 @@ def set_quality(quality: Mapping[str, Any]) -> None:
 
 
 def set_light(light: Mapping[str, Any]) -> None:
-    """Set a distant lamp or an environment panorama, and switch the other off."""
-    if light["kind"] == "distant":
-        bpy.context.scene.world = None
+    """Set a distant lamp, a patch of light or an environment panorama, and switch the others off."""
+    kind = light["kind"]
+    bpy.context.scene.world = _world(light["picture"], light["strength"]) if kind == "panorama" else None
+    if kind == "distant":
         _set_sun(light["direction"], light["irradiance"], light["size_deg"])
     else:
         _set_sun([0.0, 1.0, 0.0], 0.0, 1.0)
-        bpy.context.scene.world = _world(light["picture"], light["strength"])
+    if kind == "patch":
+        _set_patch(light["center_cm"], light["size_cm"])
+    else:
+        _set_patch([0.0, 0.0, 0.0], None)
 
 
 def _set_sun(direction: Sequence[float], irradiance: float, size_deg: float) -> None:
@@ -70,6 +74,24 @@ def _set_sun(direction: Sequence[float], irradiance: float, size_deg: float) -> 
         bpy.context.collection.objects.link(placed)
     placed.rotation_quaternion = Vector(to_blender(direction).tolist()).to_track_quat("Z", "Y")
     placed.hide_render = irradiance == 0
+
+
+def _set_patch(center_cm: Sequence[float], size_cm: Sequence[float] | None) -> None:
+    """The patch of light at a place; None switches it off."""
+    lamp = bpy.data.lights.get("patch") or bpy.data.lights.new("patch", "AREA")
+    placed = bpy.data.objects.get("patch")
+    if placed is None:
+        placed = bpy.data.objects.new("patch", lamp)
+        placed.rotation_mode = "QUATERNION"
+        # Blender's lamps shine along their own -Z.
+        placed.rotation_quaternion = Vector(to_blender([0.0, 0.0, 1.0]).tolist()).to_track_quat("Z", "Y")
+        bpy.context.collection.objects.link(placed)
+    placed.location = to_blender(center_cm)
+    placed.hide_render = size_cm is None
+    if size_cm is not None:
+        lamp.shape, lamp.size, lamp.size_y = "RECTANGLE", *size_cm
+        # A Lambertian patch of radiance 1 sends pi through each square centimeter.
+        lamp.energy = math.pi * size_cm[0] * size_cm[1]
 
 
 def _world(picture: str, strength: float) -> Any:

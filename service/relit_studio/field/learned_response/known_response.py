@@ -15,7 +15,8 @@ from relit_camera.capture.instant.face_selection import select_faces
 from relit_camera.capture.instant.head_shape import fit_head_shape
 from relit_camera.capture.instant.median_picture import median_picture
 from relit_camera.capture.instant.response.generic_reflectance import shape_response
-from relit_camera.capture.instant.response.learned_response import DEGREE, response_inputs
+from relit_camera.capture.instant.response.learned_response import response_inputs
+from relit_camera.capture.instant.response.response_network import DEGREE
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.light.directions import texel_directions, texel_solid_angles
 from relit_camera.light.spherical_harmonics import texel_basis
@@ -79,9 +80,9 @@ def known_response(samples: OlatSamples, lights: NDArray[np.float32], lamp_size_
         return np.asarray(cv2.remap(image, place_x, place_y, cv2.INTER_LINEAR)[0], np.float32)
 
     seen = np.stack([at_pixels(luminance(each).astype(np.float32)) for each in samples.pictures], axis=1)
-    lamps = _lamp_maps(samples.directions, lamp_size_deg)
+    lamps = lamp_maps(samples.directions, lamp_size_deg)
     diffuse, glossy = response.diffuse @ lamps, response.glossy @ lamps
-    weights = _lamp_weights(samples.directions, lights)
+    weights = lamp_weights(samples.directions, lights)
     inside, true_matte = matte.ravel()[response.pixels], at_pixels(samples.matte)
     skin = shape.skin.ravel()[response.pixels] & (np.minimum(inside, true_matte) > ON_SKIN)
     if not skin.any():
@@ -94,7 +95,7 @@ def known_response(samples: OlatSamples, lights: NDArray[np.float32], lamp_size_
         expected=((diffuse + glossy / albedo) @ weights)[kept].astype(np.float32),
         truth=np.log(np.maximum((seen @ weights)[kept] / albedo, LEAST_LIGHT)).astype(np.float32),
         skin=skin[kept].astype(np.float32),
-        harmonics=(weights.T @ (lamps.T @ texel_basis(DEGREE))).astype(np.float32),
+        harmonics=harmonics_of(weights, lamps),
     )
 
 
@@ -107,14 +108,14 @@ def _frame(samples: OlatSamples) -> NDArray[np.uint8]:
     return uint8_from_linear(np.maximum(large, 0))
 
 
-def _lamp_maps(directions: NDArray[np.float64], size_deg: float) -> NDArray[np.float32]:
+def lamp_maps(directions: NDArray[np.float64], size_deg: float) -> NDArray[np.float32]:
     """Solid angle (2048, lamps) of the texels that each lamp covers, over that of all of them: the sums are 1."""
     inside = texel_directions().reshape(-1, 3) @ directions.T > np.cos(np.radians(size_deg / 2))
     measured = inside * texel_solid_angles().reshape(-1, 1)
     return np.asarray(measured / measured.sum(axis=0), np.float32)
 
 
-def _lamp_weights(directions: NDArray[np.float64], lights: NDArray[np.float32]) -> NDArray[np.float32]:
+def lamp_weights(directions: NDArray[np.float64], lights: NDArray[np.float32]) -> NDArray[np.float32]:
     """Irradiance (lamps, lights) with which the lamps together give each light.
 
     What comes from between lamps is shared by them, with weights as wide as half of their spacing.
@@ -122,3 +123,8 @@ def _lamp_weights(directions: NDArray[np.float64], lights: NDArray[np.float32]) 
     width = np.sqrt(4 * np.pi / len(directions)) / 2
     share = np.exp((texel_directions().reshape(-1, 3) @ directions.T - 1) / width**2)
     return np.asarray((share / share.sum(axis=1, keepdims=True)).T @ lights, np.float32)
+
+
+def harmonics_of(weights: NDArray[np.float32], lamps: NDArray[np.float32]) -> Float32Array:
+    """What one of each harmonic sends (lights, 9) under lights of `lamp_weights`, made of lamps of `lamp_maps`."""
+    return np.asarray(weights.T @ (lamps.T @ texel_basis(DEGREE)), np.float32)

@@ -9,22 +9,15 @@ brows, beards and make-up are among it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import minimize
 
-from relit_camera.base.array_types import Float32Array, Float64Array
-from relit_camera.capture.instant.response.learned_response import (
-    INPUTS,
-    LEAK,
-    LEAST_SHARE,
-    ResponseNetwork,
-    mirror_signs,
-)
+from relit_camera.base.array_types import Float32Array
+from relit_camera.capture.instant.response.learned_response import LEAST_SHARE, input_signs
+from relit_camera.capture.instant.response.response_network import ResponseNetwork, harmonic_signs
 from relit_studio.field.learned_response.known_response import KnownResponse
+from relit_studio.field.learned_response.network_training import TrainingSettings, train_network
 
 
 @dataclass(frozen=True)
@@ -32,32 +25,24 @@ class FitSettings:
     """Settings of the fit; only `believed` matters much.
 
     Attributes:
-        hidden: units of the layers between.
+        training: of the optimization.
         pixels: of each person that are used.
-        rounds: of the optimizer (L-BFGS).
-        decay: weight of the squared weights.
-        small: of the squared harmonics.
         skin: of the constant of a pixel of skin, where its other errors have 1.
         believed: share of that constant that is learned. For rendered people all of it would be right; on real faces
             (Extended Yale Face Database B) the forehead is hardly lighter than the cheeks, and eye sockets no darker.
         outlier: of that constant, in units of the logarithm, from which it loses weight (Cauchy).
         brightness: exponent of a pixel's brightness relative to skin by which it is weighed, about that of the display;
             pixels count up to `brightest` times as much as skin.
-        jitter: deviation of noise that is added to the inputs, in units of their own.
         seed: of weights, noise and the choice of pixels.
     """
 
-    hidden: tuple[int, ...] = (48, 48)
+    training: TrainingSettings = field(default_factory=TrainingSettings)
     pixels: int = 3000
-    rounds: int = 400
-    decay: float = 1e-5
-    small: float = 1e-3
     skin: float = 1.0
     believed: float = 0.5
     outlier: float = 0.15
     brightness: float = 0.8
     brightest: float = 3.0
-    jitter: float = 0.1
     seed: int = 0
 
 
@@ -65,61 +50,19 @@ def fit_network(people: Sequence[KnownResponse], settings: FitSettings | None = 
     """The network with the least error on these people and their mirror images; their lights must be the same."""
     settings = settings or FitSettings()
     rng = np.random.default_rng(settings.seed)
-    of_inputs, of_harmonics = mirror_signs()
-    known, weight = _some_pixels_twice(people, settings, rng)
-    mirrored = (np.arange(len(known.inputs)) >= len(known.inputs) // 2)[:, None]
-    mean = np.where(of_inputs < 0, 0, known.inputs.mean(axis=0)).astype(np.float32)
-    blank = ResponseNetwork(mean, (known.inputs.std(axis=0) + 1e-3).astype(np.float32), ())
-    inputs = blank.scaled(known.inputs)
-    inputs = np.where(mirrored, inputs * of_inputs, inputs)
-    inputs += np.float32(settings.jitter) * rng.standard_normal(inputs.shape, np.float32)
-    signs = np.where(mirrored, of_harmonics, np.float32(1))
-    sizes = (INPUTS, *settings.hidden, len(of_harmonics))
-    shapes = [shape for rows, columns in pairwise(sizes) for shape in ((rows, columns), (columns,))]
+    known, weight = _some_pixels(people, settings, rng)
 
-    def layers_of(flat: Float64Array) -> list[Float32Array]:
-        ends = np.cumsum([int(np.prod(shape)) for shape in shapes])[:-1]
-        return [
-            part.reshape(shape).astype(np.float32) for part, shape in zip(np.split(flat, ends), shapes, strict=True)
-        ]
+    def error(given: Float32Array) -> tuple[float, Float32Array]:
+        return _error(given, known, weight, settings)
 
-    def loss(flat: Float64Array) -> tuple[float, Float64Array]:
-        layers = layers_of(flat)
-        values = [inputs]
-        for weights, offsets in zip(layers[:-2:2], layers[1:-2:2], strict=True):
-            reached = values[-1] @ weights + offsets
-            values.append(np.maximum(reached, LEAK * reached))
-        given = (values[-1] @ layers[-2] + layers[-1]) * signs
-        error, slope = _error(given, known, weight, settings)
-        back = (slope + 2 * settings.small / len(given) * given) * signs
-        slopes: list[NDArray[np.floating]] = []
-        for index in range(len(values) - 1, -1, -1):
-            weights = layers[2 * index]
-            slopes[:0] = [values[index].T @ back + 2 * settings.decay * weights, back.sum(axis=0)]
-            if index:
-                back = (back @ weights.T) * np.where(values[index] > 0, np.float32(1), LEAK)
-        error += settings.small * float((given**2).sum()) / len(given)
-        error += settings.decay * sum(float((each**2).sum()) for each in layers[::2])
-        return error, np.concatenate([each.ravel() for each in slopes]).astype(np.float64)
-
-    start = [rng.normal(0, np.sqrt(2 / shape[0]), shape) if len(shape) == 2 else np.zeros(shape) for shape in shapes]
-    start[-2] *= 0.1
-    found = minimize(
-        loss,
-        np.concatenate([each.ravel() for each in start]),
-        jac=True,
-        method="L-BFGS-B",
-        options={"maxiter": settings.rounds, "maxfun": 2 * settings.rounds},
-    )
-    layers = layers_of(found.x)
-    return ResponseNetwork(mean, blank.spread, tuple(zip(layers[::2], layers[1::2], strict=True)))
+    return train_network(known.inputs, input_signs(), harmonic_signs(), error, settings.training, rng)
 
 
 def mean_error(network: ResponseNetwork | None, person: KnownResponse, settings: FitSettings | None = None) -> float:
     """How wrong the response of a person is, as the root of what the fit makes least; None is the generic one."""
     settings = settings or FitSettings()
     nothing = np.zeros((len(person.inputs), person.harmonics.shape[1]), np.float32)
-    added = network.corrections(person.inputs) if network else nothing
+    added = network.outputs(person.inputs) if network else nothing
     return float(np.sqrt(_error(added, person, _weights(person, settings), settings)[0]))
 
 
@@ -153,14 +96,14 @@ def _weights(person: KnownResponse, settings: FitSettings) -> Float32Array:
     return np.asarray(np.minimum(bright**settings.brightness, settings.brightest), np.float32)
 
 
-def _some_pixels_twice(
+def _some_pixels(
     people: Sequence[KnownResponse], settings: FitSettings, rng: np.random.Generator
 ) -> tuple[KnownResponse, Float32Array]:
-    """Some pixels of all people, first as they are, then all once more to be mirrored; and their weights."""
+    """Some pixels of all people, and their weights."""
     chosen = []
     for person in people:
         pixels = rng.permutation(len(person.inputs))[: settings.pixels]
         parts = person.inputs, person.expected, person.truth, person.skin, _weights(person, settings)
         chosen.append([part[pixels] for part in parts])
-    inputs, expected, truth, skin, weight = (np.concatenate(each * 2) for each in zip(*chosen, strict=True))
+    inputs, expected, truth, skin, weight = (np.concatenate(each) for each in zip(*chosen, strict=True))
     return KnownResponse(inputs, expected, truth, skin, people[0].harmonics), weight

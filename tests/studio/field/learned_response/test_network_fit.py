@@ -10,23 +10,26 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from relit_camera.app.demo import demo_files
-from relit_camera.base.errors import InputError
-from relit_camera.capture.instant.response.learned_response import INPUTS, learned_network, mirror_signs, read_network
+from relit_camera.base.errors import CaptureError, InputError
+from relit_camera.capture.desk.person import learned_field
+from relit_camera.capture.instant.response.learned_response import INPUTS, input_signs, learned_network
+from relit_camera.capture.instant.response.response_network import harmonic_signs, read_network
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
-from relit_camera.light.directions import fibonacci_directions, texel_directions, texel_solid_angles
+from relit_camera.light.directions import fibonacci_directions, texel_directions
 from relit_camera.light.spherical_harmonics import basis
-from relit_camera.subject.relighting.basis_relighter import BasisRelighter
-from relit_camera.subject.subject_file import read_subject
 from relit_studio.__main__ import app
 from relit_studio.commands import learn
 from relit_studio.field.learned_response import network_fit
+from relit_studio.field.learned_response.field_fit import fit_field_network
+from relit_studio.field.learned_response.known_field import KnownField
 from relit_studio.field.learned_response.known_response import KnownResponse, known_response
 from relit_studio.field.learned_response.network_fit import FitSettings, fit_network, mean_error
+from relit_studio.field.learned_response.network_training import TrainingSettings
 from relit_studio.field.learned_response.training_lights import training_lights
+from tests.studio.field.learned_response.made_up_field import QUICK_FIELD, made_up_field
 
 LAMP_DEG = 30.0
-QUICK = FitSettings(hidden=(16,), pixels=400, rounds=150, jitter=0.0)
+QUICK = FitSettings(TrainingSettings(hidden=(16,), rounds=150, jitter=0.0), pixels=400)
 
 
 def made_up(seed: int, brightness: float = 1.0, tilt: float = 0.3) -> KnownResponse:
@@ -56,11 +59,10 @@ def test_lights_are_rooms_of_the_same_strength() -> None:
 
 
 def test_the_mirrored_person_has_left_and_right_changed() -> None:
-    of_inputs, of_harmonics = mirror_signs()
     toward = fibonacci_directions(9)
     mirrored = basis(toward * (-1, 1, 1), 2)
-    np.testing.assert_allclose(mirrored, basis(toward, 2) * of_harmonics, atol=1e-9)
-    assert of_inputs[:3].tolist() == [-1, 1, 1]
+    np.testing.assert_allclose(mirrored, basis(toward, 2) * harmonic_signs(), atol=1e-9)
+    assert input_signs()[:3].tolist() == [-1, 1, 1]
 
 
 def test_the_slope_is_that_of_the_error() -> None:
@@ -82,28 +84,15 @@ def test_what_people_have_in_common_is_found_whatever_their_albedo() -> None:
     network = fit_network(people, QUICK)
     assert mean_error(None, unseen, QUICK) > 0.03
     assert mean_error(network, unseen, QUICK) < 0.3 * mean_error(None, unseen, QUICK)
-    left, right = (network.corrections(np.eye(1, INPUTS, dtype=np.float32) * sign)[0, 1] for sign in (-1, 1))
+    left, right = (network.outputs(np.eye(1, INPUTS, dtype=np.float32) * sign)[0, 1] for sign in (-1, 1))
     assert left == pytest.approx(-right, abs=0.06)
 
 
 def test_skin_that_is_brighter_in_all_light_is_expected_half_so() -> None:
     person = made_up(3, brightness=1.1, tilt=0.0)
-    network = fit_network([person], replace(QUICK, small=0.0))
-    gained = network.corrections(person.inputs) @ person.harmonics.T / person.expected
+    network = fit_network([person], replace(QUICK, training=replace(QUICK.training, small=0.0)))
+    gained = network.outputs(person.inputs) @ person.harmonics.T / person.expected
     assert gained[person.skin > 0].mean() == pytest.approx(0.1 * QUICK.believed, abs=0.02)
-
-
-@pytest.fixture(scope="module")
-def bundled_person() -> OlatSamples:
-    """The person of the demo under wide lamps all round, by the measured field; nothing was trained on them."""
-    subject = read_subject(demo_files.SUBJECT)
-    toward = fibonacci_directions(48)
-    lamps = texel_directions().reshape(-1, 3) @ toward.T > np.cos(np.radians(LAMP_DEG / 2))
-    radiance = lamps / (lamps * texel_solid_angles().reshape(-1, 1)).sum(axis=0)
-    maps = np.repeat(radiance.T.reshape(48, 32, 64, 1), 3, axis=3).astype(np.float32)
-    relighter = BasisRelighter(subject)
-    pictures = np.stack([relighter.relight(each[None])[0] for each in maps])
-    return OlatSamples(pictures.astype(np.float32), toward, subject.matte)
 
 
 @pytest.mark.usefixtures("models")
@@ -124,13 +113,26 @@ def test_the_command_learns_and_says_how_well(
             return replace(bundled_person, pictures=nobody)
         return bundled_person
 
-    monkeypatch.setattr(learn, "_render", lambda number, folder, threads: None)
+    monkeypatch.setattr(learn, "_render", lambda *arguments: None)
     monkeypatch.setattr(learn, "import_samples", people)
+
+    def fields(name: str, *more: object) -> list[KnownField]:
+        if name == "6":
+            raise CaptureError("nobody", "leave them out")
+        return [made_up_field(0)]
+
+    monkeypatch.setattr(learn, "_known_fields", fields)
     monkeypatch.setattr(learn, "fit_network", lambda known: fit_network(known, QUICK))
+    monkeypatch.setattr(learn, "fit_field_network", lambda known: fit_field_network(known, QUICK_FIELD))
     found = CliRunner().invoke(app, ["learn", "--out", str(tmp_path), "--first", "5", "--people", "3"])
     assert found.exit_code == 0, found.output
     assert "7 is left out: no face was found" in found.output
-    assert "5, held out: error" in found.output
-    assert read_network(tmp_path / learn.RESULT).layers[-1][1].shape == (9,)
+    assert "6 before screens is left out: nobody" in found.output
+    assert "instant, 5, held out: error" in found.output
+    assert "desk, all 2, trained on: error" in found.output
+    response = read_network(tmp_path / learn.RESPONSE, input_signs(), harmonic_signs())
+    field = read_network(tmp_path / learn.FIELD, learned_field.input_signs(), learned_field.output_signs())
+    assert response.layers[-1][1].shape == (9,)
+    assert field.layers[-1][1].shape == (10,)
     few = CliRunner().invoke(app, ["learn", "--out", str(tmp_path), "--first", "6", "--people", "2"])
     assert isinstance(few.exception, InputError)

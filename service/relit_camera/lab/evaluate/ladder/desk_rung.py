@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.errors import SubjectError
+from relit_camera.base.errors import LightsError, SubjectError
 from relit_camera.capture.desk.desk_capture import build_desk_subject
-from relit_camera.capture.desk.desk_recording import DeskSetup
+from relit_camera.capture.desk.desk_recording import DeskRecording
+from relit_camera.capture.desk.person.patch_light import place_patches
 from relit_camera.capture.instant.head_shape import fit_head_shape
+from relit_camera.capture.lights_file import LIGHTS_FILE_NAME
+from relit_camera.capture.picture_import import import_samples
 from relit_camera.capture.reflectance.directional_light import directional_coefficients
 from relit_camera.capture.reflectance.method_registry import ReflectanceMethod, open_method
-from relit_camera.lab.evaluate.desk_simulation import SimulatedPerson, simulate_desk_recording
+from relit_camera.capture.reflectance.olat_samples import OlatSamples
+from relit_camera.lab.evaluate.desk_simulation import SCREENS, SimulatedPerson, simulate_desk_recording
 from relit_camera.lab.evaluate.ladder.known_person import KnownPerson
 from relit_camera.subject.subject import Subject
 
@@ -69,11 +75,42 @@ def simulated_person(person: KnownPerson) -> SimulatedPerson:
     )
 
 
-def desk_subject(person: KnownPerson, setup: DeskSetup) -> Subject:
-    """The subject of a simulated recording before that screen.
+def read_screens(folder: Path, rungs: Sequence[str]) -> dict[str, OlatSamples]:
+    """The pictures before screens that `relit_studio screen` has rendered into the folder of a person's lights.
+
+    Args:
+        folder: of the lights.
+        rungs: which of the screens are wanted, by name.
+
+    Raises:
+        LightsError: there are pictures of other patches than the screen's.
+        ImageError: a picture cannot be read.
+    """
+    listed = {name: folder / name / LIGHTS_FILE_NAME for name in SCREENS if name in rungs}
+    found = {name: import_samples(path) for name, path in listed.items() if path.is_file()}
+    for name, samples in found.items():
+        expected = place_patches(SCREENS[name]).directions
+        if samples.directions.shape != expected.shape or np.abs(samples.directions - expected).max() > _APART:
+            raise LightsError(
+                f"{listed[name]} does not list the patches of the {name}", "render them anew, or take that folder away"
+            )
+    return found
+
+
+_APART = 1e-3
+"""Of two unit vectors, from which they are those of different patches."""
+
+
+def desk_subject(person: KnownPerson, screen: str) -> Subject:
+    """The subject of a simulated recording before a screen, by its name in `SCREENS`.
 
     Raises:
         CaptureError: the recording is not good enough.
     """
-    recording = simulate_desk_recording(simulated_person(person), setup)
-    return build_desk_subject(recording, person.name)[0]
+    return build_desk_subject(filmed_before(person, screen), person.name)[0]
+
+
+def filmed_before(person: KnownPerson, screen: str) -> DeskRecording:
+    """A simulated recording of a person before a screen of `SCREENS`, of rendered pictures where there are any."""
+    rendered = person.screens.get(screen)
+    return simulate_desk_recording(simulated_person(person), SCREENS[screen], patch_pictures=rendered)

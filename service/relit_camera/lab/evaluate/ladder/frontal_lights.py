@@ -14,14 +14,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.errors import CaptureError, InputError, LightsError
-from relit_camera.base.images.color import uint8_from_linear
+from relit_camera.base.images.color import luminance, uint8_from_linear
+from relit_camera.base.images.image_types import Mask
 from relit_camera.capture.alignment.picture_set_alignment import align_if_better
-from relit_camera.capture.desk.person.desk_field import fit_desk_field, hold_geometry, skin_mask
+from relit_camera.capture.desk.person.desk_field import (
+    DeskField,
+    certain_skin,
+    fit_desk_field,
+    hold_geometry,
+    skin_mask,
+)
 from relit_camera.capture.desk.person.generic_head import GenericHead
+from relit_camera.capture.desk.person.learned_field import (
+    brightened,
+    mix,
+    mixture,
+    mixture_inputs,
+    on_face,
+    paint_head,
+    skin_brightness,
+)
 from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
 from relit_camera.capture.instant.response.generic_reflectance import AMOUNTS, shape_response
 from relit_camera.capture.instant.response.learned_response import with_learned_response
+from relit_camera.capture.instant.response.response_network import DEGREE
 from relit_camera.capture.instant.skin.skin_prior import skin_luminance_by_eyes
 from relit_camera.capture.reflectance.appearance_model import TERM_COUNT, distant_terms
 from relit_camera.capture.reflectance.methods.appearance_field import AppearanceMethod
@@ -33,6 +50,7 @@ from relit_camera.lab.evaluate.field.ground_truth import select_lights
 from relit_camera.lab.evaluate.field.relighting_metrics import MAX_DB, Colors
 from relit_camera.lab.evaluate.ladder.known_person import reduced
 from relit_camera.light.directions import spherical_from_direction
+from relit_camera.light.spherical_harmonics import basis
 from relit_camera.subject.reflectance_field import texel_vectors
 
 AZIMUTH_DEG, ELEVATION_DEG = 30.0, 21.0
@@ -229,8 +247,35 @@ def _blend(known: FrontalSet) -> Colors:
     return _pictures(known, field.at(known.asked, np.arange(known.captured.matte.size)))
 
 
-def _desk(known: FrontalSet) -> Colors:
+def _measured_desk(known: FrontalSet) -> Colors:
     """The field of a desk capture, which ties what frontal light leaves open to skin and to a generic head."""
+    field, _ = _desk_field(known)
+    return _pictures(known, field.at(known.asked, np.arange(known.captured.matte.size)))
+
+
+def _desk(known: FrontalSet) -> Colors:
+    """The same as desk captures have it: with what rendered people taught."""
+    (field, skin), head, matte = _desk_field(known), known.head, known.captured.matte
+    painted = paint_head(head, matte, known.captured.directions)
+    response = painted.response
+    level = field.at(known.captured.directions, response.pixels).mean(axis=0)
+    found = mixture(mixture_inputs(painted, head, matte, level, field, response.pixels))
+    level = brightened(level, skin_brightness(painted, head, level))
+    asked = on_face(skin, head).ravel()[response.pixels]
+    nearest = (known.asked @ texel_vectors().T).argmax(axis=1)
+    diffuse, glossy = (each[:, nearest].T[..., None] for each in (response.diffuse, response.glossy))
+    pictures = np.zeros((len(known.asked), matte.size, 3), np.float32)
+    pictures[:, response.pixels] = mix(
+        field.at(known.asked, response.pixels),
+        painted.albedo(level) * diffuse + painted.gloss[:, None] * glossy,
+        (1 - asked * (1 - found.share))[:, None],
+        (basis(known.asked, DEGREE) @ (asked[:, None] * found.added).T)[..., None] * level,
+    )
+    return _pictures(known, pictures)
+
+
+def _desk_field(known: FrontalSet) -> tuple[DeskField, Mask]:
+    """The field that a desk capture fits to the frontal lights, a white wall having 1, and what is skin."""
     samples, head = known.captured, known.head
     generic = GenericHead(
         points_cm=np.zeros((*samples.matte.shape, 3), np.float32),
@@ -243,8 +288,13 @@ def _desk(known: FrontalSet) -> Colors:
     )
     held = hold_geometry(samples.geometry, generic, np.zeros(samples.matte.shape, bool))
     skin = skin_mask(samples.geometry.albedo, head.skin)
-    field = fit_desk_field(samples, held, skin, skin_luminance_by_eyes(None))
-    return _pictures(known, field.at(known.asked, np.arange(samples.matte.size)))
+    luminance_of_skin = skin_luminance_by_eyes(None)
+    field = fit_desk_field(samples, held, skin, luminance_of_skin)
+    chosen = np.flatnonzero(certain_skin(skin, samples.matte).ravel())
+    if len(chosen) == 0:
+        raise CaptureError(f"no skin is seen in {known.name}", "give pictures of a face that looks to the camera")
+    bright = max(float(np.percentile(luminance(field.at(samples.directions, chosen).mean(axis=0)), 75)), 1e-9)
+    return field.scaled(np.full((samples.matte.size, 1), luminance_of_skin / bright, np.float32)), skin
 
 
 def _pictures(known: FrontalSet, colors: Colors) -> Colors:
@@ -258,6 +308,7 @@ PREDICTORS: Mapping[str, Callable[[FrontalSet], Colors]] = {
     "instant": _instant,
     "model": _model,
     "blend": _blend,
+    "desk, untaught": _measured_desk,
     "desk": _desk,
 }
 """By name: what predicts the pictures (count, height, width, 3) of all lights that are asked for."""

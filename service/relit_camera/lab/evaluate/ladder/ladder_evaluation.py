@@ -17,7 +17,7 @@ from relit_camera.base.images.tone_mapping import display_from_linear
 from relit_camera.capture.alignment.picture_set_alignment import align_to_prediction, apply_alignment
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
-from relit_camera.lab.evaluate.ladder.known_person import KnownPerson, SubjectFolder
+from relit_camera.lab.evaluate.ladder.known_person import KnownPerson, SubjectFolder, within_border
 from relit_camera.lab.evaluate.ladder.ladder_metrics import (
     FieldFigures,
     Pictures,
@@ -206,7 +206,7 @@ class _TrueLight:
         self.relit: Pictures = person.relighter.relight(self.maps) * np.float32(person.subject.metadata.display_gain)
         self.large = np.stack([enlarged(each) for each in self.relit])
         self.matte = np.minimum(enlarged(person.samples.matte), 1)
-        self.counted: NDArray[np.bool_] = self.matte > OPAQUE
+        self.counted: NDArray[np.bool_] = within_border(self.matte > OPAQUE)
         trusted = ratio_confidence(feather_edges(person.samples.matte)) > WHOLLY_TRUSTED
         self.inner = self.counted & (enlarged(trusted.astype(np.float32)) > 0.5)
         self.shown = {

@@ -9,7 +9,6 @@ from functools import partial
 from relit_camera.base.errors import NotFoundError
 from relit_camera.capture.instant.instant_capture import build_instant_subject
 from relit_camera.capture.reflectance.sampled_region import with_black_ring
-from relit_camera.lab.evaluate.desk_simulation import LAPTOP, MONITOR
 from relit_camera.lab.evaluate.field.ground_truth import subsample_lights
 from relit_camera.lab.evaluate.ladder.desk_rung import desk_subject
 from relit_camera.lab.evaluate.ladder.known_person import KnownPerson, SubjectFolder
@@ -61,11 +60,11 @@ def _instant(person: KnownPerson, frames: RoomFrames, subjects: SubjectFolder) -
 
 
 def _desk(person: KnownPerson, frames: RoomFrames, subjects: SubjectFolder) -> Subject:
-    return subjects.made_of(person, "desk", partial(desk_subject, person, MONITOR))
+    return subjects.made_of(person, "desk", partial(desk_subject, person, "desk"))
 
 
 def _laptop(person: KnownPerson, frames: RoomFrames, subjects: SubjectFolder) -> Subject:
-    return subjects.made_of(person, "laptop", partial(desk_subject, person, LAPTOP))
+    return subjects.made_of(person, "laptop", partial(desk_subject, person, "laptop"))
 
 
 RUNGS: Mapping[str, Rung] = {
