@@ -192,7 +192,8 @@ async def made(channel: PreviewStream, count: int) -> list[tuple[float, EncodedF
 def test_a_rate_limit_is_kept(camera: FakeCamera) -> None:
     times = [at for at, _ in asyncio.run(made(PreviewStream(camera, PreviewVariant(fps=10)), 8))]
     assert (times[-1] - times[0]) / 7 == pytest.approx(0.1, abs=0.025)
-    assert all(later - earlier > 0.05 for earlier, later in pairwise(times[1:]))
+    # Where one came late, the next may follow sooner.
+    assert sum(later - earlier > 0.05 for earlier, later in pairwise(times[1:])) >= 5
 
 
 def test_a_limit_at_the_camera_s_rate_drops_no_picture(camera: FakeCamera) -> None:
