@@ -7,6 +7,7 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from typing import Any
 
 import httpx
 import numpy as np
@@ -192,8 +193,25 @@ async def made(channel: PreviewStream, count: int) -> list[tuple[float, EncodedF
 def test_a_rate_limit_is_kept(camera: FakeCamera) -> None:
     times = [at for at, _ in asyncio.run(made(PreviewStream(camera, PreviewVariant(fps=10)), 8))]
     assert (times[-1] - times[0]) / 7 == pytest.approx(0.1, abs=0.025)
-    # Where one came late, the next may follow sooner.
-    assert sum(later - earlier > 0.05 for earlier, later in pairwise(times[1:])) >= 5
+    assert all(later - earlier > 0.05 for earlier, later in pairwise(times[1:]))
+
+
+def test_a_picture_that_was_late_is_not_followed_by_one_at_once(
+    camera: FakeCamera, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    picture, asked = camera.picture, []
+
+    def late(after: int, timeout_s: float) -> Any:
+        asked.append(after)
+        if len(asked) == 4:
+            time.sleep(0.25)
+        return picture(after, timeout_s)
+
+    monkeypatch.setattr(camera, "picture", late)
+    times = [at for at, _ in asyncio.run(made(PreviewStream(camera, PreviewVariant(fps=10)), 7))]
+    gaps = [later - earlier for earlier, later in pairwise(times[1:])]
+    assert max(gaps) > 0.25
+    assert min(gaps) > 0.05
 
 
 def test_a_limit_at_the_camera_s_rate_drops_no_picture(camera: FakeCamera) -> None:

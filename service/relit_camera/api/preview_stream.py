@@ -35,6 +35,8 @@ ENCODING_SHARE = 0.05
 """Of a core, for encoding for all viewers together: where that takes longer, they get fewer pictures."""
 COST_SMOOTHING = 0.9
 """Share of the earlier ones in the mean of what an encoding costs."""
+LEAST_INTERVAL = 0.6
+"""Of the time between pictures: after one that was late, the next is made no sooner than so much of it."""
 FRAME_WAIT_S = 0.25
 """Wait for a picture this long before checking whether to end."""
 PREVIEW_JPEG_QUALITY = 82
@@ -108,8 +110,9 @@ class PreviewStream:
                 made = await to_thread.run_sync(self._make, limiter=limiter, abandon_on_cancel=True)
                 if made is None:
                     continue
+                interval_s = 1 / self._fps()
                 # Counted from the last due time, not from now: otherwise every late wake-up would lower the rate.
-                due = max(due + 1 / self._fps(), time.monotonic())
+                due = max(due + interval_s, time.monotonic() + LEAST_INTERVAL * interval_s)
                 self._newest = made
                 self._wake()
         except Exception:
