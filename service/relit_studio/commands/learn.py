@@ -25,7 +25,7 @@ from relit_studio.field.field_renderer import FieldSettings, render_field
 from relit_studio.field.learned_response.field_fit import field_error, fit_field_network
 from relit_studio.field.learned_response.known_field import KnownField, known_field
 from relit_studio.field.learned_response.known_response import KnownResponse, known_response
-from relit_studio.field.learned_response.network_fit import fit_network, mean_error
+from relit_studio.field.learned_response.response_fit import fit_response_network, response_error
 from relit_studio.field.learned_response.training_lights import training_lights
 from relit_studio.field.screen_renderer import ScreenSettings, render_screen
 
@@ -64,7 +64,7 @@ def learn(
             fields[name] = _known_fields(name, samples, before, lights)
     if min(len(responses), len(fields)) < 2:
         raise InputError("too few people are left to learn from", "name more of them by --people")
-    _train("instant", responses, fit_network, mean_error, out / RESPONSE)
+    _train("instant", responses, fit_response_network, response_error, out / RESPONSE)
     _train("desk", fields, fit_field_network, field_error, out / FIELD)
 
 

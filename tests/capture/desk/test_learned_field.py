@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -65,7 +65,7 @@ def learned(share: float, harmonic: float, monkeypatch: pytest.MonkeyPatch) -> L
     weights, _ = known.layers[-1]
     said = np.zeros(10, np.float32)
     said[0], said[-1] = harmonic, share
-    steady = known.with_layers((*known.layers[:-1], (0 * weights, said)))
+    steady = replace(known, layers=(*known.layers[:-1], (0 * weights, said)))
     monkeypatch.setattr(learned_field, "learned_network", lambda: steady)
     return with_learned_field(FlatField(), TOWARD, LANDMARKS, np.ones((SIDE, SIDE), np.float32), MATTE)
 

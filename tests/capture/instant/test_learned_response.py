@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from relit_camera.capture.instant.response.learned_response import (
-    INPUTS,
     LEAST_SHARE,
     input_signs,
     learned_network,
@@ -25,7 +25,7 @@ TOWARD = texel_directions().reshape(-1, 3)
 def test_it_sees_where_a_pixel_lies_on_the_head_and_what_the_generic_head_answers() -> None:
     shape, response, matte = generic_person()
     seen = response_inputs(response, shape, matte)
-    assert seen.shape == (len(response.pixels), INPUTS)
+    assert seen.shape == (len(response.pixels), len(input_signs()))
     y, x = np.divmod(response.pixels, SIDE // 2)
     rows, columns = np.nonzero(shape.face)
     np.testing.assert_allclose(seen[:, 0], (x - columns.mean()) / shape.pixels_per_cm, atol=0.05)
@@ -40,7 +40,7 @@ def test_a_network_that_adds_nothing_leaves_the_response() -> None:
     shape, response, matte = generic_person()
     known = learned_network()
     weights, offsets = known.layers[-1]
-    nothing = known.with_layers((*known.layers[:-1], (0 * weights, 0 * offsets)))
+    nothing = replace(known, layers=(*known.layers[:-1], (0 * weights, 0 * offsets)))
     same = with_learned_response(response, shape, matte, nothing)
     np.testing.assert_array_equal(same.diffuse, response.diffuse)
 
@@ -51,7 +51,7 @@ def test_what_it_adds_is_the_harmonics_and_never_takes_all() -> None:
     weights, _ = known.layers[-1]
     shift = np.zeros(9, np.float32)
     shift[3] = -5.0  # much less from before, more from behind
-    steep = known.with_layers((*known.layers[:-1], (0 * weights, shift)))
+    steep = replace(known, layers=(*known.layers[:-1], (0 * weights, shift)))
     changed = with_learned_response(response, shape, matte, steep).diffuse
     wanted = response.diffuse + shift @ basis(TOWARD, 2).T
     free = wanted > LEAST_SHARE * response.diffuse
@@ -73,6 +73,6 @@ def test_written_it_is_read_again(tmp_path: Path) -> None:
     known = learned_network()
     known.write(tmp_path / "network.npz")
     again = read_network(tmp_path / "network.npz", input_signs(), harmonic_signs())
-    inputs = np.random.default_rng(0).normal(0, 3, (20, INPUTS)).astype(np.float32)
+    inputs = np.random.default_rng(0).normal(0, 3, (20, len(input_signs()))).astype(np.float32)
     np.testing.assert_array_equal(again.outputs(inputs), known.outputs(inputs))
     assert (tmp_path / "network.npz").stat().st_size < 1 << 16

@@ -24,7 +24,12 @@ from relit_camera.capture.instant.face_selection import SCHEME, select_faces
 from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
 from relit_camera.capture.instant.median_picture import MedianPicture, median_picture
 from relit_camera.capture.instant.response.generic_compression import compress_generic_field
-from relit_camera.capture.instant.response.generic_reflectance import GenericField, ShapeResponse, shape_response
+from relit_camera.capture.instant.response.generic_reflectance import (
+    GenericField,
+    ShapeResponse,
+    gloss_amounts,
+    shape_response,
+)
 from relit_camera.capture.instant.response.learned_response import with_learned_response
 from relit_camera.capture.instant.room_light import fit_room_light
 from relit_camera.capture.instant.room_shadows import with_room_shadows
@@ -59,7 +64,6 @@ class InstantTunables:
         least_unclipped: pixels of skin, as a share, that the fit needs; else clipped ones count too.
         harsh_dark_fraction: share of the skin that hardly any light reaches from which a room is harsh.
         sure_matte: from which a pixel's color is the person's alone; others take the colors next to them.
-        body_gloss: gloss of hair and clothes, where skin has 1.
     """
 
     min_face_luminance: float = 0.008
@@ -68,7 +72,6 @@ class InstantTunables:
     least_unclipped: float = 0.3
     harsh_dark_fraction: float = 0.15
     sure_matte: float = 0.9
-    body_gloss: float = 0.5
 
 
 TUNABLES = InstantTunables()
@@ -178,8 +181,7 @@ def _reflectance(
     response = with_room_shadows(response, coarse, skin, shape.certainty, room, skin_albedo)
     lit = response.spread(np.concatenate([response.diffuse @ room, response.glossy @ room], axis=1))
     lit = lit.reshape(*picture.matte.shape, 6)
-    gloss = np.where(_doubled(shape.face), 1.0, TUNABLES.body_gloss).astype(np.float32)
-    gloss = np.asarray(cv2.GaussianBlur(gloss, (0, 0), 0.01 * width), np.float32)
+    gloss = gloss_amounts(_doubled(shape.face), 0.01 * width)
     whole_skin = _doubled(shape.skin)
     found = estimate_albedo(linear, lit[..., :3], gloss[..., None] * lit[..., 3:], whole_skin)
     evened = found.albedo * even_sides(found.albedo, whole_skin, picture.landmarks, landmark_scheme(SCHEME))

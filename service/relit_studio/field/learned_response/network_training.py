@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -97,7 +97,7 @@ def train_network(
         options={"maxiter": settings.rounds, "maxfun": 2 * settings.rounds},
     )
     layers = layers_of(found.x)
-    return blank.with_layers(tuple(zip(layers[::2], layers[1::2], strict=True)))
+    return replace(blank, layers=tuple(zip(layers[::2], layers[1::2], strict=True)))
 
 
 def _first_layers(shapes: Sequence[tuple[int, ...]], rng: np.random.Generator) -> list[Float64Array]:

@@ -27,7 +27,12 @@ from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.color import luminance
 from relit_camera.base.images.image_types import Mask, Points
 from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
-from relit_camera.capture.instant.response.generic_reflectance import GenericField, ShapeResponse, shape_response
+from relit_camera.capture.instant.response.generic_reflectance import (
+    GenericField,
+    ShapeResponse,
+    gloss_amounts,
+    shape_response,
+)
 from relit_camera.capture.instant.response.learned_response import (
     LEAST_SHARE,
     PLACE_SIGNS,
@@ -50,8 +55,6 @@ from relit_camera.subject.reflectance_field import ExactField, texel_vectors
 BELIEVED = np.float32(0.5)
 """Share of what the network says that is done. For rendered people all of it would be best; on the faces of the
 Extended Yale Face Database B half of it is better than all (docs/evaluate.md)."""
-BODY_GLOSS = 0.5
-"""Gloss of what is no face, where skin has 1."""
 LEAST_DIFFUSE = np.float32(0.3)
 """Share of a pixel's brightness that is not gloss, at least."""
 LEAST_FRONT = np.float32(0.05)
@@ -126,8 +129,7 @@ def paint_head(shape: HeadShape, matte: Mask, directions: NDArray[np.float64]) -
     """
     response = with_learned_response(shape_response(shape.geometry, shape.certainty, matte), shape, matte)
     nearest = (directions @ texel_vectors().T).argmax(axis=1)
-    gloss = np.where(shape.face, 1.0, BODY_GLOSS).astype(np.float32)
-    gloss = np.asarray(cv2.GaussianBlur(gloss, (0, 0), 0.01 * matte.shape[1]).ravel()[response.pixels], np.float32)
+    gloss = gloss_amounts(shape.face, 0.01 * matte.shape[1]).ravel()[response.pixels]
     front, shiny = (each[:, nearest].mean(axis=1) for each in (response.diffuse, response.glossy))
     return PaintedHead(response, front, gloss, gloss * shiny)
 

@@ -35,6 +35,7 @@ class GenericAmounts:
     Attributes:
         diffuse, wrap, surroundings: those that have the color of the pixel, in units of its albedo.
         sheen, shine: the glossy ones, of skin.
+        body_gloss: gloss of hair and clothes, where skin has 1.
         penumbra_rad: scale over which a shadow's edge is spread: about the error of a generic head's horizons.
         vague_diffuse, vague_wrap: those of a surface of which only the side is known that it lies on, as of hair: the
             mean over what its normals may be. It has no horizon.
@@ -45,6 +46,7 @@ class GenericAmounts:
     surroundings: float = 0.02
     sheen: float = 0.010
     shine: float = 0.025
+    body_gloss: float = 0.5
     penumbra_rad: float = 0.15
     vague_diffuse: float = 0.3
     vague_wrap: float = 0.6
@@ -53,6 +55,12 @@ class GenericAmounts:
 AMOUNTS = GenericAmounts()
 HIDDEN_BY_NOTHING = np.float32(2.0)
 """Radians by which lights are raised above the horizon of a vague surface."""
+
+
+def gloss_amounts(face: NDArray[np.bool_], blur_px: float) -> Mask:
+    """Amount of gloss (height, width): 1 on the face (height, width), less elsewhere, the edge blurred."""
+    gloss = np.where(face, 1.0, AMOUNTS.body_gloss).astype(np.float32)
+    return np.asarray(cv2.GaussianBlur(gloss, (0, 0), blur_px), np.float32)
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from relit_camera.capture.instant.head_shape import HeadShape
 from relit_camera.capture.instant.response.generic_reflectance import ShapeResponse
 from relit_camera.capture.instant.response.response_network import (
     DEGREE,
-    HARMONICS,
     ResponseNetwork,
     Signs,
     harmonic_signs,
@@ -32,8 +31,6 @@ from relit_camera.capture.instant.response.response_network import (
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.light.spherical_harmonics import texel_basis
 
-INPUTS = 3 + HARMONICS
-"""Place to the right and up, distance from the outline, and the harmonics of the generic response."""
 DEEPEST_CM = 6.0
 """Distance from the outline from which a pixel counts as well inside."""
 LEAST_SHARE = np.float32(0.15)
@@ -49,7 +46,7 @@ def learned_network() -> ResponseNetwork:
 
 
 def input_signs() -> Signs:
-    """Signs (12,) of the network's inputs."""
+    """Signs (12,) of the network's inputs: the place on the head, and the harmonics of the generic response."""
     return np.concatenate([PLACE_SIGNS, harmonic_signs()])
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +49,6 @@ class ResponseNetwork:
         """Outputs (pixels, outputs), the mean of what the network says of a pixel and of its mirror image."""
         mirrored = self._one_side(inputs * self.of_inputs) * self.of_outputs
         return np.asarray((self._one_side(inputs) + mirrored) / 2, np.float32)
-
-    def with_layers(self, layers: tuple[tuple[Float32Array, Float32Array], ...]) -> ResponseNetwork:
-        """The same with other layers."""
-        return replace(self, layers=layers)
 
     def _one_side(self, inputs: Float32Array) -> Float32Array:
         values = self.scaled(inputs)

@@ -46,7 +46,7 @@ class FitSettings:
     seed: int = 0
 
 
-def fit_network(people: Sequence[KnownResponse], settings: FitSettings | None = None) -> ResponseNetwork:
+def fit_response_network(people: Sequence[KnownResponse], settings: FitSettings | None = None) -> ResponseNetwork:
     """The network with the least error on these people and their mirror images; their lights must be the same."""
     settings = settings or FitSettings()
     rng = np.random.default_rng(settings.seed)
@@ -58,7 +58,9 @@ def fit_network(people: Sequence[KnownResponse], settings: FitSettings | None = 
     return train_network(known.inputs, input_signs(), harmonic_signs(), error, settings.training, rng)
 
 
-def mean_error(network: ResponseNetwork | None, person: KnownResponse, settings: FitSettings | None = None) -> float:
+def response_error(
+    network: ResponseNetwork | None, person: KnownResponse, settings: FitSettings | None = None
+) -> float:
     """How wrong the response of a person is, as the root of what the fit makes least; None is the generic one."""
     settings = settings or FitSettings()
     nothing = np.zeros((len(person.inputs), person.harmonics.shape[1]), np.float32)
