@@ -27,7 +27,7 @@ def blended(live: np.ndarray, room: np.ndarray, scene: np.ndarray = SIDE, bright
     """The blend of a picture, with a source image of even albedo under the estimated room and the scene."""
     even = np.full((ROWS, COLUMNS, 3), ALBEDO.mean())
     relit, under_room = (root_of_light((even * light).astype(np.float32)) for light in (scene, room))
-    source = SourceCells(relit, under_room, EVERYWHERE, EVERYWHERE, EVERYWHERE)
+    source = SourceCells(relit, under_room, EVERYWHERE, EVERYWHERE, EVERYWHERE, EVERYWHERE)
     roots = root_of_light(live.astype(np.float32))
     return blend_cells(roots, roots, brightest * EVERYWHERE, source, UNIT)
 
@@ -102,7 +102,7 @@ def test_black_pixels_and_nothing_to_go_by_are_numbers_all_the_same(brightest: f
     room[20:24, 20:24] = 0
     sure = np.float32(confidence) * EVERYWHERE
     blend = blend_cells(
-        live, live, brightest * EVERYWHERE, SourceCells(relit, room, sure, EVERYWHERE, EVERYWHERE), UNIT
+        live, live, brightest * EVERYWHERE, SourceCells(relit, room, sure, EVERYWHERE, EVERYWHERE, EVERYWHERE), UNIT
     )
     assert np.isfinite(blend.ratio).all()
     assert np.isfinite(blend.trust).all()
@@ -114,7 +114,9 @@ def test_eyes_and_lips_are_the_live_pictures_even_where_they_are_overexposed() -
     skin = EVERYWHERE.copy()
     skin[20:40, 30:50] = 0
     relit = root_of_light(np.full((ROWS, COLUMNS, 3), 0.3, np.float32))
-    blend = blend_cells(relit, relit, 255 * EVERYWHERE, SourceCells(relit, relit, EVERYWHERE, skin, EVERYWHERE), UNIT)
+    blend = blend_cells(
+        relit, relit, 255 * EVERYWHERE, SourceCells(relit, relit, EVERYWHERE, skin, EVERYWHERE, EVERYWHERE), UNIT
+    )
     assert blend.trust[25:35, 35:45].min() == 1
     assert blend.trust[5, 5] < 0.1
 
@@ -122,7 +124,7 @@ def test_eyes_and_lips_are_the_live_pictures_even_where_they_are_overexposed() -
 def test_noise_near_overexposure_does_not_flicker() -> None:
     rng, shown = np.random.default_rng(3), []
     relit = root_of_light(np.full((ROWS, COLUMNS, 3), 0.3, np.float32))
-    source = SourceCells(relit, relit, EVERYWHERE, EVERYWHERE, EVERYWHERE)
+    source = SourceCells(relit, relit, EVERYWHERE, EVERYWHERE, EVERYWHERE, EVERYWHERE)
     for _ in range(6):
         brightest = (241 + rng.normal(0, 1.5, (ROWS, COLUMNS))).astype(np.float32)
         shown.append(blend_cells(relit, relit, brightest, source, UNIT).trust[5:-5, 5:-5])
@@ -148,7 +150,7 @@ def dim_picture() -> np.ndarray:
 def noise_in(image: np.ndarray, factor: float, confidence: np.ndarray = EVERYWHERE, step: int = STEP) -> np.ndarray:
     """How much of each cell is taken for noise where roots of the picture are multiplied by `factor`."""
     roots = np.full((ROWS, COLUMNS, 3), 0.5, np.float32)
-    source = SourceCells(roots, roots, confidence, EVERYWHERE, EVERYWHERE)
+    source = SourceCells(roots, roots, confidence, EVERYWHERE, EVERYWHERE, confidence)
     return noise_fraction(image, step, BOX, np.full((ROWS, COLUMNS, 3), factor, np.float32), source, UNIT)
 
 

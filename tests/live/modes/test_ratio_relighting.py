@@ -22,15 +22,17 @@ from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.ratio_relighting import (
     BOX_CELLS,
+    NEAR,
     RatioPlan,
     RatioRelighting,
     extrapolate_roots,
     fit_similarity,
+    near_person,
     ratio_confidence,
 )
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate, RoomLightEstimator
 from relit_camera.live.reenactment.dense_motion import DenseMotion
-from tests.live.people import close_up, face_of
+from tests.live.people import SCHEME, close_up, face_of
 from tests.live.rooms import (
     EVENING,
     WINDOW,
@@ -71,6 +73,47 @@ def relit_live(
     positions = ours.positions(motion, motion.pose, frame.size)
     span = landmark_scheme("mesh478").eye_span(motion.landmarks)
     return ours.apply(RatioPlan(frame, motion.presence, room.gain, pictures, positions, span), blend)
+
+
+def aligned_and_not(image: DisplayImage) -> list[DisplayImage]:
+    """A live frame in the light of the evening, without and with its positions corrected; the room's light is known."""
+    ours, motion, frame = relighting(WINDOW), before_the_camera(), live_frame(image, 0)
+    assert motion.pose is not None
+    pictures = ours.raised_lights(still_under(EVENING), still_under(WINDOW))
+    positions, span = ours.positions(motion, motion.pose, frame.size), SCHEME.eye_span(motion.landmarks)
+    plan = RatioPlan(frame, 1.0, np.ones(3, np.float32), pictures, positions, span)
+    return [ours.apply(plan), ours.apply(ours.aligned(plan))]
+
+
+def test_a_collar_that_sits_elsewhere_is_relit_as_a_collar() -> None:
+    """Truth: the same person with the lower part of the picture moved, photographed in the other room."""
+
+    def with_body_moved(image: DisplayImage) -> DisplayImage:
+        rows = image.shape[0]
+        moved = np.roll(image, 4, axis=1)
+        return np.concatenate([image[: 3 * rows // 4], moved[3 * rows // 4 :]])
+
+    truth = with_body_moved(live_picture(EVENING))
+    shown = aligned_and_not(with_body_moved(live_picture(WINDOW)))
+    lower = np.s_[-truth.shape[0] // 4 + 4 : -4, 12:-12]
+    as_guessed, aligned = (psnr(linear_from_uint8(each[lower]), linear_from_uint8(truth[lower])) for each in shown)
+    assert aligned > as_guessed + 1
+
+
+def test_a_person_as_expected_is_relit_as_well_with_alignment() -> None:
+    as_guessed, aligned = (
+        psnr(inner(linear_from_uint8(each)), inner(linear_from_uint8(live_picture(EVENING))))
+        for each in aligned_and_not(live_picture(WINDOW))
+    )
+    assert aligned > as_guessed - 0.5
+
+
+def test_noise_is_kept_away_up_to_a_distance_from_the_outline() -> None:
+    matte = np.zeros((100, 200), np.float32)
+    matte[:, :100] = 1
+    near = near_person(matte, 40.0)
+    assert near[:, : 100 + 4].min() > 0.95
+    assert near[:, 100 + round(1.1 * NEAR * 40) :].max() == 0
 
 
 def inner(picture: np.ndarray) -> np.ndarray:
@@ -133,7 +176,7 @@ def test_what_is_made_for_the_person_s_cells_alone_is_what_all_cells_would_give(
     subject, image = close_up(), live_picture(WINDOW)
     matte = np.zeros_like(subject.matte)
     height, width = matte.shape
-    cv2.ellipse(matte, (width // 2, height // 2), (width // 4, height // 3), 0, 0, 360, 1.0, -1)
+    cv2.ellipse(matte, (width // 2, height // 2), (width // 8, height // 6), 0, 0, 360, 1.0, -1)
     ours = RatioRelighting(
         replace(subject, matte=matte),
         face_of(subject),

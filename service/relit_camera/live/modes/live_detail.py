@@ -46,10 +46,11 @@ class LiveDetailTunables:
         visible_excess: by how much a root of the ratio exceeds 1 where half of the noise is suppressed.
         noise_fraction: of the cells whose noise could be seen, how many are taken to show nothing but noise.
         noise_margin: how many times the variance of noise counts as noise.
+        dark_noise: linear light at which a webcam's sensor has as much noise of its own as of counted photons.
         noise_cells: so many cells must tell the noise; with fewer it is suppressed less.
     """
 
-    coarse: float = 0.08
+    coarse: float = 0.05
     needed: float = 0.3
     range: tuple[float, float] = (0.2, 5.0)
     floor: float = 0.02
@@ -64,6 +65,7 @@ class LiveDetailTunables:
     visible_excess: float = 0.3
     noise_fraction: float = 0.05
     noise_margin: float = 5.0
+    dark_noise: float = 0.12
     noise_cells: int = 200
 
 
@@ -80,6 +82,7 @@ class SourceCells:
         confidence: how far the ratio counts, 0..1.
         skin: how far a cell is on skin or hair that moves with the head: not lids, eyes, lips or what they show.
         face: how far it is inside the outline of the face.
+        near: how far it is on the person or near their outline.
     """
 
     relit: Cells
@@ -87,6 +90,7 @@ class SourceCells:
     confidence: Cells
     skin: Cells
     face: Cells
+    near: Cells
 
 
 @dataclass(frozen=True)
@@ -134,10 +138,11 @@ def smoothed(live: Cells, unit: float) -> Cells:
 
 
 def noise_fraction(image: DisplayImage, step: int, box: Box, factor: Cells, source: SourceCells, unit: float) -> Cells:
-    """How much of each cell's detail is noise that would be seen on the person, (rows, columns), 0..1.
+    """How much of each cell's detail is noise that would be seen on the person or near them, (rows, columns), 0..1.
 
-    Roots of light have about the same noise in the dark as in light (it is that of counted photons). So the noise is
-    taken from the calmest of those cells of the person where the factor would show it.
+    Roots of light have the same noise where it is that of counted photons, and more in the dark, where it is the
+    sensor's own. How much of both there is, is taken from the calmest of those cells of the person where the factor
+    would show it.
 
     Args:
         image: the live picture.
@@ -150,22 +155,24 @@ def noise_fraction(image: DisplayImage, step: int, box: Box, factor: Cells, sour
     tuning = TUNABLES
     excess = cv2.max(_largest(factor) - 1, 0.0)
     excess = cv2.multiply(excess, excess)
-    visible = cv2.multiply(cv2.divide(excess, cv2.add(excess, tuning.visible_excess**2)), source.confidence)
-    told = cv2.bitwise_and(cv2.compare(visible, _VISIBLE, cv2.CMP_GT), cv2.compare(source.skin, _STILL, cv2.CMP_GT))
-    count = cv2.countNonZero(told)
+    visible = cv2.divide(excess, cv2.add(excess, tuning.visible_excess**2))
+    told = cv2.compare(cv2.multiply(visible, source.confidence), _VISIBLE, cv2.CMP_GT)
+    told = cv2.bitwise_and(told, cv2.compare(source.skin, _STILL, cv2.CMP_GT)) > 0
+    count = np.count_nonzero(told)
     if count == 0:
         return np.zeros(visible.shape, np.float32)
-    variance = _variance(image, step, box, max(tuning.smooth * unit, _LEAST_SIGMA))
-    few = variance[told > 0][:: count // _NOISE_SAMPLES + 1]
-    noise = float(np.quantile(few, tuning.noise_fraction)) * tuning.noise_margin * min(count / tuning.noise_cells, 1)
+    brightness, variance = _moments(image, step, box, max(tuning.smooth * unit, _LEAST_SIGMA))
+    expected = 1 + tuning.dark_noise / np.maximum(brightness**POWER, _DARKEST)
+    calmest = np.quantile((variance[told] / expected[told])[:: count // _NOISE_SAMPLES + 1], tuning.noise_fraction)
+    noise = expected * np.float32(calmest * tuning.noise_margin * min(count / tuning.noise_cells, 1))
     fraction = cv2.min(cv2.divide(noise, cv2.add(variance, 1e-9)), 1.0)
-    return np.asarray(cv2.multiply(visible, fraction), np.float32)
+    return np.asarray(cv2.multiply(cv2.multiply(visible, source.near), fraction), np.float32)
 
 
-def _variance(image: DisplayImage, step: int, box: Box, sigma: float) -> Cells:
-    """The variance of roots of the live picture's green light in each cell's surroundings, (rows, columns).
+def _moments(image: DisplayImage, step: int, box: Box, sigma: float) -> tuple[Cells, Cells]:
+    """Mean and variance of roots of the live picture's green light round each cell, both (rows, columns).
 
-    From the difference of two pixels of each cell: shades that go on over several cells do not count.
+    The variance from the difference of two pixels of each cell: shades that go on over several cells do not count.
     """
     green = _cell_part(image, step, box)[..., 1]
     one, other = step // 4, step // 4 + max(step // 2, 1)
@@ -173,11 +180,13 @@ def _variance(image: DisplayImage, step: int, box: Box, sigma: float) -> Cells:
     rows, columns = second.shape  # of cells of one pixel the last have no other
     codes = cv2.hconcat([np.ascontiguousarray(first[:rows, :columns]), np.ascontiguousarray(second)])
     roots = cv2.LUT(codes, _ROOTS_OF_CODES)
-    difference = cv2.subtract(roots[:, :columns], roots[:, columns:])
+    first, second = roots[:, :columns], roots[:, columns:]
+    difference = cv2.subtract(first, second)
+    moments = cv2.merge([cv2.addWeighted(first, 0.5, second, 0.5, 0), cv2.multiply(difference, difference, scale=0.5)])
     left, top, right, bottom = box
-    squares = cv2.multiply(difference, difference, scale=0.5)
-    squares = cv2.copyMakeBorder(squares, 0, bottom - top - rows, 0, right - left - columns, cv2.BORDER_REPLICATE)
-    return np.asarray(cv2.GaussianBlur(squares, (0, 0), sigma), np.float32)
+    moments = cv2.copyMakeBorder(moments, 0, bottom - top - rows, 0, right - left - columns, cv2.BORDER_REPLICATE)
+    mean, variance = cv2.split(cv2.GaussianBlur(moments, (0, 0), sigma))
+    return np.asarray(mean, np.float32), np.asarray(variance, np.float32)
 
 
 def _cell_part(image: DisplayImage, step: int, box: Box) -> DisplayImage:
@@ -210,6 +219,8 @@ _VISIBLE, _STILL = 0.3, 0.9
 """Cells tell the noise where it can be seen on the person, and not on lids, eyes or lips."""
 _NOISE_SAMPLES = 1000
 """So many of these cells are looked at."""
+_DARKEST = np.float32(0.003)
+"""Linear: the least light that counts as brightness, about ten codes."""
 _LEAST_SIGMA = 0.3
 """Of a blur, in cells; OpenCV takes 0 for something else."""
 _GRAY = np.full((1, 3), 1 / 3, np.float32)

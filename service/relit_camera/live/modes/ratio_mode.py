@@ -128,8 +128,9 @@ class RatioMode:
         )
         with context.timer.stage("follow"):
             positions = relighting.positions(motion, pose, frame.size)
-        eye_distance = context.face.scheme.eye_span(motion.landmarks)
-        return RatioPlan(frame, float(motion.presence), room.gain, pictures, positions, eye_distance)
+            eye_distance = context.face.scheme.eye_span(motion.landmarks)
+            plan = RatioPlan(frame, float(motion.presence), room.gain, pictures, positions, eye_distance)
+            return relighting.aligned(plan)
 
 
 def split_view(relit: DisplayImage, live: DisplayImage, share: float) -> DisplayImage:

@@ -6,7 +6,7 @@ The person's own mouth, eyes and texture stay in the picture; only the light is 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import cv2
@@ -18,6 +18,7 @@ from relit_camera.base.images.light_multiplication import POWER, light_of_root, 
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.modes.live_alignment import ComparedCells, LiveAlignment
 from relit_camera.live.modes.live_detail import SourceCells, blend_cells, live_cells, noise_fraction, smoothed
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.reenactment.control_points import control_points, feature_landmarks, head_and_shoulder_anchors
@@ -37,6 +38,8 @@ MOVING_REACH, SOFT_PX = 1.25, 1.5
 """By how much the outlines of eyes and lips are enlarged, and how soft the borders are, in source pixels."""
 EDGE_MARGIN = 0.02
 """Share of the source image's width at the matte's edge that is not trusted."""
+NEAR = 0.6
+"""Eye distances beyond the outline up to which noise is kept from being shown."""
 RATIO_CELLS = 120
 """The ratio is made for cells of the frame, about so many on its shorter side: it is softer than the source image."""
 SMALL_FRAME_PX = 300
@@ -82,7 +85,8 @@ class RatioPlan:
 class RatioRelighting:
     """Exchanges the light on the live face of one subject.
 
-    `positions`, `raised_lights` and `apply` share nothing that changes: each may run in a thread of its own.
+    `positions`, `raised_lights` and `apply` share nothing that changes: each may run in a thread of its own. `aligned`
+    and `room_light` see the frames one after another.
 
     Attributes:
         room_light: estimates the room's light from the live face.
@@ -104,8 +108,11 @@ class RatioRelighting:
         self._mesh = triangulate_face(face)
         confidence = ratio_confidence(feather_edges(subject.matte))
         self._inside = (confidence > 0.5).astype(np.uint8)
-        self._person = _looked_at(confidence)
-        self._parts = cv2.merge([confidence, still_skin(face), inside_face(face)])
+        self._confidence = confidence
+        near = near_person(confidence, face.scheme.eye_span(face.landmarks))
+        self._person = _looked_at(near)
+        self._parts = cv2.merge([confidence, still_skin(face), inside_face(face), near])
+        self._alignment = LiveAlignment(face)
 
     def raised_lights(self, relit: LinearImage, under_room: LinearImage) -> NDArray[np.float32]:
         """The source image under the scene's light and, below it, under the room's: (2 · height, width, 3) float32.
@@ -134,6 +141,24 @@ class RatioRelighting:
         step = 1 if min(size) < SMALL_FRAME_PX else round(min(size) / RATIO_CELLS)
         return self._warp(motion, pose, size).grid((0, 0, *size), step)
 
+    def aligned(self, plan: RatioPlan) -> RatioPlan:
+        """The same plan, its positions corrected by what the frame shows; see `live_alignment`."""
+        frame, positions = plan.frame, plan.positions
+        if self._alignment.is_due(frame.time_s):
+            nodes = positions.nodes() - np.float32(0.5)
+            left, top, right, bottom = box = self._cells_of_person(nodes)
+            looks = nodes[top:bottom, left:right]
+            under_room, confidence = (
+                cv2.remap(each, looks, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+                for each in (np.split(plan.pictures, 2)[1], self._confidence)
+            )
+            cv2.multiply(under_room, (*map(float, plan.gain), 1.0), dst=under_room)
+            live, _ = live_cells(frame.image, positions.step, box)
+            unit = plan.eye_distance / positions.step
+            cells = ComparedCells(live, root_of_light(under_room), confidence, looks, unit)
+            self._alignment.update(cells, frame.time_s)
+        return replace(plan, positions=self._alignment.corrected(positions))
+
     def apply(self, plan: RatioPlan, blend: float = 1.0) -> DisplayImage:
         """The planned frame in the scene's light, uint8 sRGB.
 
@@ -155,8 +180,8 @@ class RatioRelighting:
         # Roots, because the step between two of them is about as visible anywhere.
         relit, under_room = root_of_light(relit), root_of_light(under_room)
         live, brightest = live_cells(plan.frame.image, step, box)
-        confidence, skin, face = cv2.split(parts)
-        source = SourceCells(relit, under_room, confidence, skin, face)
+        confidence, *others = cv2.split(parts)
+        source = SourceCells(relit, under_room, confidence, *others)
         unit = plan.eye_distance / step
         smooth = smoothed(live, unit)
         cells = blend_cells(live, smooth, brightest, source, unit)
@@ -222,6 +247,18 @@ def ratio_confidence(matte: Mask) -> Mask:
     reach = max(round(EDGE_MARGIN * matte.shape[1]), 1)
     inner = cv2.erode(matte, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
     return np.asarray(cv2.GaussianBlur(inner, (0, 0), reach / 2), dtype=np.float32)
+
+
+def near_person(confidence: Mask, eye_distance: float) -> Mask:
+    """Where the person is, or is as soon as they turn, since a turned head is wider, 0..1: up to NEAR from the outline.
+
+    Args:
+        confidence: where the source image shows them.
+        eye_distance: in its pixels.
+    """
+    blurred = cv2.GaussianBlur(confidence, (0, 0), NEAR / 1.28 * eye_distance, borderType=cv2.BORDER_REPLICATE)
+    # Beside a straight outline a blur has fallen to a tenth after 1.28 sigma.
+    return np.asarray(np.clip((blurred - 0.1) / 0.3, 0, 1), np.float32)
 
 
 def still_skin(face: SourceFace) -> Mask:

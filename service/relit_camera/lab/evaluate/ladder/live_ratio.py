@@ -87,4 +87,4 @@ class LiveRatio:
         pictures = self._relighting.raised_lights(*self._relighter.relight(maps))
         presence = float(self._last.motion.presence)
         plan = RatioPlan(self._last.frame, presence, self._room.gain, pictures, self._positions, self._eye_distance)
-        return self._relighting.apply(plan)
+        return self._relighting.apply(self._relighting.aligned(plan))
