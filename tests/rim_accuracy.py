@@ -4,14 +4,18 @@ The person is the mannequin, or that of a folder of `python -m relit_studio driv
 matte. They are put before a dark and a bright room, with a webcam's noise, parted from it by the matting network, and
 put before four backgrounds. Printed are, as means of all frames: the matte's sum of absolute differences and its
 gradient error, both in thousands of pixels (Rhemann et al., CVPR 2009), and the PSNR of sRGB codes round the outline:
-of the picture that the camera makes, and of one that mixes the filmed colours by the same matte.
+of the picture that the camera makes, and of one that mixes the filmed colours by the same matte. Where `pymatting` is
+installed (`pip install pymatting`; the program does not use it), also of closed-form matting (Levin et al., TPAMI 2008)
+with its own estimate of the person's colours: its trimap leaves the neighborhood of the network's outline open.
 """
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -37,11 +41,17 @@ from relit_studio.mannequin.rendering.distant_lights import lights_from_map
 from relit_studio.mannequin.rendering.mannequin_camera import Camera
 from relit_studio.mannequin.rendering.renderer import View
 
+CLOSED_FORM = importlib.util.find_spec("pymatting") is not None
+if CLOSED_FORM:
+    import pymatting
+
 TIMES_S = np.arange(8) / 2
 BRIGHT = 0.8
 """What the brightest hundredth of the person's pixels is exposed to."""
 SHOT, READ = 4e-4, 9e-6
 """Variance of a webcam's noise: a share of the light, and without light."""
+UNKNOWN_PX = 5
+"""How far on each side of the network's outline the closed form has to decide."""
 OUTSIDE_PX, INSIDE_PX = 4, 6
 """How far the outline reaches."""
 GRADIENT_SIGMA = 1.4
@@ -106,10 +116,37 @@ def slopes(matte: Mask) -> NDArray[np.float32]:
     return np.hypot(across, down)
 
 
-WAYS: dict[str, Callable[[DisplayImage, Alpha, DisplayImage], DisplayImage]] = {
-    "filmed colours": over,
-    "the camera": lambda image, alpha, background: replace_room(MattedFrame(image, alpha), background),
-}
+@dataclass(frozen=True)
+class Parted:
+    """A person parted from their room: the matte, and what puts them before a background."""
+
+    alpha: Alpha
+    before: Callable[[DisplayImage], DisplayImage]
+
+
+def ways(live: DisplayImage, alpha: Alpha) -> dict[str, Parted]:
+    """The live picture parted in each way; `alpha` is the network's."""
+    frame = MattedFrame(live, alpha)
+    parted = {
+        "filmed colours": Parted(alpha, partial(over, live, alpha)),
+        "the camera": Parted(alpha, partial(replace_room, frame)),
+    }
+    if CLOSED_FORM:
+        colors, closed = closed_form(live, alpha)
+        parted["closed form"] = Parted(closed, partial(over, colors, closed))
+    return parted
+
+
+def closed_form(live: DisplayImage, alpha: Alpha) -> tuple[DisplayImage, Alpha]:
+    """The person's colours and matte by closed-form matting, where the network's matte is not certain."""
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * UNKNOWN_PX + 1,) * 2)
+    trimap = np.full(alpha.shape, 0.5)
+    trimap[cv2.dilate(alpha, kernel) < 0.1 * 255] = 0
+    trimap[cv2.erode(alpha, kernel) > 0.9 * 255] = 1
+    image = live / 255.0
+    found = pymatting.estimate_alpha_cf(image, trimap)
+    colors = pymatting.estimate_foreground_ml(image, found)
+    return tuple(np.clip(np.rint(255 * each), 0, 255).astype(np.uint8) for each in (colors, found))
 
 
 def main() -> None:
@@ -129,24 +166,22 @@ def main() -> None:
     print(f"{'room':8}{'way':16}" + "".join(f"{name:>14}" for name in ("SAD", "gradient", *backgrounds)))
     for room, behind in rooms.items():
         network = SelfieMatting()
-        found: dict[str, list[list[float]]] = {way: [] for way in WAYS}
+        found: dict[str, list[list[float]]] = {}
         for index, person in enumerate(people):
             seen = before(person, behind)
             noise = random.normal(size=seen.shape) * np.sqrt(SHOT * seen + READ)
             live = uint8_from_linear(np.clip(seen + noise, 0, 1).astype(np.float32))
             for repeat in range(2):  # it smooths over time, and the frames are far apart
                 alpha = network.matte(Frame(live, index, 0.0, index + repeat / 30))
-            share = np.divide(alpha, 255, dtype=np.float32)
-            matte_errors = [
-                float(np.abs(share - person.matte).sum()) / 1e3,
-                float(((slopes(share) - slopes(person.matte)) ** 2).sum()) / 1e3,
-            ]
             near = outline(person.matte)
-            for way, compose in WAYS.items():
-                found[way].append([*matte_errors, *(
-                    codes_psnr(compose(live, alpha, each), uint8_from_linear(before(person, each)), near)
-                    for each in backgrounds.values()
-                )])  # fmt: skip
+            for way, parted in ways(live, alpha).items():
+                share = np.divide(parted.alpha, 255, dtype=np.float32)
+                found.setdefault(way, []).append([
+                    float(np.abs(share - person.matte).sum()) / 1e3,
+                    float(((slopes(share) - slopes(person.matte)) ** 2).sum()) / 1e3,
+                    *(codes_psnr(parted.before(each), uint8_from_linear(before(person, each)), near)
+                      for each in backgrounds.values()),
+                ])  # fmt: skip
         for way, rows in found.items():
             print(f"{room:8}{way:16}" + "".join(f"{value:14.3f}" for value in np.mean(rows, axis=0)))
 

@@ -44,7 +44,7 @@ class LiveAlignmentTunables:
     blur: float = 1.0
     prior: float = 0.05
     interval_s: float = 0.09
-    time_constant_s: float = 0.15
+    time_constant_s: float = 0.25
     mean_code: float = 75.0
 
 

@@ -51,7 +51,7 @@ class LiveDetailTunables:
     """
 
     coarse: float = 0.05
-    needed: float = 0.3
+    needed: float = 0.25
     range: tuple[float, float] = (0.2, 5.0)
     floor: float = 0.02
     full_code: float = 232.0
