@@ -162,9 +162,15 @@ def noise_fraction(image: DisplayImage, step: int, box: Box, factor: Cells, sour
     if count == 0:
         return np.zeros(visible.shape, np.float32)
     brightness, variance = _moments(image, step, box, max(tuning.smooth * unit, _LEAST_SIGMA))
-    expected = 1 + tuning.dark_noise / np.maximum(brightness**POWER, _DARKEST)
-    calmest = np.quantile((variance[told] / expected[told])[:: count // _NOISE_SAMPLES + 1], tuning.noise_fraction)
-    noise = expected * np.float32(calmest * tuning.noise_margin * min(count / tuning.noise_cells, 1))
+    every = count // _NOISE_SAMPLES + 1
+
+    def calmest(values: Cells) -> np.float32:
+        return np.float32(np.quantile(values[told][::every], tuning.noise_fraction))
+
+    in_the_dark = 1 + tuning.dark_noise / np.maximum(brightness**POWER, _DARKEST)
+    # Webcams that smooth the dark have the same noise everywhere.
+    noise = np.maximum(calmest(variance), in_the_dark * calmest(variance / in_the_dark))
+    noise *= np.float32(tuning.noise_margin * min(count / tuning.noise_cells, 1))
     fraction = cv2.min(cv2.divide(noise, cv2.add(variance, 1e-9)), 1.0)
     return np.asarray(cv2.multiply(cv2.multiply(visible, source.near), fraction), np.float32)
 
