@@ -143,10 +143,13 @@ def closed_form(live: DisplayImage, alpha: Alpha) -> tuple[DisplayImage, Alpha]:
     trimap = np.full(alpha.shape, 0.5)
     trimap[cv2.dilate(alpha, kernel) < 0.1 * 255] = 0
     trimap[cv2.erode(alpha, kernel) > 0.9 * 255] = 1
+    if trimap.min() > 0 or trimap.max() < 1:
+        return live, alpha  # nothing is certain
     image = live / 255.0
     found = pymatting.estimate_alpha_cf(image, trimap)
     colors = pymatting.estimate_foreground_ml(image, found)
-    return tuple(np.clip(np.rint(255 * each), 0, 255).astype(np.uint8) for each in (colors, found))
+    codes = [np.clip(np.rint(255 * each), 0, 255).astype(np.uint8) for each in (colors, found)]
+    return codes[0], codes[1]
 
 
 def main() -> None:

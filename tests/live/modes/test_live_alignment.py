@@ -100,8 +100,28 @@ def test_flows_keep_their_interval_and_a_clip_that_starts_anew_has_one_at_once()
     assert np.median(correction(alignment)[BODY][..., 0]) == pytest.approx(-SHIFT_PX, rel=0.2)
 
 
-def test_a_picture_without_any_light_moves_nothing() -> None:
+def test_the_noise_of_a_dark_picture_moves_next_to_nothing() -> None:
+    alignment, sure = LiveAlignment(FACE), np.ones((ROWS, COLUMNS), np.float32)
+    random, even = np.random.default_rng(2), np.full((ROWS, COLUMNS, 3), 0.01, np.float32)
+    for step in range(10):
+        dark = np.abs(random.normal(0, 0.01, even.shape)).astype(np.float32)
+        alignment.update(ComparedCells(dark, even, sure, looks(), UNIT), step / 10)
+    assert np.abs(correction(alignment)).mean() < 0.02 * UNIT
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "unit"), [(1, 1, 10), (120, 3, 10), (120, 16, 60), (4, 5, 30), (60, 8, 30)]
+)
+def test_where_hardly_anything_is_seen_nothing_is_corrected(rows: int, columns: int, unit: float) -> None:
+    alignment, few = LiveAlignment(FACE), np.s_[:rows, :columns]
+    large = np.ones((rows, columns, 3), np.float32)
+    places = np.zeros((rows, columns, 2), np.float32)
+    alignment.update(ComparedCells(large, large, large[..., 0], places, unit), 0)
+    assert correction(alignment)[few].max() == 0
+
+
+def test_a_profile_whose_eyes_seem_to_meet_is_compared_in_no_more_pixels() -> None:
     alignment = LiveAlignment(FACE)
-    dark = np.zeros((ROWS, COLUMNS, 3), np.float32)
-    alignment.update(ComparedCells(dark, dark, np.ones((ROWS, COLUMNS), np.float32), looks(), UNIT), 0)
-    assert np.abs(correction(alignment)).max() < 1e-3
+    narrow = ComparedCells(with_body_moved(pattern()), pattern(), np.ones((ROWS, COLUMNS), np.float32), looks(), 1e-3)
+    alignment.update(narrow, 0)
+    assert np.isfinite(correction(alignment)).all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from relit_camera.base.images.color import uint8_from_linear
 from relit_camera.base.images.light_multiplication import light_of_root, root_of_light
 from relit_camera.live.modes.live_detail import (
     CellBlend,
@@ -147,10 +148,16 @@ def dim_picture() -> np.ndarray:
     return image
 
 
-def noise_in(image: np.ndarray, factor: float, confidence: np.ndarray = EVERYWHERE, step: int = STEP) -> np.ndarray:
+def noise_in(
+    image: np.ndarray,
+    factor: float,
+    confidence: np.ndarray = EVERYWHERE,
+    step: int = STEP,
+    near: np.ndarray | None = None,
+) -> np.ndarray:
     """How much of each cell is taken for noise where roots of the picture are multiplied by `factor`."""
     roots = np.full((ROWS, COLUMNS, 3), 0.5, np.float32)
-    source = SourceCells(roots, roots, confidence, EVERYWHERE, EVERYWHERE, confidence)
+    source = SourceCells(roots, roots, confidence, EVERYWHERE, EVERYWHERE, confidence if near is None else near)
     return noise_fraction(image, step, BOX, np.full((ROWS, COLUMNS, 3), factor, np.float32), source, UNIT)
 
 
@@ -163,6 +170,31 @@ def test_noise_that_would_be_seen_is_told_from_detail() -> None:
 @pytest.mark.parametrize("factor", [0.5, 1.0])
 def test_noise_that_the_ratio_does_not_multiply_stays(factor: float) -> None:
     assert noise_in(noisy(dim_picture(), 4.0), factor).max() == 0
+
+
+def test_in_the_dark_more_is_taken_for_noise() -> None:
+    """A sensor's own noise, the same in light everywhere, is most of it there; the calm half alone does not tell it."""
+    light = np.full((ROWS * STEP, COLUMNS * STEP, 3), 0.6)
+    light[ROWS * STEP // 2 :] = 0.012
+    sensor = light + np.random.default_rng(8).normal(0, 1, light.shape) * np.sqrt(4e-4 * light + 2e-5)
+    fraction = noise_in(uint8_from_linear(np.clip(sensor, 0, 1).astype(np.float32)), 2.5)
+    assert fraction[3:27, 3:-3].mean() > 0.8
+    assert fraction[33:-3, 3:-3].mean() > 0.65
+
+
+def test_noise_that_a_webcam_smooths_in_the_dark_is_still_noise_in_the_light() -> None:
+    codes = np.full((ROWS * STEP, COLUMNS * STEP, 3), 120.0)
+    codes[ROWS * STEP // 2 :] = 30
+    fraction = noise_in(noisy(codes, 3.0), 2.5)
+    assert fraction[3:27, 3:-3].mean() > 0.8
+
+
+def test_what_a_turn_of_the_head_brings_to_sight_is_smoothed_too() -> None:
+    person, near = EVERYWHERE.copy(), EVERYWHERE.copy()
+    person[:, :30] = near[:, :15] = 0
+    fraction = noise_in(noisy(dim_picture(), 4.0), 2.5, person, near=near)
+    assert fraction[3:27, 18:30].mean() > 0.8
+    assert fraction[:, :15].max() == 0
 
 
 def test_beside_the_person_nothing_is_smoothed() -> None:

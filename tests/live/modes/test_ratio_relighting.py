@@ -25,6 +25,7 @@ from relit_camera.live.modes.ratio_relighting import (
     NEAR,
     RatioPlan,
     RatioRelighting,
+    _cells_within,
     extrapolate_roots,
     fit_similarity,
     near_person,
@@ -116,6 +117,23 @@ def test_noise_is_kept_away_up_to_a_distance_from_the_outline() -> None:
     assert near[:, 100 + round(1.1 * NEAR * 40) :].max() == 0
 
 
+def test_every_part_of_the_person_is_near_them() -> None:
+    matte = np.zeros((100, 100), np.float32)
+    matte[40:44, 10:14] = 1  # less than the neighborhood that makes a point near
+    assert np.all(near_person(matte, 40.0) >= matte)
+
+
+def test_nothing_is_aligned_by_whom_nobody_is_sure_of() -> None:
+    ours, motion, frame = relighting(WINDOW), before_the_camera(), live_frame(live_picture(EVENING)[:, ::-1].copy(), 0)
+    assert motion.pose is not None
+    pictures = ours.raised_lights(still_under(EVENING), still_under(WINDOW))
+    positions, span = ours.positions(motion, motion.pose, frame.size), SCHEME.eye_span(motion.landmarks)
+    plan = RatioPlan(frame, 0.2, np.ones(3, np.float32), pictures, positions, span)
+    np.testing.assert_array_equal(ours.aligned(plan).positions.positions, positions.positions)
+    sure = replace(plan, presence=1.0)
+    assert np.abs(ours.aligned(sure).positions.positions - positions.positions).max() > 0.1
+
+
 def inner(picture: np.ndarray) -> np.ndarray:
     """The middle of the live picture, where the source image is trusted wholly."""
     height, width = picture.shape[:2]
@@ -186,12 +204,12 @@ def test_what_is_made_for_the_person_s_cells_alone_is_what_all_cells_would_give(
     frame, motion = live_frame(image, 0), before_the_camera()
     assert motion.pose is not None
     nodes = ours.positions(motion, motion.pose, frame.size).nodes()
-    left, top, right, bottom = ours._cells_of_person(nodes)
+    left, top, right, bottom = _cells_within(nodes, *ours._near)
     assert 0 < left < right < nodes.shape[1]
     assert 0 < top < bottom < nodes.shape[0]
     assert not any(side % BOX_CELLS for side in (left, top, right, bottom)), "or it would flicker as the person moves"
     few = relit_live(ours, still_under(EVENING), motion, frame).astype(int)
-    ours._person = (-1e9, -1e9), (1e9, 1e9)
+    ours._near = (-1e9, -1e9), (1e9, 1e9)
     error = np.abs(few - relit_live(ours, still_under(EVENING), motion, frame))
     assert error.mean() < 0.1
     assert error.max() <= 5

@@ -1,9 +1,10 @@
 """Where a live picture looks in the source image, corrected by what both show.
 
-Landmarks tell where the face lies. Where shoulders, collar, ears and hair lie is a guess from the pose of the head, and
-there the ratio would set the light of cloth on skin. Under the room's light the source image is what the live picture
-shows, so the optical flow between the two (DIS: Kroeger et al., ECCV 2016) tells how far the guess is off. Single flows
-err where there is little to see: they are averaged over the neighborhood in the source image and over some frames.
+Landmarks tell where the face lies, within a pixel or two. Where shoulders, collar, ears and hair lie is a guess from
+the pose of the head, and there the ratio would set the light of cloth on skin. Under the room's light the source image
+is what the live picture shows, so the optical flow between the two (DIS: Kroeger et al., ECCV 2016) tells how far both
+are off. Single flows err where there is little to see: they are averaged over the neighborhood in the source image and
+over some frames.
 """
 
 from __future__ import annotations
@@ -22,18 +23,22 @@ from relit_camera.live.reenactment.warp import PositionGrid
 
 @dataclass(frozen=True)
 class LiveAlignmentTunables:
-    """Constants, chosen on one rendered person in six rooms (see docs/evaluate.md); all are on a plateau.
+    """Constants, chosen on one rendered person in six rooms and two lights (`bea` in docs/evaluate.md).
+
+    Half or twice of `reach`, `spacing`, `blur` and `prior` changes no part of the person by more than 0.2 dB; with
+    patches of 8 pixels, or 8 pixels an eye distance, the face has 0.5 dB less.
 
     Attributes:
-        resolution: pixels an eye distance of the pictures that are compared.
+        resolution: pixels an eye distance of the pictures that are compared; at most as many as there are cells.
         patch, stride: side of the patches of the flow, and their distance, in these pixels.
         reach: flow of which half is believed, in eye distances.
         spacing: of the nodes at which the correction is kept, in eye distances.
         blur: sigma of the neighborhood, in nodes.
-        prior: weight of no correction, where a node that is seen wholly has 1.
+        prior: weight of no correction, where nodes that are seen wholly have 1 in the mean.
         interval_s: time between two flows.
         time_constant_s: of the average over time.
         mean_code: what the person's mean root becomes in the pictures that are compared, of 255.
+        dark_root: mean root below which they are not made brighter: there is little but noise.
     """
 
     resolution: float = 12.0
@@ -46,11 +51,14 @@ class LiveAlignmentTunables:
     interval_s: float = 0.09
     time_constant_s: float = 0.25
     mean_code: float = 75.0
+    dark_root: float = 0.1
 
 
 TUNABLES = LiveAlignmentTunables()
 _SEEN = 0.02
 """Confidence above which a cell shows the person."""
+_LEAST_SIDE = 16
+"""Pixels: of smaller pictures OpenCV gives no flow."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +68,7 @@ class ComparedCells:
     Attributes:
         live: (rows, columns, 3) roots of the live picture's light.
         under_room: the same of the source image under the room's light, in the live frame's exposure.
-        confidence: (rows, columns) how far a cell is the person's, 0..1.
+        confidence: (rows, columns) how far a cell can be compared, 0..1: it is the person's, and not overexposed.
         looks: (rows, columns, 2) float32 source pixels, as OpenCV counts them.
         unit: the eye distance in cells.
     """
@@ -100,16 +108,21 @@ class LiveAlignment:
         return self._updated_s is None or not 0 <= time_s - self._updated_s < TUNABLES.interval_s
 
     def update(self, cells: ComparedCells, time_s: float) -> None:
-        """Find the correction anew.
+        """Find the correction anew, unless so little of the person is seen that there is nothing to go by.
 
         Args:
             cells: of a live frame; they look where they did before any correction.
             time_s: of that frame.
         """
+        shrink = min(TUNABLES.resolution / cells.unit, 1.0)
+        size = [round(side * shrink) for side in cells.confidence.shape[::-1]]
+        if min(size) < _LEAST_SIDE:
+            return
         elapsed = np.inf if self._updated_s is None else time_s - self._updated_s
         kept = np.exp(-elapsed / TUNABLES.time_constant_s) if elapsed > 0 else 0.0
         self._updated_s = time_s
-        found = self._on_nodes(*_moved(self._flow, cells))
+        unit = shrink * cells.unit
+        found = self._on_nodes(*_moved(self._flow, cells, size, unit), unit)
         self._sums = cv2.addWeighted(self._sums, float(kept), found, float(1 - kept), 0)
         weight, x, y = cv2.split(cv2.GaussianBlur(self._sums, (0, 0), TUNABLES.blur))
         weight += np.float32(TUNABLES.prior)
@@ -122,18 +135,16 @@ class LiveAlignment:
         change = cv2.remap(self._correction, nodes, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return replace(positions, positions=positions.positions + change)
 
-    def _on_nodes(
-        self, looks: NDArray[np.float32], change: Flow, weight: Mask, cells_per_eye_distance: float
-    ) -> NDArray[np.float32]:
-        """Sums of weight and of weight times change, of all cells that look at each node: (rows, columns, 3).
+    def _on_nodes(self, looks: NDArray[np.float32], change: Flow, weight: Mask, unit: float) -> NDArray[np.float32]:
+        """Sums of weight and of weight times change, of all pixels that look at each node: (rows, columns, 3).
 
-        A node of the person on which as many cells look as its size allows has the weight 1.
+        Nodes at which as many look as the eye distance `unit` in pixels says have the weight 1 in the mean.
         """
         rows, columns = self._shape
         column, row = np.floor((looks + 0.5) / self._spacing).astype(np.int32).transpose(2, 0, 1)
         inside = (weight > 0) & (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
         node, counted = (row * columns + column)[inside], weight[inside]
-        full = (TUNABLES.spacing * cells_per_eye_distance) ** 2
+        full = (TUNABLES.spacing * unit) ** 2
         sums = [
             np.bincount(node, each, minlength=rows * columns) / full
             for each in (counted, *(change[inside].T * counted))
@@ -141,18 +152,21 @@ class LiveAlignment:
         return np.stack(sums, axis=-1).reshape(rows, columns, 3).astype(np.float32)
 
 
-def _moved(flow: cv2.DISOpticalFlow, cells: ComparedCells) -> tuple[NDArray[np.float32], Flow, Mask, float]:
-    """What the flow of the live picture toward the source image says, in the cells that are compared.
+def _moved(
+    flow: cv2.DISOpticalFlow, cells: ComparedCells, size: list[int], unit: float
+) -> tuple[NDArray[np.float32], Flow, Mask]:
+    """What the flow of the live picture toward the source image says, in pictures of `size` (width, height).
 
-    Where each looks, by how many source pixels it should look elsewhere, with which weight, and the eye distance.
+    Of each pixel where it looks, by how many source pixels it should look elsewhere, and the weight of that; `unit` is
+    the eye distance in these pixels.
     """
-    shrink = TUNABLES.resolution / cells.unit
-    size = [max(round(side * shrink), 1) for side in cells.confidence.shape[::-1]]
+    reduced = cv2.INTER_AREA if size[0] < cells.confidence.shape[1] else cv2.INTER_LINEAR
     live, known, confidence, looks = (
-        np.asarray(cv2.resize(each, size, interpolation=cv2.INTER_AREA if shrink < 1 else cv2.INTER_LINEAR))
+        np.asarray(cv2.resize(each, size, interpolation=reduced))
         for each in (_gray(cells.live), _gray(cells.under_room), cells.confidence, cells.looks)
     )
-    gain = TUNABLES.mean_code / max(float((known * confidence).sum()) / max(float(confidence.sum()), 1e-6), 1e-3)
+    mean = float((known * confidence).sum()) / max(float(confidence.sum()), 1e-6)
+    gain = TUNABLES.mean_code / max(mean, TUNABLES.dark_root)
     # Beside the person the source image has nothing: there both are the same, so that no wall pulls at the outline.
     known = live + (known - live) * confidence
     first, second = (cv2.convertScaleAbs(each, alpha=gain) for each in (live, known))
@@ -160,9 +174,9 @@ def _moved(flow: cv2.DISOpticalFlow, cells: ComparedCells) -> tuple[NDArray[np.f
     rows, columns = confidence.shape
     there = found + np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(np.float32)
     change = cv2.remap(looks, there, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) - looks
-    length = cv2.magnitude(*cv2.split(found)) / np.float32(TUNABLES.reach * TUNABLES.resolution)
+    length = cv2.magnitude(*cv2.split(found)) / np.float32(TUNABLES.reach * unit)
     weight = np.where(confidence > _SEEN, 1 / (1 + length**4), 0)
-    return looks, change, weight, TUNABLES.resolution
+    return looks, change, weight
 
 
 def _gray(roots: Cells) -> Cells:

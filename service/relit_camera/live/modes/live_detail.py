@@ -27,7 +27,10 @@ Cells = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class LiveDetailTunables:
-    """Constants, chosen on one rendered person in two rooms: soft light, and one window at the side.
+    """Constants, chosen on one rendered person (`bea` in docs/evaluate.md): in soft light and beside a window.
+
+    `coarse` and `needed` were chosen in six rooms and two lights, where positions are aligned. `dark_noise` is from the
+    noise of three rendered webcams' pictures.
 
     Attributes:
         coarse: sigma of what counts as coarse, in eye distances.
@@ -65,7 +68,7 @@ class LiveDetailTunables:
     visible_excess: float = 0.3
     noise_fraction: float = 0.05
     noise_margin: float = 5.0
-    dark_noise: float = 0.12
+    dark_noise: float = 0.05
     noise_cells: int = 200
 
 
@@ -140,9 +143,10 @@ def smoothed(live: Cells, unit: float) -> Cells:
 def noise_fraction(image: DisplayImage, step: int, box: Box, factor: Cells, source: SourceCells, unit: float) -> Cells:
     """How much of each cell's detail is noise that would be seen on the person or near them, (rows, columns), 0..1.
 
-    Roots of light have the same noise where it is that of counted photons, and more in the dark, where it is the
-    sensor's own. How much of both there is, is taken from the calmest of those cells of the person where the factor
-    would show it.
+    Roots of light have about the same noise where it is that of counted photons, and more in the dark, where it is the
+    sensor's own, unless the webcam smooths the dark. So one amount is taken from the calmest of those cells of the
+    person where the factor would show it, once for noise that is the same everywhere and once for noise that grows in
+    the dark by `dark_noise`; the larger counts.
 
     Args:
         image: the live picture.
@@ -168,7 +172,6 @@ def noise_fraction(image: DisplayImage, step: int, box: Box, factor: Cells, sour
         return np.float32(np.quantile(values[told][::every], tuning.noise_fraction))
 
     in_the_dark = 1 + tuning.dark_noise / np.maximum(brightness**POWER, _DARKEST)
-    # Webcams that smooth the dark have the same noise everywhere.
     noise = np.maximum(calmest(variance), in_the_dark * calmest(variance / in_the_dark))
     noise *= np.float32(tuning.noise_margin * min(count / tuning.noise_cells, 1))
     fraction = cv2.min(cv2.divide(noise, cv2.add(variance, 1e-9)), 1.0)

@@ -38,6 +38,9 @@ MOVING_REACH, SOFT_PX = 1.25, 1.5
 """By how much the outlines of eyes and lips are enlarged, and how soft the borders are, in source pixels."""
 EDGE_MARGIN = 0.02
 """Share of the source image's width at the matte's edge that is not trusted."""
+SURELY_THERE, OVEREXPOSED = 0.5, 252
+"""Presence below which nobody is surely followed, and brightest code from which a cell shows nothing: both say nothing
+of where the person lies."""
 NEAR = 0.6
 """Eye distances beyond the outline up to which noise is kept from being shown."""
 RATIO_CELLS = 120
@@ -110,7 +113,7 @@ class RatioRelighting:
         self._inside = (confidence > 0.5).astype(np.uint8)
         self._confidence = confidence
         near = near_person(confidence, face.scheme.eye_span(face.landmarks))
-        self._person = _looked_at(near)
+        self._person, self._near = _limits(confidence), _limits(near)
         self._parts = cv2.merge([confidence, still_skin(face), inside_face(face), near])
         self._alignment = LiveAlignment(face)
 
@@ -143,21 +146,17 @@ class RatioRelighting:
 
     def aligned(self, plan: RatioPlan) -> RatioPlan:
         """The same plan, its positions corrected by what the frame shows; see `live_alignment`."""
-        frame, positions = plan.frame, plan.positions
-        if self._alignment.is_due(frame.time_s):
-            nodes = positions.nodes() - np.float32(0.5)
-            left, top, right, bottom = box = self._cells_of_person(nodes)
+        if plan.presence > SURELY_THERE and self._alignment.is_due(plan.frame.time_s):
+            step = plan.positions.step
+            nodes = plan.positions.nodes() - np.float32(0.5)
+            left, top, right, bottom = box = _cells_within(nodes, *self._person)
             looks = nodes[top:bottom, left:right]
-            under_room, confidence = (
-                cv2.remap(each, looks, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-                for each in (np.split(plan.pictures, 2)[1], self._confidence)
-            )
-            cv2.multiply(under_room, (*map(float, plan.gain), 1.0), dst=under_room)
-            live, _ = live_cells(frame.image, positions.step, box)
-            unit = plan.eye_distance / positions.step
-            cells = ComparedCells(live, root_of_light(under_room), confidence, looks, unit)
-            self._alignment.update(cells, frame.time_s)
-        return replace(plan, positions=self._alignment.corrected(positions))
+            confidence = cv2.remap(self._confidence, looks, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+            live, brightest = live_cells(plan.frame.image, step, box)
+            confidence[brightest >= OVEREXPOSED] = 0
+            cells = ComparedCells(live, _under_room(plan, looks), confidence, looks, plan.eye_distance / step)
+            self._alignment.update(cells, plan.frame.time_s)
+        return replace(plan, positions=self._alignment.corrected(plan.positions))
 
     def apply(self, plan: RatioPlan, blend: float = 1.0) -> DisplayImage:
         """The planned frame in the scene's light, uint8 sRGB.
@@ -169,16 +168,15 @@ class RatioRelighting:
         step = plan.positions.step
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
         nodes = plan.positions.nodes() - np.float32(0.5)
-        box = self._cells_of_person(nodes) if blend >= 1 else (0, 0, nodes.shape[1], nodes.shape[0])
+        box = _cells_within(nodes, *self._near) if blend >= 1 else (0, 0, nodes.shape[1], nodes.shape[0])
         left, top, right, bottom = box
         inside = np.s_[top:bottom, left:right]
-        relit, under_room, parts = (
+        relit, parts = (
             cv2.remap(each, nodes[inside], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-            for each in (*np.split(plan.pictures, 2), self._parts)
+            for each in (np.split(plan.pictures, 2)[0], self._parts)
         )
-        cv2.multiply(under_room, (*map(float, plan.gain), 1.0), dst=under_room)
         # Roots, because the step between two of them is about as visible anywhere.
-        relit, under_room = root_of_light(relit), root_of_light(under_room)
+        relit, under_room = root_of_light(relit), _under_room(plan, nodes[inside])
         live, brightest = live_cells(plan.frame.image, step, box)
         confidence, *others = cv2.split(parts)
         source = SourceCells(relit, under_room, confidence, *others)
@@ -204,21 +202,6 @@ class RatioRelighting:
             shown = cv2.addWeighted(shown, plan.presence, plan.frame.image, 1 - plan.presence, 0)
         return np.asarray(shown, np.uint8)
 
-    def _cells_of_person(self, nodes: NDArray[np.float32]) -> Box:
-        """The box of those cells that look at the person, with some more round them; of all where none does.
-
-        Its sides are at multiples of `BOX_CELLS`, or what is computed for fewer cells would flicker as it moves.
-        `nodes` (rows, columns, 2) are where they look, as OpenCV counts.
-        """
-        low, high = self._person
-        left, top, width, height = cv2.boundingRect(cv2.inRange(nodes, (*low, 0, 0), (*high, 0, 0)))
-        rows, columns = nodes.shape[:2]
-        if width == 0:
-            return 0, 0, columns, rows
-        right, bottom = (-(-(end + 1) // BOX_CELLS) * BOX_CELLS for end in (left + width, top + height))
-        left, top = (max(start - 1, 0) // BOX_CELLS * BOX_CELLS for start in (left, top))
-        return left, top, min(right, columns), min(bottom, rows)
-
     def _warp(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> Warp:
         """The source image as it lies on the live face of a frame of `size`.
 
@@ -233,6 +216,31 @@ class RatioRelighting:
         # Lids and lips are the live picture's; the light on them is that of the skin round them.
         flow = face_and_head_flow(self._motion, self._mesh, self._points, target, moved, pose, fine=False)
         return Warp(source_from_live, flow)
+
+
+def _under_room(plan: RatioPlan, looks: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Roots (rows, columns, 3) of what the source image has under the room's light, in the frame's exposure.
+
+    With what `RatioRelighting.raised_lights` adds. `looks` (rows, columns, 2) are source pixels, as OpenCV counts.
+    """
+    picture = np.split(plan.pictures, 2)[1]
+    light = cv2.remap(picture, looks, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return root_of_light(np.asarray(cv2.multiply(light, (*map(float, plan.gain), 1.0)), np.float32))
+
+
+def _cells_within(nodes: NDArray[np.float32], low: tuple[float, ...], high: tuple[float, ...]) -> Box:
+    """The box of those cells that look between two points of the source image, with some more round them.
+
+    Of all where none does. Its sides are at multiples of `BOX_CELLS`, or what is computed for fewer cells would flicker
+    as it moves. `nodes` (rows, columns, 2) are where cells look, `low` and `high` x and y, all as OpenCV counts.
+    """
+    left, top, width, height = cv2.boundingRect(cv2.inRange(nodes, (*low, 0, 0), (*high, 0, 0)))
+    rows, columns = nodes.shape[:2]
+    if width == 0:
+        return 0, 0, columns, rows
+    right, bottom = (-(-(end + 1) // BOX_CELLS) * BOX_CELLS for end in (left + width, top + height))
+    left, top = (max(start - 1, 0) // BOX_CELLS * BOX_CELLS for start in (left, top))
+    return left, top, min(right, columns), min(bottom, rows)
 
 
 def as_large_as_needed(subject: Subject, face: SourceFace) -> tuple[Subject, SourceFace]:
@@ -258,7 +266,7 @@ def near_person(confidence: Mask, eye_distance: float) -> Mask:
     """
     blurred = cv2.GaussianBlur(confidence, (0, 0), NEAR / 1.28 * eye_distance, borderType=cv2.BORDER_REPLICATE)
     # Beside a straight outline a blur has fallen to a tenth after 1.28 sigma.
-    return np.asarray(np.clip((blurred - 0.1) / 0.3, 0, 1), np.float32)
+    return np.asarray(np.maximum(confidence, np.clip((blurred - 0.1) / 0.3, 0, 1)), np.float32)
 
 
 def still_skin(face: SourceFace) -> Mask:
@@ -271,15 +279,15 @@ def still_skin(face: SourceFace) -> Mask:
     return np.asarray(cv2.GaussianBlur(skin, (0, 0), SOFT_PX), np.float32)
 
 
-def _looked_at(confidence: Mask) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """The least and the largest x and y, as OpenCV counts, whose surroundings have confidence.
+def _limits(mask: Mask) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The least and the largest x and y, as OpenCV counts, whose surroundings are in a mask of the source image.
 
     Where that is at a border of the picture, which is repeated beyond, there is no limit.
     """
-    left, top, width, height = cv2.boundingRect((confidence > 0).astype(np.uint8))
+    left, top, width, height = cv2.boundingRect((mask > 0).astype(np.uint8))
     low, high = np.array([left, top]) - 1.0, np.array([left + width, top + height], np.float64)
     low[low < 0] = -_NO_LIMIT
-    high[high >= confidence.shape[::-1]] = _NO_LIMIT
+    high[high >= mask.shape[::-1]] = _NO_LIMIT
     return tuple(low), tuple(high)
 
 
