@@ -48,7 +48,7 @@ class LiveAlignmentTunables:
     spacing: float = 0.05
     blur: float = 1.0
     prior: float = 0.05
-    interval_s: float = 0.09
+    interval_s: float = 0.15
     time_constant_s: float = 0.25
     mean_code: float = 75.0
     dark_root: float = 0.1

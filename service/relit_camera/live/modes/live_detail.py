@@ -49,7 +49,7 @@ class LiveDetailTunables:
         visible_excess: by how much a root of the ratio exceeds 1 where half of the noise is suppressed.
         noise_fraction: of the cells whose noise could be seen, how many are taken to show nothing but noise.
         noise_margin: how many times the variance of noise counts as noise.
-        dark_noise: linear light at which a webcam's sensor has as much noise of its own as of counted photons.
+        dark_noise: root of light at which a webcam's sensor has as much noise of its own as of counted photons.
         noise_cells: so many cells must tell the noise; with fewer it is suppressed less.
     """
 
@@ -68,7 +68,7 @@ class LiveDetailTunables:
     visible_excess: float = 0.3
     noise_fraction: float = 0.05
     noise_margin: float = 5.0
-    dark_noise: float = 0.05
+    dark_noise: float = 0.29
     noise_cells: int = 200
 
 
@@ -166,14 +166,14 @@ def noise_fraction(image: DisplayImage, step: int, box: Box, factor: Cells, sour
     if count == 0:
         return np.zeros(visible.shape, np.float32)
     brightness, variance = _moments(image, step, box, max(tuning.smooth * unit, _LEAST_SIGMA))
+    # How many times the noise in the light a sensor's own noise makes it.
+    more = cv2.divide(tuning.dark_noise**2, cv2.max(cv2.multiply(brightness, brightness), _DARKEST))
+    more = cv2.add(more, 1.0)
     every = count // _NOISE_SAMPLES + 1
-
-    def calmest(values: Cells) -> np.float32:
-        return np.float32(np.quantile(values[told][::every], tuning.noise_fraction))
-
-    in_the_dark = 1 + tuning.dark_noise / np.maximum(brightness**POWER, _DARKEST)
-    noise = np.maximum(calmest(variance), in_the_dark * calmest(variance / in_the_dark))
-    noise *= np.float32(tuning.noise_margin * min(count / tuning.noise_cells, 1))
+    sampled, expected = variance[told][::every], more[told][::every]
+    even, growing = np.quantile([sampled, sampled / expected], tuning.noise_fraction, axis=1)
+    margin = tuning.noise_margin * min(count / tuning.noise_cells, 1)
+    noise = cv2.max(cv2.multiply(more, float(growing * margin)), float(even * margin))
     fraction = cv2.min(cv2.divide(noise, cv2.add(variance, 1e-9)), 1.0)
     return np.asarray(cv2.multiply(cv2.multiply(visible, source.near), fraction), np.float32)
 
@@ -228,8 +228,8 @@ _VISIBLE, _STILL = 0.3, 0.9
 """Cells tell the noise where it can be seen on the person, and not on lids, eyes or lips."""
 _NOISE_SAMPLES = 1000
 """So many of these cells are looked at."""
-_DARKEST = np.float32(0.003)
-"""Linear: the least light that counts as brightness, about ten codes."""
+_DARKEST = 0.008
+"""Square of the least root of light that counts as brightness, about ten codes."""
 _LEAST_SIGMA = 0.3
 """Of a blur, in cells; OpenCV takes 0 for something else."""
 _GRAY = np.full((1, 3), 1 / 3, np.float32)
