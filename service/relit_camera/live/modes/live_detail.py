@@ -205,6 +205,16 @@ def _cell_part(image: DisplayImage, step: int, box: Box) -> DisplayImage:
     return image[top * step : rows * step, left * step : columns * step]
 
 
+def mean_of_channels(cells: Cells) -> Cells:
+    """The mean of the three channels of cells (rows, columns, 3): (rows, columns)."""
+    return np.asarray(cv2.transform(cells, np.full((1, 3), 1 / 3, np.float32)), np.float32)
+
+
+def overexposed(brightest: Cells) -> NDArray[np.bool_]:
+    """Which cells show nothing but that they are bright, by their brightest code, 0..255."""
+    return np.asarray(brightest >= TUNABLES.clipped_code)
+
+
 def live_cells(image: DisplayImage, step: int, box: Box) -> tuple[Cells, Cells]:
     """The live picture in cells of `step` pixels: roots of its light (rows, columns, 3), its brightest code there.
 
@@ -232,7 +242,6 @@ _DARKEST = 0.008
 """Square of the least root of light that counts as brightness, about ten codes."""
 _LEAST_SIGMA = 0.3
 """Of a blur, in cells; OpenCV takes 0 for something else."""
-_GRAY = np.full((1, 3), 1 / 3, np.float32)
 _NEAR = np.float32(0.02)
 """Mean weight in the neighborhood below which nobody knows what is expected."""
 _ROBUST_ROUNDS, _REDUCTION = 2, 4
@@ -245,7 +254,7 @@ def _match(live: Cells, clipped: Cells, source: SourceCells, seen: Cells, unit: 
     Inside the face more is allowed: shadows that the room's estimate lacks fall there.
     """
     tuning = TUNABLES
-    bright, known = cv2.transform(live, _GRAY), cv2.transform(source.under_room, _GRAY)
+    bright, known = mean_of_channels(live), mean_of_channels(source.under_room)
     mean = float((known * seen).sum()) / max(float(seen.sum()), 1e-6)
     least = np.float32(max(tuning.mismatch_floor * mean, 1e-3))
     apart = cv2.log((bright + least) / (known + least)) * np.float32(POWER)

@@ -19,7 +19,14 @@ from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.live_alignment import ComparedCells, LiveAlignment
-from relit_camera.live.modes.live_detail import SourceCells, blend_cells, live_cells, noise_fraction, smoothed
+from relit_camera.live.modes.live_detail import (
+    SourceCells,
+    blend_cells,
+    live_cells,
+    noise_fraction,
+    overexposed,
+    smoothed,
+)
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.reenactment.control_points import control_points, feature_landmarks, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion
@@ -38,9 +45,8 @@ MOVING_REACH, SOFT_PX = 1.25, 1.5
 """By how much the outlines of eyes and lips are enlarged, and how soft the borders are, in source pixels."""
 EDGE_MARGIN = 0.02
 """Share of the source image's width at the matte's edge that is not trusted."""
-SURELY_THERE, OVEREXPOSED = 0.5, 252
-"""Presence below which nobody is surely followed, and brightest code from which a cell shows nothing: both say nothing
-of where the person lies."""
+SURELY_THERE = 0.5
+"""Presence up to which a frame does not tell where the person lies: the face may be lost, or not yet found."""
 NEAR = 0.6
 """Eye distances beyond the outline up to which noise is kept from being shown."""
 RATIO_CELLS = 120
@@ -153,7 +159,7 @@ class RatioRelighting:
             looks = nodes[top:bottom, left:right]
             confidence = cv2.remap(self._confidence, looks, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
             live, brightest = live_cells(plan.frame.image, step, box)
-            confidence[brightest >= OVEREXPOSED] = 0
+            confidence[overexposed(brightest)] = 0
             cells = ComparedCells(live, _under_room(plan, looks), confidence, looks, plan.eye_distance / step)
             self._alignment.update(cells, plan.frame.time_s)
         return replace(plan, positions=self._alignment.corrected(plan.positions))
@@ -178,8 +184,8 @@ class RatioRelighting:
         # Roots, because the step between two of them is about as visible anywhere.
         relit, under_room = root_of_light(relit), _under_room(plan, nodes[inside])
         live, brightest = live_cells(plan.frame.image, step, box)
-        confidence, *others = cv2.split(parts)
-        source = SourceCells(relit, under_room, confidence, *others)
+        confidence, skin, face, near = cv2.split(parts)
+        source = SourceCells(relit, under_room, confidence, skin, face, near)
         unit = plan.eye_distance / step
         smooth = smoothed(live, unit)
         cells = blend_cells(live, smooth, brightest, source, unit)
