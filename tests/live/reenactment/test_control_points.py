@@ -24,8 +24,8 @@ from relit_camera.live.reenactment.control_points import (
     skull_outline,
 )
 from relit_camera.live.reenactment.dense_motion import DenseMotion
-from relit_camera.live.reenactment.face_mesh import triangulate_face
-from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
+from relit_camera.live.reenactment.first_order_reenactor import whole_flow
+from relit_camera.live.reenactment.mesh.head_mesh import triangulate_head
 from relit_camera.live.reenactment.motion_transfer import rotate_about, transfer_motion
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.warp import Warp
@@ -111,9 +111,8 @@ def test_a_blink_shows_the_upper_lid_above_the_slit_and_the_lower_lid_below_it(
 ) -> None:
     """The eyeball between the still's open lids is nowhere to be seen."""
     moved = transfer_motion(face, points, motion(expression=lids_lowered(face)))
-    patches = face_and_head_flow(
-        DenseMotion(SessionOptions()), triangulate_face(face), points, moved.points, moved.landmarks, moved.pose
-    )
+    mesh = triangulate_head(face, head_and_shoulder_anchors(face.pose, face.size))
+    patches = whole_flow(DenseMotion(SessionOptions()), mesh, points, moved.points, moved.landmarks, moved.pose)
     still = face.landmarks.astype(float)
     # A fifth of a source pixel from place to place.
     grid = Warp(np.array([[0.2, 0, 0], [0, 0.2, 0]]), patches).grid((0, 0, 5 * face.size[0], 5 * face.size[1]), 1)

@@ -30,8 +30,8 @@ from relit_camera.live.modes.live_detail import (
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.reenactment.control_points import control_points, feature_landmarks, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion
-from relit_camera.live.reenactment.face_mesh import triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
+from relit_camera.live.reenactment.mesh.face_mesh import triangulate_face
 from relit_camera.live.reenactment.source_image import SourceFace, feather_edges, half_size_face
 from relit_camera.live.reenactment.warp import Box, PositionGrid, Warp
 from relit_camera.subject.half_size import half_size_subject
@@ -220,7 +220,7 @@ class RatioRelighting:
         target = live @ source_from_live[:, :2].T + source_from_live[:, 2]
         moved = landmarks @ source_from_live[:, :2].T + source_from_live[:, 2]
         # Lids and lips are the live picture's; the light on them is that of the skin round them.
-        flow = face_and_head_flow(self._motion, self._mesh, self._points, target, moved, pose, fine=False)
+        flow = face_and_head_flow(self._motion, self._mesh, self._points, target, moved, pose)
         return Warp(source_from_live, flow)
 
 

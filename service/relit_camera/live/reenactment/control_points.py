@@ -39,6 +39,8 @@ _SKULL_RINGS = np.vstack(
     [np.column_stack([a * np.cos(_RING_ANGLES), b * np.sin(_RING_ANGLES)]) for a, b in SKULL_RADII]
 )
 """Points of the outline (count, 2): cm to the right and up from the skull's center."""
+SKULL_ABOVE_EARS, BEYOND_HAIR, SHOULDERS = np.s_[2:11], np.s_[13:26], np.s_[34:48]
+"""Rows of `head_and_shoulder_anchors`: the skull's outline above the ears, the ring beyond the hair, the shoulders."""
 SLIT_OFFSET = 3.0
 """Distance from the slit, in radii, at which the influence of closed lids and lips is centred: one side's influence
 gives way to the other's within a third of the radius."""

@@ -20,14 +20,17 @@ from relit_camera.live.reenactment.control_points import (
     head_and_shoulder_anchors,
 )
 from relit_camera.live.reenactment.dense_motion import DenseMotion, box_around
-from relit_camera.live.reenactment.face_mesh import FaceMesh, triangulate_face
+from relit_camera.live.reenactment.mesh.eye_drawing import plan_closing_eyes
+from relit_camera.live.reenactment.mesh.face_mesh import FaceMesh, SurfacePatch
+from relit_camera.live.reenactment.mesh.head_mesh import HeadMesh, triangulate_head
 from relit_camera.live.reenactment.motion_transfer import transfer_motion, transfer_motion_in_place
 from relit_camera.live.reenactment.mouth.mouth_interior import MouthInterior
 from relit_camera.live.reenactment.reenactor import ReenactorContext, WarpedLayer, WarpTask
-from relit_camera.live.reenactment.source_image import Cutout
+from relit_camera.live.reenactment.source_image import Cutout, SourceFace
 from relit_camera.live.reenactment.stills.still_drawing import StillDrawing
 from relit_camera.live.reenactment.warp import (
     FixedBorder,
+    FlowPatch,
     Patch,
     Warp,
     inverse_affine,
@@ -55,7 +58,7 @@ class FirstOrderReenactor:
             head_and_shoulder_anchors(context.face.pose, context.face.size) if self._person.whole else np.zeros((0, 2))
         )
         self._points = control_points(context.face, anchors)
-        self._mesh = triangulate_face(context.face)
+        self._mesh = triangulate_head(context.face, anchors)
         self._motion = DenseMotion(context.session)
         self._mouth = MouthInterior(context.face, context.subject.neutral)
         with_stills = context.subject.stills and context.face.scheme.name == STILL_SCHEME
@@ -68,19 +71,17 @@ class FirstOrderReenactor:
         """See `Reenactor.plan_warp`."""
         face = self._face
         target = (transfer_motion if self._person.whole else transfer_motion_in_place)(face, self._points, motion)
-        patches = face_and_head_flow(
-            self._motion, self._mesh, self._points, target.points, target.landmarks, target.pose
-        )
-        if not self._person.whole:
-            patches = (*patches, FixedBorder(face.size))
+        landmarks = self._mesh.with_shut_lids(target.landmarks)
+        patches = whole_flow(self._motion, self._mesh, self._points, target.points, landmarks, target.pose)
+        fixed = () if self._person.whole else (FixedBorder(face.size),)
         placed = move_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
         box = visible_box(placed, face.size, self._size)
-        grid = Warp(placed, patches).grid(box, 2 * self._step if quality.half_size else self._step)
+        grid = Warp(placed, (*patches, *fixed)).grid(box, 2 * self._step if quality.half_size else self._step)
         to_box = inverse_affine(placed)
         to_box[:, 2] -= box[:2]
         size = (box[2] - box[0], box[3] - box[1])
         stills = self._stills and self._stills.plan(
-            target.landmarks,
+            landmarks,
             target.pose,
             motion.expression,
             frame.time_s,
@@ -90,10 +91,14 @@ class FirstOrderReenactor:
             quality.half_size,
         )
 
+        eyes = plan_closing_eyes(self._mesh.eyes, patches[1], landmarks, to_box, size, quality.half_size)
+
         def warp(relit: LinearImage) -> WarpedLayer:
             image = self._person.warped(relit, grid, quality.half_size)
+            for eye in eyes:
+                eye.draw(image, relit)
             if not (stills and stills.has_mouth):
-                self._mouth.draw(image, relit, target.landmarks, target.pose, to_box)
+                self._mouth.draw(image, relit, landmarks, target.pose, to_box)
             if stills:
                 stills.draw(image, relit)
             return WarpedLayer(image, box[:2])
@@ -108,9 +113,10 @@ def face_and_head_flow(
     target: NDArray[np.float64],
     landmarks: NDArray[np.float64],
     pose: HeadPose,
-    fine: bool = True,
-) -> tuple[Patch, ...]:
-    """The flow that brings the source image's control points to `target`: over the head, the face, then eyes and mouth.
+) -> tuple[Patch, Patch]:
+    """The flow that brings the source image's control points to `target`: over the head, and over the face.
+
+    Eyes and mouth do not open and close in it, for the mesh has no seams there.
 
     Args:
         motion: the graph.
@@ -119,18 +125,42 @@ def face_and_head_flow(
         target: (count, 2) where they must go, source pixels.
         landmarks: (count, 2) where all landmarks go, source pixels.
         pose: of the head that goes there.
-        fine: eyes and mouth too: they open and close, as the mesh's seams cannot.
     """
-    scheme = mesh.face.scheme
+    (head,) = _flows(motion, mesh.face, points, target, landmarks, [])
+    return head, mesh.surface(landmarks, pose)
+
+
+def whole_flow(
+    motion: DenseMotion,
+    mesh: HeadMesh,
+    points: ControlPoints,
+    target: NDArray[np.float64],
+    landmarks: NDArray[np.float64],
+    pose: HeadPose,
+) -> tuple[Patch, SurfacePatch, *tuple[Patch, ...]]:
+    """As `face_and_head_flow`, with eyes and mouth, and with the far side of a turned head hidden by the face."""
+    face = mesh.face.face
+    boxes = feature_boxes(face, landmarks)
+    head, *features = _flows(motion, face, points, target, landmarks, boxes)
+    surface = mesh.surface(landmarks, target[len(points.chosen) :], pose)
+    source = face.landmarks.astype(np.float64)
+    # Over an eye that closes its lids move, which are the mesh's.
+    shares = (*(1 - eye.closing(landmarks) for eye in mesh.eyes), 1.0)
+    parts = zip(features, feature_landmarks(face.scheme), shares, strict=True)
+    return head, surface, *(mesh.face.feature_patch(flow, source[list(part)], share) for flow, part, share in parts)
+
+
+def _flows(
+    motion: DenseMotion,
+    face: SourceFace,
+    points: ControlPoints,
+    target: NDArray[np.float64],
+    landmarks: NDArray[np.float64],
+    features: list[NDArray[np.float64]],
+) -> tuple[FlowPatch, ...]:
+    """The first-order flow over the head, then over boxes of `features`; see `face_and_head_flow`."""
     head = box_around(np.vstack([points.source, target]), HEAD_MARGIN * points.unit)
-    boxes = feature_boxes(mesh.face, landmarks) if fine else []
-    up = scheme.eye_centers(landmarks.astype(np.float32)).mean(axis=0) - landmarks[list(scheme.lips)].mean(axis=0)
+    lips = landmarks[list(face.scheme.lips)].mean(axis=0)
+    up = face.scheme.eye_centers(landmarks.astype(np.float32)).mean(axis=0) - lips
     influence = points.influence(target, up / max(float(np.linalg.norm(up)), 1e-6))
-    whole, *features = motion.flow(points.source, influence, points.radius, points.unit, head, boxes)
-    source = mesh.face.landmarks.astype(np.float64)
-    groups = feature_landmarks(scheme) if fine else ()
-    return (
-        whole,
-        mesh.surface(landmarks, pose),
-        *(mesh.feature_patch(patch, source[list(group)]) for patch, group in zip(features, groups, strict=True)),
-    )
+    return motion.flow(points.source, influence, points.radius, points.unit, head, features)

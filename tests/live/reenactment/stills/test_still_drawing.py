@@ -135,3 +135,23 @@ def test_no_region_ends_at_the_border_of_its_box() -> None:
             rim = np.concatenate([layer.cover[0], layer.cover[-1], layer.cover[:, 0], layer.cover[:, -1]])
             assert rim.max() < 0.15
             assert layer.cover.max() > 0.4
+
+
+def test_a_still_of_a_turned_head_leaves_a_shut_eye_out() -> None:
+    """It shows the eye open."""
+    subject = with_stills(still(soft_light(), expression(), rotation_from_angles(25)))
+    face = context_of(subject, SIZE).face
+    pose = rotate_about(np.zeros(3), face.pose, rotation_from_angles(22))
+
+    def cover_at_eye(shut: float) -> float:
+        moved = expression(shut=shut).astype(np.float64)
+        landmarks = project(face.head_points + moved, pose, face.size).astype(np.float64)
+        enlarged = np.array([[4.0, 0, 0], [0, 4.0, 0]])
+        size = (4 * face.size[0], 4 * face.size[1])
+        (side,) = StillDrawing(subject, face).plan(landmarks, pose, moved, 0.0, enlarged, size, 3).regions
+        cover = side.layers[0].cover  # of half the resolution, for the still is coarser
+        x, y = (4 * landmarks[list(face.scheme.left_eye.lids)].mean(axis=0) - side.box[:2]) / 2
+        return float(cover[int(y), int(x)])
+
+    assert cover_at_eye(shut=0.0) > 0.5
+    assert cover_at_eye(shut=1.0) < 0.05

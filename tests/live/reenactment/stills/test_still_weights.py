@@ -46,6 +46,15 @@ def test_shut_eyes_are_the_shut_stills_and_one_eye_may_wink(weights: StillWeight
     assert not shown["left_eye"]
 
 
+@pytest.mark.parametrize("shut", [0.0, 0.4])
+def test_a_still_of_an_open_eye_is_not_laid_over_a_shut_one(shut: float) -> None:
+    """Where no still shows shut lids the source image's own shut."""
+    only = with_stills(still(soft_light(), expression(open_cm=1.0)), still(soft_light(), expression(shut=shut)))
+    shown = settled(StillWeights(only.stills, face_of(close_up())), expression(shut=1.0))
+    assert not shown["right_eye"]
+    assert not shown["left_eye"]
+
+
 @pytest.mark.parametrize(("yaw", "region", "turned", "other"), [(25, "left_side", RIGHT, "right_side"),
                                                                (-25, "right_side", LEFT, "left_side")])  # fmt: skip
 def test_the_side_that_turns_away_is_the_turned_stills(

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.image_types import LinearImage, RgbaImage
 from relit_camera.base.images.light_multiplication import multiply_light
 from relit_camera.face.head_pose import HeadPose
-from relit_camera.live.reenactment.face_mesh import draw_triangles
+from relit_camera.live.reenactment.mesh.triangle_drawing import draw_triangles
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.stills.still_light import StillLight
 from relit_camera.live.reenactment.stills.still_regions import (
@@ -147,13 +147,20 @@ class StillDrawing:
             half_size: draw at half the picture's resolution at most, positions twice as far apart.
         """
         rotation = pose.rotation * self._face.pose.rotation.inv()
-        chosen = self._weights.update(self._weights.doing(expression, rotation), time_s)
+        doing = self._weights.doing(expression, rotation)
+        chosen = self._weights.update(doing, time_s)
         seen = landmarks @ to_picture[:, :2].T + to_picture[:, 2]
         depth = pose.rotation.as_matrix()[2]
         step = 2 * step if half_size else step
         drawn = [
             mesh.plan(
-                chosen[mesh.region.name], seen, depth, size, step * SIDE_STEPS if mesh.is_side else step, half_size
+                chosen[mesh.region.name],
+                seen,
+                depth,
+                size,
+                step * SIDE_STEPS if mesh.is_side else step,
+                half_size,
+                doing.needed[mesh.region.eye_name] if mesh.is_side else 0.0,
             )
             for mesh in self._meshes
         ]
@@ -202,6 +209,7 @@ class _RegionMesh:
         size: tuple[int, int],
         step: int,
         half_size: bool,
+        shut: float,
     ) -> _PlannedRegion | None:
         """What shows in the picture; None where nothing does.
 
@@ -212,6 +220,7 @@ class _RegionMesh:
             size: (width, height) of the picture.
             step: pixels between computed positions.
             half_size: draw at half the picture's resolution, however fine the stills are.
+            shut: how far the eye of a side is shut, 0..1: stills of a side show it open.
         """
         if not chosen:
             return None
@@ -229,11 +238,13 @@ class _RegionMesh:
         front = np.flatnonzero(facing(corners) | self.region.between)
         nearness = self.region.middles @ depth - BEHIND_CM * self.region.between
         order = front[np.argsort(nearness[front])]
-        values = [
-            places.take(order, axis=0) for places in (self._source, *(self._places[still] for still, _ in chosen))
-        ]
+        places = (self._source, *(self._places[still] for still, _ in chosen))
+        values = np.concatenate([each.take(order, axis=0) for each in places], axis=2)
+        if shut > 0:
+            eye = self.region.eye[self.region.triangles.take(order, axis=0)]
+            values[..., 4::3] *= 1 - shut * eye[..., None]  # the trust of each still
         shape = (-(-height // step) + 2, -(-width // step) + 2)
-        drawn = draw_triangles(corners.take(order, axis=0), np.concatenate(values, axis=2), shape)
+        drawn = draw_triangles(corners.take(order, axis=0), values, shape)
         box = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
         # Between a cell of the mesh and one beside it positions mean nothing.
         within = cv2.erode((drawn[0] > 0).astype(np.float32), np.ones((3, 3), np.uint8))

@@ -21,7 +21,7 @@ from relit_camera.base.images.light_multiplication import root_of_light
 from relit_camera.face.landmarks.canonical_face import canonical_face
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.live.reenactment.control_points import feature_landmarks
-from relit_camera.live.reenactment.face_mesh import draw_triangles
+from relit_camera.live.reenactment.mesh.triangle_drawing import draw_triangles
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.stills.still_regions import face_in_still, facing, shown_landmarks
 from relit_camera.subject.expression_stills import ExpressionStill

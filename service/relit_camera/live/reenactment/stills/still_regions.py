@@ -12,7 +12,7 @@ from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.landmarks.canonical_face import canonical_face
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
-from relit_camera.live.reenactment.face_mesh import doubled_areas, draw_triangles
+from relit_camera.live.reenactment.mesh.triangle_drawing import doubled_areas, draw_triangles
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.subject.expression_stills import ExpressionStill
 
@@ -45,6 +45,7 @@ class StillRegion:
         between: (count,) whether a triangle spans lids or lips: it lies behind them and may be flat, or turned over.
         middles: (count, 3) float64 head axes, cm.
         trust: (landmarks,) float64, how far a still shows there: 1 inside, 0 at the rim and beyond.
+        eye: (landmarks,) float64, how far that belongs to the eye of a side; elsewhere 0.
     """
 
     name: str
@@ -52,6 +53,12 @@ class StillRegion:
     between: NDArray[np.bool_]
     middles: NDArray[np.float64]
     trust: NDArray[np.float64]
+    eye: NDArray[np.float64]
+
+    @property
+    def eye_name(self) -> str:
+        """The region of a side's eye."""
+        return self.name.replace("side", "eye")
 
 
 def still_regions(scheme: LandmarkScheme) -> tuple[StillRegion, ...]:
@@ -76,7 +83,8 @@ def still_regions(scheme: LandmarkScheme) -> tuple[StillRegion, ...]:
             reach = canonical[:, 0] * (1 if name == "left_side" else -1) > -NOSE_CM
             used = reach[triangles].all(axis=1)
         part = triangles[used]
-        regions.append(StillRegion(name, part, between[used], canonical[part].mean(axis=1), trust))
+        eye = trusts[name.replace("side", "eye")] if name.endswith("side") else np.zeros(len(canonical))
+        regions.append(StillRegion(name, part, between[used], canonical[part].mean(axis=1), trust, eye))
     return tuple(regions)
 
 

@@ -34,6 +34,8 @@ PARTED_UNITS = 3.0
 """By how many units a mouth with parted lips differs from one with shut lips, beside all else: it has an inside."""
 CLOSING_LID = (0.4, 0.7)
 """The same for an eye, by how far it is shut."""
+SHUT_LID = 0.55
+"""How far an eye must be shut in a still that shows shut lids."""
 TURNED_DEG = (9.0, 18.0)
 """The same for a side that turns away, by the yaw."""
 SMOOTHING_S = {"mouth": 0.05, "right_eye": 0.025, "left_eye": 0.025, "right_side": 0.12, "left_side": 0.12}
@@ -81,7 +83,14 @@ class StillWeights:
         self._features = {
             region: np.stack([still.features[region] for still in self._stills]) for region in SMOOTHING_S
         }
-        self._yaws = np.array([_angles(still.rotation)[0] for still in stills])
+        yaws = np.array([_yaw(still.rotation) for still in stills])
+        self._usable = {
+            "mouth": np.ones(len(stills), np.bool_),
+            "right_eye": self._features["right_eye"][:, 0] * CLOSURE > SHUT_LID,
+            "left_eye": self._features["left_eye"][:, 0] * CLOSURE > SHUT_LID,
+            "right_side": -yaws > TURNED_DEG[0],
+            "left_side": yaws > TURNED_DEG[0],
+        }
         self._followed: dict[str, NDArray[np.float64]] = {}
         self._time_s: float | None = None
 
@@ -138,9 +147,7 @@ class StillWeights:
     def _wanted(self, region: str, doing: Doing) -> NDArray[np.float64]:
         """The weight (stills,) of each still where time plays no role."""
         total = self._total(region, doing)
-        usable = np.ones(len(self._stills), bool)
-        if region.endswith("side"):
-            usable = self._yaws * (-1 if region == "right_side" else 1) > TURNED_DEG[0]
+        usable = self._usable[region]
         if total <= 0 or not usable.any():
             return np.zeros(len(usable))
         offset = (self._features[region] - doing.features[region]) * doing.certain.get(region, 1.0)
@@ -190,6 +197,6 @@ def _drawn(weights: NDArray[np.float64]) -> list[tuple[int, float]]:
     return [(int(index), float(shown[index])) for index in np.argsort(-shown) if shown[index] > 0]
 
 
-def _angles(rotation: NDArray[np.float32]) -> tuple[float, float]:
-    yaw, pitch, _ = angles_from_rotation(Rotation.from_rotvec(rotation.astype(np.float64)))
-    return yaw, pitch
+def _yaw(rotation: NDArray[np.float32]) -> float:
+    """The yaw, in degrees, of a rotation vector (3,)."""
+    return angles_from_rotation(Rotation.from_rotvec(rotation.astype(np.float64))).yaw

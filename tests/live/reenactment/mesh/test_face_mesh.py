@@ -13,8 +13,9 @@ from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.base.rotations import Rotation, rotation_from_angles
 from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion, box_around
-from relit_camera.live.reenactment.face_mesh import draw_triangles, triangulate_face
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
+from relit_camera.live.reenactment.mesh.face_mesh import triangulate_face
+from relit_camera.live.reenactment.mesh.triangle_drawing import draw_triangles
 from relit_camera.live.reenactment.motion_transfer import transfer_motion
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.warp import Warp
@@ -35,7 +36,7 @@ def warps_of(face: SourceFace, turn: Rotation):
     target = transfer_motion(face, points, motion(turn))
     motion_graph = DenseMotion(SessionOptions())
     head, mesh = face_and_head_flow(
-        motion_graph, triangulate_face(face), points, target.points, target.landmarks, target.pose, fine=False
+        motion_graph, triangulate_face(face), points, target.points, target.landmarks, target.pose
     )
     return target, Warp(np.eye(2, 3), (head,)), Warp(np.eye(2, 3), (head, mesh))
 

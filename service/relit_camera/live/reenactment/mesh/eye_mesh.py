@@ -1,0 +1,114 @@
+"""Eyes in the face's mesh: lids that meet when an eye shuts, and the eyeball behind them, which lids hide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.easing import smoothstep
+from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks
+from relit_camera.live.reenactment.source_image import SourceFace
+
+SHUT, AS_SEEN = 0.35, 0.65
+"""Opening of an eye beside that in the source image: up to where it is shut, and from where on it is as open as the
+landmarks say. Trackers leave a gap between shut lids."""
+LOWER_LID_SHARE = 0.15
+"""By how much of what is closed so the lower lid rises; the upper one falls by the rest."""
+CLOSING = (0.9, 0.65)
+"""Opening from where on the lids begin to hide the eyeball, and from where on only they move: see `EyeMesh.closing`."""
+
+
+@dataclass(frozen=True)
+class EyeMesh:
+    """One eye of a source image.
+
+    Attributes:
+        source: (landmarks, 2) float64 source pixels: all landmarks of the face.
+        lids: (count,) the closed outline of the opening, as `EyeLandmarks.lids`.
+        upper, lower: (pairs,) points of the lids that lie over each other, from the outer to the inner corner.
+        corners: (2,) the outer and the inner corner.
+        gap: mean distance of the lids in the source image, pixels.
+    """
+
+    source: NDArray[np.float64]
+    lids: NDArray[np.intp]
+    upper: NDArray[np.intp]
+    lower: NDArray[np.intp]
+    corners: NDArray[np.intp]
+    gap: float
+
+    def opening(self, landmarks: NDArray[np.float64]) -> float:
+        """How open the eye is among moved landmarks (count, 2): 1 as in the source image, 0 shut, below 0 crossed."""
+        return float(_gaps(landmarks, self.upper, self.lower, self.corners).mean()) / self.gap
+
+    def closing(self, landmarks: NDArray[np.float64]) -> float:
+        """How far lids that move over the eyeball take the place of a flow that moves both and the skin round them."""
+        return float(smoothstep(self.opening(landmarks), *CLOSING))
+
+    def shut(self, landmarks: NDArray[np.float64]) -> None:
+        """Let lids meet that nearly do, and those that have crossed; `landmarks` (count, 2) are changed in place."""
+        gaps = _gaps(landmarks, self.upper, self.lower, self.corners)
+        kept = float(np.clip((gaps.mean() / self.gap - SHUT) / (AS_SEEN - SHUT), 0, 1))
+        closed = (gaps - kept * np.maximum(gaps, 0))[:, None] * _axes(landmarks[self.corners])[:, 1]
+        landmarks[self.upper] += (1 - LOWER_LID_SHARE) * closed
+        landmarks[self.lower] -= LOWER_LID_SHARE * closed
+
+    def eyeball(self, landmarks: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """What is seen between moved lids, as a fan of triangles.
+
+        The eyeball lies between the corners of the eye as it does in the source image. Where the opening is larger than
+        there, it is stretched.
+
+        Args:
+            landmarks: (count, 2) where all landmarks go, source pixels.
+
+        Returns:
+            Of the triangles, (lids, 3, 2) each: where their corners go, and where these look in the source image.
+        """
+        moved = _along_axes(landmarks[self.lids], landmarks[self.corners])
+        upper, lower = (
+            _along_axes(self.source[[self.corners[0], *lid, self.corners[1]]], self.source[self.corners])
+            for lid in (self.upper, self.lower)
+        )
+        across = np.clip(moved[:, 0], upper[0, 0], upper[-1, 0])
+        top, bottom = (np.interp(across, lid[:, 0], lid[:, 1]) for lid in (upper, lower))
+        seen = np.column_stack([across, np.clip(moved[:, 1], top, np.maximum(top, bottom))])
+        looks = self.source[self.corners].mean(axis=0) + seen @ _axes(self.source[self.corners]).T
+        return _fan(landmarks[self.lids]), _fan(looks)
+
+
+def eye_mesh(face: SourceFace, eye: EyeLandmarks) -> EyeMesh:
+    """An eye of a source image's face."""
+    source = face.landmarks.astype(np.float64)
+    inner = eye.lids.index(eye.inner)
+    upper, lower, corners = (
+        np.array(part) for part in (eye.lids[1:inner], eye.lids[:inner:-1], (eye.outer, eye.inner))
+    )
+    gap = max(float(_gaps(source, upper, lower, corners).mean()), 1e-6)
+    return EyeMesh(source, np.array(eye.lids), upper, lower, corners, gap)
+
+
+def _axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Columns (2, 2): from the outer to the inner corner of an eye, and a unit vector down the face."""
+    across = corners[1] - corners[0]
+    down = np.array([-across[1], across[0]]) / max(float(np.hypot(*across)), 1e-6)
+    return np.column_stack([across, down if down[1] > 0 else -down])
+
+
+def _along_axes(points: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (count, 2) in the axes of an eye, from the middle between its corners."""
+    return np.asarray((points - corners.mean(axis=0)) @ np.linalg.pinv(_axes(corners)).T)
+
+
+def _gaps(
+    landmarks: NDArray[np.float64], upper: NDArray[np.intp], lower: NDArray[np.intp], corners: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """Distance (pairs,) of the lids, down the face, pixels; below 0 where they have crossed."""
+    return np.asarray((landmarks[lower] - landmarks[upper]) @ _axes(landmarks[corners])[:, 1])
+
+
+def _fan(outline: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Triangles (count, 3, 2) from the mean of an outline (count, 2) to its sides."""
+    return np.stack([np.broadcast_to(outline.mean(axis=0), outline.shape), outline, np.roll(outline, -1, axis=0)], 1)

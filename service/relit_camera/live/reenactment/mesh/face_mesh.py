@@ -1,0 +1,189 @@
+"""Flow over the face from a mesh of its landmarks, the nearest surface in front: a turned nose hides its far side.
+
+The first-order mixture knows no surface: where one part of the face moves behind another it averages the two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.easing import smoothstep
+from relit_camera.face.head_pose import HeadPose
+from relit_camera.face.landmarks.landmark_triangulation import delaunay_triangles, outline_edges
+from relit_camera.live.reenactment.dense_motion import box_around
+from relit_camera.live.reenactment.mesh.triangle_drawing import doubled_areas, draw_triangles
+from relit_camera.live.reenactment.source_image import SourceFace
+from relit_camera.live.reenactment.warp import FlowPatch, Nodes, inverse_affine, patch_cover
+
+MARGIN = 0.1
+"""Eye distances round the face that the mesh's patch takes in: it fades out there and a little inside."""
+OUTLINE_BLEND = 0.2
+"""Eye distances inside the face's outline, over which the mesh's flow gives way to the flow around the face."""
+FEATURE_REACH = 0.03
+"""Eye distances round lids and lips: their own flow fades out between this and twice this distance. Where it reaches
+further the rims of glasses waver, and the far cheek is dented below the eye."""
+JUMP_CELLS = 8.0
+"""Where neighboring cells look so many cells apart, an edge of the mesh lies between them."""
+
+
+@dataclass(frozen=True)
+class FaceMesh:
+    """The landmarks of a source image's face, triangulated.
+
+    Attributes:
+        face: that face.
+        members: (points,) the landmarks that are corners: all but the irises, which roll behind the lids.
+        triangles: (count, 3) rows of `members`.
+        clockwise: (count,) the sign of each triangle's area in the source image.
+        middles: (count, 3) float64 head axes, cm: the middle of each triangle on the canonical face.
+        outline: (sides, 2) rows of `members`: the sides of its outline.
+        trust: (points,) float64 how far the mesh counts beside the flow round it: 0 at the outline, rising to 1 inside.
+        values: (count, 3, 3) float64, of each triangle's corners: x and y in the source image, and the trust.
+        span: the eye distance in source pixels.
+    """
+
+    face: SourceFace
+    members: NDArray[np.intp]
+    triangles: NDArray[np.intp]
+    clockwise: NDArray[np.float64]
+    middles: NDArray[np.float64]
+    outline: NDArray[np.intp]
+    trust: NDArray[np.float64]
+    values: NDArray[np.float64]
+    span: float
+
+    def nearest_last(self, corners: NDArray[np.float64], pose: HeadPose) -> NDArray[np.intp]:
+        """The triangles that face the camera, from the farthest to the nearest.
+
+        Args:
+            corners: (triangles, 3, 2) where the corners of all triangles go.
+            pose: of the head that goes there.
+        """
+        facing = np.flatnonzero(doubled_areas(corners) * self.clockwise > 0)
+        nearness = self.middles @ pose.rotation.as_matrix()[2]
+        return np.asarray(facing[np.argsort(nearness[facing])])
+
+    def surface(self, landmarks: NDArray[np.float64], pose: HeadPose) -> SurfacePatch:
+        """The mesh, moved.
+
+        Args:
+            landmarks: (count, 2) where all landmarks go, source pixels.
+            pose: of the head that goes there: it says which of two parts is nearer.
+        """
+        target = landmarks[self.members]
+        corners = target.take(self.triangles, axis=0)
+        order = self.nearest_last(corners, pose)
+        return SurfacePatch(
+            corners.take(order, axis=0), self.values.take(order, axis=0), box_around(target, MARGIN * self.span)
+        )
+
+    def feature_patch(self, flow: FlowPatch, feature: NDArray[np.float64], share: float = 1.0) -> FeaturePatch:
+        """The flow of an eye or the mouth, whose landmarks in the source image are `feature` (count, 2).
+
+        It counts by a `share` beside the mesh.
+        """
+        return FeaturePatch(flow, box_around(feature, 0.0), FEATURE_REACH * self.span, share)
+
+
+@dataclass(frozen=True)
+class SurfacePatch:
+    """The moved mesh: of surfaces behind each other the nearest shows.
+
+    Attributes:
+        corners: (triangles, 3, 2) float64 source pixels where the corners go, from the farthest to the nearest.
+        values: (triangles, 3, 3) float64 as in `FaceMesh`, of the corners.
+        box: (4,) float64 round them all, toward whose sides the patch fades out.
+    """
+
+    corners: NDArray[np.float64]
+    values: NDArray[np.float64]
+    box: NDArray[np.float64]
+
+    def write(self, nodes: Nodes) -> None:
+        """See `Patch.write`."""
+        part = nodes.within(self.box)
+        if part is None:
+            return
+        inverse = inverse_affine(part.source_from_node)
+        corners = self.corners @ inverse[:, :2].T + inverse[:, 2]
+        drawn = draw_triangles(corners, self.values, part.positions.shape[1:])
+        x, y, trust = _softened(drawn, JUMP_CELLS * abs(float(part.source_from_node[0, 0])))
+        part.blend(x, y, trust * patch_cover(part, self.box))
+
+
+@dataclass(frozen=True)
+class FeaturePatch:
+    """The flow of an eye or the mouth, but where the mesh shows something else there: a nose before the far eye.
+
+    Attributes:
+        flow: its fine flow.
+        feature: (4,) float64 box of it in the source image.
+        reach: source pixels beside that box, from which on and up to twice of which its flow gives way.
+        share: by which it counts.
+    """
+
+    flow: FlowPatch
+    feature: NDArray[np.float64]
+    reach: float
+    share: float
+
+    def write(self, nodes: Nodes) -> None:
+        """See `Patch.write`."""
+        part = nodes.within(self.flow.box) if self.share > 0 else None
+        if part is None:
+            return
+        left, top, right, bottom = self.feature.astype(np.float32)
+        x, y = part.positions
+        beside = np.maximum(np.maximum(left - x, x - right), np.maximum(top - y, y - bottom))
+        shown = np.clip(2 - beside / np.float32(self.reach), 0, 1) * np.float32(self.share)
+        part.blend(*self.flow.positions(part), shown * patch_cover(part, self.flow.box))
+
+
+def _softened(drawn: NDArray[np.float32], jump: float) -> NDArray[np.float32]:
+    """What a mesh draws (x, y, trust; rows, columns), averaged over 3 × 3 cells where x or y differs by a `jump`.
+
+    Else an edge between near and far, which runs between cells, would be a staircase.
+    """
+    kernel = np.ones((3, 3), np.uint8)
+    known = cv2.erode(((drawn[0] != 0) | (drawn[1] != 0)).astype(np.uint8), kernel, borderValue=0)
+    edge = np.zeros(known.shape, np.bool_)
+    for places in drawn[:2]:
+        edge |= cv2.dilate(places, kernel) - cv2.erode(places, kernel) > jump
+    edge &= known > 0
+    for channel in drawn:
+        np.copyto(channel, cv2.blur(channel, (3, 3)), where=edge)
+    return drawn
+
+
+def triangulate_face(face: SourceFace) -> FaceMesh:
+    """The mesh of a source image's face."""
+    irises = {*face.scheme.right_eye.iris, *face.scheme.left_eye.iris}
+    members = np.array([index for index in range(face.scheme.count) if index not in irises], dtype=np.intp)
+    corners = face.landmarks[members].astype(np.float64)
+    triangles = delaunay_triangles(face.landmarks[members])
+    outline = outline_edges(triangles)
+    span = face.scheme.eye_span(face.landmarks)
+    trust = smoothstep(distance_from_sides(corners, corners[outline]), 0, OUTLINE_BLEND * span)
+    return FaceMesh(
+        face=face,
+        members=members,
+        triangles=triangles,
+        clockwise=np.sign(doubled_areas(corners[triangles])),
+        middles=face.scheme.canonical[members][triangles].mean(axis=1),
+        outline=outline,
+        trust=trust,
+        values=np.column_stack([corners, trust])[triangles],
+        span=span,
+    )
+
+
+def distance_from_sides(points: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of points (count, 2) from the nearest of line segments (some, 2, 2): (count,)."""
+    start, along = sides[:, 0], sides[:, 1] - sides[:, 0]
+    offset = points[:, None] - start
+    share = np.clip((offset * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
+    return np.asarray(np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1))

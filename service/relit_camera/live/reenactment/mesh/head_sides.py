@@ -1,0 +1,115 @@
+"""What lies beside the face in the source image, as a mesh round it: ears, hair and neck.
+
+The face hides the ear and the hair at the far side of a turned head. A smooth flow cannot hide anything: it presses
+both together beside the far cheek, which they widen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.easing import smoothstep
+from relit_camera.base.rotations import Rotation, angles_from_rotation
+from relit_camera.face.head_pose import HeadPose, project
+from relit_camera.face.landmarks.landmark_triangulation import delaunay_triangles
+from relit_camera.live.reenactment.control_points import BEYOND_HAIR, SHOULDERS, SKULL_ABOVE_EARS
+from relit_camera.live.reenactment.mesh.triangle_drawing import doubled_areas
+from relit_camera.live.reenactment.source_image import SourceFace
+
+EAR_BESIDE_CM, EAR_BEHIND_CM = 2.0, 4.0
+"""From the face's outline to the outer edge of the ear."""
+CHEEK_SHARE = 0.6
+"""From the middle of the face, in halves of its width, to where its outline no longer is that of chin or forehead."""
+ANCHOR_DEPTH_CM = -8.0
+"""Z of the anchors, head axes: behind the ears."""
+RIM = 1.35
+"""Size of the mesh's rim beside the ring beyond the hair: wide hair goes beyond that."""
+TURNED_DEG = (6.0, 16.0)
+"""Yaw from which on the mesh counts at the side that turns away, and from where on fully."""
+
+
+@dataclass(frozen=True)
+class HeadSides:
+    """The mesh round a source image's face.
+
+    Its points are the landmarks that are corners of the face's mesh, then ears, then what `_around` makes of anchors.
+
+    Attributes:
+        ears: (count, 3) float64 head axes, cm: the outer edges of both ears, and what lies above and below them.
+        triangles: (some, 3) rows of its points, the farthest first, none of them all in the face.
+        clockwise: (some,) the sign of each triangle's area in the source image.
+        places: (some, 3, 2) float64 source pixels of each triangle's corners.
+        side: (points,) float64, −1 in the left half of the picture, 1 in the right.
+        trust: (points,) float64 how far the mesh counts at points beside the face once their side has turned away: 0 at
+            its rim and the shoulders, else 1.
+    """
+
+    ears: NDArray[np.float64]
+    triangles: NDArray[np.intp]
+    clockwise: NDArray[np.float64]
+    places: NDArray[np.float64]
+    side: NDArray[np.float64]
+    trust: NDArray[np.float64]
+
+    def turned_away(self, turn: Rotation) -> NDArray[np.float64]:
+        """How far each point (points,) has turned away with its side of the head, 0..1.
+
+        Args:
+            turn: of the head since the source image. A nod hides no side.
+        """
+        return np.asarray(smoothstep(self.side * angles_from_rotation(turn).yaw, *TURNED_DEG))
+
+    def corners(
+        self, landmarks: NDArray[np.float64], anchors: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]
+    ) -> NDArray[np.float64]:
+        """Where the corners of the triangles go: (some, 3, 2) source pixels.
+
+        Args:
+            landmarks: (landmarks, 2) where those go that are its points.
+            anchors: (count, 2) where all anchors of head and shoulders go.
+            pose: of the head that goes there.
+            size: (width, height) of the source image.
+        """
+        ears = project(self.ears, pose, size)
+        return np.vstack([landmarks, ears, _around(anchors)]).take(self.triangles, axis=0)
+
+
+def triangulate_sides(face: SourceFace, members: NDArray[np.intp], anchors: NDArray[np.float64]) -> HeadSides:
+    """The mesh round a source image's face.
+
+    Args:
+        face: that face.
+        members: (landmarks,) those that are corners of its mesh.
+        anchors: (count, 2) `head_and_shoulder_anchors` of the source image.
+    """
+    outline = face.head_points[list(face.scheme.oval)]
+    cheeks = outline[np.abs(outline[:, 0]) > CHEEK_SHARE * np.abs(outline[:, 0]).max()]
+    ears = cheeks + np.sign(cheeks[:, :1]) * [EAR_BESIDE_CM, 0, 0] - [0, 0, EAR_BEHIND_CM]
+    landmarks = face.landmarks[members].astype(np.float64)
+    around = _around(anchors)
+    points = np.vstack([landmarks, project(ears, face.pose, face.size), around])
+    triangles = delaunay_triangles(points.astype(np.float32))
+    triangles = triangles[(triangles >= len(members)).any(axis=1)]
+    depth = np.concatenate([face.scheme.canonical[members, 2], ears[:, 2], np.full(len(around), ANCHOR_DEPTH_CM)])
+    places = points[triangles]
+    fixed = len(anchors[BEYOND_HAIR]) + len(anchors[SHOULDERS])  # the rim is a ring too
+    # The farthest first: what lies behind is drawn first.
+    order = np.argsort(depth[triangles].mean(axis=1))
+    return HeadSides(
+        ears=ears,
+        triangles=triangles[order],
+        clockwise=np.sign(doubled_areas(places[order])),
+        places=places[order],
+        side=np.where(points[:, 0] < landmarks[:, 0].mean(), -1.0, 1.0),
+        trust=np.repeat([0.0, 1.0, 0.0], [len(members), len(points) - len(members) - fixed, fixed]),
+    )
+
+
+def _around(anchors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (count, 2) of hair, rim and shoulders from all anchors of head and shoulders."""
+    ring = anchors[BEYOND_HAIR]
+    middle = (ring[0] + ring[-1]) / 2
+    return np.vstack([anchors[SKULL_ABOVE_EARS], ring, middle + RIM * (ring - middle), anchors[SHOULDERS]])

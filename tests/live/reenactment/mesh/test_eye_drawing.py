@@ -1,0 +1,86 @@
+"""Closing eyes in the moved picture: nothing of the eyeball is left to see."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from relit_camera.base.images.image_types import LinearImage
+from relit_camera.base.rotations import rotation_from_angles
+from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
+from relit_camera.live.render_quality import FULL_QUALITY, RenderQuality
+from relit_camera.subject.subject import Subject
+from tests.generated_subject import generated_subject
+from tests.live.people import SCHEME, context_of, face_of, live_frame, motion
+
+SIZE = (432, 576)
+BLUE, SKIN = (0.0, 0.0, 0.6), (0.3, 0.2, 0.15)
+
+
+@cache
+def large_person() -> Subject:
+    """An eye of a small one is three pixels high."""
+    return generated_subject(216, 288)
+
+
+def picture_with_blue_eyes() -> LinearImage:
+    """The source image: skin, and eyes that are blue between the lids."""
+    picture = np.full((*large_person().matte.shape, 3), SKIN, np.float32)
+    for eye in (SCHEME.right_eye, SCHEME.left_eye):
+        lids = face_of(large_person()).landmarks[list(eye.lids)]
+        inside = lids.mean(axis=0) + 0.85 * (lids - lids.mean(axis=0))  # the lids' own rims are skin
+        cv2.fillPoly(picture, [np.round(inside * 16 - 8).astype(np.int32)], BLUE, lineType=cv2.LINE_8, shift=4)
+    return picture
+
+
+def lids_lowered(share: float) -> NDArray[np.float64]:
+    """Centimetres since neutral: each upper lid lowered by a share of the way to the lower one."""
+    moved, points = np.zeros((SCHEME.count, 3)), face_of(large_person()).head_points
+    for eye in (SCHEME.right_eye, SCHEME.left_eye):
+        inner = eye.lids.index(eye.inner)
+        upper, lower = list(eye.lids[1:inner]), list(eye.lids[:inner:-1])
+        moved[upper, :2] = share * (points[lower] - points[upper])[:, :2]
+    return moved
+
+
+def blueness(shut: float, yaw: float = 0.0, quality: RenderQuality = FULL_QUALITY) -> float:
+    """How much more blue than red all pixels of the moved picture have together."""
+    reenactor = FirstOrderReenactor(context_of(large_person(), SIZE))
+    driver = motion(rotation_from_angles(yaw), expression=lids_lowered(shut))
+    image = reenactor.plan_warp(driver, live_frame(), quality)(picture_with_blue_eyes()).image.astype(float)
+    return float(np.maximum(image[..., 2] - image[..., 0], 0)[image[..., 3] > 200].sum())
+
+
+@pytest.mark.parametrize("yaw", [0, 20, -20])
+@pytest.mark.parametrize("half_size", [False, True])
+def test_a_shut_eye_shows_no_eyeball(yaw: float, half_size: bool) -> None:
+    """Trackers see shut eyes an eighth open."""
+    quality = RenderQuality(half_size=half_size)
+    opened, shut, nearly = (blueness(share, yaw, quality) for share in (0.0, 1.0, 0.85))
+    assert opened > 10_000
+    assert shut < 0.06 * opened
+    assert nearly < 0.06 * opened
+
+
+def test_the_more_a_lid_falls_the_less_is_seen() -> None:
+    seen = [blueness(share) for share in np.linspace(0, 0.7, 8)]
+    assert (np.diff(seen) < 0.02 * seen[0]).all()
+    assert seen[3] < 0.85 * seen[0]  # with the lid lowered by 0.3
+    assert seen[5] < 0.4 * seen[0]  # by 0.5
+
+
+def test_what_lies_beside_the_eyes_stays() -> None:
+    """Alpha is the moved picture's, and of skin of one color nothing changes."""
+    subject = large_person()
+    skin = np.full((*subject.matte.shape, 3), SKIN, np.float32)
+    reenactor = FirstOrderReenactor(context_of(subject, SIZE))
+    opened, shut = (
+        reenactor.plan_warp(motion(expression=lids_lowered(share)), live_frame(), FULL_QUALITY)(skin).image.astype(int)
+        for share in (0.0, 1.0)
+    )
+    assert np.abs(opened[..., 3] - shut[..., 3]).max() <= 5  # of 255
+    assert np.abs(opened - shut)[opened[..., 3] > 200][:, :3].max() <= 2
