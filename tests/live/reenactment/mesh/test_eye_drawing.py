@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import cv2
@@ -12,26 +13,35 @@ from numpy.typing import NDArray
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
+from relit_camera.live.reenactment.reenactor import ReenactorContext
 from relit_camera.live.render_quality import FULL_QUALITY, RenderQuality
-from relit_camera.subject.subject import Subject
-from tests.generated_subject import generated_subject
-from tests.live.people import SCHEME, context_of, face_of, live_frame, motion
+from tests.live.people import SCHEME, close_up, context_of, live_frame, motion
 
-SIZE = (432, 576)
+SIZE, SCALE = (432, 576), 3
 BLUE, SKIN = (0.0, 0.0, 0.6), (0.3, 0.2, 0.15)
 
 
 @cache
-def large_person() -> Subject:
-    """An eye of a small one is three pixels high."""
-    return generated_subject(216, 288)
+def enlarged() -> ReenactorContext:
+    """The small person, whose eyes are three pixels high, three times as large."""
+    context = context_of(close_up(), SIZE)
+    subject, face = context.subject, context.face
+    matte, neutral = (cv2.resize(each, None, fx=SCALE, fy=SCALE) for each in (subject.matte, subject.neutral))
+    size = (SCALE * face.size[0], SCALE * face.size[1])
+    pose = replace(face.pose, focal_px=SCALE * face.pose.focal_px)
+    large = replace(face, landmarks=face.landmarks * np.float32(SCALE), pose=pose, size=size)
+    metadata = subject.metadata.model_copy(update={"width": size[0], "height": size[1]})
+    subject = replace(
+        subject, metadata=metadata, matte=matte, neutral=neutral, normals=None, albedo=None, depth=None, horizons=None
+    )
+    return replace(context, subject=subject, face=large)
 
 
 def picture_with_blue_eyes() -> LinearImage:
     """The source image: skin, and eyes that are blue between the lids."""
-    picture = np.full((*large_person().matte.shape, 3), SKIN, np.float32)
+    picture = np.full((*enlarged().subject.matte.shape, 3), SKIN, np.float32)
     for eye in (SCHEME.right_eye, SCHEME.left_eye):
-        lids = face_of(large_person()).landmarks[list(eye.lids)]
+        lids = enlarged().face.landmarks[list(eye.lids)]
         inside = lids.mean(axis=0) + 0.85 * (lids - lids.mean(axis=0))  # the lids' own rims are skin
         cv2.fillPoly(picture, [np.round(inside * 16 - 8).astype(np.int32)], BLUE, lineType=cv2.LINE_8, shift=4)
     return picture
@@ -39,7 +49,7 @@ def picture_with_blue_eyes() -> LinearImage:
 
 def lids_lowered(share: float) -> NDArray[np.float64]:
     """Centimetres since neutral: each upper lid lowered by a share of the way to the lower one."""
-    moved, points = np.zeros((SCHEME.count, 3)), face_of(large_person()).head_points
+    moved, points = np.zeros((SCHEME.count, 3)), enlarged().face.head_points
     for eye in (SCHEME.right_eye, SCHEME.left_eye):
         inner = eye.lids.index(eye.inner)
         upper, lower = list(eye.lids[1:inner]), list(eye.lids[:inner:-1])
@@ -49,7 +59,7 @@ def lids_lowered(share: float) -> NDArray[np.float64]:
 
 def blueness(shut: float, yaw: float = 0.0, quality: RenderQuality = FULL_QUALITY) -> float:
     """How much more blue than red all pixels of the moved picture have together."""
-    reenactor = FirstOrderReenactor(context_of(large_person(), SIZE))
+    reenactor = FirstOrderReenactor(enlarged())
     driver = motion(rotation_from_angles(yaw), expression=lids_lowered(shut))
     image = reenactor.plan_warp(driver, live_frame(), quality)(picture_with_blue_eyes()).image.astype(float)
     return float(np.maximum(image[..., 2] - image[..., 0], 0)[image[..., 3] > 200].sum())
@@ -75,9 +85,8 @@ def test_the_more_a_lid_falls_the_less_is_seen() -> None:
 
 def test_what_lies_beside_the_eyes_stays() -> None:
     """Alpha is the moved picture's, and of skin of one color nothing changes."""
-    subject = large_person()
-    skin = np.full((*subject.matte.shape, 3), SKIN, np.float32)
-    reenactor = FirstOrderReenactor(context_of(subject, SIZE))
+    skin = np.full((*enlarged().subject.matte.shape, 3), SKIN, np.float32)
+    reenactor = FirstOrderReenactor(enlarged())
     opened, shut = (
         reenactor.plan_warp(motion(expression=lids_lowered(share)), live_frame(), FULL_QUALITY)(skin).image.astype(int)
         for share in (0.0, 1.0)
