@@ -1,8 +1,10 @@
-"""Measures mode reenact with a subject's expression stills and without, against the same performance rendered in that
-light: `python -m tests.still_accuracy SUBJECT DRIVER TRUTH --environment NAME [--sheet FILE.png]`.
+"""Measures mode reenact with a subject's expression stills and without, and mode ratio beside it, against the same
+performance rendered in that light: `python -m tests.still_accuracy SUBJECT DRIVER TRUTH --environment NAME [--sheet
+FILE.png]`.
 
-DRIVER is the clip that drives, TRUTH a clip of the same frames in the light of the environment. The reenacted head is
-placed by relative motion, so each region is aligned by its landmarks before it is compared. One gain a frame.
+DRIVER is the clip that drives, TRUTH a clip of the same frames in the light of the environment, with `matte.mp4` beside
+it. The reenacted head is placed by relative motion, so each region is aligned by its landmarks before it is compared,
+where the truth shows the person. One gain a frame.
 """
 
 from __future__ import annotations
@@ -41,6 +43,11 @@ RIMS = {"open mouth": 0.1, "shut eyes": 0.3, "far half": -0.06, "face": -0.06}
 face's outline, that does not count: outlines that differ by a pixel would be all of the error."""
 SIDE_PX = 200
 """Width of a face in which regions are compared."""
+PERSON = 200
+"""Code of the truth's matte, of 255, from which a pixel counts: behind the far cheek a turned face's regions take in
+some of the background, which in TRUTH is the environment."""
+WAYS = ("plain", "stills", "ratio")
+"""Mode reenact without stills and with them, and mode ratio."""
 
 
 @dataclass(frozen=True)
@@ -67,13 +74,13 @@ def track(pictures: list[DisplayImage]) -> list[FaceState]:
     return states
 
 
-def reenacted(subject: Path, clip: Path, environment: str) -> list[DisplayImage]:
-    """The clip in mode reenact, no background."""
+def relit(subject: Path, clip: Path, environment: str, mode: Mode) -> list[DisplayImage]:
+    """The clip in a mode, no background."""
     settings = RelitSettings().model_copy(update={"tracker": TrackerSettings(name="mesh")})
     controller = SceneController(settings.storage)
     controller.load_configured_subject(str(subject))
     lighting = parse_lighting(controller.register_temporary_environment(environment), "0,0,0", 0.0)
-    controller.set_look(Look(lighting=lighting, background=parse_background("none"), mode=Mode.REENACT))
+    controller.set_look(Look(lighting=lighting, background=parse_background("none"), mode=mode))
     tracker = make_tracker(settings)
     pictures = []
     with VideoReader(clip) as frames:
@@ -110,13 +117,15 @@ def crop(
     )
 
 
-def compare(truth: Run, today: Run, stills: Run) -> tuple[dict[tuple[str, str], list[float]], list[NDArray[np.uint8]]]:
-    """PSNR in dB by region and way, a value a frame; and rows of a contact sheet: truth, today, with stills."""
+def compare(
+    truth: Run, mattes: list[DisplayImage], runs: dict[str, Run]
+) -> tuple[dict[tuple[str, str], list[float]], list[NDArray[np.uint8]]]:
+    """PSNR in dB by region and way, a value a frame; and rows of a contact sheet: the truth, then each way."""
     scheme = landmark_scheme(truth.states[0].scheme)
     found: dict[tuple[str, str], list[float]] = {}
     rows = []
     for index, state in enumerate(truth.states):
-        if not (state.visible and today.states[index].visible and stills.states[index].visible):
+        if not (state.visible and all(run.states[index].visible for run in runs.values())):
             continue
         scale = SIDE_PX / float(np.ptp(state.landmarks[:, 0]))
         for name, members in regions(state, scheme).items():
@@ -125,15 +134,17 @@ def compare(truth: Run, today: Run, stills: Run) -> tuple[dict[tuple[str, str], 
             low = place.min(axis=0) - margin
             width, height = (int(side) for side in np.ceil(place.max(axis=0) + margin - low))
             onto = place - low
-            want = crop(truth.pictures[index], state.landmarks[members], onto, (width, height))
+            want, matte = (
+                crop(each[index], state.landmarks[members], onto, (width, height)) for each in (truth.pictures, mattes)
+            )
             mask = np.zeros((height, width), np.uint8)
             cv2.fillConvexPoly(mask, cv2.convexHull(np.round(onto).astype(np.int32)), 1)
             side = RIMS[name] * min(width, height)
             reach = max(round(abs(side)), 1)
             grown = (cv2.dilate if side > 0 else cv2.erode)(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
-            inside = grown > 0
+            inside = (grown > 0) & (matte[..., 0] > PERSON)
             shown = [want]
-            for way, run in (("today", today), ("stills", stills)):
+            for way, run in runs.items():
                 got = crop(run.pictures[index], run.states[index].landmarks[members], onto, (width, height))
                 got = with_best_gain(got, want, inside)
                 found.setdefault((name, way), []).append(codes_psnr(got, want, inside))
@@ -141,10 +152,16 @@ def compare(truth: Run, today: Run, stills: Run) -> tuple[dict[tuple[str, str], 
             if name != "face":
                 pieces = [letterbox(each, (240, 160), (0, 0, 0), cv2.INTER_CUBIC) for each in shown]
                 row = np.hstack(pieces)
-                values = " ".join(f"{found[name, way][-1]:.1f}" for way in ("today", "stills"))
+                values = " ".join(f"{found[name, way][-1]:.1f}" for way in runs)
                 cv2.putText(row, f"{index} {name} {values}", (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (255, 255, 0))
                 rows.append(row)
     return found, rows
+
+
+def clip_pictures(clip: Path) -> list[DisplayImage]:
+    """All pictures of a clip."""
+    with VideoReader(clip) as frames:
+        return [frame.image for frame in frames]
 
 
 def following(driver: list[FaceState], run: Run) -> tuple[float, float]:
@@ -169,24 +186,25 @@ def main() -> None:
     whole: Subject = read_subject(args.subject)
     write_subject(plain, replace(whole, stills=()))
     try:
-        with VideoReader(args.truth) as frames:
-            pictures = [frame.image for frame in frames]
-        with VideoReader(args.driver) as frames:
-            driver = track([frame.image for frame in frames])
-        runs = [pictures, *(reenacted(path, args.driver, args.environment) for path in (plain, args.subject))]
+        truth, driver = (clip_pictures(clip) for clip in (args.truth, args.driver))
+        mattes = clip_pictures(args.truth.with_name("matte.mp4"))
+        subjects, modes = (plain, args.subject, args.subject), (Mode.REENACT, Mode.REENACT, Mode.RATIO)
+        shown = {
+            way: relit(subject, args.driver, args.environment, mode)
+            for way, subject, mode in zip(WAYS, subjects, modes, strict=True)
+        }
     finally:
         plain.unlink(missing_ok=True)
-    truth, today, stills = (Run(pictures, track(pictures)) for pictures in runs)
-    found, rows = compare(truth, today, stills)
-    print(f"{'region':12s} frames  today  stills  gain")
+    runs = {way: Run(pictures, track(pictures)) for way, pictures in shown.items()}
+    found, rows = compare(Run(truth, track(truth)), mattes, runs)
+    print(f"{'region':12s} frames {'  '.join(f'{way:>6s}' for way in WAYS)}")
     for name in ("open mouth", "shut eyes", "far half", "face"):
-        if (name, "today") in found:
-            before, after = (np.array(found[name, way]) for way in ("today", "stills"))
-            print(
-                f"{name:12s} {len(before):6d} {before.mean():6.2f}  {after.mean():6.2f} {(after - before).mean():+5.2f}"
-            )
-    for way, run in (("today", today), ("stills", stills)):
-        mouth, eyes = following(driver, run)
+        if (name, "plain") in found:
+            means = "  ".join(f"{np.mean(found[name, way]):6.2f}" for way in WAYS)
+            print(f"{name:12s} {len(found[name, 'plain']):6d} {means}")
+    driven = track(driver)
+    for way, run in runs.items():
+        mouth, eyes = following(driven, run)
         print(f"{way}: follows the driver's mouth with r = {mouth:.3f}, eyes {eyes:.3f}")
     if args.sheet and rows:
         columns = 2

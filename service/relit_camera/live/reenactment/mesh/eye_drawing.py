@@ -20,14 +20,12 @@ from relit_camera.live.reenactment.mesh.triangle_drawing import draw_triangles
 from relit_camera.live.reenactment.source_image import UPSAMPLING
 from relit_camera.live.reenactment.warp import Box
 
-REACH = 0.25
+REACH = 0.15
 """Of an eye's width beside its lids, over which what is drawn fades out."""
 SUBPIXELS = 2
 """Positions that are computed and averaged in a pixel, side by side."""
 LEAST_SIDE_PX = 4
 """Smaller parts of the picture are not drawn."""
-SOURCE_MARGIN_PX = 3
-"""What enlarging a part of the source image takes in beside it."""
 
 
 @dataclass(frozen=True)
@@ -38,18 +36,19 @@ class EyeTask:
         box: left, top, right, bottom in pixels of the moved picture.
         looks: (rows, columns, 2) float32 source pixels, `SUBPIXELS` times as many as pixels or as many.
         cover: (height, width) float32 how far it shows.
+        source: (4,) int left, top, right, bottom of the part of the source image that it looks at, in pixels.
     """
 
     box: Box
     looks: NDArray[np.float32]
     cover: NDArray[np.float32]
+    source: NDArray[np.intp]
 
     def draw(self, image: RgbaImage, relit: LinearImage) -> None:
         """Draw into the moved picture, in place, from the relit source image; its alpha stays."""
         height, width = relit.shape[:2]
-        seen = self.looks.reshape(-1, 2)
-        low = np.clip(np.floor(seen.min(axis=0)).astype(int) - SOURCE_MARGIN_PX, 0, (width - 1, height - 1))
-        high = np.clip(np.ceil(seen.max(axis=0)).astype(int) + SOURCE_MARGIN_PX, low + 1, (width, height))
+        low = np.clip(self.source[:2], 0, (width - 1, height - 1))
+        high = np.clip(self.source[2:], low + 1, (width, height))
         part = display_from_linear(np.ascontiguousarray(relit[low[1] : high[1], low[0] : high[0]]))
         part = cv2.resize(part, None, fx=UPSAMPLING, fy=UPSAMPLING, interpolation=cv2.INTER_CUBIC)
         places = (self.looks - low.astype(np.float32)) * np.float32(UPSAMPLING) - np.float32(0.5)
@@ -97,11 +96,8 @@ def plan_closing_eyes(
         )
         within = np.minimum.outer(_inward(height) / margin, _inward(width) / margin).clip(0, 1)
         cover = cv2.resize(trust, (width, height), interpolation=cv2.INTER_AREA) * np.float32(share) * within
-        looks = cv2.merge([x, y])
-        hidden = trust == 0  # nothing is drawn there, or nothing of it shows
-        looks[hidden] = looks[~hidden].mean(axis=0) if not hidden.all() else 0
         box = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
-        tasks.append(EyeTask(box, looks, np.asarray(cover, np.float32)))
+        tasks.append(EyeTask(box, cv2.merge([x, y]), np.asarray(cover, np.float32), eye.surroundings))
     return tasks
 
 

@@ -16,8 +16,10 @@ SHUT, AS_SEEN = 0.35, 0.65
 landmarks say. Trackers leave a gap between shut lids."""
 LOWER_LID_SHARE = 0.15
 """By how much of what is closed so the lower lid rises; the upper one falls by the rest."""
-CLOSING = (0.9, 0.65)
+CLOSING = (0.7, 0.5)
 """Opening from where on the lids begin to hide the eyeball, and from where on only they move: see `EyeMesh.closing`."""
+SURROUNDINGS = 0.75
+"""Skin beside the lids that may come to lie near moved ones, in widths of the eye: some of it is that of the brow."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,13 @@ class EyeMesh:
     corners: NDArray[np.intp]
     gap: float
 
+    @property
+    def surroundings(self) -> NDArray[np.intp]:
+        """The box (4,) of the source image, in pixels, that the eye and the skin round it lie in."""
+        lids = self.source[self.lids]
+        margin = SURROUNDINGS * float(np.ptp(lids[:, 0]))
+        return np.concatenate([np.floor(lids.min(axis=0) - margin), np.ceil(lids.max(axis=0) + margin)]).astype(int)
+
     def opening(self, landmarks: NDArray[np.float64]) -> float:
         """How open the eye is among moved landmarks (count, 2): 1 as in the source image, 0 shut, below 0 crossed."""
         return float(_gaps(landmarks, self.upper, self.lower, self.corners).mean()) / self.gap
@@ -50,7 +59,10 @@ class EyeMesh:
     def shut(self, landmarks: NDArray[np.float64]) -> None:
         """Let lids meet that nearly do, and those that have crossed; `landmarks` (count, 2) are changed in place."""
         gaps = _gaps(landmarks, self.upper, self.lower, self.corners)
-        kept = float(np.clip((gaps.mean() / self.gap - SHUT) / (AS_SEEN - SHUT), 0, 1))
+        opening = float(gaps.mean()) / self.gap
+        if opening >= AS_SEEN:
+            return
+        kept = max((opening - SHUT) / (AS_SEEN - SHUT), 0.0)
         closed = (gaps - kept * np.maximum(gaps, 0))[:, None] * _axes(landmarks[self.corners])[:, 1]
         landmarks[self.upper] += (1 - LOWER_LID_SHARE) * closed
         landmarks[self.lower] -= LOWER_LID_SHARE * closed
@@ -99,7 +111,9 @@ def _axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _along_axes(points: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
     """Points (count, 2) in the axes of an eye, from the middle between its corners."""
-    return np.asarray((points - corners.mean(axis=0)) @ np.linalg.pinv(_axes(corners)).T)
+    across, down = _axes(corners).T
+    length = max(float(across @ across), 1e-12)  # the axes are at right angles
+    return np.asarray((points - corners.mean(axis=0)) @ np.column_stack([across / length, down]))
 
 
 def _gaps(

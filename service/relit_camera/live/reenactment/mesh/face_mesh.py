@@ -21,8 +21,9 @@ from relit_camera.live.reenactment.warp import FlowPatch, Nodes, inverse_affine,
 
 MARGIN = 0.1
 """Eye distances round the face that the mesh's patch takes in: it fades out there and a little inside."""
-OUTLINE_BLEND = 0.2
-"""Eye distances inside the face's outline, over which the mesh's flow gives way to the flow around the face."""
+OUTLINE_BLEND = 0.07
+"""Eye distances inside the face's outline, over which the mesh's flow gives way to the flow around the face. Over more,
+what both show lies beside each other, as stripes along a turned cheek; over less the face seems to be cut out."""
 FEATURE_REACH = 0.03
 """Eye distances round lids and lips: their own flow fades out between this and twice this distance. Where it reaches
 further the rims of glasses waver, and the far cheek is dented below the eye."""
@@ -97,11 +98,14 @@ class SurfacePatch:
         corners: (triangles, 3, 2) float64 source pixels where the corners go, from the farthest to the nearest.
         values: (triangles, 3, 3) float64 as in `FaceMesh`, of the corners.
         box: (4,) float64 round them all, toward whose sides the patch fades out.
+        soft_edges: whether edges between near and far are averaged: else they are staircases of cells, which are seen
+            where they lie before the background.
     """
 
     corners: NDArray[np.float64]
     values: NDArray[np.float64]
     box: NDArray[np.float64]
+    soft_edges: bool = False
 
     def write(self, nodes: Nodes) -> None:
         """See `Patch.write`."""
@@ -111,7 +115,9 @@ class SurfacePatch:
         inverse = inverse_affine(part.source_from_node)
         corners = self.corners @ inverse[:, :2].T + inverse[:, 2]
         drawn = draw_triangles(corners, self.values, part.positions.shape[1:])
-        x, y, trust = _softened(drawn, JUMP_CELLS * abs(float(part.source_from_node[0, 0])))
+        if self.soft_edges:
+            _soften(drawn, JUMP_CELLS * abs(float(part.source_from_node[0, 0])))
+        x, y, trust = drawn
         part.blend(x, y, trust * patch_cover(part, self.box))
 
 
@@ -143,20 +149,23 @@ class FeaturePatch:
         part.blend(*self.flow.positions(part), shown * patch_cover(part, self.flow.box))
 
 
-def _softened(drawn: NDArray[np.float32], jump: float) -> NDArray[np.float32]:
-    """What a mesh draws (x, y, trust; rows, columns), averaged over 3 × 3 cells where x or y differs by a `jump`.
+def _soften(drawn: NDArray[np.float32], jump: float) -> None:
+    """Average what a mesh draws (x, y, trust; rows, columns), in place, over 3 × 3 cells where x jumps.
 
-    Else an edge between near and far, which runs between cells, would be a staircase.
+    Only a side that turns away has such edges, so they are upright.
     """
-    kernel = np.ones((3, 3), np.uint8)
-    known = cv2.erode(((drawn[0] != 0) | (drawn[1] != 0)).astype(np.uint8), kernel, borderValue=0)
-    edge = np.zeros(known.shape, np.bool_)
-    for places in drawn[:2]:
-        edge |= cv2.dilate(places, kernel) - cv2.erode(places, kernel) > jump
-    edge &= known > 0
+    kernel, x = np.ones((3, 3), np.uint8), drawn[0]
+    jumps = np.zeros(x.shape, np.uint8)
+    np.greater(np.abs(x[:, 1:] - x[:, :-1]), np.float32(jump), out=jumps[:, 1:].view(np.bool_))
+    known = cv2.erode(np.not_equal(x, 0).view(np.uint8), kernel, borderValue=0)
+    rows, columns = np.nonzero(cv2.bitwise_and(cv2.dilate(jumps, kernel), known))
+    if not rows.size:
+        return
+    around = np.s_[max(rows.min() - 1, 0) : rows.max() + 2, max(columns.min() - 1, 0) : columns.max() + 2]
     for channel in drawn:
-        np.copyto(channel, cv2.blur(channel, (3, 3)), where=edge)
-    return drawn
+        soft = np.empty_like(channel)
+        soft[around] = cv2.blur(channel[around], (3, 3))
+        channel[rows, columns] = soft[rows, columns]
 
 
 def triangulate_face(face: SourceFace) -> FaceMesh:

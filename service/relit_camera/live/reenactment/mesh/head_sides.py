@@ -62,19 +62,24 @@ class HeadSides:
         """
         return np.asarray(smoothstep(self.side * angles_from_rotation(turn).yaw, *TURNED_DEG))
 
-    def corners(
+    def facing(
         self, landmarks: NDArray[np.float64], anchors: NDArray[np.float64], pose: HeadPose, size: tuple[int, int]
-    ) -> NDArray[np.float64]:
-        """Where the corners of the triangles go: (some, 3, 2) source pixels.
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+        """The triangles that face the camera, the farthest first.
 
         Args:
             landmarks: (landmarks, 2) where those go that are its points.
             anchors: (count, 2) where all anchors of head and shoulders go.
             pose: of the head that goes there.
             size: (width, height) of the source image.
+
+        Returns:
+            Where their corners go and where these look, (some, 3, 2) source pixels; and the corners' rows (some, 3).
         """
-        ears = project(self.ears, pose, size)
-        return np.vstack([landmarks, ears, _around(anchors)]).take(self.triangles, axis=0)
+        points = np.vstack([landmarks, project(self.ears, pose, size), _around(anchors)])
+        corners = points.take(self.triangles, axis=0)
+        seen = np.flatnonzero(doubled_areas(corners) * self.clockwise > 0)
+        return corners.take(seen, axis=0), self.places.take(seen, axis=0), self.triangles.take(seen, axis=0)
 
 
 def triangulate_sides(face: SourceFace, members: NDArray[np.intp], anchors: NDArray[np.float64]) -> HeadSides:
