@@ -156,16 +156,11 @@ def _soften(drawn: NDArray[np.float32], jump: float) -> None:
     """
     kernel, x = np.ones((3, 3), np.uint8), drawn[0]
     jumps = np.zeros(x.shape, np.uint8)
-    np.greater(np.abs(x[:, 1:] - x[:, :-1]), np.float32(jump), out=jumps[:, 1:].view(np.bool_))
-    known = cv2.erode(np.not_equal(x, 0).view(np.uint8), kernel, borderValue=0)
-    rows, columns = np.nonzero(cv2.bitwise_and(cv2.dilate(jumps, kernel), known))
-    if not rows.size:
-        return
-    around = np.s_[max(rows.min() - 1, 0) : rows.max() + 2, max(columns.min() - 1, 0) : columns.max() + 2]
-    for channel in drawn:
-        soft = np.empty_like(channel)
-        soft[around] = cv2.blur(channel[around], (3, 3))
-        channel[rows, columns] = soft[rows, columns]
+    jumps[:, 1:] = cv2.absdiff(x[:, 1:], x[:, :-1]) > jump
+    known = cv2.erode((x != 0).view(np.uint8), kernel, borderValue=0)
+    places = np.flatnonzero(cv2.bitwise_and(cv2.dilate(jumps, kernel), known))
+    for channel in drawn if places.size else ():
+        channel.reshape(-1)[places] = cv2.blur(channel, (3, 3)).reshape(-1).take(places)
 
 
 def triangulate_face(face: SourceFace) -> FaceMesh:
