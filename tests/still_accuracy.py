@@ -143,6 +143,8 @@ def compare(
             reach = max(round(abs(side)), 1)
             grown = (cv2.dilate if side > 0 else cv2.erode)(mask, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
             inside = (grown > 0) & (matte[..., 0] > PERSON)
+            if not inside.any():
+                continue
             shown = [want]
             for way, run in runs.items():
                 got = crop(run.pictures[index], run.states[index].landmarks[members], onto, (width, height))

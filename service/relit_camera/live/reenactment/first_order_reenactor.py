@@ -71,8 +71,9 @@ class FirstOrderReenactor:
         """See `Reenactor.plan_warp`."""
         face = self._face
         target = (transfer_motion if self._person.whole else transfer_motion_in_place)(face, self._points, motion)
-        landmarks = self._mesh.with_shut_lids(target.landmarks)
-        patches = whole_flow(self._motion, self._mesh, self._points, target.points, landmarks, target.pose)
+        landmarks = self._mesh.with_lids_that_meet(target.landmarks, target.pose)
+        closing = self._mesh.closing(landmarks, target.pose)
+        patches = whole_flow(self._motion, self._mesh, self._points, target.points, landmarks, target.pose, closing)
         fixed = () if self._person.whole else (FixedBorder(face.size),)
         placed = move_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
         box = visible_box(placed, face.size, self._size)
@@ -91,7 +92,7 @@ class FirstOrderReenactor:
             quality.half_size,
         )
 
-        eyes = plan_closing_eyes(self._mesh.eyes, patches[1], landmarks, to_box, size, quality.half_size)
+        eyes = plan_closing_eyes(self._mesh.eyes, closing, patches[1], landmarks, to_box, size, quality.half_size)
 
         def warp(relit: LinearImage) -> WarpedLayer:
             image = self._person.warped(relit, grid, quality.half_size)
@@ -137,15 +138,18 @@ def whole_flow(
     target: NDArray[np.float64],
     landmarks: NDArray[np.float64],
     pose: HeadPose,
+    closing: tuple[float, float],
 ) -> tuple[Patch, SurfacePatch, *tuple[Patch, ...]]:
-    """As `face_and_head_flow`, with eyes and mouth, and with the far side of a turned head hidden by the face."""
+    """As `face_and_head_flow`, with eyes and mouth, and with the far side of a turned head hidden by the face.
+
+    `closing` is that of the eyes: over one that closes its lids move, which are the mesh's.
+    """
     face = mesh.face.face
     boxes = feature_boxes(face, landmarks)
     head, *features = _flows(motion, face, points, target, landmarks, boxes)
-    surface = mesh.surface(landmarks, target[len(points.chosen) :], pose)
+    surface = mesh.surface(landmarks, target[len(points.chosen) :], pose, closing)
     source = face.landmarks.astype(np.float64)
-    # Over an eye that closes its lids move, which are the mesh's.
-    shares = (*(1 - eye.closing(landmarks) for eye in mesh.eyes), 1.0)
+    shares = (*(1 - share for share in closing), 1.0)
     parts = zip(features, feature_landmarks(face.scheme), shares, strict=True)
     return head, surface, *(mesh.face.feature_patch(flow, source[list(part)], share) for flow, part, share in parts)
 

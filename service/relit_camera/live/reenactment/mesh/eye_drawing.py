@@ -24,6 +24,8 @@ REACH = 0.15
 """Of an eye's width beside its lids, over which what is drawn fades out."""
 SUBPIXELS = 2
 """Positions that are computed and averaged in a pixel, side by side."""
+WHOLE = 0.99
+"""Share of a pixel that counts as all of it."""
 LEAST_SIDE_PX = 4
 """Smaller parts of the picture are not drawn."""
 
@@ -62,6 +64,7 @@ class EyeTask:
 
 def plan_closing_eyes(
     eyes: Sequence[EyeMesh],
+    closing: Sequence[float],
     surface: SurfacePatch,
     landmarks: NDArray[np.float64],
     to_picture: NDArray[np.float64],
@@ -72,6 +75,7 @@ def plan_closing_eyes(
 
     Args:
         eyes: of the source image.
+        closing: of each, see `EyeMesh.closing`.
         surface: the moved mesh.
         landmarks: (count, 2) where all landmarks go, source pixels.
         to_picture: (2, 3) source pixels → pixels of the moved picture.
@@ -80,8 +84,7 @@ def plan_closing_eyes(
     """
     tasks = []
     fine = 1 if half_size else SUBPIXELS
-    for eye in eyes:
-        share = eye.closing(landmarks)
+    for eye, share in zip(eyes, closing, strict=True):
         lids = landmarks[eye.lids] @ to_picture[:, :2].T + to_picture[:, 2]
         margin = max(REACH * float(np.ptp(lids[:, 0])), 1.0)
         low = np.maximum(np.floor(lids.min(axis=0) - margin), 0).astype(int)
@@ -95,7 +98,9 @@ def plan_closing_eyes(
             fine * (corners[near] - low) - 0.5, surface.values[near], (fine * height, fine * width)
         )
         within = np.minimum.outer(_inward(height) / margin, _inward(width) / margin).clip(0, 1)
-        cover = cv2.resize(trust, (width, height), interpolation=cv2.INTER_AREA) * np.float32(share) * within
+        # A pixel of which a part is not drawn has no color.
+        known = cv2.resize((x != 0).astype(np.float32), (width, height), interpolation=cv2.INTER_AREA) > WHOLE
+        cover = cv2.resize(trust, (width, height), interpolation=cv2.INTER_AREA) * np.float32(share) * within * known
         box = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))
         tasks.append(EyeTask(box, cv2.merge([x, y]), np.asarray(cover, np.float32), eye.surroundings))
     return tasks

@@ -8,16 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.easing import smoothstep
+from relit_camera.face.head_pose import HeadPose, project
 from relit_camera.face.landmarks.landmark_schemes import EyeLandmarks
 from relit_camera.live.reenactment.source_image import SourceFace
 
 SHUT, AS_SEEN = 0.35, 0.65
-"""Opening of an eye beside that in the source image: up to where it is shut, and from where on it is as open as the
-landmarks say. Trackers leave a gap between shut lids."""
+"""Opening of an eye beside its neutral one: up to where it is shut, and from where on it is as open as the landmarks
+say. Trackers leave a gap between shut lids."""
 LOWER_LID_SHARE = 0.15
 """By how much of what is closed so the lower lid rises; the upper one falls by the rest."""
-CLOSING = (0.7, 0.5)
+CLOSING = (0.8, 0.5)
 """Opening from where on the lids begin to hide the eyeball, and from where on only they move: see `EyeMesh.closing`."""
+LEAST_GAP = 0.05
+"""Least neutral gap of the lids, in widths of the eye: of one that is shut in the source image, noise would open it."""
 SURROUNDINGS = 0.75
 """Skin beside the lids that may come to lie near moved ones, in widths of the eye: some of it is that of the brow."""
 
@@ -27,19 +30,19 @@ class EyeMesh:
     """One eye of a source image.
 
     Attributes:
-        source: (landmarks, 2) float64 source pixels: all landmarks of the face.
+        face: the source image's face.
+        source: (landmarks, 2) float64 source pixels: all its landmarks.
         lids: (count,) the closed outline of the opening, as `EyeLandmarks.lids`.
         upper, lower: (pairs,) points of the lids that lie over each other, from the outer to the inner corner.
         corners: (2,) the outer and the inner corner.
-        gap: mean distance of the lids in the source image, pixels.
     """
 
+    face: SourceFace
     source: NDArray[np.float64]
     lids: NDArray[np.intp]
     upper: NDArray[np.intp]
     lower: NDArray[np.intp]
     corners: NDArray[np.intp]
-    gap: float
 
     @property
     def surroundings(self) -> NDArray[np.intp]:
@@ -48,24 +51,48 @@ class EyeMesh:
         margin = SURROUNDINGS * float(np.ptp(lids[:, 0]))
         return np.concatenate([np.floor(lids.min(axis=0) - margin), np.ceil(lids.max(axis=0) + margin)]).astype(int)
 
-    def opening(self, landmarks: NDArray[np.float64]) -> float:
-        """How open the eye is among moved landmarks (count, 2): 1 as in the source image, 0 shut, below 0 crossed."""
-        return float(_gaps(landmarks, self.upper, self.lower, self.corners).mean()) / self.gap
+    def opening(self, landmarks: NDArray[np.float64], pose: HeadPose) -> float:
+        """How open the eye is: 1 as in the source image, 0 shut, below 0 with lids that have crossed.
 
-    def closing(self, landmarks: NDArray[np.float64]) -> float:
-        """How far lids that move over the eyeball take the place of a flow that moves both and the skin round them."""
-        return float(smoothstep(self.opening(landmarks), *CLOSING))
+        Args:
+            landmarks: (count, 2) where all landmarks go, source pixels.
+            pose: of the head that goes there: a nod does not shut an eye.
+        """
+        return float(self._gaps(landmarks).mean()) / self._neutral_gap(pose)
 
-    def shut(self, landmarks: NDArray[np.float64]) -> None:
-        """Let lids meet that nearly do, and those that have crossed; `landmarks` (count, 2) are changed in place."""
-        gaps = _gaps(landmarks, self.upper, self.lower, self.corners)
-        opening = float(gaps.mean()) / self.gap
+    def closing(self, landmarks: NDArray[np.float64], pose: HeadPose) -> float:
+        """How far lids that move over the eyeball take the place of a flow that moves both and the skin round them.
+
+        0..1; arguments as in `opening`.
+        """
+        return float(smoothstep(self.opening(landmarks, pose), *CLOSING))
+
+    def meet_lids(self, landmarks: NDArray[np.float64], pose: HeadPose) -> None:
+        """Let lids meet that nearly do, and those that have crossed; `landmarks` (count, 2) are changed in place.
+
+        `pose` is as in `opening`.
+        """
+        gaps = self._gaps(landmarks)
+        opening = float(gaps.mean()) / self._neutral_gap(pose)
         if opening >= AS_SEEN:
             return
         kept = max((opening - SHUT) / (AS_SEEN - SHUT), 0.0)
         closed = (gaps - kept * np.maximum(gaps, 0))[:, None] * _axes(landmarks[self.corners])[:, 1]
         landmarks[self.upper] += (1 - LOWER_LID_SHARE) * closed
         landmarks[self.lower] -= LOWER_LID_SHARE * closed
+
+    def _gaps(self, landmarks: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance (pairs,) of the lids, down the face, pixels; below 0 where they have crossed."""
+        return np.asarray((landmarks[self.lower] - landmarks[self.upper]) @ _axes(landmarks[self.corners])[:, 1])
+
+    def _neutral_gap(self, pose: HeadPose) -> float:
+        """Mean distance of the lids of a head in this pose with the source image's expression, pixels."""
+        points = np.concatenate([self.upper, self.lower, self.corners])
+        seen = project(self.face.head_points[points], pose, self.face.size).astype(np.float64)
+        upper, lower, corners = np.split(seen, [len(self.upper), len(self.upper) + len(self.lower)])
+        axes = _axes(corners)
+        least = LEAST_GAP * float(np.hypot(*axes[:, 0]))
+        return max(float(((lower - upper) @ axes[:, 1]).mean()), least, 1e-6)
 
     def eyeball(self, landmarks: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """What is seen between moved lids, as a fan of triangles.
@@ -93,13 +120,11 @@ class EyeMesh:
 
 def eye_mesh(face: SourceFace, eye: EyeLandmarks) -> EyeMesh:
     """An eye of a source image's face."""
-    source = face.landmarks.astype(np.float64)
     inner = eye.lids.index(eye.inner)
-    upper, lower, corners = (
-        np.array(part) for part in (eye.lids[1:inner], eye.lids[:inner:-1], (eye.outer, eye.inner))
+    lids, upper, lower, corners = (
+        np.array(points) for points in (eye.lids, eye.lids[1:inner], eye.lids[:inner:-1], (eye.outer, eye.inner))
     )
-    gap = max(float(_gaps(source, upper, lower, corners).mean()), 1e-6)
-    return EyeMesh(source, np.array(eye.lids), upper, lower, corners, gap)
+    return EyeMesh(face, face.landmarks.astype(np.float64), lids, upper, lower, corners)
 
 
 def _axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -114,13 +139,6 @@ def _along_axes(points: NDArray[np.float64], corners: NDArray[np.float64]) -> ND
     across, down = _axes(corners).T
     length = max(float(across @ across), 1e-12)  # the axes are at right angles
     return np.asarray((points - corners.mean(axis=0)) @ np.column_stack([across / length, down]))
-
-
-def _gaps(
-    landmarks: NDArray[np.float64], upper: NDArray[np.intp], lower: NDArray[np.intp], corners: NDArray[np.intp]
-) -> NDArray[np.float64]:
-    """Distance (pairs,) of the lids, down the face, pixels; below 0 where they have crossed."""
-    return np.asarray((landmarks[lower] - landmarks[upper]) @ _axes(landmarks[corners])[:, 1])
 
 
 def _fan(outline: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,9 +21,8 @@ from relit_camera.live.reenactment.warp import FlowPatch, Nodes, inverse_affine,
 
 MARGIN = 0.1
 """Eye distances round the face that the mesh's patch takes in: it fades out there and a little inside."""
-OUTLINE_BLEND = 0.07
-"""Eye distances inside the face's outline, over which the mesh's flow gives way to the flow around the face. Over more,
-what both show lies beside each other, as stripes along a turned cheek; over less the face seems to be cut out."""
+OUTLINE_BLEND = 0.2
+"""Eye distances inside the face's outline, over which the mesh's flow gives way to the flow around the face."""
 FEATURE_REACH = 0.03
 """Eye distances round lids and lips: their own flow fades out between this and twice this distance. Where it reaches
 further the rims of glasses waver, and the far cheek is dented below the eye."""
@@ -65,8 +64,11 @@ class FaceMesh:
             pose: of the head that goes there.
         """
         facing = np.flatnonzero(doubled_areas(corners) * self.clockwise > 0)
-        nearness = self.middles @ pose.rotation.as_matrix()[2]
-        return np.asarray(facing[np.argsort(nearness[facing])])
+        return np.asarray(facing[np.argsort(self.nearness(pose)[facing])])
+
+    def nearness(self, pose: HeadPose) -> NDArray[np.float64]:
+        """Of the triangles of a head in this pose (count,): centimetres from its middle toward the camera."""
+        return np.asarray(self.middles @ pose.rotation.as_matrix()[2])
 
     def surface(self, landmarks: NDArray[np.float64], pose: HeadPose) -> SurfacePatch:
         """The mesh, moved.
@@ -98,14 +100,14 @@ class SurfacePatch:
         corners: (triangles, 3, 2) float64 source pixels where the corners go, from the farthest to the nearest.
         values: (triangles, 3, 3) float64 as in `FaceMesh`, of the corners.
         box: (4,) float64 round them all, toward whose sides the patch fades out.
-        soft_edges: whether edges between near and far are averaged: else they are staircases of cells, which are seen
-            where they lie before the background.
+        soft_edges: 0..1, how far edges between near and far are averaged: else they are staircases of cells, which are
+            seen where they lie before the background.
     """
 
     corners: NDArray[np.float64]
     values: NDArray[np.float64]
     box: NDArray[np.float64]
-    soft_edges: bool = False
+    soft_edges: float = 0.0
 
     def write(self, nodes: Nodes) -> None:
         """See `Patch.write`."""
@@ -115,8 +117,8 @@ class SurfacePatch:
         inverse = inverse_affine(part.source_from_node)
         corners = self.corners @ inverse[:, :2].T + inverse[:, 2]
         drawn = draw_triangles(corners, self.values, part.positions.shape[1:])
-        if self.soft_edges:
-            _soften(drawn, JUMP_CELLS * abs(float(part.source_from_node[0, 0])))
+        if self.soft_edges > 0:
+            _soften(drawn, JUMP_CELLS * abs(float(part.source_from_node[0, 0])), self.soft_edges)
         x, y, trust = drawn
         part.blend(x, y, trust * patch_cover(part, self.box))
 
@@ -149,29 +151,31 @@ class FeaturePatch:
         part.blend(*self.flow.positions(part), shown * patch_cover(part, self.flow.box))
 
 
-def _soften(drawn: NDArray[np.float32], jump: float) -> None:
+def _soften(drawn: NDArray[np.float32], jump: float, share: float) -> None:
     """Average what a mesh draws (x, y, trust; rows, columns), in place, over 3 × 3 cells where x jumps.
 
-    Only a side that turns away has such edges, so they are upright.
+    Only a side that turns away has such edges, so they are upright. The average counts by a `share` 0..1.
     """
     kernel, x = np.ones((3, 3), np.uint8), drawn[0]
     jumps = np.zeros(x.shape, np.uint8)
-    jumps[:, 1:] = cv2.absdiff(x[:, 1:], x[:, :-1]) > jump
+    jumps[:, 1:] = np.abs(np.diff(x, axis=1)) > jump
     known = cv2.erode((x != 0).view(np.uint8), kernel, borderValue=0)
     places = np.flatnonzero(cv2.bitwise_and(cv2.dilate(jumps, kernel), known))
     for channel in drawn if places.size else ():
-        channel.reshape(-1)[places] = cv2.blur(channel, (3, 3)).reshape(-1).take(places)
+        flat = channel.reshape(-1)
+        soft = cv2.blur(channel, (3, 3)).reshape(-1).take(places)
+        flat[places] += np.float32(share) * (soft - flat[places])
 
 
-def triangulate_face(face: SourceFace) -> FaceMesh:
-    """The mesh of a source image's face."""
+def triangulate_face(face: SourceFace, blend: float = OUTLINE_BLEND) -> FaceMesh:
+    """The mesh of a source image's face; over `blend` eye distances inside its outline it gives way to other flow."""
     irises = {*face.scheme.right_eye.iris, *face.scheme.left_eye.iris}
     members = np.array([index for index in range(face.scheme.count) if index not in irises], dtype=np.intp)
     corners = face.landmarks[members].astype(np.float64)
     triangles = delaunay_triangles(face.landmarks[members])
     outline = outline_edges(triangles)
     span = face.scheme.eye_span(face.landmarks)
-    trust = smoothstep(distance_from_sides(corners, corners[outline]), 0, OUTLINE_BLEND * span)
+    trust = smoothstep(distance_from_sides(corners, corners[outline]), 0, blend * span)
     return FaceMesh(
         face=face,
         members=members,
@@ -190,4 +194,4 @@ def distance_from_sides(points: NDArray[np.float64], sides: NDArray[np.float64])
     start, along = sides[:, 0], sides[:, 1] - sides[:, 0]
     offset = points[:, None] - start
     share = np.clip((offset * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
-    return np.asarray(np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1))
+    return np.asarray(np.linalg.norm(offset - share[..., None] * along, axis=2).min(axis=1, initial=np.inf))

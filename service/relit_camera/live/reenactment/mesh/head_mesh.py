@@ -14,7 +14,6 @@ from relit_camera.live.reenactment.dense_motion import box_around
 from relit_camera.live.reenactment.mesh.eye_mesh import EyeMesh, eye_mesh
 from relit_camera.live.reenactment.mesh.face_mesh import (
     MARGIN,
-    OUTLINE_BLEND,
     FaceMesh,
     SurfacePatch,
     distance_from_sides,
@@ -23,6 +22,9 @@ from relit_camera.live.reenactment.mesh.face_mesh import (
 from relit_camera.live.reenactment.mesh.head_sides import CHEEK_SHARE, HeadSides, triangulate_sides
 from relit_camera.live.reenactment.source_image import SourceFace
 
+OUTLINE_BLEND = 0.07
+"""Eye distances inside the face's outline, over which the mesh's flow gives way to the flow around the face. Over more,
+what both show lies beside each other, as stripes along a turned cheek; over less the face seems to be cut out."""
 TURNED_MARGIN = 0.35
 """Eye distances round face and hair that the mesh of a turned head takes in: it fades out there, not over the ear."""
 
@@ -34,7 +36,8 @@ class HeadMesh:
     Attributes:
         face: its landmarks.
         eyes: right and left.
-        within: (2, triangles of the face) whether each lies between the lids of the right and of the left eye.
+        within, around: (2, triangles of the face) whether each lies between the lids of the right and of the left eye,
+            and whether it is skin that touches them.
         sides: what lies beside the face; None where the source image's border cuts the head off.
         turned_trust: (members of the face,) how far the mesh counts where a side has turned away: up to the face's
             outline, but at the chin.
@@ -43,68 +46,97 @@ class HeadMesh:
     face: FaceMesh
     eyes: tuple[EyeMesh, EyeMesh]
     within: NDArray[np.bool_]
+    around: NDArray[np.bool_]
     sides: HeadSides | None
     turned_trust: NDArray[np.float64]
 
-    def with_shut_lids(self, landmarks: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Moved landmarks (count, 2), with lids that meet where they nearly do."""
+    def with_lids_that_meet(self, landmarks: NDArray[np.float64], pose: HeadPose) -> NDArray[np.float64]:
+        """Moved landmarks (count, 2) of a head in a pose, with lids that meet where they nearly do."""
         changed = landmarks.copy()
         for eye in self.eyes:
-            eye.shut(changed)
+            eye.meet_lids(changed, pose)
         return changed
 
-    def surface(self, landmarks: NDArray[np.float64], anchors: NDArray[np.float64], pose: HeadPose) -> SurfacePatch:
+    def closing(self, landmarks: NDArray[np.float64], pose: HeadPose) -> tuple[float, float]:
+        """See `EyeMesh.closing`: of the right and of the left eye."""
+        right, left = (eye.closing(landmarks, pose) for eye in self.eyes)
+        return right, left
+
+    def surface(
+        self,
+        landmarks: NDArray[np.float64],
+        anchors: NDArray[np.float64],
+        pose: HeadPose,
+        closing: tuple[float, float],
+    ) -> SurfacePatch:
         """The mesh, moved.
 
         Args:
             landmarks: (count, 2) where all landmarks go, source pixels.
             anchors: (count, 2) where the anchors of head and shoulders go.
             pose: of the head that goes there.
+            closing: of the eyes.
         """
         face, target = self.face, landmarks[self.face.members]
+        away = None if self.sides is None else self.sides.turned_away(pose.rotation * face.face.pose.rotation.inv())
         corners = target.take(face.triangles, axis=0)
         order = face.nearest_last(corners, pose)
-        closing = [index for index, eye in enumerate(self.eyes) if eye.closing(landmarks) > 0]
-        hidden = np.asarray(self.within[closing].any(axis=0), np.bool_)
-        order = order[~hidden[order]]
-        values = face.values.take(order, axis=0)
-        drawn, shown = [corners.take(order, axis=0)], [values]
-        for index in closing:
-            moved, looks = self.eyes[index].eyeball(landmarks)
-            drawn.insert(0, moved)
-            shown.insert(0, np.dstack([looks, np.ones(looks.shape[:2])]))
-        sides, reached = self._sides_turned_away(pose), target
-        if sides is not None:
-            mesh, away = sides
-            count, reached = len(target), np.vstack([target, anchors[BEYOND_HAIR]])
-            trust = away * mesh.trust
-            trust[:count] = face.trust + away[:count] * (self.turned_trust - face.trust)
-            values[..., 2] = trust.take(face.triangles.take(order, axis=0))
-            beside, looks, vertices = mesh.facing(target, anchors, pose, face.face.size)
-            drawn.insert(0, beside)
-            shown.insert(0, np.dstack([looks, trust.take(vertices)]))
-        margin = MARGIN if sides is None else TURNED_MARGIN
-        box = box_around(reached, margin * face.span)
-        return SurfacePatch(np.concatenate(drawn), np.concatenate(shown), box, soft_edges=sides is not None)
+        trust, values = face.trust, face.values
+        if away is not None:
+            trust = trust + away[: len(trust)] * (self.turned_trust - trust)
+            values = np.dstack([values[..., :2], trust.take(face.triangles)])
+        drawn, shown = self._with_eyeballs(corners, values, order, landmarks, pose, closing)
+        box, turned = box_around(target, MARGIN * face.span), 0.0
+        if self.sides is not None and away is not None and away.any():
+            turned = float(away.max())
+            beside, looks, vertices = self.sides.facing(target, anchors, pose, face.face.size)
+            # Nothing beside the face counts before its side turns, not even where the outline is hollow.
+            trusts = away * np.concatenate([self.turned_trust, self.sides.trust])
+            drawn = np.concatenate([beside, drawn])
+            shown = np.concatenate([np.dstack([looks, trusts.take(vertices)]), shown])
+            # It grows as the side turns: at once, the patch's rim would be seen to jump.
+            whole = box_around(np.vstack([target, anchors[BEYOND_HAIR]]), TURNED_MARGIN * face.span)
+            box = box + turned * (whole - box)
+        return SurfacePatch(drawn, shown, box, turned)
 
-    def _sides_turned_away(self, pose: HeadPose) -> tuple[HeadSides, NDArray[np.float64]] | None:
-        """The sides and how far each of their points has turned away; None where nothing has."""
-        if self.sides is None:
-            return None
-        away = self.sides.turned_away(pose.rotation * self.face.face.pose.rotation.inv())
-        return (self.sides, away) if away.any() else None
+    def _with_eyeballs(
+        self,
+        corners: NDArray[np.float64],
+        values: NDArray[np.float64],
+        order: NDArray[np.intp],
+        landmarks: NDArray[np.float64],
+        pose: HeadPose,
+        closing: tuple[float, float],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Corners and values of the face's triangles in their order, and behind the skin round it each eyeball."""
+        closed = [index for index, share in enumerate(closing) if share > 0]
+        if not closed:
+            return corners.take(order, axis=0), values.take(order, axis=0)
+        order = order[~np.asarray(self.within[closed].any(axis=0), np.bool_)[order]]
+        nearness = self.face.nearness(pose)[order]
+        drawn, shown, near = [corners.take(order, axis=0)], [values.take(order, axis=0)], [nearness]
+        for index in closed:
+            moved, looks = self.eyes[index].eyeball(landmarks)
+            skin = nearness[self.around[index][order]]
+            drawn.append(moved)
+            shown.append(np.dstack([looks, np.ones(looks.shape[:2])]))
+            near.append(np.full(len(moved), np.nextafter(skin.min(initial=np.inf), -np.inf)))
+        back_to_front = np.argsort(np.concatenate(near), kind="stable")
+        return np.concatenate(drawn)[back_to_front], np.concatenate(shown)[back_to_front]
 
 
 def triangulate_head(face: SourceFace, anchors: NDArray[np.float64]) -> HeadMesh:
     """The mesh of a source image's head; `anchors` (count, 2) are those of head and shoulders there, or none."""
-    mesh = triangulate_face(face)
+    mesh = triangulate_face(face, OUTLINE_BLEND)
     members, scheme = mesh.members, face.scheme
     right, left = (eye_mesh(face, eye) for eye in (scheme.right_eye, scheme.left_eye))
-    within = np.stack([np.isin(members[mesh.triangles], eye.lids).all(axis=1) for eye in (right, left)])
+    on_lids = np.stack([np.isin(members[mesh.triangles], eye.lids) for eye in (right, left)])
+    within, touching = np.asarray(on_lids.all(axis=2), np.bool_), np.asarray(on_lids.any(axis=2), np.bool_)
     outline = face.head_points[members][mesh.outline]
     aside = np.abs(face.head_points[members, 0]).max()
     chin = ((np.abs(outline[..., 0]) < CHEEK_SHARE * aside) & (outline[..., 1] < 0)).any(axis=1)
     places = face.landmarks[members].astype(np.float64)
-    turned_trust = smoothstep(distance_from_sides(places, places[mesh.outline[chin]]), 0, OUTLINE_BLEND * mesh.span)
+    fade = OUTLINE_BLEND * mesh.span
+    turned_trust = smoothstep(distance_from_sides(places, places[mesh.outline[chin]]), 0, fade)
     sides = triangulate_sides(face, members, anchors) if len(anchors) else None
-    return HeadMesh(mesh, (right, left), within, sides, turned_trust)
+    return HeadMesh(mesh, (right, left), within, touching & ~within, sides, turned_trust)

@@ -43,8 +43,8 @@ class HeadSides:
         clockwise: (some,) the sign of each triangle's area in the source image.
         places: (some, 3, 2) float64 source pixels of each triangle's corners.
         side: (points,) float64, −1 in the left half of the picture, 1 in the right.
-        trust: (points,) float64 how far the mesh counts at points beside the face once their side has turned away: 0 at
-            its rim and the shoulders, else 1.
+        trust: (points beside the face,) float64 how far the mesh counts there once their side has turned away: 0 at its
+            rim and the shoulders, else 1.
     """
 
     ears: NDArray[np.float64]
@@ -109,7 +109,7 @@ def triangulate_sides(face: SourceFace, members: NDArray[np.intp], anchors: NDAr
         clockwise=np.sign(doubled_areas(places[order])),
         places=places[order],
         side=np.where(points[:, 0] < landmarks[:, 0].mean(), -1.0, 1.0),
-        trust=np.repeat([0.0, 1.0, 0.0], [len(members), len(points) - len(members) - fixed, fixed]),
+        trust=np.repeat([1.0, 0.0], [len(points) - len(members) - fixed, fixed]),
     )
 
 
