@@ -71,6 +71,16 @@ def context_of(subject: Subject, size: tuple[int, int], argument: str = "") -> R
     return ReenactorContext(subject, face_of(subject), size, SessionOptions(), argument)
 
 
+def lids_lowered(face: SourceFace, share: float = 1.0) -> NDArray[np.float64]:
+    """The expression, head-space cm, that brings each upper lid down by a share of the way to the lower one."""
+    expression = np.zeros((SCHEME.count, 3))
+    for eye in (SCHEME.right_eye, SCHEME.left_eye):
+        inner = eye.lids.index(eye.inner)
+        upper, lower = list(eye.lids[1:inner]), list(eye.lids[:inner:-1])
+        expression[upper, :2] = share * (face.head_points[lower] - face.head_points[upper])[:, :2]
+    return expression
+
+
 def motion(
     turn: Rotation | None = None,
     shift: ArrayLike = (0, 0, 0),

@@ -29,7 +29,7 @@ from relit_camera.live.reenactment.mesh.head_mesh import triangulate_head
 from relit_camera.live.reenactment.motion_transfer import rotate_about, transfer_motion
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.warp import Warp
-from tests.live.people import SCHEME, face_of, motion, person
+from tests.live.people import SCHEME, face_of, lids_lowered, motion, person
 
 UP = np.array([0.0, -1.0])
 
@@ -42,16 +42,6 @@ def face():
 @pytest.fixture(scope="module")
 def points(face: SourceFace):
     return control_points(face, head_and_shoulder_anchors(face.pose, face.size))
-
-
-def lids_lowered(face: SourceFace, share: float = 1.0):
-    """The expression, head-space cm, that brings each upper lid down by a share of the way to the lower one."""
-    expression = np.zeros((SCHEME.count, 3))
-    for eye in (SCHEME.right_eye, SCHEME.left_eye):
-        inner = eye.lids.index(eye.inner)
-        upper, lower = list(eye.lids[1:inner]), list(eye.lids[:inner:-1])
-        expression[upper, :2] = share * (face.head_points[lower] - face.head_points[upper])[:, :2]
-    return expression
 
 
 def test_lips_eyes_brows_and_outline_are_all_chosen(face: SourceFace) -> None:

@@ -74,6 +74,7 @@ class FirstOrderReenactor:
         landmarks = self._mesh.with_lids_that_meet(target.landmarks, target.pose)
         closing = self._mesh.closing(landmarks, target.pose)
         patches = whole_flow(self._motion, self._mesh, self._points, target.points, landmarks, target.pose, closing)
+        surface = patches[1]
         fixed = () if self._person.whole else (FixedBorder(face.size),)
         placed = move_body(self._placed, target.pivot, target.shift, target.scale, face.size[1])
         box = visible_box(placed, face.size, self._size)
@@ -91,8 +92,7 @@ class FirstOrderReenactor:
             self._step,
             quality.half_size,
         )
-
-        eyes = plan_closing_eyes(self._mesh.eyes, closing, patches[1], landmarks, to_box, size, quality.half_size)
+        eyes = plan_closing_eyes(self._mesh.eyes, closing, surface, landmarks, to_box, size, quality.half_size)
 
         def warp(relit: LinearImage) -> WarpedLayer:
             image = self._person.warped(relit, grid, quality.half_size)

@@ -8,7 +8,6 @@ from functools import cache
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import LinearImage
 from relit_camera.base.rotations import rotation_from_angles
@@ -17,7 +16,7 @@ from relit_camera.live.reenactment.mesh.eye_drawing import plan_closing_eyes
 from relit_camera.live.reenactment.mesh.head_mesh import triangulate_head
 from relit_camera.live.reenactment.reenactor import ReenactorContext
 from relit_camera.live.render_quality import FULL_QUALITY, RenderQuality
-from tests.live.people import SCHEME, close_up, context_of, live_frame, motion
+from tests.live.people import SCHEME, close_up, context_of, lids_lowered, live_frame, motion
 
 SIZE, SCALE = (432, 576), 3
 BLUE, SKIN = (0.0, 0.0, 0.6), (0.3, 0.2, 0.15)
@@ -49,20 +48,10 @@ def picture_with_blue_eyes() -> LinearImage:
     return picture
 
 
-def lids_lowered(share: float) -> NDArray[np.float64]:
-    """Centimetres since neutral: each upper lid lowered by a share of the way to the lower one."""
-    moved, points = np.zeros((SCHEME.count, 3)), enlarged().face.head_points
-    for eye in (SCHEME.right_eye, SCHEME.left_eye):
-        inner = eye.lids.index(eye.inner)
-        upper, lower = list(eye.lids[1:inner]), list(eye.lids[:inner:-1])
-        moved[upper, :2] = share * (points[lower] - points[upper])[:, :2]
-    return moved
-
-
 def blueness(shut: float, yaw: float = 0.0, quality: RenderQuality = FULL_QUALITY) -> float:
     """How much more blue than red all pixels of the moved picture have together."""
     reenactor = FirstOrderReenactor(enlarged())
-    driver = motion(rotation_from_angles(yaw), expression=lids_lowered(shut))
+    driver = motion(rotation_from_angles(yaw), expression=lids_lowered(enlarged().face, shut))
     image = reenactor.plan_warp(driver, live_frame(), quality)(picture_with_blue_eyes()).image.astype(float)
     return float(np.maximum(image[..., 2] - image[..., 0], 0)[image[..., 3] > 200].sum())
 
@@ -98,7 +87,7 @@ def test_a_half_shut_eye_shows_the_lower_half_of_the_eyeball_as_high_as_it_is() 
             rows = np.s_[round(top + from_share * (bottom - top)) : round(top + to_share * (bottom - top))]
             picture[rows, columns] = BLUE
         reenactor = FirstOrderReenactor(enlarged())
-        driver = motion(expression=lids_lowered(shut))
+        driver = motion(expression=lids_lowered(enlarged().face, shut))
         image = reenactor.plan_warp(driver, live_frame(), FULL_QUALITY)(picture).image.astype(float)
         return float(np.maximum(image[..., 2] - image[..., 0], 0).sum())
 
@@ -130,8 +119,8 @@ def test_what_lies_beside_the_eyes_stays() -> None:
     skin = np.full((*enlarged().subject.matte.shape, 3), SKIN, np.float32)
     reenactor = FirstOrderReenactor(enlarged())
     opened, shut = (
-        reenactor.plan_warp(motion(expression=lids_lowered(share)), live_frame(), FULL_QUALITY)(skin).image.astype(int)
-        for share in (0.0, 1.0)
+        reenactor.plan_warp(motion(expression=expression), live_frame(), FULL_QUALITY)(skin).image.astype(int)
+        for expression in (lids_lowered(enlarged().face, 0.0), lids_lowered(enlarged().face))
     )
     assert np.abs(opened[..., 3] - shut[..., 3]).max() <= 5  # of 255
     assert np.abs(opened - shut)[opened[..., 3] > 200][:, :3].max() <= 2

@@ -82,16 +82,19 @@ def plan_closing_eyes(
         size: (width, height) of that.
         half_size: at one position a pixel.
     """
-    tasks = []
-    fine = 1 if half_size else SUBPIXELS
+    if not any(closing):
+        return []
+    tasks, fine = [], 1 if half_size else SUBPIXELS
+    corners = surface.corners @ to_picture[:, :2].T + to_picture[:, 2]
     for eye, share in zip(eyes, closing, strict=True):
+        if share == 0:
+            continue
         lids = landmarks[eye.lids] @ to_picture[:, :2].T + to_picture[:, 2]
         margin = max(REACH * float(np.ptp(lids[:, 0])), 1.0)
         low = np.maximum(np.floor(lids.min(axis=0) - margin), 0).astype(int)
         high = np.minimum(np.ceil(lids.max(axis=0) + margin), size).astype(int)
-        if share == 0 or (high - low < LEAST_SIDE_PX).any():
+        if (high - low < LEAST_SIDE_PX).any():
             continue
-        corners = surface.corners @ to_picture[:, :2].T + to_picture[:, 2]
         near = ((corners.max(axis=1) > low) & (corners.min(axis=1) < high)).all(axis=1)
         width, height = (int(side) for side in high - low)
         x, y, trust = draw_triangles(

@@ -84,7 +84,7 @@ class FaceMesh:
             corners.take(order, axis=0), self.values.take(order, axis=0), box_around(target, MARGIN * self.span)
         )
 
-    def feature_patch(self, flow: FlowPatch, feature: NDArray[np.float64], share: float = 1.0) -> FeaturePatch:
+    def feature_patch(self, flow: FlowPatch, feature: NDArray[np.float64], share: float) -> FeaturePatch:
         """The flow of an eye or the mouth, whose landmarks in the source image are `feature` (count, 2).
 
         It counts by a `share` beside the mesh.

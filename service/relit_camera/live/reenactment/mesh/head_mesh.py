@@ -19,12 +19,12 @@ from relit_camera.live.reenactment.mesh.face_mesh import (
     distance_from_sides,
     triangulate_face,
 )
-from relit_camera.live.reenactment.mesh.head_sides import CHEEK_SHARE, HeadSides, triangulate_sides
+from relit_camera.live.reenactment.mesh.head_sides import HeadSides, on_cheek, triangulate_sides
 from relit_camera.live.reenactment.source_image import SourceFace
 
-OUTLINE_BLEND = 0.07
-"""Eye distances inside the face's outline, over which the mesh's flow gives way to the flow around the face. Over more,
-what both show lies beside each other, as stripes along a turned cheek; over less the face seems to be cut out."""
+SHOWN_BLEND = 0.07
+"""As `OUTLINE_BLEND`, which mode ratio has for light alone, where the source image itself is shown. Over more, what
+mesh and flow show lies beside each other, as stripes along a turned cheek; over less the face seems to be cut out."""
 TURNED_MARGIN = 0.35
 """Eye distances round face and hair that the mesh of a turned head takes in: it fades out there, not over the ear."""
 
@@ -127,16 +127,14 @@ class HeadMesh:
 
 def triangulate_head(face: SourceFace, anchors: NDArray[np.float64]) -> HeadMesh:
     """The mesh of a source image's head; `anchors` (count, 2) are those of head and shoulders there, or none."""
-    mesh = triangulate_face(face, OUTLINE_BLEND)
+    mesh = triangulate_face(face, SHOWN_BLEND)
     members, scheme = mesh.members, face.scheme
     right, left = (eye_mesh(face, eye) for eye in (scheme.right_eye, scheme.left_eye))
     on_lids = np.stack([np.isin(members[mesh.triangles], eye.lids) for eye in (right, left)])
     within, touching = np.asarray(on_lids.all(axis=2), np.bool_), np.asarray(on_lids.any(axis=2), np.bool_)
     outline = face.head_points[members][mesh.outline]
-    aside = np.abs(face.head_points[members, 0]).max()
-    chin = ((np.abs(outline[..., 0]) < CHEEK_SHARE * aside) & (outline[..., 1] < 0)).any(axis=1)
+    chin = (~on_cheek(outline) & (outline[..., 1] < 0)).any(axis=1)
     places = face.landmarks[members].astype(np.float64)
-    fade = OUTLINE_BLEND * mesh.span
-    turned_trust = smoothstep(distance_from_sides(places, places[mesh.outline[chin]]), 0, fade)
+    turned_trust = smoothstep(distance_from_sides(places, places[mesh.outline[chin]]), 0, SHOWN_BLEND * mesh.span)
     sides = triangulate_sides(face, members, anchors) if len(anchors) else None
     return HeadMesh(mesh, (right, left), within, touching & ~within, sides, turned_trust)

@@ -91,7 +91,7 @@ def triangulate_sides(face: SourceFace, members: NDArray[np.intp], anchors: NDAr
         anchors: (count, 2) `head_and_shoulder_anchors` of the source image.
     """
     outline = face.head_points[list(face.scheme.oval)]
-    cheeks = outline[np.abs(outline[:, 0]) > CHEEK_SHARE * np.abs(outline[:, 0]).max()]
+    cheeks = outline[on_cheek(outline)]
     ears = cheeks + np.sign(cheeks[:, :1]) * [EAR_BESIDE_CM, 0, 0] - [0, 0, EAR_BEHIND_CM]
     landmarks = face.landmarks[members].astype(np.float64)
     around = _around(anchors)
@@ -111,6 +111,12 @@ def triangulate_sides(face: SourceFace, members: NDArray[np.intp], anchors: NDAr
         side=np.where(points[:, 0] < landmarks[:, 0].mean(), -1.0, 1.0),
         trust=np.repeat([1.0, 0.0], [len(points) - len(members) - fixed, fixed]),
     )
+
+
+def on_cheek(outline: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which points (..., 3) of a face's outline, in head axes, are that of a cheek or a temple: (...,)."""
+    aside = np.abs(outline[..., 0])
+    return np.asarray(aside > CHEEK_SHARE * aside.max())
 
 
 def _around(anchors: NDArray[np.float64]) -> NDArray[np.float64]:
