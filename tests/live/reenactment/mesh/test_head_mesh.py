@@ -104,6 +104,16 @@ def test_the_mesh_counts_fully_at_a_cheek_that_turns_away_and_not_at_the_chin(fa
     assert mesh.face.trust[cheeks | chin].max() < 0.2
 
 
+def test_beside_the_neck_the_mesh_does_not_count(face: SourceFace, mesh: HeadMesh) -> None:
+    """Neck and collar do not turn with the head; where a mesh of it ended over them, its rim would be seen."""
+    assert mesh.sides is not None
+    trust, height = mesh.sides.trust[: len(mesh.sides.ears)], mesh.sides.ears[:, 1]
+    assert (trust[height < -8] == 0).all()
+    assert (trust[height > -5] == 1).all()
+    jaw = face.head_points[mesh.face.members, 1] < -8
+    np.testing.assert_array_equal(mesh.turned_trust[jaw], mesh.face.trust[jaw])
+
+
 @pytest.mark.parametrize("yaw", [30, -30])
 def test_the_patch_of_a_turned_head_does_not_fade_out_over_the_far_ear(
     face: SourceFace, mesh: HeadMesh, yaw: float

@@ -19,7 +19,7 @@ from relit_camera.live.reenactment.mesh.face_mesh import (
     distance_from_sides,
     triangulate_face,
 )
-from relit_camera.live.reenactment.mesh.head_sides import HeadSides, on_cheek, triangulate_sides
+from relit_camera.live.reenactment.mesh.head_sides import HeadSides, above_neck, on_cheek, triangulate_sides
 from relit_camera.live.reenactment.source_image import SourceFace
 
 SHOWN_BLEND = 0.07
@@ -40,7 +40,7 @@ class HeadMesh:
             and whether it is skin that touches them.
         sides: what lies beside the face; None where the source image's border cuts the head off.
         turned_trust: (members of the face,) how far the mesh counts where a side has turned away: up to the face's
-            outline, but at the chin.
+            outline, but at chin and jaw.
     """
 
     face: FaceMesh
@@ -135,6 +135,7 @@ def triangulate_head(face: SourceFace, anchors: NDArray[np.float64]) -> HeadMesh
     outline = face.head_points[members][mesh.outline]
     chin = (~on_cheek(outline) & (outline[..., 1] < 0)).any(axis=1)
     places = face.landmarks[members].astype(np.float64)
-    turned_trust = smoothstep(distance_from_sides(places, places[mesh.outline[chin]]), 0, SHOWN_BLEND * mesh.span)
+    to_outline = smoothstep(distance_from_sides(places, places[mesh.outline[chin]]), 0, SHOWN_BLEND * mesh.span)
+    turned_trust = mesh.trust + above_neck(face.head_points[members]) * (to_outline - mesh.trust)
     sides = triangulate_sides(face, members, anchors) if len(anchors) else None
     return HeadMesh(mesh, (right, left), within, touching & ~within, sides, turned_trust)

@@ -27,6 +27,9 @@ ANCHOR_DEPTH_CM = -8.0
 """Z of the anchors, head axes: behind the ears."""
 RIM = 1.35
 """Size of the mesh's rim beside the ring beyond the hair: wide hair goes beyond that."""
+NECK_CM = (-8.0, -5.0)
+"""Y in head axes: at the height of the neck, up to which the mesh does not count, and from where on it does fully. What
+is behind the jaw there, neck and collar, does not turn with the head."""
 TURNED_DEG = (6.0, 16.0)
 """Yaw from which on the mesh counts at the side that turns away, and from where on fully."""
 
@@ -44,7 +47,7 @@ class HeadSides:
         places: (some, 3, 2) float64 source pixels of each triangle's corners.
         side: (points,) float64, −1 in the left half of the picture, 1 in the right.
         trust: (points beside the face,) float64 how far the mesh counts there once their side has turned away: 0 at its
-            rim and the shoulders, else 1.
+            rim, the shoulders and beside the neck, else 1.
     """
 
     ears: NDArray[np.float64]
@@ -109,7 +112,7 @@ def triangulate_sides(face: SourceFace, members: NDArray[np.intp], anchors: NDAr
         clockwise=np.sign(doubled_areas(places[order])),
         places=places[order],
         side=np.where(points[:, 0] < landmarks[:, 0].mean(), -1.0, 1.0),
-        trust=np.repeat([1.0, 0.0], [len(points) - len(members) - fixed, fixed]),
+        trust=np.concatenate([above_neck(ears), np.ones(len(around) - fixed), np.zeros(fixed)]),
     )
 
 
@@ -117,6 +120,11 @@ def on_cheek(outline: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which points (..., 3) of a face's outline, in head axes, are that of a cheek or a temple: (...,)."""
     aside = np.abs(outline[..., 0])
     return np.asarray(aside > CHEEK_SHARE * aside.max())
+
+
+def above_neck(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far points (count, 3) of the head, in head axes, lie above the height of the neck: (count,) 0..1."""
+    return np.asarray(smoothstep(points[:, 1], *NECK_CM))
 
 
 def _around(anchors: NDArray[np.float64]) -> NDArray[np.float64]:
