@@ -7,6 +7,7 @@ from the controls that the camera sets. The networks find the face, and the work
 from __future__ import annotations
 
 import threading
+import time
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -102,25 +103,18 @@ def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: 
         timings=TIMINGS,
     )
 
-    changing = threading.Lock()  # no picture of a pattern is given after the next one is shown
-
     def page() -> None:
         shown = -1
         while not stop.wait(0.02):
             status = filming.page_shows(shown)
             if status.stage.needs_page:
-                with changing:
-                    desk.shown, shown = np.array(status.patches, np.float32) ** np.float32(2.2), status.step
+                desk.shown, shown = np.array(status.patches, np.float32) ** np.float32(2.2), status.step
 
     def webcam() -> None:
         random, index = np.random.default_rng(0), 0
         while not stop.is_set():
-            shown = desk.shown
-            picture = desk.picture(random)
-            with changing:
-                if not np.array_equal(desk.shown, shown):
-                    continue  # a webcam's picture takes a moment, this one up to half a second
-                recorder.offer(Frame(picture, index, index / 20, index / 20))
+            captured_at = time.monotonic()  # a webcam's picture takes a moment, this one up to half a second
+            recorder.offer(Frame(desk.picture(random), index, captured_at, index / 20))
             index += 1
             if filming.status().stage is DeskStage.BUILDING:
                 stop.wait(0.5)  # nobody looks; a picture takes the time of a core

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -61,6 +62,7 @@ class Desk:
         )
         self.page_open, self.webcam_on = True, True
         self.closed_after: int | None = None
+        self.shows_from = 0.0
         self.screen = 0.0
         self._stop = threading.Event()
         self._threads = [threading.Thread(target=run) for run in (self._page, self._camera)]
@@ -73,6 +75,8 @@ class Desk:
             if not self.page_open:
                 continue
             status = self.filming.page_shows(shown)
+            if status.stage.needs_page and time.monotonic() < self.shows_from:
+                continue
             if status.stage.needs_page:
                 shown, self.screen = status.step, float(np.mean(status.patches))
                 if self.closed_after is not None and status.stage is DeskStage.FILMING and shown >= self.closed_after:
@@ -84,9 +88,10 @@ class Desk:
         index = 0
         while not self._stop.wait(0.004):
             if self.webcam_on:
+                captured_at = time.monotonic()
                 level = min(255.0, 10 + self.screen * self.webcam.brightness())
                 picture = np.full((64, 64, 3), int(level), np.uint8)
-                self.recorder.offer(Frame(picture, index, index / 30, index / 30))
+                self.recorder.offer(Frame(picture, index, captured_at, index / 30))
                 index += 1
 
     def start(self, name: str = "desk") -> None:
@@ -157,6 +162,14 @@ def test_a_page_that_is_closed_midway_ends_it_and_frees_the_webcam(desk: Callabl
     assert "page with the patterns was closed" in there.filming.status().what
     assert there.webcam.values == there.before
     assert there.scenes.subjects.names() == []
+
+
+def test_the_exposure_is_found_under_white_however_late_the_page_shows_it(desk: Callable[[DeskBuilder], Desk]) -> None:
+    there = desk(check_and_build)
+    there.shows_from = time.monotonic() + 0.8
+    there.start()
+    wait_until(lambda: there.filming.status().stage is DeskStage.FILMING, 30)
+    assert 0.8 * TIMINGS.bright_code < 10 + there.webcam.brightness() <= TIMINGS.bright_code + 5
 
 
 def test_it_can_be_canceled_while_it_films(desk: Callable[[DeskBuilder], Desk]) -> None:

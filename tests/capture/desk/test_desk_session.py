@@ -45,7 +45,7 @@ class Filming:
             self.changes.append(self.clock.now())
 
     def _webcam(self) -> None:
-        if self.webcam_on and self.session.wants_frame():
+        if self.webcam_on and self.session.wants_frame(self.clock.now()):
             self.frames.append((self.session.step, self.clock.now()))
             self.session.frame_taken()
 
@@ -74,7 +74,7 @@ def test_the_screen_changes_three_times_a_second_at_most_whatever_the_webcam_doe
     changes = []
     while not fast.is_done:
         fast.page_shows(fast.step)
-        if fast.wants_frame():
+        if fast.wants_frame(filming.clock.now()):
             fast.frame_taken()
         before = fast.step
         fast.advance()
@@ -99,10 +99,20 @@ def test_a_step_that_is_not_shown_yet_is_not_filmed() -> None:
     session = DeskSession(PATTERNS, clock)
     session.page_shows(3)
     clock.sleep(1)
-    assert not session.wants_frame()
+    assert not session.wants_frame(clock.now())
     session.page_shows(0)
     clock.sleep(1)
-    assert session.wants_frame()
+    assert session.wants_frame(clock.now())
+
+
+def test_a_frame_from_before_the_change_does_not_count_however_late_it_is_looked_at() -> None:
+    clock = VirtualClock()
+    session = DeskSession(PATTERNS, clock)
+    captured_at = clock.now()
+    session.page_shows(0)
+    clock.sleep(1)
+    assert not session.wants_frame(captured_at)
+    assert session.wants_frame(captured_at + TIMINGS.settling_s)
 
 
 def test_a_page_that_is_closed_midway_ends_it() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import CaptureError
+from relit_camera.base.images.color import srgb_decode, srgb_encode
 from relit_camera.capture.desk.desk_recording import CameraPlace, DeskSetup, PatchGrid, Screen
 from relit_camera.capture.desk.patterns.pattern_sequence import (
     demultiplex,
@@ -130,6 +131,28 @@ def test_plateaus_end_where_light_changes() -> None:
     random = np.random.default_rng(0)
     cells = (levels[:, None, None] + 0.002 * random.normal(size=(len(levels), 24, 32))).astype(np.float32)
     assert [(each.start, each.stop) for each in find_plateaus(cells)] == [(0, 9), (13, 20), (20, 28)]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_head_that_trembles_hides_no_pattern(seed: int) -> None:
+    """A trembling changes bright frames more than dark ones, and some of them more than a next pattern does."""
+    random = np.random.default_rng(seed)
+    face, across, down, side = random.uniform(0.3, 1, (4, 24, 32)) * np.array([1, 0.3, 0.3, 0.05])[:, None, None]
+    levels = np.repeat([0.01, 1.0, 0.01, *([0.5, 0.55] * 8)], 4)
+    turned = np.repeat([0, 0, 0, *([1, -1] * 8)], 4)
+    lit = face + np.einsum("tk,kyx->tyx", 0.015 * random.normal(size=(len(levels), 2)), np.stack([across, down]))
+    codes = srgb_encode(0.5 * levels[:, None, None] * (lit + turned[:, None, None] * side))
+    found = find_plateaus(srgb_decode(codes + np.float32(0.0005) * random.standard_normal(codes.shape, np.float32)))
+    assert {each.start // 4 for each in found} == set(range(len(levels) // 4))
+    assert all(each.start // 4 == (each.stop - 1) // 4 for each in found)
+
+
+def test_a_long_recording_is_parted_in_bounded_time_and_memory() -> None:
+    levels = np.tile(np.repeat([0.2, 0.7], [700, 50]), 4)
+    cells = levels[:, None, None] + 0.002 * np.random.default_rng(0).normal(size=(len(levels), 24, 32))
+    found = find_plateaus(cells.astype(np.float32))
+    assert {each.start for each in found} >= set(range(0, 3000, 750)) | {k + 700 for k in range(0, 3000, 750)}
+    assert max(each.stop - each.start for each in found) <= 200
 
 
 def test_noise_alone_has_no_plateaus() -> None:

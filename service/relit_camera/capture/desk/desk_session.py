@@ -83,11 +83,11 @@ class DeskSession:
             late = "the page does not show its pattern" if self._shown_at is None else "the webcam gives no frames"
             raise CaptureError(f"{late}: step {self._step + 1} took too long", "close other programs, and start again")
 
-    def wants_frame(self) -> bool:
-        """Whether a frame that is filmed now would count."""
+    def wants_frame(self, captured_at: float) -> bool:
+        """Whether a frame that was captured at a time of the clock counts for the pattern that is shown."""
         if self.is_done or self._shown_at is None or self._taken >= self._timings.frames_a_step:
             return False
-        return self._clock.now() >= self._shown_at + self._timings.settling_s
+        return captured_at >= self._shown_at + self._timings.settling_s
 
     def frame_taken(self) -> None:
         """Note that a frame was kept."""

@@ -157,7 +157,7 @@ class DeskFilming:
         """Capture; `before` is what was shown when somebody asked for it. Returns what its end changes."""
         try:
             with self._controls() as device:
-                self._white_balance(setup)
+                self._white_balance()
                 with self._note.until_restored() as keep, hold_controls(device, keep) as held:
                     reached = find_exposure(held, self._brightness, self._timings.bright_code, self._frame_interval_s())
                     log.info("desk capture: %s held, white reads %.0f", ", ".join(held.names), reached)
@@ -175,12 +175,18 @@ class DeskFilming:
             what, cure = describe_failure("desk capture", error)
             return {"stage": DeskStage.FAILED, "patches": (), "what": what, "cure": cure}
 
-    def _white_balance(self, setup: DeskSetup) -> None:
+    def _white_balance(self) -> None:
         """Wait until the page shows white, and the webcam has adapted to it."""
-        self._next_frames(1)
+        while not self._shows_pattern(self._next_frames(1)[0]):
+            pass
         ends = self._clock.now() + self._timings.automatic_s
         while self._clock.now() < ends:
             self._next_frames(1)
+
+    def _shows_pattern(self, frame: Frame) -> bool:
+        """Whether a frame was captured under the pattern that is to be shown."""
+        with self._lock:
+            return self._session is not None and self._session.wants_frame(frame.captured_at)
 
     def _brightness(self) -> float:
         """Code of 255 that the brightest part of the picture's middle has, once the last change shows."""
@@ -196,7 +202,7 @@ class DeskFilming:
         while not session.is_done:
             frame = self._next_frames(1)[0]
             with self._lock:
-                wanted = session.wants_frame()
+                wanted = session.wants_frame(frame.captured_at)
                 if wanted:
                     session.frame_taken()
                 step = session.step

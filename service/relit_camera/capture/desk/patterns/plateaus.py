@@ -1,6 +1,9 @@
 """Plateaus: runs of frames in which the screen shows one pattern, found by how the frames change.
 
-No clock is trusted: the screen, the webcam and the program between them are each late by times that vary.
+No clock is trusted: the screen, the webcam and the program between them are each late by times that vary. The frames
+are parted into runs so that each frame is near the mean of its run, and each run costs something: optimal partitioning
+(Jackson et al. 2005, "An Algorithm for Optimal Partitioning of Data on an Interval"). A head that moves in one frame
+ends no run, as it would where only successive frames are compared.
 """
 
 from __future__ import annotations
@@ -13,7 +16,7 @@ import numpy as np
 
 from relit_camera.base.array_types import Float32Array
 from relit_camera.base.errors import CaptureError
-from relit_camera.base.images.color import Gamma, decode, luminance
+from relit_camera.base.images.color import Gamma, decode, luminance, srgb_encode
 from relit_camera.capture.desk.desk_recording import DeskRecording, require_frame
 
 
@@ -25,15 +28,17 @@ class PlateauTunables:
         cells: width and height of the grid of cells to which a frame is reduced.
         min_frames: fewer frames between two changes are no plateau.
         noise_percentile: of the differences of successive frames: that of standing patterns, which are most.
-        noise_factor: a difference larger than this many times that is a change,
-        min_change: and than this fraction of the largest difference from the mean of all.
+        min_noise: noise that is assumed at least, as a fraction of the largest difference from the mean of all frames.
+        run_cost: of one more run of frames, in squares of the noise.
+        max_run: frames of a run at most, which bounds the work; a longer plateau becomes several.
     """
 
     cells: tuple[int, int] = (32, 24)
     min_frames: int = 3
     noise_percentile: float = 35.0
-    noise_factor: float = 3.0
-    min_change: float = 0.003
+    min_noise: float = 0.001
+    run_cost: float = 20.0
+    max_run: int = 200
 
 
 TUNABLES = PlateauTunables()
@@ -82,19 +87,43 @@ def find_plateaus(cells: Float32Array) -> list[Plateau]:
     Raises:
         CaptureError: the frames never change, or never stand still.
     """
-    steps = np.sqrt(np.mean(np.diff(cells, axis=0) ** 2, axis=(1, 2)))
-    spread = float(np.sqrt(np.mean((cells - cells.mean(axis=0)) ** 2, axis=(1, 2))).max())
-    noise = float(np.percentile(steps, TUNABLES.noise_percentile))
-    threshold = max(TUNABLES.noise_factor * noise, TUNABLES.min_change * spread)
-    if spread <= 2 * noise or steps.max() <= threshold:
+    # As codes, in which a webcam's noise is about the same in bright frames and in dark ones.
+    codes = srgb_encode(cells).reshape(len(cells), -1)
+    steps = np.sqrt(np.mean(np.diff(codes, axis=0) ** 2, axis=1))
+    spread = float(np.sqrt(np.mean((codes - codes.mean(axis=0)) ** 2, axis=1)).max())
+    # Of two frames that both have it, the difference has twice its square.
+    noise = float(np.percentile(steps, TUNABLES.noise_percentile)) / np.sqrt(2)
+    runs = _part(codes, max(noise, TUNABLES.min_noise * spread, 1e-9))
+    if spread <= 3 * noise or len(runs) == 1:
         cure = "the patterns must light the face: darken the room, raise the screen's brightness, come nearer"
         raise CaptureError("no patterns are seen: the frames hardly change", cure)
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], steps > threshold, [True]]).astype(np.int8)))
-    # A standing run of differences from a to b joins the frames a to b.
-    plateaus = []
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
-        if stop - start + 1 >= TUNABLES.min_frames:
-            plateaus.append(Plateau(int(start), int(stop) + 1, cells[start : stop + 1].mean(axis=0)))
+    plateaus = [
+        Plateau(start, stop, cells[start:stop].mean(axis=0))
+        for start, stop in runs
+        if stop - start >= TUNABLES.min_frames
+    ]
     if not plateaus:
         raise CaptureError("no patterns are seen: the frames change all the time", "keep still, and film without zoom")
     return plateaus
+
+
+def _part(frames: Float32Array, noise: float) -> list[tuple[int, int]]:
+    """Runs [start, stop) that part frames (frames, values) at the least cost, in order.
+
+    A run costs the squared distances of its frames from their mean, per value and in squares of the noise, and
+    `run_cost`.
+    """
+    scaled = (frames - frames.mean(axis=0, dtype=np.float64)) / (noise * np.sqrt(frames.shape[1]))
+    sums = np.concatenate([np.zeros((1, frames.shape[1])), np.cumsum(scaled, axis=0)])
+    squares = np.concatenate([[0.0], np.cumsum((scaled**2).sum(axis=1))])
+    cost, came_from = np.zeros(len(frames) + 1), np.zeros(len(frames) + 1, np.intp)
+    for stop in range(1, len(frames) + 1):
+        starts = np.arange(max(0, stop - TUNABLES.max_run), stop)
+        apart = squares[stop] - squares[starts] - ((sums[stop] - sums[starts]) ** 2).sum(axis=1) / (stop - starts)
+        total = cost[starts] + apart + TUNABLES.run_cost
+        cost[stop], came_from[stop] = total.min(), starts[total.argmin()]
+    runs, stop = [], len(frames)
+    while stop:
+        runs.append((int(came_from[stop]), stop))
+        stop = int(came_from[stop])
+    return runs[::-1]
