@@ -38,7 +38,7 @@ from relit_camera.subject.subject_file import read_subject, write_subject
 
 OPEN_MOUTH, SHUT_EYE, TURNED_DEG = 0.1, 0.13, (22.0, 40.0)
 """What the truth must show for a frame to count: least opening of the mouth, most of the eyes, and yaw."""
-RIMS = {"open mouth": 0.1, "shut eyes": 0.3, "far half": -0.06, "face": -0.06}
+RIMS = {"open mouth": 0.1, "shut eyes": 0.3, "far half": -0.06, "near half": -0.06, "face": -0.06}
 """By how much each region reaches beyond the hull of its landmarks, in parts of its smaller side. Where it ends at the
 face's outline, that does not count: outlines that differ by a pixel would be all of the error."""
 SIDE_PX = 200
@@ -104,6 +104,7 @@ def regions(state: FaceState, scheme: LandmarkScheme) -> dict[str, list[int]]:
     if TURNED_DEG[0] <= abs(yaw) <= TURNED_DEG[1]:
         far = scheme.canonical[:468, 0] * np.sign(yaw)
         found["far half"] = list(np.flatnonzero(far > 0.3))
+        found["near half"] = list(np.flatnonzero(far < -0.3))
     return found
 
 
@@ -200,7 +201,7 @@ def main() -> None:
     runs = {way: Run(pictures, track(pictures)) for way, pictures in shown.items()}
     found, rows = compare(Run(truth, track(truth)), mattes, runs)
     print(f"{'region':12s} frames {'  '.join(f'{way:>6s}' for way in WAYS)}")
-    for name in ("open mouth", "shut eyes", "far half", "face"):
+    for name in ("open mouth", "shut eyes", "far half", "near half", "face"):
         if (name, "plain") in found:
             means = "  ".join(f"{np.mean(found[name, way]):6.2f}" for way in WAYS)
             print(f"{name:12s} {len(found[name, 'plain']):6d} {means}")

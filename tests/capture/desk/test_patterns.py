@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from relit_camera.base.errors import CaptureError
-from relit_camera.base.images.color import srgb_decode, srgb_encode
+from relit_camera.base.images.color import Gamma, decode, srgb_decode, srgb_encode
 from relit_camera.capture.desk.desk_recording import CameraPlace, DeskSetup, PatchGrid, Screen
 from relit_camera.capture.desk.patterns.pattern_sequence import (
     demultiplex,
@@ -145,6 +145,38 @@ def test_a_head_that_trembles_hides_no_pattern(seed: int) -> None:
     found = find_plateaus(srgb_decode(codes + np.float32(0.0005) * random.standard_normal(codes.shape, np.float32)))
     assert {each.start // 4 for each in found} == set(range(len(levels) // 4))
     assert all(each.start // 4 == (each.stop - 1) // 4 for each in found)
+
+
+@pytest.mark.parametrize("frames", [6, 10, 20])
+@pytest.mark.parametrize("disturbed", ["drifting", "noisy"])
+def test_patterns_under_which_the_head_drifts_or_the_picture_is_noisy_are_seen_too(frames: int, disturbed: str) -> None:
+    """In a third of the patterns each frame differs from the one before as much as three or six times the noise."""
+    random = np.random.default_rng(0)
+    noise, levels = 0.002, np.tile([0.25, 0.6], 15)
+    codes = np.repeat(levels, frames)[:, None, None] + noise * random.normal(size=(30 * frames, 24, 32))
+    for pattern in range(0, 30, 3):
+        part = codes[pattern * frames : (pattern + 1) * frames]
+        if disturbed == "drifting":
+            part += 3 * noise * np.arange(frames)[:, None, None]
+        else:
+            part += 6 * noise * random.normal(size=part.shape)
+    found = find_plateaus(srgb_decode(codes.astype(np.float32)))
+    assert {each.start // frames for each in found} == set(range(30))
+    assert all(each.start // frames == (each.stop - 1) // frames for each in found)
+
+
+@pytest.mark.parametrize("gamma", ["srgb", "linear", 2.2])
+def test_black_is_a_plateau_whatever_the_curve_of_the_camera(gamma: Gamma) -> None:
+    random = np.random.default_rng(0)
+    codes = np.repeat([0.02, 0.6, 0.02, 0.3, 0.35, 0.02], 8)[:, None, None] + 0.003 * random.normal(size=(48, 24, 32))
+    found = find_plateaus(decode(codes.astype(np.float32), gamma), gamma)
+    assert [(each.start, each.stop) for each in found] == [(k, k + 8) for k in range(0, 48, 8)]
+
+
+def test_too_few_frames_are_no_patterns() -> None:
+    for count in (1, 2):
+        with pytest.raises(CaptureError, match="no patterns are seen"):
+            find_plateaus(np.linspace(0.1, 0.2, count * 4, dtype=np.float32).reshape(count, 2, 2))
 
 
 def test_a_long_recording_is_parted_in_bounded_time_and_memory() -> None:

@@ -94,6 +94,15 @@ def decode(encoded: NDArray[np.float32], gamma: Gamma) -> NDArray[np.float32]:
     return np.power(np.maximum(encoded, 0), float(gamma)).astype(np.float32)
 
 
+def encode(linear: NDArray[np.float32], gamma: Gamma) -> NDArray[np.float32]:
+    """Code values of linear light in 0..1 under `gamma`, float32, same shape: the inverse of `decode`."""
+    if gamma == "linear":
+        return linear.astype(np.float32)
+    if gamma == "srgb":
+        return srgb_encode(linear)
+    return np.power(np.maximum(linear, 0), 1 / float(gamma)).astype(np.float32)
+
+
 def luminance(linear: NDArray[np.float32]) -> NDArray[np.float32]:
     """Rec. 709 luminance (...,) of linear RGB (..., 3)."""
     result: NDArray[np.float32] = linear @ LUMINANCE

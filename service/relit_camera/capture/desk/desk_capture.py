@@ -223,7 +223,9 @@ def identify_patterns(
         CaptureError: no face, no patterns, or not enough of them.
     """
     cells = frame_cells(recording, progress)
-    plateaus = find_plateaus(cells) if recording.setup.shown == "unknown" else _stated_plateaus(recording, cells)
+    setup = recording.setup
+    stated = setup.shown != "unknown"
+    plateaus = _stated_plateaus(recording, cells) if stated else find_plateaus(cells, setup.camera_gamma)
     white = mean_frame(recording, max(plateaus, key=lambda each: float(each.cells.mean())))
     face = find_face(_exposed(white), recording.setup)
     on_face = _disc(recording.size, face)

@@ -14,7 +14,7 @@ from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenac
 from relit_camera.live.reenactment.motion_transfer import rotate_about
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.stills import still_light, still_regions
-from relit_camera.live.reenactment.stills.still_drawing import StillDrawing
+from relit_camera.live.reenactment.stills.still_drawing import StillDrawing, _Layer, _PlannedRegion
 from relit_camera.live.reenactment.stills.still_regions import face_in_still
 from relit_camera.subject.expression_stills import ExpressionStill
 from relit_camera.subject.subject import Subject
@@ -22,6 +22,8 @@ from tests.live.people import close_up, context_of, live_frame, motion, moved_by
 from tests.live.reenactment.stills.made_stills import expression, relit, soft_light, still, with_stills
 
 SIZE = (288, 384)
+TURNED_RIGHT, NEAR_CHEEK = 3, 280
+"""A still of `with_stills`, and a landmark of the cheek that is near in it."""
 
 
 def shown(subject: Subject, moved: np.ndarray, picture: np.ndarray, turn: float = 0.0) -> np.ndarray:
@@ -129,7 +131,7 @@ def test_no_region_ends_at_the_border_of_its_box() -> None:
     enlarged = np.array([[4.0, 0, 0], [0, 4.0, 0]])
     size = (4 * face.size[0], 4 * face.size[1])
     task = StillDrawing(subject, face).plan(landmarks, turned, moved, 0.0, enlarged, size, 3)
-    assert len(task.regions) == 4  # mouth, both eyes, one side
+    assert len(task.regions) == 4  # mouth, both eyes, the turned face
     for region in task.regions:
         for layer in region.layers:
             rim = np.concatenate([layer.cover[0], layer.cover[-1], layer.cover[:, 0], layer.cover[:, -1]])
@@ -137,21 +139,87 @@ def test_no_region_ends_at_the_border_of_its_box() -> None:
             assert layer.cover.max() > 0.4
 
 
+def cover_at(subject: Subject, moved: np.ndarray, turn: float, landmarks: tuple[int, ...]) -> float:
+    """How far the only region that is drawn shows its only still in the middle of some landmarks."""
+    face = context_of(subject, SIZE).face
+    pose = rotate_about(np.zeros(3), face.pose, rotation_from_angles(turn))
+    places = project(face.head_points + moved, pose, face.size).astype(np.float64)
+    enlarged = np.array([[4.0, 0, 0], [0, 4.0, 0]])
+    size = (4 * face.size[0], 4 * face.size[1])
+    drawing = StillDrawing(subject, face)
+    (region,) = drawing.plan(places, pose, moved.astype(np.float64), 0.0, enlarged, size, 3).regions
+    (layer,) = region.layers
+    return cover_of(region, layer, 4 * places[list(landmarks)].mean(axis=0))
+
+
+def cover_of(region: _PlannedRegion, layer: _Layer, place: np.ndarray) -> float:
+    """How far a layer shows at a place (x, y) of the picture."""
+    x, y = (place - region.box[:2]) / 2  # drawn at half the size: the still is small
+    rows, columns = layer.cover.shape
+    return float(layer.cover[int(y), int(x)]) if 0 <= y < rows and 0 <= x < columns else 0.0
+
+
 def test_a_still_of_a_turned_head_leaves_a_shut_eye_out() -> None:
     """It shows the eye open."""
     subject = with_stills(still(soft_light(), expression(), rotation_from_angles(25)))
+    lids = context_of(subject, SIZE).face.scheme.left_eye.lids
+    assert cover_at(subject, expression(shut=0.0), 22, lids) > 0.5
+    assert cover_at(subject, expression(shut=1.0), 22, lids) < 0.05
+
+
+@pytest.mark.parametrize(("turn", "near"), [(25, 50), (-25, 280)])
+def test_of_a_turned_head_a_still_shows_the_near_cheek_too(turn: float, near: int) -> None:
+    """The source image shows that from aside, with fewer pixels. The near eye stays the source image's."""
+    subject = with_stills(still(soft_light(), expression(), rotation_from_angles(turn)))
+    scheme = context_of(subject, SIZE).face.scheme
+    eyes = [scheme.right_eye, scheme.left_eye]
+    near_eye, far_eye = eyes if turn > 0 else eyes[::-1]
+    assert cover_at(subject, expression(), 1.2 * turn, (near,)) > 0.9
+    assert cover_at(subject, expression(), 0.48 * turn, (near,)) < 0.05, "there the source image's is sharper"
+    assert cover_at(subject, expression(), turn, near_eye.lids) < 0.1
+    assert cover_at(subject, expression(), turn, far_eye.lids) > 0.5
+
+
+def test_the_near_cheek_of_the_side_that_a_head_comes_from_does_not_come_back() -> None:
+    """While a head swings over in a seventh of a second the other side's still fades out. Its near cheek is gone."""
+    subject = with_stills()
     face = context_of(subject, SIZE).face
-    pose = rotate_about(np.zeros(3), face.pose, rotation_from_angles(22))
+    drawing, covers = StillDrawing(subject, face), []
+    enlarged, size = np.array([[4.0, 0, 0], [0, 4.0, 0]]), (4 * face.size[0], 4 * face.size[1])
+    for index, turn in enumerate([-30.0] * 10 + [-18.0, -6.0, 6.0, 18.0] + [30.0] * 10):
+        pose = rotate_about(np.zeros(3), face.pose, rotation_from_angles(turn))
+        places = project(face.head_points, pose, face.size).astype(np.float64)
+        task = drawing.plan(places, pose, np.zeros_like(face.head_points), index / 30, enlarged, size, 3)
+        shown = [(region, layer) for region in task.regions for layer in region.layers if layer.still == TURNED_RIGHT]
+        covers.append(max((cover_of(region, layer, 4 * places[NEAR_CHEEK]) for region, layer in shown), default=0.0))
+    assert min(covers[:10]) > 0.9
+    assert max(covers[11:]) == 0
 
-    def cover_at_eye(shut: float) -> float:
-        moved = expression(shut=shut).astype(np.float64)
-        landmarks = project(face.head_points + moved, pose, face.size).astype(np.float64)
-        enlarged = np.array([[4.0, 0, 0], [0, 4.0, 0]])
-        size = (4 * face.size[0], 4 * face.size[1])
-        (side,) = StillDrawing(subject, face).plan(landmarks, pose, moved, 0.0, enlarged, size, 3).regions
-        cover = side.layers[0].cover  # of half the resolution, for the still is coarser
-        x, y = (4 * landmarks[list(face.scheme.left_eye.lids)].mean(axis=0) - side.box[:2]) / 2
-        return float(cover[int(y), int(x)])
 
-    assert cover_at_eye(shut=0.0) > 0.5
-    assert cover_at_eye(shut=1.0) < 0.05
+def test_skin_is_not_taken_for_hair() -> None:
+    """Nor is dark skin: what counts is the skin round it."""
+    bare = with_stills()
+    face = context_of(bare, SIZE).face
+    dark = replace(bare, basis=replace(bare.basis, scales=bare.basis.scales * np.float32(0.15)))
+    for subject in (bare, dark):
+        whole = still_light._Grid.over(subject, face).skin
+        assert still_light.StillLight(subject, face)._grid.skin.sum() > 0.95 * whole.sum()
+
+
+def test_hair_over_the_outline_of_the_source_image_does_not_brighten_a_still_s_cheek() -> None:
+    """A strand of black hair hangs over one cheek there, and none in the still: divided by it, skin would be white."""
+    bare = with_stills(still(soft_light(), expression(), rotation_from_angles(25)))
+    face = context_of(bare, SIZE).face
+    oval = np.zeros(bare.size[::-1], np.uint8)
+    cv2.fillPoly(oval, [face.landmarks[list(face.scheme.oval)].astype(np.int32)], 1)
+    inside = np.flatnonzero(oval.any(axis=0))
+    strand = np.zeros_like(oval)
+    strand[:, inside[0] : inside[0] + len(inside) // 12] = 1
+    per_place = np.where(strand.ravel()[bare.basis.pixels], 0.05, 1.0)  # (clusters, places)
+    of_cluster = np.repeat(np.arange(len(bare.basis.pixels)), np.diff(bare.basis.first))
+    darkened = bare.basis.values.astype(np.float32) * per_place[of_cluster][:, None]
+    hairy = replace(bare, basis=replace(bare.basis, values=darkened.astype(np.float16)))
+    with_hair, without = (still_light.StillLight(each, face).unlit[0].astype(int) for each in (hairy, bare))
+    assert (relit(hairy, soft_light())[strand > 0].mean()) < 0.1 * relit(bare, soft_light())[strand > 0].mean()
+    skin = (oval > 0) & (cv2.erode(oval, np.ones((5, 5))) > 0)
+    assert (with_hair - without)[skin].max() < 25

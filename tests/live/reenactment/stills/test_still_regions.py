@@ -10,6 +10,8 @@ from relit_camera.live.reenactment.stills.still_regions import face_in_still, fa
 from tests.live.people import SCHEME, close_up, face_of
 from tests.live.reenactment.stills.made_stills import expression, soft_light, still
 
+NOSE_TIP, CHEEKS = 1, (50, 280)
+"""Landmarks of the scheme `mesh478`."""
 REGIONS = {region.name: region for region in still_regions(SCHEME)}
 
 
@@ -34,9 +36,20 @@ def test_each_region_fades_out_and_leaves_the_rest_alone() -> None:
         trust = REGIONS[name].trust
         assert trust[list(features)].min() > 0.99
         assert (trust > 0).mean() < 0.35
-    assert REGIONS["left_side"].trust[SCHEME.right_eye.outer] == 0
-    assert REGIONS["left_side"].trust[SCHEME.left_eye.outer] == 1
-    assert max(REGIONS[side].trust[list(SCHEME.oval)].max() for side in ("left_side", "right_side")) == 0
+
+
+def test_a_turned_face_is_its_cheeks_and_the_eye_that_turns_away() -> None:
+    """Not the near eye, whose gaze is the driver's, nor the nose, which is seen from the front as well."""
+    for name, far, near in (
+        ("left_turn", SCHEME.left_eye, SCHEME.right_eye),
+        ("right_turn", SCHEME.right_eye, SCHEME.left_eye),
+    ):
+        region = REGIONS[name]
+        assert region.eye_name == name.replace("turn", "eye")
+        assert (region.trust[far.outer], region.eye[far.outer]) == (1, 1)
+        assert max(region.trust[list(near.lids)].max(), region.eye[list(near.lids)].max()) == 0
+        assert max(region.trust[list(SCHEME.oval)].max(), region.trust[NOSE_TIP]) == 0
+        assert region.trust[list(CHEEKS)].min() > 0.95
 
 
 def test_a_still_does_not_show_at_the_outline_of_its_face() -> None:

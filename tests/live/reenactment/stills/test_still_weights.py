@@ -34,7 +34,7 @@ def test_an_open_mouth_is_the_open_stills(weights: StillWeights) -> None:
     shown = settled(weights, expression(open_cm=0.9))
     assert shown["mouth"][OPEN] > 0.98
     assert not shown["right_eye"]
-    assert not shown["left_side"]
+    assert not shown["left_turn"]
 
 
 def test_shut_eyes_are_the_shut_stills_and_one_eye_may_wink(weights: StillWeights) -> None:
@@ -55,8 +55,8 @@ def test_a_still_of_an_open_eye_is_not_laid_over_a_shut_one(shut: float) -> None
     assert not shown["left_eye"]
 
 
-@pytest.mark.parametrize(("yaw", "region", "turned", "other"), [(25, "left_side", RIGHT, "right_side"),
-                                                               (-25, "right_side", LEFT, "left_side")])  # fmt: skip
+@pytest.mark.parametrize(("yaw", "region", "turned", "other"), [(25, "left_turn", RIGHT, "right_turn"),
+                                                               (-25, "right_turn", LEFT, "left_turn")])  # fmt: skip
 def test_the_side_that_turns_away_is_the_turned_stills(
     weights: StillWeights, yaw: float, region: str, turned: int, other: str
 ) -> None:
@@ -68,7 +68,7 @@ def test_the_side_that_turns_away_is_the_turned_stills(
 def test_a_side_without_a_still_that_is_turned_there_stays() -> None:
     only = with_stills(still(soft_light(), expression(), rotation_from_angles(25)))
     shown = settled(StillWeights(only.stills, face_of(only)), expression(), rotation_from_angles(-25))
-    assert not shown["right_side"]
+    assert not shown["right_turn"]
 
 
 def drawn(weights: StillWeights, doing: Doing, time_s: float, count: int) -> dict[str, np.ndarray]:

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import percentile_filter
 
 from relit_camera.base.array_types import Float32Array
 from relit_camera.base.errors import CaptureError
-from relit_camera.base.images.color import Gamma, decode, luminance, srgb_encode
+from relit_camera.base.images.color import Gamma, decode, encode, luminance
 from relit_camera.capture.desk.desk_recording import DeskRecording, require_frame
 
 
@@ -28,6 +30,9 @@ class PlateauTunables:
         cells: width and height of the grid of cells to which a frame is reduced.
         min_frames: fewer frames between two changes are no plateau.
         noise_percentile: of the differences of successive frames: that of standing patterns, which are most.
+        nearby: number of successive differences of which the same percentile is the noise of the frame amid them,
+        max_noise: up to this many times that of the recording: a head that drifts, or a picture that is noisy where it
+            is dark, is no change of pattern.
         min_noise: noise that is assumed at least, as a fraction of the largest difference from the mean of all frames.
         run_cost: of one more run of frames, in squares of the noise.
         max_run: frames of a run at most, which bounds the work; a longer plateau becomes several.
@@ -36,6 +41,8 @@ class PlateauTunables:
     cells: tuple[int, int] = (32, 24)
     min_frames: int = 3
     noise_percentile: float = 35.0
+    nearby: int = 5
+    max_noise: float = 4.0
     min_noise: float = 0.001
     run_cost: float = 20.0
     max_run: int = 200
@@ -78,23 +85,24 @@ def decode_table(gamma: Gamma) -> Float32Array:
     return decode(np.arange(256, dtype=np.float32) / np.float32(255), gamma)
 
 
-def find_plateaus(cells: Float32Array) -> list[Plateau]:
+def find_plateaus(cells: Float32Array, gamma: Gamma = "srgb") -> list[Plateau]:
     """The plateaus of a recording, in order.
 
     Args:
         cells: (frames, rows, columns) of `frame_cells`.
+        gamma: curve of the camera.
 
     Raises:
         CaptureError: the frames never change, or never stand still.
     """
     # As codes, in which a webcam's noise is about the same in bright frames and in dark ones.
-    codes = srgb_encode(cells).reshape(len(cells), -1)
+    codes = encode(cells, gamma).reshape(len(cells), -1)
     steps = np.sqrt(np.mean(np.diff(codes, axis=0) ** 2, axis=1))
     spread = float(np.sqrt(np.mean((codes - codes.mean(axis=0)) ** 2, axis=1)).max())
     # Of two frames that both have it, the difference has twice its square.
-    noise = float(np.percentile(steps, TUNABLES.noise_percentile)) / np.sqrt(2)
-    runs = _part(codes, max(noise, TUNABLES.min_noise * spread, 1e-9))
-    if spread <= 3 * noise or len(runs) == 1:
+    noise = float(np.percentile(steps, TUNABLES.noise_percentile)) / np.sqrt(2) if len(steps) else 0.0
+    runs = _part(codes, _noise_of_frames(steps, max(noise, TUNABLES.min_noise * spread, 1e-9)))
+    if spread <= 2 * np.sqrt(2) * noise or len(runs) == 1:
         cure = "the patterns must light the face: darken the room, raise the screen's brightness, come nearer"
         raise CaptureError("no patterns are seen: the frames hardly change", cure)
     plateaus = [
@@ -107,23 +115,39 @@ def find_plateaus(cells: Float32Array) -> list[Plateau]:
     return plateaus
 
 
-def _part(frames: Float32Array, noise: float) -> list[tuple[int, int]]:
+def _noise_of_frames(steps: NDArray[np.floating], noise: float) -> NDArray[np.float64]:
+    """Noise (frames,) of each frame, from the differences (frames − 1,) and the noise of the whole recording."""
+    if not len(steps):
+        return np.array([noise])
+    nearby = percentile_filter(steps, TUNABLES.noise_percentile, size=TUNABLES.nearby, mode="nearest") / np.sqrt(2)
+    # A frame has a difference before it and one after it.
+    both = np.minimum(np.concatenate([nearby[:1], nearby]), np.concatenate([nearby, nearby[-1:]]))
+    return np.asarray(np.clip(both, noise, TUNABLES.max_noise * noise), np.float64)
+
+
+def _part(frames: Float32Array, noise: NDArray[np.float64]) -> list[tuple[int, int]]:
     """Runs [start, stop) that part frames (frames, values) at the least cost, in order.
 
-    A run costs the squared distances of its frames from their mean, per value and in squares of the noise, and
-    `run_cost`.
+    A run costs the squared distances of its frames from their mean, per value and in squares of each frame's noise
+    (frames,), and `run_cost`.
     """
-    scaled = (frames - frames.mean(axis=0, dtype=np.float64)) / (noise * np.sqrt(frames.shape[1]))
-    sums = np.concatenate([np.zeros((1, frames.shape[1])), np.cumsum(scaled, axis=0)])
-    squares = np.concatenate([[0.0], np.cumsum((scaled**2).sum(axis=1))])
+    weights = 1 / noise**2
+    scaled = (frames - frames.mean(axis=0, dtype=np.float64)) / np.sqrt(frames.shape[1])
+    sums = _running_sums(scaled * weights[:, None])
+    squares, amounts = _running_sums((scaled**2).sum(axis=1) * weights), _running_sums(weights)
     cost, came_from = np.zeros(len(frames) + 1), np.zeros(len(frames) + 1, np.intp)
     for stop in range(1, len(frames) + 1):
         starts = np.arange(max(0, stop - TUNABLES.max_run), stop)
-        apart = squares[stop] - squares[starts] - ((sums[stop] - sums[starts]) ** 2).sum(axis=1) / (stop - starts)
-        total = cost[starts] + apart + TUNABLES.run_cost
+        about_mean = ((sums[stop] - sums[starts]) ** 2).sum(axis=1) / (amounts[stop] - amounts[starts])
+        total = cost[starts] + squares[stop] - squares[starts] - about_mean + TUNABLES.run_cost
         cost[stop], came_from[stop] = total.min(), starts[total.argmin()]
     runs, stop = [], len(frames)
     while stop:
         runs.append((int(came_from[stop]), stop))
         stop = int(came_from[stop])
     return runs[::-1]
+
+
+def _running_sums(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sums (count + 1, ...) of the first 0, 1, ... count values (count, ...)."""
+    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])

@@ -1,4 +1,4 @@
-"""Drawing expression stills into the moved picture: mouth, eyes and far cheek as they really look, relit.
+"""Drawing expression stills into the moved picture: mouth, eyes and turned cheeks as they really look, relit.
 
 Each part of the face is a mesh of landmarks, which is moved from the stills to where the driver's face has it. It fades
 out at its rim.
@@ -13,8 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import LinearImage, RgbaImage
 from relit_camera.base.images.light_multiplication import multiply_light
+from relit_camera.base.rotations import Rotation, angles_from_rotation
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.live.reenactment.mesh.triangle_drawing import draw_triangles
 from relit_camera.live.reenactment.source_image import SourceFace
@@ -25,13 +27,16 @@ from relit_camera.live.reenactment.stills.still_regions import (
     facing,
     still_regions,
 )
-from relit_camera.live.reenactment.stills.still_weights import StillWeights
+from relit_camera.live.reenactment.stills.still_weights import Doing, StillWeights
 from relit_camera.live.reenactment.warp import Box, PositionGrid
 from relit_camera.subject.expression_stills import ExpressionStill
 from relit_camera.subject.subject import Subject
 
-SIDE_STEPS = 2
-"""The sides of the face are large and smooth: their positions are computed so many times as far apart."""
+TURN_STEPS = 2
+"""The cheeks of a turned face are large and smooth: their positions are computed so many times as far apart."""
+NEAR_CHEEK_DEG = (12.0, 24.0)
+"""Yaw from which on a still shows the near cheek too, and from where on fully: up to it the source image's is sharper,
+later it is a few columns of pixels, drawn wide."""
 HALVED_FROM = 1.5
 """By how much a face in the picture must be larger than in the stills for them to be drawn at half its resolution."""
 WHOLE_MOUTH = 0.98
@@ -158,14 +163,24 @@ class StillDrawing:
                 seen,
                 depth,
                 size,
-                step * SIDE_STEPS if mesh.is_side else step,
+                step * TURN_STEPS if mesh.region.is_turn else step,
                 half_size,
-                doing.needed[mesh.region.eye_name] if mesh.is_side else 0.0,
+                self._left_out(mesh.region, doing, rotation) if mesh.region.is_turn else None,
             )
             for mesh in self._meshes
         ]
         mouth = sum(weight for _, weight in chosen["mouth"])
         return StillTask(self._light, tuple(region for region in drawn if region is not None), mouth >= WHOLE_MOUTH)
+
+    def _left_out(self, region: StillRegion, doing: Doing, rotation: Rotation) -> NDArray[np.float64]:
+        """How far each landmark (landmarks,) of a turned face is left out, 0..1.
+
+        That is a shut eye, which its stills show open, and the near cheek of a face that is hardly turned.
+        """
+        # By the turn to that side: while a head swings over, the still of the side that it comes from fades out.
+        yaw = angles_from_rotation(rotation).yaw * (-1 if region.name == "right_turn" else 1)
+        near = smoothstep(yaw, *NEAR_CHEEK_DEG)
+        return np.asarray(doing.needed[region.eye_name] * region.eye + (1 - near) * region.near)
 
 
 def _doubled(picture: NDArray, shape: tuple[int, ...]) -> NDArray:
@@ -175,22 +190,14 @@ def _doubled(picture: NDArray, shape: tuple[int, ...]) -> NDArray:
 
 
 class _RegionMesh:
-    """A region's mesh with its places in the stills.
-
-    Attributes:
-        region: the region.
-        is_side: whether it is a side of the face.
-    """
+    """A region's mesh with its places in the stills."""
 
     def __init__(
         self, region: StillRegion, face: SourceFace, stills: Sequence[ExpressionStill], shown: NDArray[np.float64]
     ) -> None:
         """`shown` (stills, landmarks) is how far each still shows each landmark."""
         self.region = region
-        self.is_side = region.name in ("right_side", "left_side")
         triangles = region.triangles
-        # A still shows up to the far corners of the outermost triangles.
-        self._members = np.unique(triangles[(region.trust[triangles] > 0).any(axis=1)])
         self._source = face.landmarks[triangles].astype(np.float64)
         self._scheme = face.scheme
         self._spans = [face.scheme.eye_span(still.landmarks) for still in stills]
@@ -209,7 +216,7 @@ class _RegionMesh:
         size: tuple[int, int],
         step: int,
         half_size: bool,
-        shut: float,
+        left_out: NDArray[np.float64] | None,
     ) -> _PlannedRegion | None:
         """What shows in the picture; None where nothing does.
 
@@ -220,11 +227,15 @@ class _RegionMesh:
             size: (width, height) of the picture.
             step: pixels between computed positions.
             half_size: draw at half the picture's resolution, however fine the stills are.
-            shut: how far the eye of a side is shut, 0..1: stills of a side show it open.
+            left_out: (landmarks,) how far each is left out, 0..1; None for nothing.
         """
         if not chosen:
             return None
-        inside = seen[self._members]
+        kept = self.region.trust if left_out is None else self.region.trust * (1 - left_out)
+        # A still shows up to the far corners of the outermost triangles.
+        inside = seen[self.region.triangles[(kept[self.region.triangles] > 0).any(axis=1)].ravel()]
+        if not len(inside):
+            return None
         low = np.maximum(np.floor(inside.min(axis=0)).astype(int), 0)
         high = np.minimum(np.ceil(inside.max(axis=0)).astype(int), size)
         if (high - low < LEAST_SIDE_PX).any():
@@ -240,9 +251,9 @@ class _RegionMesh:
         order = front[np.argsort(nearness[front])]
         places = (self._source, *(self._places[still] for still, _ in chosen))
         values = np.concatenate([each.take(order, axis=0) for each in places], axis=2)
-        if shut > 0:
-            eye = self.region.eye[self.region.triangles.take(order, axis=0)]
-            values[..., 4::3] *= 1 - shut * eye[..., None]  # the trust of each still
+        if left_out is not None:
+            kept = 1 - left_out[self.region.triangles.take(order, axis=0)]
+            values[..., 4::3] *= kept[..., None]  # the trust of each still
         shape = (-(-height // step) + 2, -(-width // step) + 2)
         drawn = draw_triangles(corners.take(order, axis=0), values, shape)
         box = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))

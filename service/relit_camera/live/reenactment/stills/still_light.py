@@ -3,23 +3,25 @@
 A still is shown times (relit source image) / (source image under the still's own light), looked up where the landmarks
 lead in the source image's face. The divisor does not change: the stills are kept divided. A smooth factor corrects them
 so that, blurred and relit, they have the colors of the relit source image: then no seam shows, whatever the light,
-exposure and white balance of the film were taken for. Eyes and mouth get the light of the skin round them.
+exposure and white balance of the film were taken for. Eyes and mouth get the light of the skin round them, and so
+does hair that hangs over the face's outline.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_types import DisplayImage, LinearImage, Mask
 from relit_camera.base.images.light_multiplication import root_of_light
 from relit_camera.face.landmarks.canonical_face import canonical_face
-from relit_camera.light.directions import texel_solid_angles
+from relit_camera.light.directions import MAP_HEIGHT, MAP_WIDTH, texel_solid_angles
 from relit_camera.live.reenactment.control_points import feature_landmarks
 from relit_camera.live.reenactment.mesh.triangle_drawing import draw_triangles
 from relit_camera.live.reenactment.source_image import SourceFace
@@ -27,6 +29,12 @@ from relit_camera.live.reenactment.stills.still_regions import face_in_still, fa
 from relit_camera.subject.expression_stills import ExpressionStill
 from relit_camera.subject.subject import Subject
 
+HAIR_SPANS = 0.15
+"""Within the face's outline, where hair may hang over it, or a beard grow."""
+HAIR_BRIGHTNESS = (0.6, 0.9)
+"""Brightness there, in parts of that of the skin round it: up to which it is hair, and from where on skin."""
+AROUND_SPANS = 0.2
+"""Sigma of the blur that gives that of the skin round it."""
 CELLS_PER_SPAN = 32
 """Cells of the grid in the distance of the outer eye corners."""
 MARGIN_SPANS = 0.15
@@ -55,7 +63,11 @@ class StillLight:
 
     def __init__(self, subject: Subject, face: SourceFace) -> None:
         self._grid = _Grid.over(subject, face)
-        under_own = _relit_on_grid(subject, self._grid, [still.light for still in subject.stills])
+        everywhere = np.ones((MAP_HEIGHT, MAP_WIDTH, 3), np.float32)
+        evenly, *under_own = _relit_on_grid(
+            subject, self._grid, [everywhere, *(still.light for still in subject.stills)]
+        )
+        self._grid = self._grid.without_hair(evenly)
         skin = np.array(cv2.mean(np.mean(under_own, axis=0), (self._grid.skin > 0.5).astype(np.uint8))[:3])
         self._skin = np.maximum(skin / max(float(skin.max()), 1e-6), 0.1).astype(np.float32) * np.float32(UNLIT_SKIN)
         self.unlit: list[DisplayImage] = []
@@ -101,12 +113,14 @@ class _Grid:
         box: left, top, right, bottom in source pixels.
         cell: side of a cell in source pixels.
         skin: (rows, columns) float32, the share of a cell that is skin of the face, no eye and no lip.
+        depth: (rows, columns) float32, distance from the face's outline in `span`; 0 outside.
         span: distance of the outer eye corners, in cells.
     """
 
     box: tuple[int, int, int, int]
     cell: int
     skin: Mask
+    depth: NDArray[np.float32]
     span: float
 
     @property
@@ -117,6 +131,25 @@ class _Grid:
     def cells(self, positions: NDArray[np.float32]) -> NDArray[np.float32]:
         """Where source pixels (..., 2) lie in pictures of the grid, as OpenCV counts."""
         return (positions - np.array(self.box[:2], np.float32)) / np.float32(self.cell) - np.float32(0.5)
+
+    def without_hair(self, evenly: LinearImage) -> _Grid:
+        """The grid whose skin leaves out what near the outline is darker than the skin round it: hair, or a beard.
+
+        Where hair lies over the cheek in the source image a still may show skin, which divided by that would be far too
+        bright. Hair that is lighter than the skin is not told from it, nor is the middle of a broad strand.
+
+        Args:
+            evenly: (rows, columns, 3) the source image in light from everywhere: with no side in shade.
+        """
+        light = np.repeat(evenly.mean(axis=2, keepdims=True), 3, axis=2)
+        skin = self.skin
+        for _ in range(2):  # at first the hair itself counts as skin
+            around = _blurred(light, skin, {AROUND_SPANS * self.span: 1.0, 4 * AROUND_SPANS * self.span: 1e-3})
+            bright = smoothstep((light / np.maximum(around, 1e-9))[..., 0].astype(np.float64), *HAIR_BRIGHTNESS)
+            certain = smoothstep(self.depth.astype(np.float64), HAIR_SPANS, 1.5 * HAIR_SPANS)
+            share = np.maximum(certain, cv2.erode(bright, np.ones((3, 3))))
+            skin = np.asarray(self.skin * share, np.float32)
+        return replace(self, skin=skin)
 
     @classmethod
     def over(cls, subject: Subject, face: SourceFace) -> _Grid:
@@ -131,10 +164,14 @@ class _Grid:
         skin = np.zeros((box[3] - box[1], box[2] - box[0]), np.uint8)
         shifted = np.round(face.landmarks - low).astype(np.int32)
         cv2.fillPoly(skin, [shifted[list(face.scheme.oval)]], 255)
+        depth = cv2.distanceTransform(skin, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) / np.float32(span)
         for feature in feature_landmarks(face.scheme):
             cv2.fillConvexPoly(skin, cv2.convexHull(shifted[list(feature)]), 0)
-        share = cv2.resize(skin, (int(columns), int(rows)), interpolation=cv2.INTER_AREA)
-        return cls(box, cell, np.asarray(cv2.erode(share, np.ones((2, 2))) / np.float32(255), np.float32), span / cell)
+        share, depth = (
+            cv2.resize(each, (int(columns), int(rows)), interpolation=cv2.INTER_AREA) for each in (skin, depth)
+        )
+        share = np.asarray(cv2.erode(share, np.ones((2, 2))) / np.float32(255), np.float32)
+        return cls(box, cell, share, np.asarray(depth, np.float32), span / cell)
 
 
 def _relit_on_grid(subject: Subject, grid: _Grid, lights: list[NDArray[np.float32]]) -> list[LinearImage]:

@@ -18,12 +18,13 @@ from relit_camera.subject.expression_stills import ExpressionStill
 
 MOUTH_RIM_CM, EYE_RIM_CM = (0.5, 2.2), (0.3, 1.1)
 """From lips and lids: up to where a still shows fully, and from where on not at all."""
-SIDE_RIM_CM = (0.5, 2.5)
-"""From the middle of the face outward: from where on a side begins to show, and from where on fully."""
-NOSE_CM = 1.5
-"""Half the width of what of the nose can hide the cheek."""
+MIDDLE_RIM_CM = (0.5, 2.5)
+"""From the middle of a turned face outward: from where on a still begins to show, and from where on fully. Between them
+the source image is as good, and sharper."""
 OUTLINE_RIM_CM = 0.9
-"""Inside the face's outline, over which a side fades out."""
+"""Inside the face's outline, over which a mouth's still fades out."""
+TURNED_RIM_CM = 1.2
+"""The same of a turned face: over less, its rim is seen as a line along the near jaw."""
 
 STILL_RIM_SPANS = (0.03, 0.14)
 """Distance of the outer eye corners inside the face's outline in a still: from where on it shows, and up to where
@@ -40,12 +41,14 @@ class StillRegion:
     """A part of the face.
 
     Attributes:
-        name: `mouth`, `right_eye`, `left_eye`, `right_side` or `left_side`; right and left are the person's.
+        name: `mouth`, `right_eye`, `left_eye`, or the cheeks and temples of a face that is turned to a side,
+            `right_turn` or `left_turn`; right and left are the person's.
         triangles: (count, 3) landmark indices, some beyond the rim.
         between: (count,) whether a triangle spans lids or lips: it lies behind them and may be flat, or turned over.
         middles: (count, 3) float64 head axes, cm.
         trust: (landmarks,) float64, how far a still shows there: 1 inside, 0 at the rim and beyond.
-        eye: (landmarks,) float64, how far that belongs to the eye of a side; elsewhere 0.
+        eye: (landmarks,) float64, how far that belongs to the eye that turns away; elsewhere 0.
+        near: (landmarks,) bool, whether that lies on the side that turns toward the camera.
     """
 
     name: str
@@ -54,11 +57,17 @@ class StillRegion:
     middles: NDArray[np.float64]
     trust: NDArray[np.float64]
     eye: NDArray[np.float64]
+    near: NDArray[np.bool_]
+
+    @property
+    def is_turn(self) -> bool:
+        """Whether it belongs to a turned face: it is `right_turn` or `left_turn`."""
+        return self.name.endswith("_turn")
 
     @property
     def eye_name(self) -> str:
-        """The region of a side's eye."""
-        return self.name.replace("side", "eye")
+        """Of a turned face: the region of the eye that turns away."""
+        return self.name.replace("turn", "eye")
 
 
 def still_regions(scheme: LandmarkScheme) -> tuple[StillRegion, ...]:
@@ -66,25 +75,27 @@ def still_regions(scheme: LandmarkScheme) -> tuple[StillRegion, ...]:
     triangles = canonical_face().triangles  # the insides of mouth and eyes among them
     canonical = scheme.canonical
     flat = canonical[:, :2]
-    inside = smoothstep(_nearest(flat, flat[list(scheme.oval)]), 0, OUTLINE_RIM_CM)
-    trusts = {
-        "right_side": inside * smoothstep(-canonical[:, 0], *SIDE_RIM_CM),
-        "left_side": inside * smoothstep(canonical[:, 0], *SIDE_RIM_CM),
-        "mouth": _around(canonical, scheme.lips, MOUTH_RIM_CM) * inside,
-        "right_eye": _around(canonical, scheme.right_eye.lids, EYE_RIM_CM),
-        "left_eye": _around(canonical, scheme.left_eye.lids, EYE_RIM_CM),
+    to_outline = _nearest(flat, flat[list(scheme.oval)])
+    right_eye, left_eye = (_around(canonical, eye.lids, EYE_RIM_CM) for eye in (scheme.right_eye, scheme.left_eye))
+    mouth = _around(canonical, scheme.lips, MOUTH_RIM_CM)
+    cheeks = smoothstep(to_outline, 0, TURNED_RIM_CM) * smoothstep(np.abs(canonical[:, 0]), *MIDDLE_RIM_CM)
+    right, left = canonical[:, 0] < 0, canonical[:, 0] > 0
+    nothing, nowhere = np.zeros(len(canonical)), np.zeros(len(canonical), np.bool_)
+    parts = {  # trust, eye, near: the near eye and mouth do what the driver's do, which those of a still do not
+        "right_turn": (cheeks * (1 - left * np.maximum(left_eye, mouth)), right_eye, left),
+        "left_turn": (cheeks * (1 - right * np.maximum(right_eye, mouth)), left_eye, right),
+        "mouth": (mouth * smoothstep(to_outline, 0, OUTLINE_RIM_CM), nothing, nowhere),
+        "right_eye": (right_eye, nothing, nowhere),
+        "left_eye": (left_eye, nothing, nowhere),
     }
     between = spans_a_gap(triangles, scheme)
     regions = []
-    for name, trust in trusts.items():
-        used = (trust[triangles] > 0).any(axis=1)
-        if name.endswith("side"):
-            # A turned nose hides a part of the cheek.
-            reach = canonical[:, 0] * (1 if name == "left_side" else -1) > -NOSE_CM
-            used = reach[triangles].all(axis=1)
+    for name, (trust, eye, near) in parts.items():
+        used = (trust[triangles] > 0).any(
+            axis=1
+        ) | near.any()  # of a turned face all: the nose hides a part of the cheek
         part = triangles[used]
-        eye = trusts[name.replace("side", "eye")] if name.endswith("side") else np.zeros(len(canonical))
-        regions.append(StillRegion(name, part, between[used], canonical[part].mean(axis=1), trust, eye))
+        regions.append(StillRegion(name, part, between[used], canonical[part].mean(axis=1), trust, eye, near))
     return tuple(regions)
 
 

@@ -23,7 +23,7 @@ REACH = 0.8
 """By how many units one still may be nearer than another until it alone shows."""
 FAR = 1e6
 TURN_UNIT_DEG = 15.0
-"""Turn that is another view of a side of the face."""
+"""Turn that is another view of cheeks and temples."""
 FEATURE_TURN_UNIT_DEG = 45.0
 """The same for mouth and eyes, which are moved to any turn."""
 PARTED_LIPS_CM = (0.05, 0.3)
@@ -37,8 +37,8 @@ CLOSING_LID = (0.4, 0.7)
 SHUT_LID = 0.55
 """How far an eye must be shut in a still that shows shut lids."""
 TURNED_DEG = (9.0, 18.0)
-"""The same for a side that turns away, by the yaw."""
-SMOOTHING_S = {"mouth": 0.05, "right_eye": 0.025, "left_eye": 0.025, "right_side": 0.12, "left_side": 0.12}
+"""The same for a face that is turned to a side, by the yaw."""
+SMOOTHING_S = {"mouth": 0.05, "right_eye": 0.025, "left_eye": 0.025, "right_turn": 0.12, "left_turn": 0.12}
 """Time in which weights follow, by region."""
 RIVAL, FADED = 0.35, 0.1
 """Share of the largest weight up to which another still does not show: of the wanted weights, so that few are mixed,
@@ -88,8 +88,8 @@ class StillWeights:
             "mouth": np.ones(len(stills), np.bool_),
             "right_eye": self._features["right_eye"][:, 0] * CLOSURE > SHUT_LID,
             "left_eye": self._features["left_eye"][:, 0] * CLOSURE > SHUT_LID,
-            "right_side": -yaws > TURNED_DEG[0],
-            "left_side": yaws > TURNED_DEG[0],
+            "right_turn": -yaws > TURNED_DEG[0],
+            "left_turn": yaws > TURNED_DEG[0],
         }
         self._followed: dict[str, NDArray[np.float64]] = {}
         self._time_s: float | None = None
@@ -121,7 +121,7 @@ class StillWeights:
             features[name] = np.append(closure / CLOSURE, turn / FEATURE_TURN_UNIT_DEG)
             needed[name] = float(smoothstep(closure, *CLOSING_LID))
         # The person's right is at the picture's left: that side turns away while the nose turns there.
-        for name, sign in (("right_side", -1.0), ("left_side", 1.0)):
+        for name, sign in (("right_turn", -1.0), ("left_turn", 1.0)):
             features[name] = turn / TURN_UNIT_DEG
             needed[name] = float(smoothstep(sign * yaw, *TURNED_DEG))
         return Doing(features, certain, needed)
