@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
@@ -194,9 +195,10 @@ class Desk:
     def _film(self, stop: threading.Event) -> None:
         index = 0
         while not stop.wait(1 / 60):
+            captured_at = time.monotonic()
             level = min(255.0, 10 + self.screen * self.webcam.brightness())
             picture = np.full((64, 64, 3), int(level), np.uint8)
-            self.recorder.offer(Frame(picture, index, index / 30, index / 30))
+            self.recorder.offer(Frame(picture, index, captured_at, index / 30))
             index += 1
 
     def look_at(self, page: Page) -> bool:
