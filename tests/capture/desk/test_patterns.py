@@ -130,7 +130,7 @@ def test_plateaus_end_where_light_changes() -> None:
     levels = np.concatenate([np.full(9, 0.2), np.linspace(0.2, 0.8, 6)[1:-1], np.full(7, 0.8), np.full(8, 0.3)])
     random = np.random.default_rng(0)
     cells = (levels[:, None, None] + 0.002 * random.normal(size=(len(levels), 24, 32))).astype(np.float32)
-    assert [(each.start, each.stop) for each in find_plateaus(cells)] == [(0, 9), (13, 20), (20, 28)]
+    assert [(each.start, each.stop) for each in find_plateaus(cells, "srgb")] == [(0, 9), (13, 20), (20, 28)]
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -142,7 +142,8 @@ def test_a_head_that_trembles_hides_no_pattern(seed: int) -> None:
     turned = np.repeat([0, 0, 0, *([1, -1] * 8)], 4)
     lit = face + np.einsum("tk,kyx->tyx", 0.015 * random.normal(size=(len(levels), 2)), np.stack([across, down]))
     codes = srgb_encode(0.5 * levels[:, None, None] * (lit + turned[:, None, None] * side))
-    found = find_plateaus(srgb_decode(codes + np.float32(0.0005) * random.standard_normal(codes.shape, np.float32)))
+    noise = np.float32(0.0005) * random.standard_normal(codes.shape, np.float32)
+    found = find_plateaus(srgb_decode(codes + noise), "srgb")
     assert {each.start // 4 for each in found} == set(range(len(levels) // 4))
     assert all(each.start // 4 == (each.stop - 1) // 4 for each in found)
 
@@ -160,7 +161,7 @@ def test_patterns_under_which_the_head_drifts_or_the_picture_is_noisy_are_seen_t
             part += 3 * noise * np.arange(frames)[:, None, None]
         else:
             part += 6 * noise * random.normal(size=part.shape)
-    found = find_plateaus(srgb_decode(codes.astype(np.float32)))
+    found = find_plateaus(srgb_decode(codes.astype(np.float32)), "srgb")
     assert {each.start // frames for each in found} == set(range(30))
     assert all(each.start // frames == (each.stop - 1) // frames for each in found)
 
@@ -176,13 +177,13 @@ def test_black_is_a_plateau_whatever_the_curve_of_the_camera(gamma: Gamma) -> No
 def test_too_few_frames_are_no_patterns() -> None:
     for count in (1, 2):
         with pytest.raises(CaptureError, match="no patterns are seen"):
-            find_plateaus(np.linspace(0.1, 0.2, count * 4, dtype=np.float32).reshape(count, 2, 2))
+            find_plateaus(np.linspace(0.1, 0.2, count * 4, dtype=np.float32).reshape(count, 2, 2), "srgb")
 
 
 def test_a_long_recording_is_parted_in_bounded_time_and_memory() -> None:
     levels = np.tile(np.repeat([0.2, 0.7], [700, 50]), 4)
     cells = levels[:, None, None] + 0.002 * np.random.default_rng(0).normal(size=(len(levels), 24, 32))
-    found = find_plateaus(cells.astype(np.float32))
+    found = find_plateaus(cells.astype(np.float32), "srgb")
     assert {each.start for each in found} >= set(range(0, 3000, 750)) | {k + 700 for k in range(0, 3000, 750)}
     assert max(each.stop - each.start for each in found) <= 200
 
@@ -190,4 +191,4 @@ def test_a_long_recording_is_parted_in_bounded_time_and_memory() -> None:
 def test_noise_alone_has_no_plateaus() -> None:
     cells = 0.2 + 0.01 * np.random.default_rng(0).normal(size=(60, 24, 32))
     with pytest.raises(CaptureError, match="no patterns are seen"):
-        find_plateaus(cells.astype(np.float32))
+        find_plateaus(cells.astype(np.float32), "srgb")

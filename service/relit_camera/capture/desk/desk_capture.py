@@ -227,14 +227,14 @@ def identify_patterns(
     stated = setup.shown != "unknown"
     plateaus = _stated_plateaus(recording, cells) if stated else find_plateaus(cells, setup.camera_gamma)
     white = mean_frame(recording, max(plateaus, key=lambda each: float(each.cells.mean())))
-    face = find_face(_exposed(white), recording.setup)
+    face = find_face(_exposed(white), setup)
     on_face = _disc(recording.size, face)
     # Most plateaus light half of the screen, so the median is one of these.
     typical = sorted(plateaus, key=lambda each: float(each.cells.mean()))[len(plateaus) // 2]
     require_exposure(require_frame(recording, (typical.start + typical.stop) // 2), on_face)
     middles = [require_frame(recording, (each.start + each.stop) // 2) for each in plateaus]
     require_person(middles, np.array([each.cells.mean() for each in plateaus]), _exposed(white), face)
-    patches = place_patches(recording.setup, face.from_axis_cm(recording.size))
+    patches = place_patches(setup, face.from_axis_cm(recording.size))
     patterns = match_patterns(plateaus, lights, face_cells(cells.shape[1:], recording.size, face), patches).patterns
     known = [index for index, pattern in enumerate(patterns) if pattern >= 0]
     patterns = patterns[known]

@@ -57,7 +57,7 @@ def test_a_still_of_an_open_eye_is_not_laid_over_a_shut_one(shut: float) -> None
 
 @pytest.mark.parametrize(("yaw", "region", "turned", "other"), [(25, "left_turn", RIGHT, "right_turn"),
                                                                (-25, "right_turn", LEFT, "left_turn")])  # fmt: skip
-def test_the_side_that_turns_away_is_the_turned_stills(
+def test_a_turned_face_is_the_still_that_is_turned_there(
     weights: StillWeights, yaw: float, region: str, turned: int, other: str
 ) -> None:
     shown = settled(weights, expression(), rotation_from_angles(yaw))
@@ -65,7 +65,7 @@ def test_the_side_that_turns_away_is_the_turned_stills(
     assert not shown[other]
 
 
-def test_a_side_without_a_still_that_is_turned_there_stays() -> None:
+def test_a_turned_face_without_a_still_that_is_turned_there_stays() -> None:
     only = with_stills(still(soft_light(), expression(), rotation_from_angles(25)))
     shown = settled(StillWeights(only.stills, face_of(only)), expression(), rotation_from_angles(-25))
     assert not shown["right_turn"]

@@ -85,7 +85,7 @@ def decode_table(gamma: Gamma) -> Float32Array:
     return decode(np.arange(256, dtype=np.float32) / np.float32(255), gamma)
 
 
-def find_plateaus(cells: Float32Array, gamma: Gamma = "srgb") -> list[Plateau]:
+def find_plateaus(cells: Float32Array, gamma: Gamma) -> list[Plateau]:
     """The plateaus of a recording, in order.
 
     Args:

@@ -165,22 +165,22 @@ class StillDrawing:
                 size,
                 step * TURN_STEPS if mesh.region.is_turn else step,
                 half_size,
-                self._left_out(mesh.region, doing, rotation) if mesh.region.is_turn else None,
+                self._kept(mesh.region, doing, rotation),
             )
             for mesh in self._meshes
         ]
         mouth = sum(weight for _, weight in chosen["mouth"])
         return StillTask(self._light, tuple(region for region in drawn if region is not None), mouth >= WHOLE_MOUTH)
 
-    def _left_out(self, region: StillRegion, doing: Doing, rotation: Rotation) -> NDArray[np.float64]:
-        """How far each landmark (landmarks,) of a turned face is left out, 0..1.
+    def _kept(self, region: StillRegion, doing: Doing, rotation: Rotation) -> NDArray[np.float64]:
+        """How far each landmark (landmarks,) of a region is kept, 0..1.
 
-        That is a shut eye, which its stills show open, and the near cheek of a face that is hardly turned.
+        Of a turned face a shut eye is not, which its stills show open, nor the near cheek while it is hardly turned.
         """
         # By the turn to that side: while a head swings over, the still of the side that it comes from fades out.
         yaw = angles_from_rotation(rotation).yaw * (-1 if region.name == "right_turn" else 1)
         near = smoothstep(yaw, *NEAR_CHEEK_DEG)
-        return np.asarray(doing.needed[region.eye_name] * region.eye + (1 - near) * region.near)
+        return np.asarray(1 - doing.needed[region.eye_name] * region.eye - (1 - near) * region.near)
 
 
 def _doubled(picture: NDArray, shape: tuple[int, ...]) -> NDArray:
@@ -216,7 +216,7 @@ class _RegionMesh:
         size: tuple[int, int],
         step: int,
         half_size: bool,
-        left_out: NDArray[np.float64] | None,
+        kept: NDArray[np.float64],
     ) -> _PlannedRegion | None:
         """What shows in the picture; None where nothing does.
 
@@ -227,13 +227,13 @@ class _RegionMesh:
             size: (width, height) of the picture.
             step: pixels between computed positions.
             half_size: draw at half the picture's resolution, however fine the stills are.
-            left_out: (landmarks,) how far each is left out, 0..1; None for nothing.
+            kept: (landmarks,) how far the stills count at each, 0..1.
         """
         if not chosen:
             return None
-        kept = self.region.trust if left_out is None else self.region.trust * (1 - left_out)
         # A still shows up to the far corners of the outermost triangles.
-        inside = seen[self.region.triangles[(kept[self.region.triangles] > 0).any(axis=1)].ravel()]
+        showing = (self.region.trust * kept > 0)[self.region.triangles].any(axis=1)
+        inside = seen[self.region.triangles[showing].ravel()]
         if not len(inside):
             return None
         low = np.maximum(np.floor(inside.min(axis=0)).astype(int), 0)
@@ -251,9 +251,7 @@ class _RegionMesh:
         order = front[np.argsort(nearness[front])]
         places = (self._source, *(self._places[still] for still, _ in chosen))
         values = np.concatenate([each.take(order, axis=0) for each in places], axis=2)
-        if left_out is not None:
-            kept = 1 - left_out[self.region.triangles.take(order, axis=0)]
-            values[..., 4::3] *= kept[..., None]  # the trust of each still
+        values[..., 4::3] *= kept[self.region.triangles.take(order, axis=0)][..., None]  # the trust of each still
         shape = (-(-height // step) + 2, -(-width // step) + 2)
         drawn = draw_triangles(corners.take(order, axis=0), values, shape)
         box = (int(low[0]), int(low[1]), int(high[0]), int(high[1]))

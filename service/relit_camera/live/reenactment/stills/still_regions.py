@@ -66,7 +66,7 @@ class StillRegion:
 
     @property
     def eye_name(self) -> str:
-        """Of a turned face: the region of the eye that turns away."""
+        """Of a turned face, the region of the eye that turns away; of others, their own name."""
         return self.name.replace("turn", "eye")
 
 
@@ -91,9 +91,8 @@ def still_regions(scheme: LandmarkScheme) -> tuple[StillRegion, ...]:
     between = spans_a_gap(triangles, scheme)
     regions = []
     for name, (trust, eye, near) in parts.items():
-        used = (trust[triangles] > 0).any(
-            axis=1
-        ) | near.any()  # of a turned face all: the nose hides a part of the cheek
+        # Of a turned face all: the nose hides a part of the cheek.
+        used = (trust[triangles] > 0).any(axis=1) | near.any()
         part = triangles[used]
         regions.append(StillRegion(name, part, between[used], canonical[part].mean(axis=1), trust, eye, near))
     return tuple(regions)
