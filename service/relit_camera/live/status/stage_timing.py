@@ -46,9 +46,20 @@ class StageTimer:
         state = tracker.track(frame)
     """
 
-    def __init__(self, length: int = WINDOW_LENGTH, now: Callable[[], float] = time.perf_counter) -> None:
-        """`length` durations are kept a stage; `now` gives the time in seconds."""
-        self._length, self._now = length, now
+    def __init__(
+        self,
+        length: int = WINDOW_LENGTH,
+        now: Callable[[], float] = time.perf_counter,
+        processor_now: Callable[[], float] = time.thread_time,
+    ) -> None:
+        """Set up an empty timer.
+
+        Args:
+            length: durations that are kept a stage.
+            now: gives the time in seconds.
+            processor_now: gives the processor time that the thread has used, in seconds.
+        """
+        self._length, self._now, self._processor_now = length, now, processor_now
         self._windows: dict[str, DurationWindow] = {}
         self._latest: dict[str, float] = {}
         self._running: list[str] = []
@@ -59,14 +70,14 @@ class StageTimer:
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Time the body of a with-statement; of one that raises only the processor time is counted."""
-        start, processor_start = self._now(), time.thread_time()
+        start, processor_start = self._now(), self._processor_now()
         around_s, self._within.seconds = getattr(self._within, "seconds", 0.0), 0.0
         self._running.append(name)
         try:
             yield
         finally:
             self._running.remove(name)
-            used_s = time.thread_time() - processor_start
+            used_s = self._processor_now() - processor_start
             own_s, self._within.seconds = used_s - self._within.seconds, around_s + used_s
             with self._lock:
                 self._processor_s[name] = self._processor_s.get(name, 0.0) + own_s
