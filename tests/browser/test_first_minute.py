@@ -156,6 +156,7 @@ def test_thumbnails_are_there_at_once(tmp_path: Path, open_page: OpenPage) -> No
 
 
 def test_sliders_can_be_seen_in_forced_colours(fake: FakeServer, open_page: OpenPage) -> None:
+    fake.show_checks()  # else the list of what is missing comes in above the slider while its picture is taken
     panel = open_panel(open_page, fake.url, forced_colors="active", color_scheme="dark")
     slider = panel.slider("Exposure")
     slider.scroll_into_view_if_needed()
