@@ -12,6 +12,7 @@ import pytest
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.head_pose import project
 from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.reenactment import first_order_reenactor
 from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
 from relit_camera.live.reenactment.first_order_reenactor import FirstOrderReenactor
 from relit_camera.live.reenactment.motion_transfer import split_body_motion, transfer_motion
@@ -100,6 +101,25 @@ def test_features_go_where_the_turned_head_has_them(feature: str, angles: tuple[
     way = np.linalg.norm(expected - start)
     assert way > pixel  # it had somewhere to go
     assert np.linalg.norm(centroid(moved) - expected) < 0.5 * pixel + 0.15 * way
+
+
+@pytest.mark.parametrize("yaw", [0.0, 30.0, -30.0])
+def test_the_far_outline_alone_is_drawn_anew(yaw: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    subject = person()
+    relit = relit_picture(subject)
+
+    def turned() -> np.ndarray:
+        reenactor = open_reenactor("first-order", context_of(subject, SIZE))
+        return in_output(moved_by(reenactor, relit, motion(rotation_from_angles(yaw)), live_frame()))[0]
+
+    drawn = turned()
+    monkeypatch.setattr(first_order_reenactor, "plan_far_outline", lambda *_: None)
+    changed = np.nonzero(np.abs(drawn - turned()).max(axis=2) > 1e-3)[1]
+    if yaw == 0:
+        assert changed.size == 0
+    else:
+        assert changed.size > 50
+        assert (np.sign(yaw) * (changed - SIZE[0] / 2) > 0).all()
 
 
 def test_brows_go_up_with_the_drivers() -> None:

@@ -144,7 +144,7 @@ def unmoved(subject: Subject, relit: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """The still as it stands in the output when nothing moves, through a network that is never asked."""
     person_alone = Cutout(subject)
     warp = Warp(source_from_output(subject.size, SIZE), ())
-    return premultiplied(WarpedLayer(person_alone.warped(relit, warp.grid((0, 0, *SIZE))), (0, 0)))
+    return premultiplied(WarpedLayer(person_alone.warped(person_alone.image(relit), warp.grid((0, 0, *SIZE))), (0, 0)))
 
 
 def test_a_flow_that_moves_nothing_gives_the_still(path: Path) -> None:

@@ -30,7 +30,7 @@ def with_edges(over_black: bool):
 def unmoved(cutout: Cutout, relit: np.ndarray):
     """Colours and alpha of the still as it lies."""
     grid = Warp(np.eye(2, 3), ()).grid((0, 0, relit.shape[1], relit.shape[0]))
-    return split_alpha(cutout.warped(relit, grid))
+    return split_alpha(cutout.warped(cutout.image(relit), grid))
 
 
 HALF_LIGHT = display_from_linear(np.full((1, 1, 3), 0.5, np.float32))[0, 0]
@@ -76,7 +76,7 @@ def test_an_edge_over_another_background_is_as_a_finer_rendering_has_it() -> Non
     )
     cutout = Cutout(dataclasses.replace(subject, matte=matte))
     grid = Warp(source_from_output(subject.size, (width, height)), ()).grid((0, 0, width, height))
-    found, found_alpha = split_alpha(cutout.warped(picture, grid))
+    found, found_alpha = split_alpha(cutout.warped(cutout.image(picture), grid))
     exact = np.rint(alpha * 255).astype(np.uint8)
     for behind in (0, 60, 255):
         background = np.full((height, width, 3), behind, np.uint8)
@@ -101,7 +101,7 @@ def test_what_the_cutout_leaves_out_cannot_be_seen() -> None:
     for scale in (0.6, 1.0, 3.1):
         size = (round(96 * scale), round(128 * scale))
         grid = Warp(source_from_output(subject.size, size), ()).grid((0, 0, *size))
-        cut, whole = cutout.warped(relit, grid), grid.sample(cutout.image(relit), UPSAMPLING)
+        cut, whole = cutout.warped(cutout.image(relit), grid), grid.sample(cutout.image(relit), UPSAMPLING)
         left_out = (cut != whole).any(axis=2)
         assert left_out.mean() > 0.02
         assert whole[left_out, 3].max() == 0

@@ -33,5 +33,6 @@ def delaunay_triangles(points: Points) -> NDArray[np.intp]:
 def outline_edges(triangles: NDArray[np.intp]) -> NDArray[np.intp]:
     """Edges (count, 2) that belong to one triangle only: the convex hull of a Delaunay triangulation."""
     edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    distinct, uses = np.unique(edges, axis=0, return_counts=True)
-    return np.asarray(distinct[uses == 1], np.intp)
+    count = int(triangles.max(initial=0)) + 1
+    distinct, uses = np.unique(edges[:, 0] * count + edges[:, 1], return_counts=True)
+    return np.column_stack(np.divmod(distinct[uses == 1], count)).astype(np.intp)

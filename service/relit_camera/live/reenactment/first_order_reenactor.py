@@ -22,6 +22,7 @@ from relit_camera.live.reenactment.control_points import (
 from relit_camera.live.reenactment.dense_motion import DenseMotion, box_around
 from relit_camera.live.reenactment.mesh.eye_drawing import plan_closing_eyes
 from relit_camera.live.reenactment.mesh.face_mesh import FaceMesh, SurfacePatch
+from relit_camera.live.reenactment.mesh.far_outline import plan_far_outline
 from relit_camera.live.reenactment.mesh.head_mesh import HeadMesh, triangulate_head
 from relit_camera.live.reenactment.motion_transfer import transfer_motion, transfer_motion_in_place
 from relit_camera.live.reenactment.mouth.mouth_interior import MouthInterior
@@ -94,8 +95,13 @@ class FirstOrderReenactor:
         )
         eyes = plan_closing_eyes(self._mesh.eyes, closing, surface, landmarks, to_box, size, quality.half_size)
 
+        outline = plan_far_outline(self._mesh.silhouette(landmarks, target.pose, to_box), grid)
+
         def warp(relit: LinearImage) -> WarpedLayer:
-            image = self._person.warped(relit, grid, quality.half_size)
+            person = self._person.image(relit)
+            image = self._person.warped(person, grid, quality.half_size)
+            if outline:
+                outline.draw(image, person)
             for eye in eyes:
                 eye.draw(image, relit)
             if not (stills and stills.has_mouth):

@@ -21,4 +21,4 @@ class RestLayer:
 
     def render(self, relit: LinearImage) -> WarpedLayer:
         """The layer of a relit picture of the subject's size, float32 linear in display exposure."""
-        return WarpedLayer(self._person.warped(relit, self._grid), self._box[:2])
+        return WarpedLayer(self._person.warped(self._person.image(relit), self._grid), self._box[:2])

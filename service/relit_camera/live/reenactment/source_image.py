@@ -152,16 +152,16 @@ class Cutout:
         image: RgbaImage = cv2.resize(colored, size, interpolation=cv2.INTER_CUBIC)
         return image
 
-    def warped(self, relit: LinearImage, grid: PositionGrid, half_size: bool = False) -> RgbaImage:
-        """The person in the relit source image (height, width, 3) at the positions of `grid`.
+    def warped(self, image: RgbaImage, grid: PositionGrid, half_size: bool = False) -> RgbaImage:
+        """The person, as `image` gives them, at the positions of `grid`.
 
         With `half_size`, for which the step must be even, every second pixel is sampled and the others interpolated.
         """
         near = cv2.remap(self._around, grid.nodes() - np.float32(0.5), None, cv2.INTER_NEAREST, borderMode=BEYOND)
         seen = near.view(np.bool_)
         if not half_size:
-            return grid.sample(self.image(relit), UPSAMPLING, BEYOND, seen)
-        half = grid.halved().sample(self.image(relit), UPSAMPLING, BEYOND, seen)
+            return grid.sample(image, UPSAMPLING, BEYOND, seen)
+        half = grid.halved().sample(image, UPSAMPLING, BEYOND, seen)
         (left, top, right, bottom), (rows, columns) = grid.box, half.shape[:2]
         whole: RgbaImage = cv2.resize(half, (2 * columns, 2 * rows), interpolation=cv2.INTER_LINEAR)
         return np.ascontiguousarray(whole[: bottom - top, : right - left])

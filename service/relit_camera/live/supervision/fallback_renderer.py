@@ -189,7 +189,7 @@ class _RelitSource:
         if last is not None and last[0] is relit and np.array_equal(last[1], placed):
             return last[2]
         box = visible_box(placed, self.subject.size, self._size)
-        layer = WarpedLayer(self._person.warped(relit, Warp(placed, ()).grid(box)), box[:2])
+        layer = WarpedLayer(self._person.warped(self._person.image(relit), Warp(placed, ()).grid(box)), box[:2])
         self._layer = relit, placed, layer
         return layer
 

@@ -177,7 +177,7 @@ def test_edges_are_averaged_where_a_mesh_jumps_and_nowhere_else() -> None:
     drawn[2, :, 2:] = 1
     for share in (0.0, 0.5, 1.0):
         softened = drawn.copy()
-        _soften(softened, 20.0, share)
+        soften(softened, softened[0] > 0, 20.0, share)
         changed = np.flatnonzero(np.abs(softened - drawn).max(axis=(0, 1)) > 0)
         assert set(changed) <= {5, 6, 7, 8}
         assert set(changed) >= ({6, 7} if share else set())
@@ -185,7 +185,67 @@ def test_edges_are_averaged_where_a_mesh_jumps_and_nowhere_else() -> None:
         np.testing.assert_allclose(softened[0, 4, 6] - drawn[0, 4, 6], step, atol=1.5)
 
 
+@pytest.mark.parametrize("ends", [7, 6, 8])
+def test_the_outline_of_the_face_is_left_sharp(ends: int) -> None:
+    """It is drawn pixel by pixel: see `far_outline`."""
+    drawn = np.zeros((3, 9, 12), np.float32)
+    drawn[0] = 1 + np.arange(12)
+    drawn[0, :, 7:] += 50
+    face = np.zeros((9, 12), np.bool_)
+    face[:, :ends] = True
+    softened = drawn.copy()
+    soften(softened, face, 20.0, 1.0)
+    np.testing.assert_array_equal(softened[:, :, ends - 1 : ends + 1], drawn[:, :, ends - 1 : ends + 1])
+
+
 def test_a_patch_of_one_column_is_drawn() -> None:
     drawn = np.ones((3, 9, 1), np.float32)
-    _soften(drawn, 1.0, 1.0)
+    soften(drawn, drawn[0] > 0, 1.0, 1.0)
     assert (drawn == 1).all()
+
+
+def soften(drawn: NDArray[np.float32], face: NDArray[np.bool_], jump: float, share: float) -> None:
+    _soften((drawn[0], drawn[1], drawn[2]), face, jump, share)
+
+
+TO_PICTURE = np.array([[2.0, 0, 0], [0, 2, 0]])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_silhouette_is_that_of_the_side_that_turns_away(face: SourceFace, mesh: HeadMesh, side: int) -> None:
+    target = turned(face, side * 30)
+    silhouette = mesh.silhouette(target.landmarks, target.pose, TO_PICTURE)
+    assert silhouette is not None
+    points = target.landmarks[mesh.face.members] @ TO_PICTURE[:, :2].T
+    outward, ends = side * points[:, 0], side * silhouette.edges[..., 0]
+    assert ends.max() == pytest.approx(outward.max())
+    assert ends.min() > outward.min() + 0.2 * np.ptp(outward)
+    assert side * silhouette.edges[silhouette.hiding > 0.99][..., 0].mean() > outward.max() - 0.15 * np.ptp(outward)
+    assert np.ptp(silhouette.edges[silhouette.shares > 0.9][..., 1]) > 0.6 * np.ptp(points[:, 1])
+
+
+def test_what_is_behind_a_far_cheek_is_left_out_once_no_ear_is_in_sight(face: SourceFace, mesh: HeadMesh) -> None:
+    """Nothing at the forehead or below the jaw, at any turn."""
+    hidden = {}
+    for yaw in (10, 20, 30):
+        target = turned(face, yaw)
+        silhouette = mesh.silhouette(target.landmarks, target.pose, TO_PICTURE)
+        assert silhouette is not None
+        hidden[yaw] = silhouette.hiding.max()
+        heights = silhouette.edges[..., 1].mean(axis=1)
+        eyes = TO_PICTURE[1, 1] * face.scheme.eye_centers(target.landmarks.astype(np.float32))[:, 1].mean()
+        chin = heights.max()
+        assert (silhouette.hiding[heights < eyes - 0.6 * (chin - eyes)] == 0).all()
+        assert (silhouette.hiding[heights > eyes + 0.8 * (chin - eyes)] == 0).all()
+    assert hidden[10] == 0
+    assert 0 < hidden[20] < 1
+    assert hidden[30] == 1
+
+
+@pytest.mark.parametrize("yaw", [0, 4])
+def test_a_face_that_hardly_turns_has_no_silhouette_to_draw(face: SourceFace, mesh: HeadMesh, yaw: float) -> None:
+    target = turned(face, yaw)
+    assert mesh.silhouette(target.landmarks, target.pose, TO_PICTURE) is None
+    alone = triangulate_head(face, np.zeros((0, 2)))
+    target = turned(face, 30)
+    assert alone.silhouette(target.landmarks, target.pose, TO_PICTURE) is None

@@ -100,14 +100,16 @@ class SurfacePatch:
         corners: (triangles, 3, 2) float64 source pixels where the corners go, from the farthest to the nearest.
         values: (triangles, 3, 3) float64 as in `FaceMesh`, of the corners.
         box: (4,) float64 round them all, toward whose sides the patch fades out.
-        soft_edges: 0..1, how far edges between near and far are averaged: else they are staircases of cells, which are
-            seen where they lie before the background.
+        soft_edges: 0..1, how far edges between near and far are averaged within the face: else they are staircases of
+            cells.
+        beside: how many of the triangles, the first, lie beside the face.
     """
 
     corners: NDArray[np.float64]
     values: NDArray[np.float64]
     box: NDArray[np.float64]
     soft_edges: float = 0.0
+    beside: int = 0
 
     def write(self, nodes: Nodes) -> None:
         """See `Patch.write`."""
@@ -116,10 +118,14 @@ class SurfacePatch:
             return
         inverse = inverse_affine(part.source_from_node)
         corners = self.corners @ inverse[:, :2].T + inverse[:, 2]
-        drawn = draw_triangles(corners, self.values, part.positions.shape[1:])
+        values = self.values
         if self.soft_edges > 0:
-            _soften(drawn, JUMP_CELLS * abs(float(part.source_from_node[0, 0])), self.soft_edges)
-        x, y, trust = drawn
+            is_face = np.broadcast_to((np.arange(len(values)) >= self.beside)[:, None, None], (*values.shape[:2], 1))
+            values = np.concatenate([values, is_face], axis=2)
+        x, y, trust, *face = draw_triangles(corners, values, part.positions.shape[1:])
+        if self.soft_edges > 0:
+            jump = JUMP_CELLS * abs(float(part.source_from_node[0, 0]))
+            _soften((x, y, trust), face[0] > 0, jump, self.soft_edges)
         part.blend(x, y, trust * patch_cover(part, self.box))
 
 
@@ -151,15 +157,22 @@ class FeaturePatch:
         part.blend(*self.flow.positions(part), shown * patch_cover(part, self.flow.box))
 
 
-def _soften(drawn: NDArray[np.float32], jump: float, share: float) -> None:
-    """Average what a mesh draws (x, y, trust; rows, columns), in place, over 3 × 3 cells where x jumps.
+def _soften(
+    drawn: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]],
+    face: NDArray[np.bool_],
+    jump: float,
+    share: float,
+) -> None:
+    """Average what a mesh draws (x, y, trust, each (rows, columns)), in place, over 3 × 3 cells where x jumps.
 
-    Only a side that turns away has such edges, so they are upright. The average counts by a `share` 0..1.
+    Only where all nine are the face: its outline is drawn pixel by pixel. Only a side that turns away has such edges,
+    so they are upright. The average counts by a `share` 0..1.
     """
     kernel, x = np.ones((3, 3), np.uint8), drawn[0]
     jumps = np.zeros(x.shape, np.uint8)
     jumps[:, 1:] = np.abs(np.diff(x, axis=1)) > jump
-    known = cv2.erode((x != 0).view(np.uint8), kernel, borderValue=0)
+    within, beside = (cv2.erode(each.view(np.uint8), kernel, borderValue=0) for each in (face, (x != 0) & ~face))
+    known = within | beside
     places = np.flatnonzero(cv2.bitwise_and(cv2.dilate(jumps, kernel), known))
     for channel in drawn if places.size else ():
         flat = channel.reshape(-1)

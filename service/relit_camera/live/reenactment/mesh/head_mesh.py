@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.easing import smoothstep
 from relit_camera.face.head_pose import HeadPose
+from relit_camera.face.landmarks.landmark_triangulation import outline_edges
 from relit_camera.live.reenactment.control_points import BEYOND_HAIR
 from relit_camera.live.reenactment.dense_motion import box_around
 from relit_camera.live.reenactment.mesh.eye_mesh import EyeMesh, eye_mesh
@@ -19,7 +20,14 @@ from relit_camera.live.reenactment.mesh.face_mesh import (
     distance_from_sides,
     triangulate_face,
 )
-from relit_camera.live.reenactment.mesh.head_sides import HeadSides, above_neck, on_cheek, triangulate_sides
+from relit_camera.live.reenactment.mesh.far_outline import Silhouette
+from relit_camera.live.reenactment.mesh.head_sides import (
+    HeadSides,
+    above_neck,
+    far_ear_in_sight,
+    on_cheek,
+    triangulate_sides,
+)
 from relit_camera.live.reenactment.source_image import SourceFace
 
 SHOWN_BLEND = 0.07
@@ -27,6 +35,11 @@ SHOWN_BLEND = 0.07
 mesh and flow show lies beside each other, as stripes along a turned cheek; over less the face seems to be cut out."""
 TURNED_MARGIN = 0.35
 """Eye distances round face and hair that the mesh of a turned head takes in: it fades out there, not over the ear."""
+HIDDEN_CM = ((-5.0, -2.0), (6.5, 3.5))
+"""Y in head axes, upward from the jaw and downward from the temple: from where on the far cheek hides an ear, and from
+where on wholly. Below them the neck is in sight, above them hair."""
+EAR_IN_SIGHT_CM = (0.9, 0.2)
+"""`far_ear_in_sight` from which on it is left out, for there is no more than a line of it, and from which on wholly."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +75,35 @@ class HeadMesh:
         right, left = (eye.closing(landmarks, pose) for eye in self.eyes)
         return right, left
 
+    def silhouette(
+        self, landmarks: NDArray[np.float64], pose: HeadPose, to_picture: NDArray[np.float64]
+    ) -> Silhouette | None:
+        """The outline of the side that has turned away; None where none has.
+
+        Args:
+            landmarks: (count, 2) where all landmarks go, source pixels.
+            pose: of the head that goes there.
+            to_picture: (2, 3) source pixels → pixels of the moved picture.
+        """
+        face = self.face
+        if self.sides is None:
+            return None
+        away = self.sides.turned_away(pose.rotation * face.face.pose.rotation.inv())[: len(face.members)]
+        if not away.any():
+            return None
+        points = landmarks[face.members] @ to_picture[:, :2].T + to_picture[:, 2]
+        triangles = face.triangles[face.nearest_last(points.take(face.triangles, axis=0), pose)]
+        edges = outline_edges(triangles)
+        places = face.face.head_points[face.members]
+        shares = (away * self.turned_trust)[edges].mean(axis=1)
+        edges, shares = edges[shares > 0], shares[shares > 0]
+        if not len(edges):
+            return None
+        height = places[edges, 1].mean(axis=1)
+        hiding = smoothstep(height, *HIDDEN_CM[0]) * smoothstep(height, *HIDDEN_CM[1])
+        hiding *= smoothstep(far_ear_in_sight(pose), *EAR_IN_SIGHT_CM)
+        return Silhouette(points[triangles], points[edges], shares, hiding)
+
     def surface(
         self,
         landmarks: NDArray[np.float64],
@@ -86,6 +128,7 @@ class HeadMesh:
             trust = trust + away[: len(trust)] * (self.turned_trust - trust)
             values = np.dstack([values[..., :2], trust.take(face.triangles)])
         drawn, shown = self._with_eyeballs(corners, values, order, landmarks, pose, closing)
+        visible = len(drawn)
         box, turned = box_around(target, MARGIN * face.span), 0.0
         if self.sides is not None and away is not None and away.any():
             turned = float(away.max())
@@ -97,7 +140,7 @@ class HeadMesh:
             # It grows as the side turns: at once, the patch's rim would be seen to jump.
             whole = box_around(np.vstack([target, anchors[BEYOND_HAIR]]), TURNED_MARGIN * face.span)
             box = box + turned * (whole - box)
-        return SurfacePatch(drawn, shown, box, turned)
+        return SurfacePatch(drawn, shown, box, turned, len(drawn) - visible)
 
     def _with_eyeballs(
         self,

@@ -116,6 +116,12 @@ def triangulate_sides(face: SourceFace, members: NDArray[np.intp], anchors: NDAr
     )
 
 
+def far_ear_in_sight(pose: HeadPose) -> float:
+    """How far the ear of the side that turns away is seen beyond the face's outline, in cm; hidden it is negative."""
+    across = pose.rotation.as_matrix()[0]
+    return float(EAR_BESIDE_CM * across[0] - EAR_BEHIND_CM * abs(across[2]))
+
+
 def on_cheek(outline: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Which points (..., 3) of a face's outline, in head axes, are that of a cheek or a temple: (...,)."""
     aside = np.abs(outline[..., 0])

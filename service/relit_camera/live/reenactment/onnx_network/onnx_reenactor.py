@@ -84,7 +84,7 @@ class OnnxReenactor:
         grid = Warp(placed, patches).grid(box)
 
         def warp(relit: LinearImage) -> WarpedLayer:
-            image = self._person.warped(relit, grid)
+            image = self._person.warped(self._person.image(relit), grid)
             if seen and not self._network.gives_flow:
                 source = crop_square(display_from_linear(relit), self._crop, self._network.side)
                 answer = self._network.run(source, *seen)

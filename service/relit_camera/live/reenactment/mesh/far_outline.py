@@ -1,0 +1,162 @@
+"""The outline of a turned face at its far side, drawn pixel by pixel over the moved picture.
+
+Between two cells of a warp positions are interpolated. Where one looks at the cheek and the next at what is behind it,
+all that the cheek hides shows between them as a thin line: ear, sideburn, jaw.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.image_types import RgbaImage
+from relit_camera.live.reenactment.mesh.triangle_drawing import draw_triangles
+from relit_camera.live.reenactment.source_image import BEYOND, UPSAMPLING
+from relit_camera.live.reenactment.warp import PositionGrid
+
+STRIP_CELLS = 2
+"""Cells beyond the outline of a cheek, over which what is farther out shows instead: what the warp shows there is the
+hidden side of the head, narrowed to a line."""
+SUBPIXELS = 4
+"""Points across a pixel, and down it, by which the share of the face in it is counted. OpenCV counts those too that a
+border touches: half of one too many."""
+SHIFT = 4
+"""Binary digits that OpenCV is told of a fraction of a pixel."""
+
+
+@dataclass(frozen=True)
+class Silhouette:
+    """Where a moved face ends, in pixels of the moved picture.
+
+    Attributes:
+        corners: (triangles, 3, 2) float64 of all that shows of the face.
+        edges: (count, 2, 2) float64 the ends of those sides of its outline that are to be drawn.
+        shares: (count,) float64 how far each is, 0..1.
+        hiding: (count,) float64 how far what lies right behind it is left out, 0..1.
+    """
+
+    corners: NDArray[np.float64]
+    edges: NDArray[np.float64]
+    shares: NDArray[np.float64]
+    hiding: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class OutlineTask:
+    """What is drawn along an outline.
+
+    Attributes:
+        face, behind: where the pixels of a box look on the face, and where at what is behind it; both go on a little
+            beyond the outline.
+        seen: (rows, columns) the cells of the box in which pixels are drawn.
+        pixels: (2, count) rows and columns of those in the box.
+        within: (count,) float32 the share of each that the face fills.
+        cover: (count,) float32 how far each is drawn.
+    """
+
+    face: PositionGrid
+    behind: PositionGrid
+    seen: NDArray[np.bool_]
+    pixels: NDArray[np.intp]
+    within: NDArray[np.float32]
+    cover: NDArray[np.float32]
+
+    def draw(self, moved: RgbaImage, person: RgbaImage) -> None:
+        """Draw into the moved picture, in place, from the person as `Cutout.image` has them."""
+        left, top, right, bottom = self.face.box
+        area, at = moved[top:bottom, left:right], tuple(self.pixels)
+        face, behind = (grid.sample(person, UPSAMPLING, BEYOND, self.seen)[at] for grid in (self.face, self.behind))
+        area[at] = _mixed(_mixed(face, behind, self.within), area[at], self.cover)
+
+
+def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid) -> OutlineTask | None:
+    """What is to be drawn along an outline; None where there is none, or it lies outside the picture.
+
+    Args:
+        silhouette: of the face in this picture.
+        grid: where the picture's pixels look.
+    """
+    if silhouette is None:
+        return None
+    step, (rows, columns) = grid.step, grid.nodes().shape[:2]
+    ends, margin = silhouette.edges.reshape(-1, 2) / step, 2 * STRIP_CELLS + 2
+    first = np.maximum(np.floor(ends.min(axis=0)).astype(int) - margin, 0)
+    last = np.minimum(np.ceil(ends.max(axis=0)).astype(int) + margin, (columns, rows))
+    if (last <= first).any():
+        return None
+    low, high = step * first, np.minimum(step * last, (grid.box[2] - grid.box[0], grid.box[3] - grid.box[1]))
+    box, (width, height) = (int(low[0]), int(low[1]), int(high[0]), int(high[1])), high - low
+    positions = grid.positions[first[1] : last[1] + 2, first[0] : last[0] + 2]
+    # The middle of a cell is a whole number, and there is one cell more round the box: see `PositionGrid`.
+    corners, edges = ((points - low) / step + 0.5 for points in (silhouette.corners, silhouette.edges))
+    inside = draw_triangles(corners, np.ones((*corners.shape[:2], 1)), positions.shape[:2])[0] > 0
+    beside, beyond = _filled(positions, ~inside, 1), _filled(positions, ~_grown(inside, STRIP_CELLS), STRIP_CELLS + 1)
+    hiding = _band(edges, silhouette.hiding, inside.shape)[..., None]
+    # Farther in the face alone shows as it is, and farther out what is behind it.
+    seen = (_grown(inside, STRIP_CELLS + 1) & _grown(~inside, 1))[1:-1, 1:-1]
+    shares = cv2.resize(_band(edges, silhouette.shares, inside.shape), None, fx=step, fy=step)
+    drawn = cv2.resize(seen.view(np.uint8), None, fx=step, fy=step, interpolation=cv2.INTER_NEAREST)
+    cover = shares[step : step + height, step : step + width] * drawn[:height, :width]
+    pixels = np.nonzero(cover)
+    return OutlineTask(
+        face=PositionGrid(_filled(positions, inside, 1), box, step),
+        behind=PositionGrid(beside + hiding * (beyond - beside), box, step),
+        seen=seen,
+        pixels=np.stack(pixels),
+        within=_filled_share(corners, seen, step, pixels),
+        cover=cover[pixels],
+    )
+
+
+def _grown(cells: NDArray[np.bool_], by: int) -> NDArray[np.bool_]:
+    """The cells and those that are up to so many away."""
+    grown = cv2.dilate(cells.view(np.uint8), np.ones((2 * by + 1, 2 * by + 1), np.uint8))
+    return np.asarray(grown.view(np.bool_))
+
+
+def _filled(positions: NDArray[np.float32], known: NDArray[np.bool_], reach: int) -> NDArray[np.float32]:
+    """Positions (rows, columns, 2), where they are not known the mean of those that are, up to `reach` cells away."""
+    size = (2 * reach + 1, 2 * reach + 1)
+    count = cv2.blur(known.astype(np.float32), size)
+    mean = cv2.blur(positions * known[..., None], size) / np.maximum(count, 1e-6)[..., None]
+    return np.where((known | (count < 1e-6))[..., None], positions, mean)
+
+
+def _band(edges: NDArray[np.float64], shares: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """How far cells (rows, columns) belong to lines: as far as `shares` say next to them, and 0 farther away."""
+    band = np.zeros(shape, np.float32)
+    ends = np.rint(edges * 2**SHIFT).astype(np.int32)
+    for share, (start, end) in sorted(zip(shares.tolist(), ends.tolist(), strict=True)):
+        cv2.line(band, start, end, share, 4 * STRIP_CELLS + 4, cv2.LINE_8, SHIFT)
+    return np.asarray(cv2.blur(band, (2 * STRIP_CELLS + 1, 2 * STRIP_CELLS + 1)), np.float32)
+
+
+def _filled_share(
+    corners: NDArray[np.float64], seen: NDArray[np.bool_], step: int, pixels: tuple[NDArray[np.intp], ...]
+) -> NDArray[np.float32]:
+    """The share that triangles fill of each of these pixels (count,), which lie in cells that are seen."""
+    (rows, columns), scale = seen.shape, step * SUBPIXELS
+    sums = cv2.integral(seen.view(np.uint8))
+    low = np.clip(np.floor(corners.min(axis=1) - 0.5).astype(int), 0, (columns, rows))
+    high = np.clip(np.ceil(corners.max(axis=1) - 0.5).astype(int), 0, (columns, rows))
+    (left, top), (right, bottom) = low.T, high.T
+    touching = sums[bottom, right] - sums[bottom, left] - sums[top, right] + sums[top, left] > 0
+    filled = np.zeros((scale * rows, scale * columns), np.uint8)
+    points = scale * (corners[touching] - 0.5) - 0.5
+    for triangle in np.rint(points * 2**SHIFT).astype(np.int32):
+        cv2.fillConvexPoly(filled, triangle, 1, cv2.LINE_8, SHIFT)
+    row, column = pixels
+    points_in = filled.reshape(step * rows, SUBPIXELS, -1, SUBPIXELS)[row, :, column]
+    return np.asarray(points_in.mean(axis=(1, 2)), np.float32)
+
+
+def _mixed(front: NDArray[np.uint8], back: NDArray[np.uint8], share: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Two pictures of straight alpha (count, 4), the first by a share (count,) of each pixel."""
+    by_front, by_back = share * front[:, 3], (1 - share) * back[:, 3]
+    alpha = by_front + by_back
+    colors = by_front[:, None] * front[:, :3] + by_back[:, None] * back[:, :3]
+    colors /= np.maximum(alpha, 1e-3)[:, None]
+    return np.asarray(np.rint(np.column_stack([colors, alpha])), np.uint8)
