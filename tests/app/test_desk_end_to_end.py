@@ -44,7 +44,9 @@ NOSE_TIP = 1
 """Of the scheme `mesh478`."""
 PLACE = DeskPlace(MONITOR.screen.width_cm, MONITOR.screen.height_cm, MONITOR.distance_cm, MONITOR.camera.up_cm)
 TIMINGS = FilmingTimings(
-    session=SessionTimings(frames_a_step=4, settling_s=0.1, min_step_s=0.15, page_timeout_s=5.0, step_timeout_s=30.0),
+    session=SessionTimings(
+        frames_a_step=4, settling_s=0.1, min_step_s=0.15, page_timeout_s=5.0, show_timeout_s=30.0, step_timeout_s=30.0
+    ),
     automatic_s=0.5,
     delay_frames=2,
     frame_timeout_s=10.0,

@@ -41,7 +41,9 @@ STEP_MS = 60_000
 CHANGED = 8.0
 """Mean difference of two published pictures, code values, by which the light is seen to be another."""
 DESK_TIMINGS = FilmingTimings(
-    session=SessionTimings(frames_a_step=2, settling_s=0.05, min_step_s=0.1, page_timeout_s=10, step_timeout_s=20),
+    session=SessionTimings(
+        frames_a_step=2, settling_s=0.05, min_step_s=0.1, page_timeout_s=10, show_timeout_s=20, step_timeout_s=20
+    ),
     automatic_s=0.1,
     delay_frames=2,
     frame_timeout_s=5.0,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import threading
+from dataclasses import replace
 
 import pytest
 
@@ -20,9 +21,11 @@ FRAME_S = 1 / 30
 class Filming:
     """A page that shows each step a little late, and a webcam of 30 frames a second."""
 
-    def __init__(self, patterns: list[Pattern], page_delay_s: float = 0.08) -> None:
+    def __init__(
+        self, patterns: list[Pattern], page_delay_s: float = 0.08, timings: SessionTimings | None = None
+    ) -> None:
         self.clock = VirtualClock()
-        self.session = DeskSession(patterns, self.clock)
+        self.session = DeskSession(patterns, self.clock, timings)
         self.page_open, self.webcam_on = True, True
         self.shown = -1
         self.changes: list[float] = []
@@ -129,3 +132,19 @@ def test_a_webcam_that_stops_ends_it() -> None:
     filming.clock.at(5.0, lambda: setattr(filming, "webcam_on", False))
     with pytest.raises(CaptureError, match="the webcam gives no frames"):
         filming.run()
+
+
+@pytest.mark.parametrize("page_delay_s", [TIMINGS.show_timeout_s - 1, TIMINGS.show_timeout_s + 1])
+def test_a_page_that_does_not_show_its_pattern_is_told_in_time_and_a_late_one_is_filmed(page_delay_s: float) -> None:
+    """The webcam has all of its own time once a pattern is shown, however late that was."""
+    timings = replace(TIMINGS, step_timeout_s=3.0)
+    filming = Filming(["white"], page_delay_s, timings)
+    late = page_delay_s > TIMINGS.show_timeout_s
+    began = filming.clock.now()
+    if late:
+        with pytest.raises(CaptureError, match="does not show its pattern"):
+            filming.run()
+        assert filming.clock.now() - began == pytest.approx(TIMINGS.show_timeout_s, abs=0.2)
+    else:
+        filming.run()
+        assert len(filming.frames) == TIMINGS.frames_a_step

@@ -25,13 +25,15 @@ class SessionTimings:
         min_step_s: least time of a step: at most three changes a second, as guidelines for photosensitive people ask
             (WCAG 2.2, 2.3.1).
         page_timeout_s: without a word from the page, after which it counts as closed.
-        step_timeout_s: for one step, after which screen or webcam count as stuck.
+        show_timeout_s: until the page shows a pattern, after which the screen counts as stuck.
+        step_timeout_s: for the frames of a pattern that is shown, after which the webcam counts as stuck.
     """
 
     frames_a_step: int = 10
     settling_s: float = 0.25
     min_step_s: float = 0.34
     page_timeout_s: float = 2.5
+    show_timeout_s: float = 12.0
     step_timeout_s: float = 12.0
 
 
@@ -79,8 +81,11 @@ class DeskSession:
         if now - self._heard_at > self._timings.page_timeout_s:
             what = f"the page with the patterns was closed or hidden at step {self._step + 1} of {len(self._patterns)}"
             raise CaptureError(what, "start again, and keep it in front, full screen, until it is done")
-        if now - self._began_at > self._timings.step_timeout_s:
-            late = "the page does not show its pattern" if self._shown_at is None else "the webcam gives no frames"
+        if self._shown_at is None:
+            late, since, at_most = "the page does not show its pattern", self._began_at, self._timings.show_timeout_s
+        else:
+            late, since, at_most = "the webcam gives no frames", self._shown_at, self._timings.step_timeout_s
+        if now - since > at_most:
             raise CaptureError(f"{late}: step {self._step + 1} took too long", "close other programs, and start again")
 
     def wants_frame(self, captured_at: float) -> bool:
