@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import cv2
@@ -19,13 +19,16 @@ from relit_camera.live.reenactment.motion_transfer import split_body_motion, tra
 from relit_camera.live.reenactment.reenactor import WarpedLayer, open_reenactor
 from relit_camera.live.reenactment.source_image import feather_edges
 from relit_camera.live.reenactment.warp import inverse_affine, move_body, source_from_output
-from relit_camera.live.render_quality import FULL_QUALITY
+from relit_camera.live.render_quality import FULL_QUALITY, RenderQuality
 from relit_camera.subject.subject import Subject
 from tests.live.people import NOBODY, SCHEME, close_up, context_of, live_frame, motion, moved_by, person, premultiplied
 
 SIZE = (480, 360)
 FEATURES = {"nose": 1, "chin": 152, "brow": 105, "cheek": 50, "mouth corner": 61}
 """Vertices of the canonical face that lie well inside it."""
+
+CELL = 2
+"""Side of a cell of the warp in this output, in pixels."""
 
 
 def relit_picture(subject: Subject):
@@ -103,23 +106,42 @@ def test_features_go_where_the_turned_head_has_them(feature: str, angles: tuple[
     assert np.linalg.norm(centroid(moved) - expected) < 0.5 * pixel + 0.15 * way
 
 
-@pytest.mark.parametrize("yaw", [0.0, 30.0, -30.0])
-def test_the_far_outline_alone_is_drawn_anew(yaw: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def turned_pictures(yaws: Sequence[float], half_size: bool) -> np.ndarray:
+    """Linear premultiplied pictures (count, rows, columns, 3) of a head with these yaws."""
     subject = person()
-    relit = relit_picture(subject)
+    relit, quality = relit_picture(subject), RenderQuality(half_size=half_size)
+    reenactor = open_reenactor("first-order", context_of(subject, SIZE))
+    moved = (reenactor.plan_warp(motion(rotation_from_angles(yaw)), live_frame(), quality)(relit) for yaw in yaws)
+    return np.stack([in_output(each)[0] for each in moved])
 
-    def turned() -> np.ndarray:
-        reenactor = open_reenactor("first-order", context_of(subject, SIZE))
-        return in_output(moved_by(reenactor, relit, motion(rotation_from_angles(yaw)), live_frame()))[0]
 
-    drawn = turned()
+@pytest.mark.parametrize("half_size", [False, True])
+@pytest.mark.parametrize("yaw", [0.0, 30.0, -30.0])
+def test_the_far_outline_alone_is_drawn_anew(yaw: float, half_size: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = turned_pictures([yaw], half_size)
     monkeypatch.setattr(first_order_reenactor, "plan_far_outline", lambda *_: None)
-    changed = np.nonzero(np.abs(drawn - turned()).max(axis=2) > 1e-3)[1]
+    changed = np.nonzero(np.abs(drawn - turned_pictures([yaw], half_size)).max(axis=3) > 1e-3)[2]
     if yaw == 0:
         assert changed.size == 0
     else:
         assert changed.size > 50
-        assert (np.sign(yaw) * (changed - SIZE[0] / 2) > 0).all()
+        assert (np.sign(yaw) * (changed - SIZE[0] / 2) > -CELL * (1 + half_size)).all()
+
+
+@pytest.mark.parametrize("half_size", [False, True])
+@pytest.mark.parametrize("yaws", [np.arange(22, 29, 0.2), np.arange(-29, -22, 0.2)], ids=["right", "left"])
+def test_the_outline_of_a_head_that_turns_slowly_goes_along_evenly(
+    yaws: Sequence[float], half_size: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The pixels that change most do so less than where nothing draws the outline, in the worst moment too."""
+
+    def worst() -> float:
+        changes = np.abs(np.diff(turned_pictures(yaws, half_size), axis=0)).max(axis=3)
+        return float(np.sort(changes.reshape(len(changes), -1), axis=1)[:, -200:].mean(axis=1).max())
+
+    drawn = worst()
+    monkeypatch.setattr(first_order_reenactor, "plan_far_outline", lambda *_: None)
+    assert drawn < worst()
 
 
 def test_brows_go_up_with_the_drivers() -> None:

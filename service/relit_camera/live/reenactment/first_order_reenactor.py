@@ -94,8 +94,8 @@ class FirstOrderReenactor:
             quality.half_size,
         )
         eyes = plan_closing_eyes(self._mesh.eyes, closing, surface, landmarks, to_box, size, quality.half_size)
-
-        outline = plan_far_outline(self._mesh.silhouette(landmarks, target.pose, to_box), grid)
+        silhouette = self._mesh.silhouette(landmarks, target.pose, to_box)
+        outline = plan_far_outline(silhouette, grid, quality.half_size)
 
         def warp(relit: LinearImage) -> WarpedLayer:
             person = self._person.image(relit)

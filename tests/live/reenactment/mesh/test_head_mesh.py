@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,11 +16,14 @@ from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow, whole_flow
 from relit_camera.live.reenactment.mesh.face_mesh import SurfacePatch, _soften
 from relit_camera.live.reenactment.mesh.head_mesh import HeadMesh, triangulate_head
+from relit_camera.live.reenactment.mesh.head_sides import ear_in_sight
 from relit_camera.live.reenactment.motion_transfer import TransferredPose, transfer_motion
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.reenactment.warp import Nodes, Patch, Warp, patch_cover
 from tests.live.people import face_of, motion, person
 
+CHIN = 152
+"""The landmark at its tip."""
 FINE = 4
 """Places in a source pixel, side by side."""
 
@@ -148,6 +153,7 @@ def test_a_closing_eye_has_its_eyeball_behind_the_skin_round_it_and_before_the_c
         assert fan.max() < skin.min()
         seen = mesh.face.nearest_last(target.landmarks[mesh.face.members][mesh.face.triangles], target.pose)
         beside = len(surface_of(mesh, target).corners) - len(seen)
+        assert surface.beside == beside
         assert fan.min() > beside + (10 if yaw else 0)
 
 
@@ -183,6 +189,15 @@ def test_edges_are_averaged_where_a_mesh_jumps_and_nowhere_else() -> None:
         assert set(changed) >= ({6, 7} if share else set())
         step = 50 * share / 3
         np.testing.assert_allclose(softened[0, 4, 6] - drawn[0, 4, 6], step, atol=1.5)
+
+
+def test_edges_beside_the_face_are_averaged_too() -> None:
+    drawn = np.ones((3, 9, 12), np.float32)
+    drawn[0, :, 7:] += 50
+    face = np.zeros((9, 12), np.bool_)
+    face[:, :4] = True
+    soften(drawn, face, 20.0, 1.0)
+    np.testing.assert_allclose(drawn[0, 4, 6:8], [1 + 50 / 3, 1 + 100 / 3], rtol=1e-5)
 
 
 @pytest.mark.parametrize("ends", [7, 6, 8])
@@ -222,6 +237,9 @@ def test_the_silhouette_is_that_of_the_side_that_turns_away(face: SourceFace, me
     assert ends.min() > outward.min() + 0.2 * np.ptp(outward)
     assert side * silhouette.edges[silhouette.hiding > 0.99][..., 0].mean() > outward.max() - 0.15 * np.ptp(outward)
     assert np.ptp(silhouette.edges[silhouette.shares > 0.9][..., 1]) > 0.6 * np.ptp(points[:, 1])
+    chin = points[mesh.face.members == CHIN][0]
+    near_chin = np.linalg.norm(silhouette.edges.mean(axis=1) - chin, axis=1) < 0.1 * np.ptp(points[:, 1])
+    assert not near_chin.any()
 
 
 def test_what_is_behind_a_far_cheek_is_left_out_once_no_ear_is_in_sight(face: SourceFace, mesh: HeadMesh) -> None:
@@ -249,3 +267,14 @@ def test_a_face_that_hardly_turns_has_no_silhouette_to_draw(face: SourceFace, me
     alone = triangulate_head(face, np.zeros((0, 2)))
     target = turned(face, 30)
     assert alone.silhouette(target.landmarks, target.pose, TO_PICTURE) is None
+
+
+def test_an_ear_is_in_sight_by_how_far_its_side_has_turned_away(face: SourceFace) -> None:
+    def seen(turn: float, roll: float = 0.0, away: float = 1.0) -> float:
+        return ear_in_sight(replace(face.pose, rotation=rotation_from_angles(turn, 0, roll)), away)
+
+    assert seen(0) == pytest.approx(2)
+    assert seen(np.degrees(np.arctan(0.5))) == pytest.approx(0, abs=1e-9)
+    assert seen(-20, away=-1) == pytest.approx(seen(20))
+    assert seen(15, away=-5) > 2.5
+    assert seen(15, roll=30) == pytest.approx(seen(15))

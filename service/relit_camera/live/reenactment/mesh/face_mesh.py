@@ -63,8 +63,12 @@ class FaceMesh:
             corners: (triangles, 3, 2) where the corners of all triangles go.
             pose: of the head that goes there.
         """
-        facing = np.flatnonzero(doubled_areas(corners) * self.clockwise > 0)
+        facing = self.facing(corners)
         return np.asarray(facing[np.argsort(self.nearness(pose)[facing])])
+
+    def facing(self, corners: NDArray[np.float64]) -> NDArray[np.intp]:
+        """The triangles that face the camera where the corners of all go to `corners` (triangles, 3, 2)."""
+        return np.flatnonzero(doubled_areas(corners) * self.clockwise > 0)
 
     def nearness(self, pose: HeadPose) -> NDArray[np.float64]:
         """Of the triangles of a head in this pose (count,): centimetres from its middle toward the camera."""
@@ -100,8 +104,8 @@ class SurfacePatch:
         corners: (triangles, 3, 2) float64 source pixels where the corners go, from the farthest to the nearest.
         values: (triangles, 3, 3) float64 as in `FaceMesh`, of the corners.
         box: (4,) float64 round them all, toward whose sides the patch fades out.
-        soft_edges: 0..1, how far edges between near and far are averaged within the face: else they are staircases of
-            cells.
+        soft_edges: 0..1, how far edges between near and far are averaged, but the outline of the face: else they are
+            staircases of cells.
         beside: how many of the triangles, the first, lie beside the face.
     """
 
@@ -165,8 +169,8 @@ def _soften(
 ) -> None:
     """Average what a mesh draws (x, y, trust, each (rows, columns)), in place, over 3 × 3 cells where x jumps.
 
-    Only where all nine are the face: its outline is drawn pixel by pixel. Only a side that turns away has such edges,
-    so they are upright. The average counts by a `share` 0..1.
+    Only where all nine are the face, or none: its outline is drawn pixel by pixel. Only a side that turns away has such
+    edges, so they are upright. The average counts by a `share` 0..1.
     """
     kernel, x = np.ones((3, 3), np.uint8), drawn[0]
     jumps = np.zeros(x.shape, np.uint8)

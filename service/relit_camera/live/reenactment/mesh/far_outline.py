@@ -19,10 +19,11 @@ from relit_camera.live.reenactment.warp import PositionGrid
 
 STRIP_CELLS = 2
 """Cells beyond the outline of a cheek, over which what is farther out shows instead: what the warp shows there is the
-hidden side of the head, narrowed to a line."""
+hidden side of the head, narrowed to a line. At half the resolution, where cells are twice as large, it stays: a strip
+that comes and goes by such cells as the head turns would be seen more."""
 SUBPIXELS = 4
 """Points across a pixel, and down it, by which the share of the face in it is counted. OpenCV counts those too that a
-border touches: half of one too many."""
+border touches: the face is wider by an eighth to a quarter of a pixel."""
 SHIFT = 4
 """Binary digits that OpenCV is told of a fraction of a pixel."""
 
@@ -33,7 +34,8 @@ class Silhouette:
 
     Attributes:
         corners: (triangles, 3, 2) float64 of all that shows of the face.
-        edges: (count, 2, 2) float64 the ends of those sides of its outline that are to be drawn.
+        edges: (count, 2, 2) float64 the ends of the sides along which it is to be drawn, folds within the face among
+            them, where that changes nothing.
         shares: (count,) float64 how far each is, 0..1.
         hiding: (count,) float64 how far what lies right behind it is left out, 0..1.
     """
@@ -72,17 +74,19 @@ class OutlineTask:
         area[at] = _mixed(_mixed(face, behind, self.within), area[at], self.cover)
 
 
-def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid) -> OutlineTask | None:
+def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid, half_size: bool = False) -> OutlineTask | None:
     """What is to be drawn along an outline; None where there is none, or it lies outside the picture.
 
     Args:
         silhouette: of the face in this picture.
         grid: where the picture's pixels look.
+        half_size: the picture has half its resolution, and positions are twice as far apart.
     """
     if silhouette is None:
         return None
+    strip = 0 if half_size else STRIP_CELLS
     step, (rows, columns) = grid.step, grid.nodes().shape[:2]
-    ends, margin = silhouette.edges.reshape(-1, 2) / step, 2 * STRIP_CELLS + 2
+    ends, margin = silhouette.edges.reshape(-1, 2) / step, 2 * strip + 2
     first = np.maximum(np.floor(ends.min(axis=0)).astype(int) - margin, 0)
     last = np.minimum(np.ceil(ends.max(axis=0)).astype(int) + margin, (columns, rows))
     if (last <= first).any():
@@ -93,11 +97,12 @@ def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid) -> Outli
     # The middle of a cell is a whole number, and there is one cell more round the box: see `PositionGrid`.
     corners, edges = ((points - low) / step + 0.5 for points in (silhouette.corners, silhouette.edges))
     inside = draw_triangles(corners, np.ones((*corners.shape[:2], 1)), positions.shape[:2])[0] > 0
-    beside, beyond = _filled(positions, ~inside, 1), _filled(positions, ~_grown(inside, STRIP_CELLS), STRIP_CELLS + 1)
-    hiding = _band(edges, silhouette.hiding, inside.shape)[..., None]
+    beside = _filled(positions, ~inside, 1)
+    beyond = _filled(beside, ~_grown(inside, strip), strip + 2)
+    hiding = _band(edges, silhouette.hiding, inside.shape, strip)[..., None]
     # Farther in the face alone shows as it is, and farther out what is behind it.
-    seen = (_grown(inside, STRIP_CELLS + 1) & _grown(~inside, 1))[1:-1, 1:-1]
-    shares = cv2.resize(_band(edges, silhouette.shares, inside.shape), None, fx=step, fy=step)
+    seen = (_grown(inside, strip + 1) & _grown(~inside, 1))[1:-1, 1:-1]
+    shares = cv2.resize(_band(edges, silhouette.shares, inside.shape, strip), None, fx=step, fy=step)
     drawn = cv2.resize(seen.view(np.uint8), None, fx=step, fy=step, interpolation=cv2.INTER_NEAREST)
     cover = shares[step : step + height, step : step + width] * drawn[:height, :width]
     pixels = np.nonzero(cover)
@@ -125,17 +130,22 @@ def _filled(positions: NDArray[np.float32], known: NDArray[np.bool_], reach: int
     return np.where((known | (count < 1e-6))[..., None], positions, mean)
 
 
-def _band(edges: NDArray[np.float64], shares: NDArray[np.float64], shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """How far cells (rows, columns) belong to lines: as far as `shares` say next to them, and 0 farther away."""
+def _band(
+    edges: NDArray[np.float64], shares: NDArray[np.float64], shape: tuple[int, ...], reach: int
+) -> NDArray[np.float32]:
+    """How far cells (rows, columns) belong to lines: as far as `shares` say up to `reach` cells aside, then less."""
     band = np.zeros(shape, np.float32)
     ends = np.rint(edges * 2**SHIFT).astype(np.int32)
     for share, (start, end) in sorted(zip(shares.tolist(), ends.tolist(), strict=True)):
-        cv2.line(band, start, end, share, 4 * STRIP_CELLS + 4, cv2.LINE_8, SHIFT)
-    return np.asarray(cv2.blur(band, (2 * STRIP_CELLS + 1, 2 * STRIP_CELLS + 1)), np.float32)
+        cv2.line(band, start, end, share, 4 * reach + 4, cv2.LINE_8, SHIFT)
+    return np.asarray(cv2.blur(band, (2 * reach + 1, 2 * reach + 1)), np.float32)
 
 
 def _filled_share(
-    corners: NDArray[np.float64], seen: NDArray[np.bool_], step: int, pixels: tuple[NDArray[np.intp], ...]
+    corners: NDArray[np.float64],
+    seen: NDArray[np.bool_],
+    step: int,
+    pixels: tuple[NDArray[np.intp], ...],
 ) -> NDArray[np.float32]:
     """The share that triangles fill of each of these pixels (count,), which lie in cells that are seen."""
     (rows, columns), scale = seen.shape, step * SUBPIXELS

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.easing import smoothstep
+from relit_camera.base.rotations import angles_from_rotation
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.landmarks.landmark_triangulation import outline_edges
 from relit_camera.live.reenactment.control_points import BEYOND_HAIR
@@ -24,7 +25,7 @@ from relit_camera.live.reenactment.mesh.far_outline import Silhouette
 from relit_camera.live.reenactment.mesh.head_sides import (
     HeadSides,
     above_neck,
-    far_ear_in_sight,
+    ear_in_sight,
     on_cheek,
     triangulate_sides,
 )
@@ -39,7 +40,7 @@ HIDDEN_CM = ((-5.0, -2.0), (6.5, 3.5))
 """Y in head axes, upward from the jaw and downward from the temple: from where on the far cheek hides an ear, and from
 where on wholly. Below them the neck is in sight, above them hair."""
 EAR_IN_SIGHT_CM = (0.9, 0.2)
-"""`far_ear_in_sight` from which on it is left out, for there is no more than a line of it, and from which on wholly."""
+"""`ear_in_sight` from which on it is left out, for there is no more than a line of it, and from which on wholly."""
 
 
 @dataclass(frozen=True)
@@ -85,14 +86,12 @@ class HeadMesh:
             pose: of the head that goes there.
             to_picture: (2, 3) source pixels → pixels of the moved picture.
         """
-        face = self.face
-        if self.sides is None:
-            return None
-        away = self.sides.turned_away(pose.rotation * face.face.pose.rotation.inv())[: len(face.members)]
-        if not away.any():
+        face, turn = self.face, pose.rotation * self.face.face.pose.rotation.inv()
+        away = None if self.sides is None else self.sides.turned_away(turn)[: len(face.members)]
+        if away is None or not away.any():
             return None
         points = landmarks[face.members] @ to_picture[:, :2].T + to_picture[:, 2]
-        triangles = face.triangles[face.nearest_last(points.take(face.triangles, axis=0), pose)]
+        triangles = face.triangles[face.facing(points.take(face.triangles, axis=0))]
         edges = outline_edges(triangles)
         places = face.face.head_points[face.members]
         shares = (away * self.turned_trust)[edges].mean(axis=1)
@@ -101,7 +100,7 @@ class HeadMesh:
             return None
         height = places[edges, 1].mean(axis=1)
         hiding = smoothstep(height, *HIDDEN_CM[0]) * smoothstep(height, *HIDDEN_CM[1])
-        hiding *= smoothstep(far_ear_in_sight(pose), *EAR_IN_SIGHT_CM)
+        hiding *= smoothstep(ear_in_sight(pose, angles_from_rotation(turn).yaw), *EAR_IN_SIGHT_CM)
         return Silhouette(points[triangles], points[edges], shares, hiding)
 
     def surface(

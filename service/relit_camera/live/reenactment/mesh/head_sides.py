@@ -116,10 +116,15 @@ def triangulate_sides(face: SourceFace, members: NDArray[np.intp], anchors: NDAr
     )
 
 
-def far_ear_in_sight(pose: HeadPose) -> float:
-    """How far the ear of the side that turns away is seen beyond the face's outline, in cm; hidden it is negative."""
-    across = pose.rotation.as_matrix()[0]
-    return float(EAR_BESIDE_CM * across[0] - EAR_BEHIND_CM * abs(across[2]))
+def ear_in_sight(pose: HeadPose, turn: float) -> float:
+    """How far an ear is seen beyond the face's outline, in cm; hidden it is negative.
+
+    Args:
+        pose: of the head.
+        turn: any yaw that turns this ear away: above 0 for the one at the picture's right.
+    """
+    yaw = np.radians(angles_from_rotation(pose.rotation).yaw)
+    return float(EAR_BESIDE_CM * np.cos(yaw) - EAR_BEHIND_CM * np.sign(turn) * np.sin(yaw))
 
 
 def on_cheek(outline: NDArray[np.float64]) -> NDArray[np.bool_]:
