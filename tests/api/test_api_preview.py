@@ -154,27 +154,28 @@ def test_nothing_is_encoded_without_viewers(camera: FakeCamera, monkeypatch: pyt
     assert len(encodings) == left > 0
 
 
-def test_a_slow_viewer_skips_pictures_and_delays_nobody(camera: FakeCamera) -> None:
+def test_a_slow_viewer_skips_pictures_and_delays_nobody(camera: FakeCamera, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It takes a picture only whenever another has seen five more. The camera has a new one whenever it is asked."""
+    monkeypatch.setattr(camera, "picture", lambda after, _timeout_s: (after + 1, camera.image))
+
     async def view() -> tuple[list[int], list[int]]:
         feed = PreviewBroadcaster(camera)
         with feed.subscribe(PreviewVariant()) as channel, feed.subscribe(PreviewVariant()) as same:
-            slow: list[int] = [-1]
-
-            async def dawdle() -> None:
-                while True:
-                    picture = await same.next(slow[-1], 1.0)
-                    slow.append(picture.count if picture else slow[-1])
-                    await asyncio.sleep(0.2)
-
-            task = asyncio.create_task(dawdle())
-            fast = [picture.count for picture in await see(channel, 20)]
-            task.cancel()
-            return fast, slow[1:]
+            fast, slow = [-1], [-1]
+            while len(fast) <= 20:
+                for _ in range(5):
+                    picture = await channel.next(fast[-1], 2.0)
+                    assert picture is not None
+                    fast.append(picture.count)
+                taken = await same.next(slow[-1], 2.0)
+                assert taken is not None
+                slow.append(taken.count)
+            return fast[1:], slow[1:]
 
     fast, slow = asyncio.run(view())
-    assert fast[-1] - fast[0] <= 19 + 4
-    assert len(slow) >= 2
-    assert all(later - earlier >= 4 for earlier, later in pairwise(slow))
+    assert fast == list(range(fast[0], fast[0] + 20))
+    assert len(slow) == 4
+    assert all(later - earlier >= 5 for earlier, later in pairwise(slow))
 
 
 async def made(channel: PreviewStream, count: int) -> list[tuple[float, EncodedFrame]]:
@@ -214,9 +215,26 @@ def test_a_picture_that_was_late_is_not_followed_by_one_at_once(
     assert min(gaps) > 0.05
 
 
-def test_a_limit_at_the_camera_s_rate_drops_no_picture(camera: FakeCamera) -> None:
-    counts = [picture.count for _, picture in asyncio.run(made(PreviewStream(camera, PreviewVariant(fps=FPS)), 20))]
-    assert counts[-1] - counts[0] <= 19 + 3  # a busy machine may miss one now and then, not every other
+@pytest.mark.parametrize("late_s", [0.0, 0.004, 0.012])
+def test_a_limit_at_the_camera_s_rate_drops_no_picture(
+    camera: FakeCamera, monkeypatch: pytest.MonkeyPatch, late_s: float
+) -> None:
+    """In virtual time, in which the stream wakes late each time."""
+    clock, counts = [100.0], []
+
+    async def sleep(seconds: float) -> None:
+        clock[0] += seconds + late_s
+        await asyncio.sleep(0)
+
+    def picture(after: int, _timeout_s: float) -> Any:
+        clock[0] = max(clock[0], (after + 1) / FPS)
+        counts.append(int(clock[0] * FPS + 1e-6))
+        return counts[-1], camera.image
+
+    monkeypatch.setattr(camera, "picture", picture)
+    stream = PreviewStream(camera, PreviewVariant(fps=FPS), now=lambda: clock[0], sleep=sleep)
+    asyncio.run(made(stream, 100))
+    assert counts[:100] == list(range(counts[0], counts[0] + 100))
 
 
 def test_many_viewers_share_what_may_be_sent(camera: FakeCamera, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
@@ -76,13 +76,22 @@ class PreviewStream:
         ended: whether `run` has ended: no more pictures come.
     """
 
-    def __init__(self, camera: CameraControl, variant: PreviewVariant, fps: Callable[[], float] | None = None) -> None:
+    def __init__(
+        self,
+        camera: CameraControl,
+        variant: PreviewVariant,
+        fps: Callable[[], float] | None = None,
+        now: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], Awaitable[None]] = asyncio.sleep,
+    ) -> None:
         """Set up.
 
         Args:
             camera: whose pictures they are.
             variant: how they are wanted.
             fps: gives the pictures a second that may be made now; the variant's if not given.
+            now: gives the time, in seconds.
+            sleep: waits for some seconds of it.
         """
         self.viewers = 0
         self.encoding_s = 0.0
@@ -90,6 +99,7 @@ class PreviewStream:
         self._camera = camera
         self._variant = variant
         self._fps = fps or (lambda: variant.fps)
+        self._now, self._sleep = now, sleep
         self._newest = EncodedFrame(-1, b"")
         self._frame_arrived = asyncio.Event()
 
@@ -106,13 +116,13 @@ class PreviewStream:
         due = 0.0
         try:
             while True:
-                await asyncio.sleep(max(0.0, due - time.monotonic()))
+                await self._sleep(max(0.0, due - self._now()))
                 made = await to_thread.run_sync(self._make, limiter=limiter, abandon_on_cancel=True)
                 if made is None:
                     continue
                 interval_s = 1 / self._fps()
                 # Counted from the last due time, not from now: otherwise every late wake-up would lower the rate.
-                due = max(due + interval_s, time.monotonic() + LEAST_INTERVAL * interval_s)
+                due = max(due + interval_s, self._now() + LEAST_INTERVAL * interval_s)
                 self._newest = made
                 self._wake()
         except Exception:
