@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -131,6 +133,23 @@ def test_plateaus_end_where_light_changes() -> None:
     random = np.random.default_rng(0)
     cells = (levels[:, None, None] + 0.002 * random.normal(size=(len(levels), 24, 32))).astype(np.float32)
     assert [(each.start, each.stop) for each in find_plateaus(cells, "srgb")] == [(0, 9), (13, 20), (20, 28)]
+
+
+@pytest.mark.parametrize("change", [10, 15, 20, 40])
+def test_a_slow_change_of_little_light_belongs_to_no_plateau(change: int) -> None:
+    """As before a laptop: ten frames of each pattern, and four in between; changes in units of the noise."""
+    random = np.random.default_rng(0)
+    noise = 0.002
+    light = np.concatenate([[0.9, 0.1], 0.5 + change * noise * (np.arange(25) % 2)])  # one change is large
+    fades = [np.linspace(one, other, 6)[1:-1] for one, other in pairwise(light)]
+    standing = light.repeat(10).reshape(-1, 10)
+    levels = np.concatenate([standing[0], *(np.append(*each) for each in zip(fades, standing[1:], strict=True))])
+    codes = levels[:, None, None] + noise * random.normal(size=(len(levels), 24, 32))
+    found = find_plateaus(srgb_decode(codes.astype(np.float32)), "srgb")
+    assert len(found) == len(light)
+    for index, each in enumerate(found):
+        assert 14 * index - 1 <= each.start <= 14 * index
+        assert 14 * index + 10 <= each.stop <= 14 * index + 11
 
 
 @pytest.mark.parametrize("seed", range(20))
