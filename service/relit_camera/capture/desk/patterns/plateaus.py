@@ -41,7 +41,7 @@ class PlateauTunables:
     cells: tuple[int, int] = (32, 24)
     min_frames: int = 3
     noise_percentile: float = 35.0
-    nearby: int = 9
+    nearby: int = 8
     max_noise: float = 4.0
     min_noise: float = 0.001
     run_cost: float = 20.0
