@@ -30,9 +30,10 @@ class PlateauTunables:
         cells: width and height of the grid of cells to which a frame is reduced.
         min_frames: fewer frames between two changes are no plateau.
         noise_percentile: of the differences of successive frames: that of standing patterns, which are most.
-        nearby: number of successive differences of which the same percentile is the noise of the frame amid them,
-        max_noise: up to this many times that of the recording: a head that drifts, or a picture that is noisy where it
-            is dark, is no change of pattern.
+        nearby: number of successive differences of which the same percentile is the noise of the frame amid them. Of
+            fewer a slow change of pattern, some four frames, would be most, and count as noise.
+        max_noise: how many times that of the recording it is at most: a head that drifts, or a picture that is noisy
+            where it is dark, is no change of pattern.
         min_noise: noise that is assumed at least, as a fraction of the largest difference from the mean of all frames.
         run_cost: of one more run of frames, in squares of the noise.
         max_run: frames of a run at most, which bounds the work; a longer plateau becomes several.
