@@ -127,7 +127,7 @@ class HeadMesh:
             trust = trust + away[: len(trust)] * (self.turned_trust - trust)
             values = np.dstack([values[..., :2], trust.take(face.triangles)])
         drawn, shown = self._with_eyeballs(corners, values, order, landmarks, pose, closing)
-        visible = len(drawn)
+        of_face = len(drawn)
         box, turned = box_around(target, MARGIN * face.span), 0.0
         if self.sides is not None and away is not None and away.any():
             turned = float(away.max())
@@ -139,7 +139,7 @@ class HeadMesh:
             # It grows as the side turns: at once, the patch's rim would be seen to jump.
             whole = box_around(np.vstack([target, anchors[BEYOND_HAIR]]), TURNED_MARGIN * face.span)
             box = box + turned * (whole - box)
-        return SurfacePatch(drawn, shown, box, turned, len(drawn) - visible)
+        return SurfacePatch(drawn, shown, box, turned, len(drawn) - of_face)
 
     def _with_eyeballs(
         self,
