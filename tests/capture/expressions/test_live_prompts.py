@@ -54,12 +54,13 @@ def test_what_is_covered_is_judged_anew_when_the_neutral_face_is_known_better() 
     """Whoever looks aside while they are asked to look ahead is not turned when they do."""
     doing = "turned right"
     tracker = PersonTracker(lambda: doing)
-    faces = FaceCollection(tracker, "talk")
+    faces = FaceCollection(tracker.scheme, "talk")
     coverage = LiveCoverage(faces)
 
     def see(first: int, count: int) -> None:
         for index in range(first, first + count):
-            face = faces.add(Frame(picture(), index, index / 10, index / 10))
+            frame = Frame(picture(), index, index / 10, index / 10)
+            face = faces.add(frame, tracker.track(frame))
             assert face is not None
             coverage.update(face, neutral_due=True)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,8 @@ from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.capture.expressions.film_tracking import FaceCollection, TrackedFace, TrackedFilm, track_film
 from relit_camera.capture.expressions.still_crops import StillCropper
 from relit_camera.capture.expressions.still_selection import Selection, select_stills
+from relit_camera.capture.instant.face_selection import INTERVAL_S, SCHEME
+from relit_camera.face.face_state import FaceState
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
@@ -29,8 +30,6 @@ LIGHT_FRAMES, LIGHT_TIME_S = 40, 1.0
 told, so that it fits the light to each."""
 SAME_PERSON_S = 2.0
 """A face may not be another person's within this time of a still, before or after it."""
-FRAME_INTERVAL_S = 0.1
-"""Time between frames in memory that is told to the tracker."""
 STAGE = "Estimating the light of the room"
 Progress = Callable[[str, int, int | None], None]
 
@@ -97,20 +96,23 @@ def take_stills(
     return _take_stills(subject, _source_face(subject), film, selection, pictures)
 
 
-def stills_of_frames(subject: Subject, frames: Sequence[DisplayImage], called: str) -> ExpressionCapture:
+def stills_of_frames(
+    subject: Subject, frames: Sequence[DisplayImage], states: Sequence[FaceState], called: str
+) -> ExpressionCapture:
     """Take expression stills from frames in memory, some tenths of a second apart.
 
     Args:
         subject: the person.
         frames: (height, width, 3) uint8, of one size, in order of time.
+        states: the face in each, see `follow_face`.
         called: what they come from, for messages.
 
     Raises:
         CaptureError, SubjectError, ModelError: as `capture_expressions`.
     """
-    faces = FaceCollection(open_tracker("mesh", TrackerOptions(blendshapes=False)), called)
-    for index, image in enumerate(frames):
-        faces.add(Frame(image, index, time.monotonic(), index * FRAME_INTERVAL_S))
+    faces = FaceCollection(SCHEME, called)
+    for index, (image, state) in enumerate(zip(frames, states, strict=True)):
+        faces.add(Frame(image, index, 0.0, index * INTERVAL_S), state)
     film = faces.film()
     return take_stills(subject, film, select_stills(film), enumerate(frames))
 

@@ -17,7 +17,7 @@ from relit_camera.base.images.image_types import DisplayImage, Frame, Points
 from relit_camera.base.rotations import Rotation
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.capture.instant.face_selection import TRACKER, face_sharpness
-from relit_camera.face.face_state import FaceState, FaceStatus, Tracker
+from relit_camera.face.face_state import FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 from relit_camera.face.motion.neutral_face import NeutralFace, NeutralSample, is_frontal, neutral_face_of
@@ -104,20 +104,24 @@ class TrackedFilm:
 class FaceCollection:
     """The faces in the frames of a film, as they come: of a file, or of a webcam."""
 
-    def __init__(self, tracker: Tracker, name: str) -> None:
-        """`name` is what the film is called in messages."""
-        self._tracker, self._name = tracker, name
-        self._scheme = landmark_scheme(tracker.scheme)
+    def __init__(self, scheme: str, name: str) -> None:
+        """Begin a film.
+
+        Args:
+            scheme: name of the landmarks' scheme.
+            name: what the film is called in messages.
+        """
+        self._name = name
+        self._scheme = landmark_scheme(scheme)
         self._faces: list[TrackedFace] = []
         self._lights: list[float] = []
         self._read = 0
         self._size = (0, 0)
 
-    def add(self, frame: Frame) -> TrackedFace | None:
-        """Follow the face into the next frame, of the same size as those before; None where it is not seen whole."""
+    def add(self, frame: Frame, state: FaceState) -> TrackedFace | None:
+        """Take the face that a tracker found in the next frame, of one size; None where it is not seen whole."""
         self._size = frame.size
         self._read += 1
-        state = self._tracker.track(frame)
         if state.status is not FaceStatus.FOUND or state.pose is None or not _is_inside(state.landmarks, frame.size):
             return None
         face = _tracked(state, state.pose, self._scheme, frame.image, frame.index, frame.time_s)
@@ -156,7 +160,8 @@ def track_film(path: Path, progress: Progress = lambda stage, done, total: None,
         CaptureError: as `FaceCollection.film`.
         ModelError: the tracker's networks are not there.
     """
-    faces = FaceCollection(open_tracker(TRACKER, TrackerOptions(blendshapes=False)), path.name)
+    tracker = open_tracker(TRACKER, TrackerOptions(blendshapes=False))
+    faces = FaceCollection(tracker.scheme, path.name)
     begins_s: float | None = None
     with VideoReader(path, threads=TUNABLES.threads, only=range(first, sys.maxsize)) as reader:
         for frame in reader:
@@ -164,7 +169,7 @@ def track_film(path: Path, progress: Progress = lambda stage, done, total: None,
             if frame.time_s - begins_s > TUNABLES.longest_s:
                 break
             progress(STAGE, frame.index + 1, reader.info.frames)
-            faces.add(frame)
+            faces.add(frame, tracker.track(frame))
     return faces.film()
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_types import DisplayImage, Frame, Points
 from relit_camera.face.detection.installed_detector import open_face_detector
+from relit_camera.face.face_state import FaceState
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
 from relit_camera.face.landmarks.rotated_crop import bounding_box
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker, track_still
@@ -20,6 +21,8 @@ TRACKER = "mesh"
 SCHEME = "mesh478"
 FOREHEAD, CHIN = 10, 152
 """Landmarks whose distance is the height of the face."""
+INTERVAL_S = 0.1
+"""Time between frames that the tracker is told."""
 
 
 @dataclass(frozen=True)
@@ -74,18 +77,36 @@ class SeenFace:
         return float(np.linalg.norm(self.landmarks[FOREHEAD] - self.landmarks[CHIN]))
 
 
-def select_faces(frames: Sequence[DisplayImage], source: str) -> list[SeenFace]:
+def follow_face(frames: Sequence[DisplayImage]) -> list[FaceState]:
+    """The face in each of some frames, in order of time, or in a picture alone.
+
+    Raises:
+        ModelError: the networks are not there.
+    """
+    tracker = open_tracker(TRACKER, TrackerOptions(blendshapes=False))
+    if len(frames) == 1:
+        return [track_still(frames[0], tracker)]
+    now = time.monotonic()
+    return [tracker.track(Frame(image, index, now, index * INTERVAL_S)) for index, image in enumerate(frames)]
+
+
+def select_faces(frames: Sequence[DisplayImage], states: Sequence[FaceState], source: str) -> list[SeenFace]:
     """The frames that show one face from the front, eyes open, sharp, and as alike as may be; the best first.
 
     Args:
         frames: in order of time.
+        states: see `follow_face`.
         source: where they come from, for messages.
 
     Raises:
         CaptureError: no face, two, one that is too small or turned away.
         ModelError: the networks are not there.
     """
-    seen = _track(frames)
+    seen = [
+        SeenFace(image, state.landmarks, state.pose.turn_deg, float(np.mean(state.eyes)))
+        for image, state in zip(frames, states, strict=True)
+        if state.visible and state.pose is not None
+    ]
     if not seen:
         raise CaptureError(f"no face was found in {source}", "look into the camera, your face in even light")
     _require_one_face([seen[int(index)].image for index in np.linspace(0, len(seen) - 1, 3)], source)
@@ -112,20 +133,6 @@ def select_faces(frames: Sequence[DisplayImage], source: str) -> list[SeenFace]:
     best = min(sharp, key=_mouth_width)
     alike = sorted((_shape_change(face, best), index) for index, face in enumerate(sharp))
     return [sharp[index] for change, index in alike[: TUNABLES.most] if change <= TUNABLES.max_shape_change]
-
-
-def _track(frames: Sequence[DisplayImage]) -> list[SeenFace]:
-    tracker = open_tracker(TRACKER, TrackerOptions(blendshapes=False))
-    if len(frames) == 1:
-        states = [track_still(frames[0], tracker)]
-    else:
-        now = time.monotonic()
-        states = [tracker.track(Frame(image, index, now, index / 10)) for index, image in enumerate(frames)]
-    return [
-        SeenFace(image, state.landmarks, state.pose.turn_deg, float(np.mean(state.eyes)))
-        for image, state in zip(frames, states, strict=True)
-        if state.visible and state.pose is not None
-    ]
 
 
 def _require_one_face(images: Sequence[DisplayImage], source: str) -> None:

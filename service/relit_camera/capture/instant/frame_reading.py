@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from relit_camera.base.config.settings import SourceSettings
 from relit_camera.base.errors import DeviceError
 from relit_camera.base.images.image_files import LDR_SUFFIXES, read_display
 from relit_camera.base.images.image_types import DisplayImage
-from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.base.video.video_readers import VideoReader, probe_video
 from relit_camera.devices.sources.source import Source
 from relit_camera.devices.sources.source_factory import open_source
 
@@ -30,6 +31,7 @@ class ReadingTunables:
         settling_s: seconds before these, in which a webcam finds its exposure.
         first_frame_s: how long a webcam may take until its first frame.
         longest_side_px: larger frames are reduced to it: a face needs no more.
+        threads: of the decoder.
     """
 
     most: int = 60
@@ -38,6 +40,7 @@ class ReadingTunables:
     settling_s: float = 1.0
     first_frame_s: float = 8.0
     longest_side_px: int = 1280
+    threads: int = 2
 
 
 TUNABLES = ReadingTunables()
@@ -83,17 +86,16 @@ def read_frames(
 
 
 def _video_frames(path: Path, progress: Progress) -> list[DisplayImage]:
-    with VideoReader(path) as reader:
-        info = reader.info
-        expected = min(info.frames or math.inf, TUNABLES.video_s * info.fps)
-        every = max(1, math.ceil(expected / TUNABLES.most))
-        kept: list[DisplayImage] = []
+    info = probe_video(path)
+    expected = min(info.frames or math.inf, TUNABLES.video_s * info.fps)
+    every = max(1, math.ceil(expected / TUNABLES.most))
+    kept: list[DisplayImage] = []
+    with VideoReader(path, threads=TUNABLES.threads, only=range(0, sys.maxsize, every)) as reader:
         for frame in reader:
             if frame.time_s > TUNABLES.video_s or len(kept) == TUNABLES.most:
                 break
-            if frame.index % every == 0:
-                kept.append(_reduced(frame.image))
-                progress("Reading the video", len(kept), TUNABLES.most)
+            kept.append(_reduced(frame.image))
+            progress("Reading the video", len(kept), TUNABLES.most)
     return kept
 
 

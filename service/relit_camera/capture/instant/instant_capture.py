@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import cv2
@@ -20,7 +20,7 @@ from relit_camera.capture.geometry.horizon_map import HorizonMap
 from relit_camera.capture.geometry.normal_completion import pull_push_fill
 from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.instant.back_light import soften_back_light
-from relit_camera.capture.instant.face_selection import SCHEME, select_faces
+from relit_camera.capture.instant.face_selection import SCHEME, follow_face, select_faces
 from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
 from relit_camera.capture.instant.median_picture import MedianPicture, median_picture
 from relit_camera.capture.instant.response.generic_compression import compress_generic_field
@@ -40,6 +40,7 @@ from relit_camera.capture.instant.skin.skin_albedo import TUNABLES as ALBEDO
 from relit_camera.capture.instant.skin.skin_albedo import estimate_albedo
 from relit_camera.capture.instant.skin.skin_prior import estimate_skin
 from relit_camera.capture.subject_builder import quantize_geometry
+from relit_camera.face.face_state import FaceState
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.light.directions import texel_directions
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
@@ -85,11 +86,13 @@ class InstantCapture:
         subject: the person.
         warnings: lines for people.
         frames: how many frames were used.
+        states: the face in each frame that was given, see `follow_face`; none where a picture was.
     """
 
     subject: Subject
     warnings: tuple[str, ...]
     frames: int
+    states: tuple[FaceState, ...] = ()
 
 
 def build_instant_subject(
@@ -114,8 +117,9 @@ def capture_instant(
         ModelError: the networks are not there.
     """
     progress("Finding the face", 0, None)
-    picture = median_picture(select_faces(frames, source))
-    return capture_from_picture(picture, source, progress)
+    states = follow_face(frames)
+    picture = median_picture(select_faces(frames, states, source))
+    return replace(capture_from_picture(picture, source, progress), states=tuple(states))
 
 
 def capture_from_picture(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +10,8 @@ import typer
 from relit_camera.cli.model_offer import Pull
 
 if TYPE_CHECKING:
-    from relit_camera.base.images.image_types import DisplayImage
+    from relit_camera.capture.instant.frame_reading import ReadFrames
+    from relit_camera.capture.instant.instant_capture import InstantCapture
     from relit_camera.subject.subject import Subject
 
 app = typer.Typer(no_args_is_help=True)
@@ -122,7 +122,7 @@ def instant(
             read = read_frames(source, settings.source, report_stage)
             captured = capture_instant(read.frames, read.source, report_stage)
             report_stage("Looking for expressions", 0, None)
-            subject, shown = _with_stills(captured.subject, read.frames, read.source)
+            subject, shown = _with_stills(captured, read)
         write_subject(subject_file, subject)
     for warning in captured.warnings:
         typer.echo(f"warning: {warning}", err=True)
@@ -135,18 +135,18 @@ def instant(
         typer.echo(f"{len(subject.stills)} expression stills: {shown}")
 
 
-def _with_stills(subject: Subject, frames: Sequence[DisplayImage], source: str) -> tuple[Subject, str]:
-    """The subject with expression stills where its frames show enough, and what they show; else as it is."""
+def _with_stills(captured: InstantCapture, read: ReadFrames) -> tuple[Subject, str]:
+    """The captured subject with expression stills where its frames show enough, and what they show; else as it is."""
     from dataclasses import replace
 
     from relit_camera.app.captures.expression_capture import stills_of_frames
     from relit_camera.base.errors import RelitError
 
     try:
-        captured = stills_of_frames(subject, frames, source)
+        found = stills_of_frames(captured.subject, read.frames, captured.states, read.source)
     except RelitError:  # somebody who keeps still, as one should: an instant subject needs no stills
-        return subject, ""
-    return replace(subject, stills=captured.stills), ", ".join(captured.selection.covered)
+        return captured.subject, ""
+    return replace(captured.subject, stills=found.stills), ", ".join(found.selection.covered)
 
 
 @app.command("expressions")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from relit_camera.base.array_types import Float32Array
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.color import luminance, uint8_from_linear
-from relit_camera.capture.instant.face_selection import select_faces
+from relit_camera.capture.instant.face_selection import follow_face, select_faces
 from relit_camera.capture.instant.head_shape import fit_head_shape
 from relit_camera.capture.instant.median_picture import median_picture
 from relit_camera.capture.instant.response.generic_reflectance import shape_response
@@ -62,7 +62,8 @@ def known_response(samples: OlatSamples, lights: NDArray[np.float32], lamp_size_
         CaptureError: no face is found, or no bare skin.
         ModelError: the networks are not there.
     """
-    face = select_faces([_frame(samples)], "the picture in even light")[0]
+    frame = _frame(samples)
+    face = select_faces([frame], follow_face([frame]), "the picture in even light")[0]
     picture = median_picture([face])
     side = len(picture.matte) // 2
     matte = np.asarray(cv2.resize(picture.matte, (side, side), interpolation=cv2.INTER_AREA), np.float32)

@@ -133,7 +133,8 @@ class GuidedFilming:
         from relit_camera.capture.expressions.still_crops import black_beyond_face
         from relit_camera.capture.expressions.still_selection import select_stills
 
-        faces = FaceCollection(self._new_tracker(), CALLED)
+        tracker = self._new_tracker()
+        faces = FaceCollection(tracker.scheme, CALLED)
         prompts, coverage = PromptSequence(), LiveCoverage(faces)
         frames: dict[int, bytes] = {}
         first: Frame | None = None
@@ -146,7 +147,8 @@ class GuidedFilming:
                 raise CaptureError("the size of the webcam's picture changed", "leave it as it is until the end")
             time_s = frame.captured_at - first.captured_at
             # Frames are left out: the index is that of those looked at.
-            face = faces.add(replace(frame, index=count, time_s=time_s))
+            told = replace(frame, index=count, time_s=time_s)
+            face = faces.add(told, tracker.track(told))
             if face is not None:
                 seen_at = face_at = time_s
                 kept = black_beyond_face(frame.image, face.landmarks)

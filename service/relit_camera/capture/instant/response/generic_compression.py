@@ -166,13 +166,15 @@ def _texel_db(
     """Lowest PSNR in dB of the picture under a single texel, on some pixels; see `CompressionTarget.allowed`."""
     pixels = np.flatnonzero(inside)
     pixels = pixels[:: max(1, len(pixels) // TUNABLES.measured_pixels)]
-    worst = np.inf
-    for start in range(0, coefficients.shape[1], TEXELS_PER_BATCH):
+
+    def worst_of(start: int) -> float:
         part = slice(start, start + TEXELS_PER_BATCH)
         seen = basis.at(np.ascontiguousarray(coefficients[:, part]), pixels)
         error = ((seen - field.rows(pixels, part).transpose(1, 0, 2)) ** 2).mean(axis=(1, 2))
-        worst = min(worst, float((-10 * np.log10(error / allowed[part] ** 2 + 1e-20)).min()))
-    return worst
+        return float((-10 * np.log10(error / allowed[part] ** 2 + 1e-20)).min())
+
+    with worker_pool() as pool:
+        return min(pool.map(worst_of, range(0, coefficients.shape[1], TEXELS_PER_BATCH)))
 
 
 def _map_db(
