@@ -155,6 +155,26 @@ def test_another_light_gives_the_person_in_that_light() -> None:
     assert psnr(inner(linear_from_uint8(picture)), inner(truth)) > max(24, unchanged + 8)
 
 
+def test_a_still_person_is_shown_without_a_webcams_noise() -> None:
+    """Truth: the same person, photographed in the other room without noise."""
+    ours, random, relit = relighting(WINDOW), np.random.default_rng(3), still_under(EVENING)
+    live, shown = list[DisplayImage](), list[DisplayImage]()
+    for step in range(16):
+        noise = 4 * random.standard_normal(live_picture(WINDOW).shape)
+        live.append(np.clip(np.rint(live_picture(WINDOW) + noise), 0, 255).astype(np.uint8))
+        shown.append(relit_live(ours, relit, before_the_camera(), live_frame(live[-1], step / 5)))
+    alone = relit_live(relighting(WINDOW), relit, before_the_camera(), live_frame(live[-1], 0))
+
+    def change(pictures: list[DisplayImage]) -> float:
+        return float(np.abs(inner(pictures[-1]).astype(float) - inner(pictures[-2])).mean())
+
+    def accuracy(picture: DisplayImage) -> float:
+        return psnr(inner(linear_from_uint8(picture)), inner(linear_from_uint8(live_picture(EVENING))))
+
+    assert change(shown) < 0.4 * change(live)
+    assert accuracy(shown[-1]) > accuracy(alone) + 0.5
+
+
 def test_a_measured_room_does_nearly_as_well() -> None:
     image, ours = live_picture(WINDOW), relighting()
     for step in range(12):

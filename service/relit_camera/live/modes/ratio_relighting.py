@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask, Points
 from relit_camera.base.images.light_multiplication import POWER, light_of_root, multiply_light, root_of_light
+from relit_camera.base.images.temporal_noise import TemporalNoiseFilter
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import HeadPose
 from relit_camera.face.motion.face_follower import FaceMotion
@@ -94,8 +95,8 @@ class RatioPlan:
 class RatioRelighting:
     """Exchanges the light on the live face of one subject.
 
-    `positions`, `raised_lights` and `apply` share nothing that changes: each may run in a thread of its own. `aligned`
-    and `room_light` see the frames one after another.
+    `positions`, `raised_lights` and `apply` share nothing that changes: each may run in a thread of its own. `aligned`,
+    `room_light` and `apply` see the frames one after another.
 
     Attributes:
         room_light: estimates the room's light from the live face.
@@ -122,6 +123,7 @@ class RatioRelighting:
         self._person, self._near = _limits(confidence), _limits(near)
         self._parts = cv2.merge([confidence, still_skin(face), inside_face(face), near])
         self._alignment = LiveAlignment(face)
+        self._noise = TemporalNoiseFilter()
 
     def raised_lights(self, relit: LinearImage, under_room: LinearImage) -> NDArray[np.float32]:
         """The source image under the scene's light and, below it, under the room's: (2 · height, width, 3) float32.
@@ -167,9 +169,9 @@ class RatioRelighting:
     def apply(self, plan: RatioPlan, blend: float = 1.0) -> DisplayImage:
         """The planned frame in the scene's light, uint8 sRGB.
 
-        `blend` is how far, in light: 0 gives the frame as it is. Its brightest codes are taken for no more light than
-        sRGB says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
-        first.
+        `blend` is how far, in light: 0 gives the frame itself. Its brightest codes are taken for no more light than sRGB
+        says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
+        first. In any case the noise of what stands still is averaged away over the frames before.
         """
         step = plan.positions.step
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
@@ -177,13 +179,14 @@ class RatioRelighting:
         box = _cells_within(nodes, *self._near) if blend >= 1 else (0, 0, nodes.shape[1], nodes.shape[0])
         left, top, right, bottom = box
         inside = np.s_[top:bottom, left:right]
+        image = self._noise.filtered(plan.frame.image, _pixels_of(box, step, plan.frame.size))
         relit, parts = (
             cv2.remap(each, nodes[inside], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
             for each in (np.split(plan.pictures, 2)[0], self._parts)
         )
         # Roots, because the step between two of them is about as visible anywhere.
         relit, under_room = root_of_light(relit), _under_room(plan, nodes[inside])
-        live, brightest = live_cells(plan.frame.image, step, box)
+        live, brightest = live_cells(image, step, box)
         confidence, skin, face, near = cv2.split(parts)
         source = SourceCells(relit, under_room, confidence, skin, face, near)
         unit = plan.eye_distance / step
@@ -194,14 +197,14 @@ class RatioRelighting:
         trust = cv2.cvtColor(cells.trust, cv2.COLOR_GRAY2RGB)
         added = cv2.multiply(relit, 1 - trust)
         factor[inside] *= trust
-        noise = noise_fraction(plan.frame.image, step, box, factor[inside], source, unit)
+        noise = noise_fraction(image, step, box, factor[inside], source, unit)
         calm = cv2.multiply(factor[inside], cv2.cvtColor(noise, cv2.COLOR_GRAY2RGB))
         factor[inside] -= calm
         added += cv2.multiply(calm, smooth)
         if blend < 1:
             factor, added = blend_toward_live(factor, added, live, blend)
         added = cv2.copyMakeBorder(added, *beside, cv2.BORDER_CONSTANT)
-        shown = multiply_light(plan.frame.image, factor, step, as_shown=1 - blend, added=added)
+        shown = multiply_light(image, factor, step, as_shown=1 - blend, added=added)
         if plan.presence < 1:
             # Where nobody is tracked with confidence the picture eases back to the live one, as both are shown:
             # in linear light that guess would be in the mixture.
@@ -247,6 +250,12 @@ def _cells_within(nodes: NDArray[np.float32], low: tuple[float, ...], high: tupl
     right, bottom = (-(-(end + 1) // BOX_CELLS) * BOX_CELLS for end in (left + width, top + height))
     left, top = (max(start - 1, 0) // BOX_CELLS * BOX_CELLS for start in (left, top))
     return left, top, min(right, columns), min(bottom, rows)
+
+
+def _pixels_of(cells: Box, step: int, size: tuple[int, int]) -> Box:
+    """The box of a frame's pixels, of `size` (width, height), that cells of `step` pixels show."""
+    left, top, right, bottom = (step * side for side in cells)
+    return left, top, min(right, size[0]), min(bottom, size[1])
 
 
 def as_large_as_needed(subject: Subject, face: SourceFace) -> tuple[Subject, SourceFace]:
