@@ -7,8 +7,10 @@ from itertools import pairwise
 import cv2
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from relit_camera.app.demo import demo_files
+from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_quality import psnr
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.images.temporal_noise import TemporalNoiseFilter
@@ -19,14 +21,14 @@ WHOLE = (0, 0, *SIZE)
 
 
 def room() -> DisplayImage:
-    """A smooth picture (120, 160, 3) with colors and a texture."""
+    """A picture (120, 160, 3) with colors and a texture."""
     random = np.random.default_rng(5)
     coarse = random.integers(60, 190, (6, 8, 3)).astype(np.uint8)
     picture = cv2.resize(coarse, SIZE, interpolation=cv2.INTER_CUBIC)
     return np.clip(picture + 8 * random.standard_normal(picture.shape), 0, 255).astype(np.uint8)
 
 
-def noisy(picture: DisplayImage, sigma: float, seed: int) -> DisplayImage:
+def noisy(picture: NDArray, sigma: float, seed: int) -> DisplayImage:
     noise = sigma * np.random.default_rng(seed).standard_normal(picture.shape)
     return np.clip(np.rint(picture + noise), 0, 255).astype(np.uint8)
 
@@ -130,5 +132,6 @@ def test_a_talking_and_turning_person_is_never_worse() -> None:
             live = noisy(frame.image, 3, frame.index)
             shown = noise_filter.filtered(live, (0, 0, *frame.size))
             if frame.index > 0:
-                gain = psnr(shown / 255, frame.image / 255) - psnr(live / 255, frame.image / 255)
+                truth = linear_from_uint8(frame.image)
+                gain = psnr(linear_from_uint8(shown), truth) - psnr(linear_from_uint8(live), truth)
                 assert gain > (2.0 if frame.index > 5 else 0.0)

@@ -169,9 +169,9 @@ class RatioRelighting:
     def apply(self, plan: RatioPlan, blend: float = 1.0) -> DisplayImage:
         """The planned frame in the scene's light, uint8 sRGB.
 
-        `blend` is how far, in light: 0 gives the frame itself. Its brightest codes are taken for no more light than sRGB
-        says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
-        first. In any case the noise of what stands still is averaged away over the frames before.
+        `blend` is how far, in light: 0 gives the frame itself. Its brightest codes are taken for no more light than
+        sRGB says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
+        first. In any case noise is averaged over the frames before, where the person stands still.
         """
         step = plan.positions.step
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
