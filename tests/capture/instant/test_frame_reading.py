@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 
@@ -12,6 +13,7 @@ from relit_camera.base.config.settings import SourceSettings
 from relit_camera.base.errors import DeviceError, VideoError
 from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import Frame
+from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.capture.instant import frame_reading
 from relit_camera.capture.instant.frame_reading import TUNABLES, read_frames
@@ -103,6 +105,22 @@ def test_of_a_video_frames_are_taken_evenly(tmp_path: Path) -> None:
     assert 30 <= len(levels) <= TUNABLES.most
     assert levels[-1] > 180
     np.testing.assert_allclose(np.diff(levels), np.diff(levels).mean(), atol=3)
+
+
+def test_damage_after_the_frames_that_are_taken_does_not_matter(tmp_path: Path) -> None:
+    path = tmp_path / "me.avi"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mjpeg", rate=30, width=64, height=48, pix_fmt="yuvj420p")
+        for index in range(300):
+            picture = av.VideoFrame.from_ndarray(np.full((48, 64, 3), index % 256, np.uint8), format="rgb24")
+            for packet in stream.encode(picture):
+                if index == 298:
+                    packet = av.Packet(bytes(packet.size))
+                    packet.stream, packet.pts = stream, index
+                container.mux(packet)
+    with pytest.raises(VideoError, match="damaged"), VideoReader(path) as reader:
+        list(reader)
+    assert len(read_frames(str(path), SourceSettings()).frames) == TUNABLES.most
 
 
 def test_a_file_that_is_not_there_is_named() -> None:

@@ -112,7 +112,7 @@ def stills_of_frames(
     """
     faces = FaceCollection(SCHEME, called)
     for index, (image, state) in enumerate(zip(frames, states, strict=True)):
-        faces.add(Frame(image, index, 0.0, index * INTERVAL_S), state)
+        faces.add(Frame(image, index, index * INTERVAL_S, index * INTERVAL_S), state)
     film = faces.film()
     return take_stills(subject, film, select_stills(film), enumerate(frames))
 

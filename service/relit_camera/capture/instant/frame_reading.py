@@ -92,10 +92,12 @@ def _video_frames(path: Path, progress: Progress) -> list[DisplayImage]:
     kept: list[DisplayImage] = []
     with VideoReader(path, threads=TUNABLES.threads, only=range(0, sys.maxsize, every)) as reader:
         for frame in reader:
-            if frame.time_s > TUNABLES.video_s or len(kept) == TUNABLES.most:
+            if frame.time_s > TUNABLES.video_s:
                 break
             kept.append(_reduced(frame.image))
             progress("Reading the video", len(kept), TUNABLES.most)
+            if len(kept) == TUNABLES.most:
+                break  # before what comes is decoded, which may be damaged
     return kept
 
 

@@ -96,7 +96,7 @@ class RatioRelighting:
     """Exchanges the light on the live face of one subject.
 
     `positions`, `raised_lights` and `apply` share nothing that changes: each may run in a thread of its own. `aligned`,
-    `room_light` and `apply` see the frames one after another.
+    `room_light` and `apply` each see the frames one after another, from one thread at a time.
 
     Attributes:
         room_light: estimates the room's light from the live face.
@@ -171,7 +171,7 @@ class RatioRelighting:
 
         `blend` is how far, in light: 0 gives the frame itself. Its brightest codes are taken for no more light than
         sRGB says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
-        first. In any case noise is averaged over the frames before, where the person stands still.
+        first. The frame is noise-filtered over time in any case, `plan.frame` is not changed.
         """
         step = plan.positions.step
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
