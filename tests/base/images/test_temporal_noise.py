@@ -129,6 +129,13 @@ def test_a_webcam_that_repeats_its_frames_loses_its_noise_as_well(times: int) ->
             assert np.sqrt(np.mean((shown.astype(float) - picture) ** 2)) < 0.65 * 3
 
 
+def test_a_picture_that_has_no_noise_at_all_is_not_copied() -> None:
+    noise_filter = TemporalNoiseFilter()
+    for _ in range(12):
+        live = room()
+        assert noise_filter.filtered(live, WHOLE) is live
+
+
 def test_a_frame_that_freezes_and_goes_on_is_averaged_all_along() -> None:
     picture, noise_filter = room(), settled(room())
     for index in range(40):

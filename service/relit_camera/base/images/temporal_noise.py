@@ -97,6 +97,8 @@ class TemporalNoiseFilter:
         last = self._half[1] if self._half is not None and self._half[0] == box else _half_size(live[inside])
         self._half = box, _half_size(part)
         if np.array_equal(self._half[1], last):
+            if shown is live:
+                return image
             # The webcam repeats its frame: what was shown of it is still the best there is.
             average, chosen = before, np.full(part.shape[:2], 255, np.uint8)
         else:

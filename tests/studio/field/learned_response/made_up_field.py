@@ -11,7 +11,7 @@ from relit_studio.field.learned_response.field_fit import FieldFitSettings
 from relit_studio.field.learned_response.known_field import KnownField
 from relit_studio.field.learned_response.network_training import TrainingSettings
 
-QUICK_FIELD = FieldFitSettings(TrainingSettings(hidden=(16,), rounds=150, jitter=0.0), pixels=400)
+QUICK_FIELD = FieldFitSettings(TrainingSettings(hidden=(16,), rounds=300, jitter=0.0), pixels=400)
 
 
 def made_up_field(seed: int, tilt: float = 0.3) -> KnownField:
