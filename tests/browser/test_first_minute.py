@@ -137,6 +137,7 @@ def test_lamps_only_is_never_a_black_silhouette(fake: FakeServer, open_page: Ope
 
 def test_as_filmed_is_seen_in_the_preview_alone(demo: ProcessCamera, open_page: OpenPage) -> None:
     demo.patch("lighting", environment="party", split=0, transition_s=0)
+    demo.wait_for("status", state="live")  # until then the person at rest is published, which is darker
     panel = open_panel(open_page, demo.url)
     panel.wait_for_picture()
     wait_until(lambda: panel.thumbnails_shown())
