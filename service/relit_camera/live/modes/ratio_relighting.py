@@ -171,7 +171,7 @@ class RatioRelighting:
 
         `blend` is how far, in light: 0 gives the frame itself. Its brightest codes are taken for no more light than
         sRGB says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
-        first. The frame is noise-filtered over time in any case, `plan.frame` is not changed.
+        first. Noise of the frame is removed over time in any case.
         """
         step = plan.positions.step
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
