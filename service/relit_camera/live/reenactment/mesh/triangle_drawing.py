@@ -40,8 +40,8 @@ def draw_triangles(
     weights[2, 1:] = -(weights[0, 1:] * x + weights[1, 1:] * y)
     weights[:, 0] = -(weights[:, 1] + weights[:, 2])
     weights[2, 0] += 1
-    base, *others = values.transpose(1, 2, 0)
-    planes = sum(weights[:, None, i] * (other - base) for i, other in enumerate(others, 1))
+    base, second, third = np.ascontiguousarray(values.transpose(1, 2, 0))
+    planes = weights[:, None, 1] * (second - base) + weights[:, None, 2] * (third - base)
     planes[2] += base
     lines = np.maximum(last_row - first_row + 1, 0)
     lines[flat] = 0
