@@ -60,6 +60,9 @@ def inverse_affine(affine: NDArray[np.float64]) -> NDArray[np.float64]:
 BAND_CELLS = 16
 """Rows of cells that are sampled at a time: their positions stay in the processor's cache."""
 
+POINT_COLUMNS = 64
+"""Single points are sampled in rows of so many."""
+
 
 @dataclass(frozen=True)
 class PositionGrid:
@@ -122,6 +125,17 @@ class PositionGrid:
             onto = sampled[top:bottom, left:right]
             cv2.remap(image, band, None, cv2.INTER_LINEAR, dst=onto, borderMode=beyond, borderValue=0)
         return sampled
+
+
+def sample_points(
+    image: Picture, looks: NDArray[np.float32], enlarged: float = 1, beyond: int = cv2.BORDER_REPLICATE
+) -> Picture:
+    """The image (rows, columns, channels) at places (count, 2): (count, channels), see `PositionGrid.sample`."""
+    # As rows of a picture, for OpenCV limits the sides of what it samples; the last one is filled up.
+    places = np.resize(looks, (-(-len(looks) // POINT_COLUMNS), POINT_COLUMNS, 2)) * np.float32(enlarged)
+    places -= np.float32(0.5)
+    sampled: Picture = cv2.remap(image, places, None, cv2.INTER_LINEAR, borderMode=beyond, borderValue=0)
+    return sampled.reshape(-1, image.shape[2])[: len(looks)]
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from relit_camera.base.images.image_types import RgbaImage
 from relit_camera.live.reenactment.mesh.triangle_drawing import draw_triangles
 from relit_camera.live.reenactment.source_image import BEYOND, UPSAMPLING
-from relit_camera.live.reenactment.warp import PositionGrid
+from relit_camera.live.reenactment.warp import PositionGrid, sample_points
 
 STRIP_CELLS = 2
 """Cells beyond the outline of a cheek, over which what is farther out shows instead: what the warp shows there is the
@@ -51,31 +51,28 @@ class OutlineTask:
     """What is drawn along an outline.
 
     Attributes:
-        face, behind: where the pixels of a box look on the face, and where at what is behind it; both go on a little
-            beyond the outline.
-        seen: (rows, columns) the cells of the box in which pixels are drawn.
-        pixels: (2, count) rows and columns of those in the box.
+        pixels: (2, count) rows and columns of the moved picture.
+        face, behind: (count, 2) float32 where each looks on the face, and where at what is behind it, in source pixels;
+            both go on a little beyond the outline.
         within: (count,) float32 the share of each that the face fills.
         cover: (count,) float32 how far each is drawn.
     """
 
-    face: PositionGrid
-    behind: PositionGrid
-    seen: NDArray[np.bool_]
     pixels: NDArray[np.intp]
+    face: NDArray[np.float32]
+    behind: NDArray[np.float32]
     within: NDArray[np.float32]
     cover: NDArray[np.float32]
 
     def draw(self, moved: RgbaImage, person: RgbaImage) -> None:
         """Draw into the moved picture, in place, from the person as `Cutout.image` has them."""
-        left, top, right, bottom = self.face.box
-        area, at = moved[top:bottom, left:right], tuple(self.pixels)
-        face, behind = (grid.sample(person, UPSAMPLING, BEYOND, self.seen)[at] for grid in (self.face, self.behind))
-        area[at] = _mixed(_mixed(face, behind, self.within), area[at], self.cover)
+        face, behind = (sample_points(person, looks, UPSAMPLING, BEYOND) for looks in (self.face, self.behind))
+        at = tuple(self.pixels)
+        moved[at] = _mixed(_mixed(face, behind, self.within), moved[at], self.cover)
 
 
 def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid, half_size: bool = False) -> OutlineTask | None:
-    """What is to be drawn along an outline; None where there is none, or it lies outside the picture.
+    """What is to be drawn along an outline; None where nothing is: there is none, or it lies outside the picture.
 
     Args:
         silhouette: of the face in this picture.
@@ -92,7 +89,7 @@ def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid, half_siz
     if (last <= first).any():
         return None
     low, high = step * first, np.minimum(step * last, (grid.box[2] - grid.box[0], grid.box[3] - grid.box[1]))
-    box, (width, height) = (int(low[0]), int(low[1]), int(high[0]), int(high[1])), high - low
+    width, height = high - low
     positions = grid.positions[first[1] : last[1] + 2, first[0] : last[0] + 2]
     # The middle of a cell is a whole number, and there is one cell more round the box: see `PositionGrid`.
     corners, edges = ((points - low) / step + 0.5 for points in (silhouette.corners, silhouette.edges))
@@ -106,11 +103,15 @@ def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid, half_siz
     drawn = cv2.resize(seen.view(np.uint8), None, fx=step, fy=step, interpolation=cv2.INTER_NEAREST)
     cover = shares[step : step + height, step : step + width] * drawn[:height, :width]
     pixels = np.nonzero(cover > 0)
+    if not pixels[0].size:
+        return None
+    behind = beside + hiding * (beyond - beside)
+    places = (np.column_stack(pixels[::-1]).astype(np.float32) + np.float32(0.5)) / np.float32(step) + 1
+    looks = sample_points(np.dstack([_filled(positions, inside, 1), behind]), places)
     return OutlineTask(
-        face=PositionGrid(_filled(positions, inside, 1), box, step),
-        behind=PositionGrid(beside + hiding * (beyond - beside), box, step),
-        seen=seen,
-        pixels=np.stack(pixels),
+        pixels=np.stack([pixels[0] + low[1], pixels[1] + low[0]]),
+        face=looks[:, :2],
+        behind=looks[:, 2:],
         within=_filled_share(corners, seen, step, pixels),
         cover=cover[pixels],
     )
