@@ -74,7 +74,7 @@ def test_an_eye_shuts_evenly(eye: EyeMesh) -> None:
     shown = np.array([eye.opening(met(eye, lowered(eye, each)), pose) for each in seen])
     assert (np.diff(shown) >= -1e-9).all()
     assert np.diff(shown).max() < 0.04
-    closing = np.array([eye.closing(met(eye, lowered(eye, each)), pose) for each in seen])
+    closing = np.array([eye.meet_lids(lowered(eye, each), pose) for each in seen])
     assert closing[0] == 1
     assert closing[-1] == 0
     assert np.abs(np.diff(closing)).max() < 0.16

@@ -75,7 +75,7 @@ def plan_closing_eyes(
 
     Args:
         eyes: of the source image.
-        closing: of each, see `EyeMesh.closing`.
+        closing: of each, see `EyeMesh.meet_lids`.
         surface: the moved mesh.
         landmarks: (count, 2) where all landmarks go, source pixels.
         to_picture: (2, 3) source pixels → pixels of the moved picture.

@@ -18,7 +18,7 @@ say. Trackers leave a gap between shut lids."""
 LOWER_LID_SHARE = 0.15
 """By how much of what is closed so the lower lid rises; the upper one falls by the rest."""
 CLOSING = (0.8, 0.5)
-"""Opening from where on the lids begin to hide the eyeball, and from where on only they move: see `EyeMesh.closing`."""
+"""Opening from where on lids begin to hide the eyeball, and from where on only they move: see `EyeMesh.meet_lids`."""
 LEAST_GAP = 0.05
 """Least neutral gap of the lids, in widths of the eye: of one that is shut in the source image, noise would open it."""
 SURROUNDINGS = 0.75
@@ -60,26 +60,26 @@ class EyeMesh:
         """
         return float(self._gaps(landmarks).mean()) / self._neutral_gap(pose)
 
-    def closing(self, landmarks: NDArray[np.float64], pose: HeadPose) -> float:
-        """How far lids that move over the eyeball take the place of a flow that moves both and the skin round them.
+    def meet_lids(self, landmarks: NDArray[np.float64], pose: HeadPose) -> float:
+        """Let lids meet that nearly do, and those that have crossed.
 
-        0..1; arguments as in `opening`.
+        Args:
+            landmarks: as in `opening`; they are changed in place.
+            pose: the same.
+
+        Returns:
+            The closing of the eye, 0..1: how far lids that move over the eyeball take the place of a flow that moves
+            both and the skin round them.
         """
-        return float(smoothstep(self.opening(landmarks, pose), *CLOSING))
-
-    def meet_lids(self, landmarks: NDArray[np.float64], pose: HeadPose) -> None:
-        """Let lids meet that nearly do, and those that have crossed; `landmarks` (count, 2) are changed in place.
-
-        `pose` is as in `opening`.
-        """
-        gaps = self._gaps(landmarks)
-        opening = float(gaps.mean()) / self._neutral_gap(pose)
-        if opening >= AS_SEEN:
-            return
-        kept = max((opening - SHUT) / (AS_SEEN - SHUT), 0.0)
-        closed = (gaps - kept * np.maximum(gaps, 0))[:, None] * _axes(landmarks[self.corners])[:, 1]
-        landmarks[self.upper] += (1 - LOWER_LID_SHARE) * closed
-        landmarks[self.lower] -= LOWER_LID_SHARE * closed
+        opening = self.opening(landmarks, pose)
+        if opening < AS_SEEN:
+            gaps, kept = self._gaps(landmarks), max((opening - SHUT) / (AS_SEEN - SHUT), 0.0)
+            left = kept * np.maximum(gaps, 0)
+            closed = (gaps - left)[:, None] * _axes(landmarks[self.corners])[:, 1]
+            landmarks[self.upper] += (1 - LOWER_LID_SHARE) * closed
+            landmarks[self.lower] -= LOWER_LID_SHARE * closed
+            opening = opening * float(left.mean() / gaps.mean()) if kept else 0.0
+        return float(smoothstep(opening, *CLOSING))
 
     def _gaps(self, landmarks: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance (pairs,) of the lids, down the face, pixels; below 0 where they have crossed."""

@@ -105,9 +105,9 @@ def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid, half_siz
     pixels = np.nonzero(cover > 0)
     if not pixels[0].size:
         return None
-    behind = beside + hiding * (beyond - beside)
+    both: NDArray[np.float32] = np.dstack([_filled(positions, inside, 1), beside + hiding * (beyond - beside)])
     places = (np.column_stack(pixels[::-1]).astype(np.float32) + np.float32(0.5)) / np.float32(step) + 1
-    looks = sample_points(np.dstack([_filled(positions, inside, 1), behind]), places)
+    looks = sample_points(both, places)
     return OutlineTask(
         pixels=np.stack([pixels[0] + low[1], pixels[1] + low[0]]),
         face=looks[:, :2],

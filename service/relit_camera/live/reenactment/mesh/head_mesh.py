@@ -64,17 +64,16 @@ class HeadMesh:
     sides: HeadSides | None
     turned_trust: NDArray[np.float64]
 
-    def with_lids_that_meet(self, landmarks: NDArray[np.float64], pose: HeadPose) -> NDArray[np.float64]:
-        """Moved landmarks (count, 2) of a head in a pose, with lids that meet where they nearly do."""
-        changed = landmarks.copy()
-        for eye in self.eyes:
-            eye.meet_lids(changed, pose)
-        return changed
+    def meet_lids(
+        self, landmarks: NDArray[np.float64], pose: HeadPose
+    ) -> tuple[NDArray[np.float64], tuple[float, float]]:
+        """Moved landmarks (count, 2) of a head in a pose, with lids that meet where they nearly do.
 
-    def closing(self, landmarks: NDArray[np.float64], pose: HeadPose) -> tuple[float, float]:
-        """See `EyeMesh.closing`: of the right and of the left eye."""
-        right, left = (eye.closing(landmarks, pose) for eye in self.eyes)
-        return right, left
+        And the closing of the right and of the left eye, see `EyeMesh.meet_lids`.
+        """
+        changed = landmarks.copy()
+        right, left = (eye.meet_lids(changed, pose) for eye in self.eyes)
+        return changed, (right, left)
 
     def silhouette(
         self, landmarks: NDArray[np.float64], pose: HeadPose, to_picture: NDArray[np.float64]
