@@ -168,6 +168,7 @@ class StillDrawing:
                 self._kept(mesh.region, doing, rotation),
             )
             for mesh in self._meshes
+            if chosen[mesh.region.name]
         ]
         mouth = sum(weight for _, weight in chosen["mouth"])
         return StillTask(self._light, tuple(region for region in drawn if region is not None), mouth >= WHOLE_MOUTH)
@@ -221,7 +222,7 @@ class _RegionMesh:
         """What shows in the picture; None where nothing does.
 
         Args:
-            chosen: stills and their weights.
+            chosen: stills and their weights, one at least.
             seen: (count, 2) landmarks in the picture.
             depth: (3,) direction in the head toward the camera.
             size: (width, height) of the picture.
@@ -229,8 +230,6 @@ class _RegionMesh:
             half_size: draw at half the picture's resolution, however fine the stills are.
             kept: (landmarks,) how far the stills count at each, 0..1.
         """
-        if not chosen:
-            return None
         # A still shows up to the far corners of the outermost triangles.
         showing = (self.region.trust * kept > 0)[self.region.triangles].any(axis=1)
         inside = seen[self.region.triangles[showing].ravel()]
