@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from math import ceil, floor
 from typing import Protocol, TypeVar
 
 import cv2
@@ -150,7 +152,7 @@ class Nodes:
     source_from_node: NDArray[np.float64]
     positions: NDArray[np.float32]
 
-    @property
+    @cached_property
     def places(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Of the places: x and y in source pixels, each of a shape that broadcasts to (rows, columns)."""
         rows, columns = self.positions.shape[1:]
@@ -164,10 +166,13 @@ class Nodes:
 
     def within(self, box: NDArray[np.float64]) -> Nodes | None:
         """A view of the smallest rectangle of nodes with all whose places lie in a box (4,); None where none do."""
-        inverse = inverse_affine(self.source_from_node)
-        corners = box[[[0, 1], [2, 1], [0, 3], [2, 3]]] @ inverse[:, :2].T + inverse[:, 2]
-        left, top = np.maximum(np.ceil(corners.min(axis=0)), 0).astype(int)
-        right, bottom = np.minimum(np.floor(corners.max(axis=0)).astype(int) + 1, self.positions.shape[:0:-1])
+        # Plain numbers: arrays of so few take several times as long.
+        corners = [(x, y) for x in box[::2].tolist() for y in box[1::2].tolist()]
+        to_node = inverse_affine(self.source_from_node).tolist()
+        across, down = ([a * x + b * y + c for x, y in corners] for a, b, c in to_node)
+        rows, columns = self.positions.shape[1:]
+        left, right = max(ceil(min(across)), 0), min(floor(max(across)) + 1, columns)
+        top, bottom = max(ceil(min(down)), 0), min(floor(max(down)) + 1, rows)
         if right <= left or bottom <= top:
             return None
         moved = self.source_from_node.copy()

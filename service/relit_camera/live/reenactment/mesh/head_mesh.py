@@ -121,15 +121,13 @@ class HeadMesh:
         away = None if self.sides is None else self.sides.turned_away(pose.rotation * face.face.pose.rotation.inv())
         corners = target.take(face.triangles, axis=0)
         order = face.nearest_last(corners, pose)
-        trust, values = face.trust, face.values
-        if away is not None:
-            trust = trust + away[: len(trust)] * (self.turned_trust - trust)
+        values, turned = face.values, 0.0 if away is None else float(away.max())
+        if away is not None and turned > 0:
+            trust = face.trust + away[: len(face.trust)] * (self.turned_trust - face.trust)
             values = np.dstack([values[..., :2], trust.take(face.triangles)])
         drawn, shown = self._with_eyeballs(corners, values, order, landmarks, pose, closing)
-        of_face = len(drawn)
-        box, turned = box_around(target, MARGIN * face.span), 0.0
-        if self.sides is not None and away is not None and away.any():
-            turned = float(away.max())
+        of_face, box = len(drawn), box_around(target, MARGIN * face.span)
+        if self.sides is not None and away is not None and turned > 0:
             beside, looks, vertices = self.sides.facing(target, anchors, pose, face.face.size)
             # Nothing beside the face counts before its side turns, not even where the outline is hollow.
             trusts = away * np.concatenate([self.turned_trust, self.sides.trust])
