@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from relit_camera.live.reenactment.warp import Box, FixedBorder, FlowPatch, Warp
+from relit_camera.live.reenactment.warp import Box, FixedBorder, FlowPatch, Warp, sample_points
 
 SIMILARITY = np.array([[0.7 * np.cos(0.3), -0.7 * np.sin(0.3), 36.0], [0.7 * np.sin(0.3), 0.7 * np.cos(0.3), -16.0]])
 WHOLE = (0, 0, 320, 240)
@@ -151,6 +151,17 @@ def test_an_affine_grid_samples_every_pixel_of_its_box(box: Box, step: int) -> N
     seen = ((looks > 1) & (looks < [359, 279])).all(axis=2)
     assert sampled.shape == looks.shape
     np.testing.assert_allclose(sampled[seen], looks[seen], atol=0.02)  # cv2 counts in 32nds
+
+
+@pytest.mark.parametrize("count", [1, 64, 65, 70_000])
+@pytest.mark.parametrize("beyond", [cv2.BORDER_REPLICATE, cv2.BORDER_CONSTANT])
+def test_single_points_are_sampled_as_a_box_of_them_is(count: int, beyond: int) -> None:
+    """However many there are, where OpenCV samples pictures of at most 32767 rows; and beyond the picture too."""
+    grid = Warp(np.array([[1.3, 0.1, -9.0], [-0.1, 1.3, -7.0]]), ()).grid((0, 0, 280, 250), 1)
+    picture = np.rint(255 * smooth_picture()).astype(np.uint8)
+    large = cv2.resize(picture, None, fx=2, fy=2)
+    sampled = sample_points(large, grid.nodes().reshape(-1, 2)[:count], 2, beyond)
+    np.testing.assert_array_equal(sampled, grid.sample(large, 2, beyond).reshape(-1, 4)[:count])
 
 
 def test_nodes_are_the_pixels_of_a_smaller_picture() -> None:

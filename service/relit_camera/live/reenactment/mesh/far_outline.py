@@ -66,9 +66,10 @@ class OutlineTask:
 
     def draw(self, moved: RgbaImage, person: RgbaImage) -> None:
         """Draw into the moved picture, in place, from the person as `Cutout.image` has them."""
-        face, behind = (sample_points(person, looks, UPSAMPLING, BEYOND) for looks in (self.face, self.behind))
         at = tuple(self.pixels)
-        moved[at] = _mixed(_mixed(face, behind, self.within), moved[at], self.cover)
+        sampled = (sample_points(person, looks, UPSAMPLING, BEYOND) for looks in (self.face, self.behind))
+        face, behind, below = (np.ascontiguousarray(each.T, np.float32) for each in (*sampled, moved[at]))
+        moved[at] = np.rint(_mixed(_mixed(face, behind, self.within), below, self.cover)).T
 
 
 def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid, half_size: bool = False) -> OutlineTask | None:
@@ -138,9 +139,9 @@ def _band(
 ) -> NDArray[np.float32]:
     """How far cells (rows, columns) belong to lines: as far as `shares` say up to `reach` cells aside, then less."""
     band = np.zeros(shape, np.float32)
-    ends = np.rint(edges * 2**SHIFT).astype(np.int32)
-    lines = sorted(each for each in zip(shares.tolist(), ends.tolist(), strict=True) if each[0] > 0)
-    for share, (start, end) in lines:
+    ends, order = np.rint(edges * 2**SHIFT).astype(np.int32), np.argsort(shares)
+    order = order[shares[order] > 0]
+    for share, (start, end) in zip(shares[order].tolist(), ends[order].tolist(), strict=True):
         cv2.line(band, start, end, share, 4 * reach + 4, cv2.LINE_8, SHIFT)
     return np.asarray(cv2.blur(band, (2 * reach + 1, 2 * reach + 1)), np.float32)
 
@@ -170,10 +171,12 @@ def _filled_share(
     return np.asarray(filled[pixels] / np.float32(whole), np.float32)
 
 
-def _mixed(front: NDArray[np.uint8], back: NDArray[np.uint8], share: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Two pictures of straight alpha (count, 4), the first by a share (count,) of each pixel."""
-    by_front, by_back = share * front[:, 3], (1 - share) * back[:, 3]
+def _mixed(front: NDArray[np.float32], back: NDArray[np.float32], share: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Two pictures of straight alpha (4, count), the first by a share (count,) of each pixel.
+
+    A channel at a time: numpy takes several times as long for rows of four.
+    """
+    by_front, by_back = share * front[3], (1 - share) * back[3]
     alpha = by_front + by_back
-    colors = by_front[:, None] * front[:, :3] + by_back[:, None] * back[:, :3]
-    colors /= np.maximum(alpha, 1e-3)[:, None]
-    return np.asarray(np.rint(np.column_stack([colors, alpha])), np.uint8)
+    colors = by_front * front[:3] + by_back * back[:3]
+    return np.vstack([colors / np.maximum(alpha, np.float32(1e-3)), alpha])
