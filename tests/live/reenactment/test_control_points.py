@@ -102,7 +102,7 @@ def test_a_blink_shows_the_upper_lid_above_the_slit_and_the_lower_lid_below_it(
     """The eyeball between the still's open lids is nowhere to be seen."""
     moved = transfer_motion(face, points, motion(expression=lids_lowered(face)))
     mesh = triangulate_head(face, head_and_shoulder_anchors(face.pose, face.size))
-    _, closing = mesh.meet_lids(moved.landmarks, moved.pose)
+    _, closing = mesh.with_lids_that_meet(moved.landmarks, moved.pose)
     graph = DenseMotion(SessionOptions())
     patches = whole_flow(graph, mesh, points, moved.points, moved.landmarks, moved.pose, closing)
     still = face.landmarks.astype(float)

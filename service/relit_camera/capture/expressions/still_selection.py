@@ -15,6 +15,7 @@ from relit_camera.face.landmarks.expression_features import (
     CLOSURE,
     WIDTH_CM,
     eye_closure,
+    lid_gap_cm,
     mouth_features,
     mouth_gap_cm,
 )
@@ -208,11 +209,11 @@ def shown_faces(film: TrackedFilm, first: int = 0) -> list[ShownFace]:
     scheme, neutral = film.scheme, film.neutral.points
     sharp = float(np.percentile([face.sharpness for face in film.faces], 90))
     mouth, gap = mouth_features(neutral, scheme), mouth_gap_cm(neutral, scheme)
-    eyes = (scheme.right_eye, scheme.left_eye)
+    eyes = [(eye, lid_gap_cm(neutral, eye)) for eye in (scheme.right_eye, scheme.left_eye)]
     result = []
     for face in film.faces[first:]:
         yaw, pitch, _ = angles_from_rotation(film.rotation(face))
-        closure = min(eye_closure(face.points, neutral, eye) for eye in eyes)
+        closure = min(eye_closure(face.points, eye, neutral_gap_cm) for eye, neutral_gap_cm in eyes)
         result.append(
             ShownFace(
                 face,

@@ -35,12 +35,12 @@ def mouth_gap_cm(points: NDArray[np.floating], scheme: LandmarkScheme) -> float:
     return float(np.linalg.norm(upper - lower))
 
 
-def eye_closure(points: NDArray[np.floating], neutral: NDArray[np.floating], eye: EyeLandmarks) -> float:
-    """How far an eye is shut: 0 as wide open as on the neutral face, 1 shut; below 0 wider."""
-    return 1 - lid_gap_cm(points, eye) / max(lid_gap_cm(neutral, eye), 1e-6)
-
-
 def lid_gap_cm(points: NDArray[np.floating], eye: EyeLandmarks) -> float:
     """Mean distance of the lids of an eye; points as in `mouth_features`."""
     upper, lower = (points[list(side)] for side in eye.gap)
     return float(np.linalg.norm(upper - lower, axis=1).mean())
+
+
+def eye_closure(points: NDArray[np.floating], eye: EyeLandmarks, neutral_gap_cm: float) -> float:
+    """How far an eye is shut: 0 as wide open as on the neutral face, which has that `lid_gap_cm`, 1 shut; < 0 wider."""
+    return 1 - lid_gap_cm(points, eye) / max(neutral_gap_cm, 1e-6)

@@ -72,7 +72,7 @@ class FirstOrderReenactor:
         """See `Reenactor.plan_warp`."""
         face = self._face
         target = (transfer_motion if self._person.whole else transfer_motion_in_place)(face, self._points, motion)
-        landmarks, closing = self._mesh.meet_lids(target.landmarks, target.pose)
+        landmarks, closing = self._mesh.with_lids_that_meet(target.landmarks, target.pose)
         patches = whole_flow(self._motion, self._mesh, self._points, target.points, landmarks, target.pose, closing)
         surface = patches[1]
         fixed = () if self._person.whole else (FixedBorder(face.size),)

@@ -132,7 +132,14 @@ class PositionGrid:
 def sample_points(
     image: Picture, looks: NDArray[np.float32], enlarged: float = 1, beyond: int = cv2.BORDER_REPLICATE
 ) -> Picture:
-    """The image (rows, columns, channels) at places (count, 2): (count, channels), see `PositionGrid.sample`."""
+    """What single points show: (count, channels), bilinear, in the type of `image`.
+
+    Args:
+        image: (rows, columns, channels ≤ 4), what they look at.
+        looks: (count, 2) where each looks in the source image, pixels; one at least.
+        enlarged: by how much it is larger than the source image.
+        beyond: as in `PositionGrid.sample`.
+    """
     # As rows of a picture, for OpenCV limits the sides of what it samples; the last one is filled up.
     places = np.resize(looks, (-(-len(looks) // POINT_COLUMNS), POINT_COLUMNS, 2)) * np.float32(enlarged)
     places -= np.float32(0.5)
@@ -166,7 +173,7 @@ class Nodes:
 
     def within(self, box: NDArray[np.float64]) -> Nodes | None:
         """A view of the smallest rectangle of nodes with all whose places lie in a box (4,); None where none do."""
-        # Plain numbers: arrays of so few take several times as long.
+        # Numbers, which must be finite: arrays of so few take several times as long.
         corners = [(x, y) for x in box[::2].tolist() for y in box[1::2].tolist()]
         to_node = inverse_affine(self.source_from_node).tolist()
         across, down = ([a * x + b * y + c for x, y in corners] for a, b, c in to_node)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.head_pose import HeadPose, project
-from relit_camera.live.reenactment.mesh.eye_mesh import AS_SEEN, SHUT, EyeMesh, eye_mesh
+from relit_camera.live.reenactment.mesh.eye_mesh import AS_SEEN, CLOSING, SHUT, EyeMesh, eye_mesh
 from relit_camera.live.reenactment.motion_transfer import rotate_about
 from tests.live.people import SCHEME, face_of, person
 
@@ -78,6 +79,8 @@ def test_an_eye_shuts_evenly(eye: EyeMesh) -> None:
     assert closing[0] == 1
     assert closing[-1] == 0
     assert np.abs(np.diff(closing)).max() < 0.16
+    # It is that of the lids where they are drawn, not of those that were seen.
+    np.testing.assert_allclose(closing, smoothstep(shown, *CLOSING), atol=1e-9)
 
 
 def test_of_an_eye_that_is_shut_in_the_source_image_noise_is_no_opening(eye: EyeMesh) -> None:

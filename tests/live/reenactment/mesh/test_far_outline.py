@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from relit_camera.base.images.image_types import RgbaImage
-from relit_camera.live.reenactment.mesh.far_outline import STRIP_CELLS, Silhouette, plan_far_outline
+from relit_camera.live.reenactment.mesh.far_outline import STRIP_CELLS, OutlineTask, Silhouette, plan_far_outline
 from relit_camera.live.reenactment.source_image import BEYOND, UPSAMPLING
 from relit_camera.live.reenactment.warp import PositionGrid
 
@@ -125,6 +125,30 @@ def test_the_face_is_hardly_wider_than_it_is(lean: float, left: bool) -> None:
     too_much = (1 - scene.filled()) - after[..., 2] / 200
     assert np.abs(too_much).max() < 0.36
     assert 0 <= too_much.sum(axis=1)[4:-4].mean() < 0.28
+
+
+def test_the_face_and_what_is_behind_it_look_where_the_warp_has_them() -> None:
+    """What goes on beyond the outline is a mean of cells; the cells themselves stay."""
+    scene = Scene(lean=0.0)
+    looks = scene.grid(1)
+    task = plan_far_outline(scene.silhouette(), looks)
+    assert task is not None
+    rows, columns = task.pixels
+    expected = looks.nodes()[rows, columns]
+    beyond = scene.beyond(columns + 0.5, rows + 0.5)
+    for shown, there in ((task.face, beyond < 0), (task.behind, beyond > STRIP_CELLS)):
+        assert there.any()
+        np.testing.assert_allclose(shown[there], expected[there], atol=1e-3)
+
+
+def test_codes_are_rounded_to_the_next() -> None:
+    """Before what is clear in color, 0.499 of a pixel with 200 is 99.8."""
+    one, full = np.zeros((1, 1, 4), np.uint8), np.ones(1, np.float32)
+    of = np.full((8, 8, 4), 200, np.uint8)
+    looks = np.full((1, 2), 1.0, np.float32)
+    one[..., 3] = 200
+    OutlineTask(np.zeros((2, 1), np.intp), looks, looks, full, np.array([0.499], np.float32)).draw(one, of)
+    assert one[0, 0].tolist() == [100, 100, 100, 200]
 
 
 def test_what_is_in_sight_beside_the_cheek_stays() -> None:

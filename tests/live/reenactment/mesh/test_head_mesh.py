@@ -49,7 +49,7 @@ def looks(face: SourceFace, mesh: HeadMesh, yaw: float, hiding: bool = True, pit
     target = turned(face, yaw, pitch)
     goes = (target.points, target.landmarks, target.pose)
     graph = DenseMotion(SessionOptions())
-    _, closing = mesh.meet_lids(target.landmarks, target.pose)
+    _, closing = mesh.with_lids_that_meet(target.landmarks, target.pose)
     patches: tuple[Patch, ...] = face_and_head_flow(graph, mesh.face, points, *goes)
     if hiding:
         patches = whole_flow(graph, mesh, points, *goes, closing)

@@ -68,17 +68,16 @@ class EyeMesh:
             pose: the same.
 
         Returns:
-            The closing of the eye, 0..1: how far lids that move over the eyeball take the place of a flow that moves
-            both and the skin round them.
+            The closing of the eye then, 0..1: how far lids that move over the eyeball take the place of a flow that
+            moves both and the skin round them.
         """
         opening = self.opening(landmarks, pose)
         if opening < AS_SEEN:
             gaps, kept = self._gaps(landmarks), max((opening - SHUT) / (AS_SEEN - SHUT), 0.0)
-            left = kept * np.maximum(gaps, 0)
-            closed = (gaps - left)[:, None] * _axes(landmarks[self.corners])[:, 1]
+            closed = (gaps - kept * np.maximum(gaps, 0))[:, None] * _axes(landmarks[self.corners])[:, 1]
             landmarks[self.upper] += (1 - LOWER_LID_SHARE) * closed
             landmarks[self.lower] -= LOWER_LID_SHARE * closed
-            opening = opening * float(left.mean() / gaps.mean()) if kept else 0.0
+            opening = self.opening(landmarks, pose)
         return float(smoothstep(opening, *CLOSING))
 
     def _gaps(self, landmarks: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,8 +22,8 @@ STRIP_CELLS = 2
 hidden side of the head, narrowed to a line. At half the resolution, where cells are twice as large, it stays: a strip
 that comes and goes by such cells as the head turns would be seen more."""
 SUBPIXELS = 4
-"""Points across a pixel, and down it, by which the share of the face in it is counted. OpenCV counts those too that a
-border touches: the face is wider by an eighth to a quarter of a pixel."""
+"""Points across a pixel, and down it, by which the share of the face in it is counted: 2, 4 or 8. OpenCV counts those
+too that a border touches: the face is wider by an eighth to a quarter of a pixel."""
 SHIFT = 4
 """Binary digits that OpenCV is told of a fraction of a pixel."""
 
@@ -73,7 +73,7 @@ class OutlineTask:
 
 
 def plan_far_outline(silhouette: Silhouette | None, grid: PositionGrid, half_size: bool = False) -> OutlineTask | None:
-    """What is to be drawn along an outline; None where nothing is: there is none, or it lies outside the picture.
+    """What is to be drawn along an outline; None where there is none, or nothing of it in the picture.
 
     Args:
         silhouette: of the face in this picture.

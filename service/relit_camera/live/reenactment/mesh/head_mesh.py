@@ -64,12 +64,17 @@ class HeadMesh:
     sides: HeadSides | None
     turned_trust: NDArray[np.float64]
 
-    def meet_lids(
+    def with_lids_that_meet(
         self, landmarks: NDArray[np.float64], pose: HeadPose
     ) -> tuple[NDArray[np.float64], tuple[float, float]]:
-        """Moved landmarks (count, 2) of a head in a pose, with lids that meet where they nearly do.
+        """Moved landmarks, with lids that meet where they nearly do.
 
-        And the closing of the right and of the left eye, see `EyeMesh.meet_lids`.
+        Args:
+            landmarks: (count, 2) where all landmarks go, source pixels; they stay as they are.
+            pose: of the head that goes there.
+
+        Returns:
+            The landmarks (count, 2), and the closing of the right and of the left eye, see `EyeMesh.meet_lids`.
         """
         changed = landmarks.copy()
         right, left = (eye.meet_lids(changed, pose) for eye in self.eyes)

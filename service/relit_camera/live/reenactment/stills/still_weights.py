@@ -12,6 +12,7 @@ from relit_camera.base.easing import smoothstep
 from relit_camera.base.rotations import Rotation, angles_from_rotation
 from relit_camera.face.landmarks.expression_features import (
     CLOSURE,
+    eye_closure,
     lid_gap_cm,
     mouth_features,
     mouth_gap_cm,
@@ -72,9 +73,9 @@ class StillWeights:
     """Weights of the stills of one subject, frame by frame."""
 
     def __init__(self, stills: Sequence[ExpressionStill], face: SourceFace) -> None:
-        self._face, self._eyes = face, (face.scheme.right_eye, face.scheme.left_eye)
-        self._lip_gap_cm = mouth_gap_cm(face.head_points, face.scheme)
-        self._lid_gaps_cm = [max(lid_gap_cm(face.head_points, eye), 1e-6) for eye in self._eyes]
+        self._face, eyes = face, (face.scheme.right_eye, face.scheme.left_eye)
+        self._neutral_mouth_gap_cm = mouth_gap_cm(face.head_points, face.scheme)
+        self._neutral_lid_gaps_cm = [(eye, lid_gap_cm(face.head_points, eye)) for eye in eyes]
         self._neutral = self.doing(np.zeros_like(face.head_points), Rotation.identity())
         self._stills = [
             self.doing(still.expression.astype(np.float64), Rotation.from_rotvec(still.rotation.astype(np.float64)))
@@ -107,15 +108,14 @@ class StillWeights:
         points = self._face.head_points + expression
         yaw, pitch, _ = angles_from_rotation(rotation)
         turn = np.array([yaw, pitch])
-        parted = float(smoothstep(mouth_gap_cm(points, scheme) - self._lip_gap_cm, *PARTED_LIPS_CM))
+        parted = float(smoothstep(mouth_gap_cm(points, scheme) - self._neutral_mouth_gap_cm, *PARTED_LIPS_CM))
         mouth = [*mouth_features(points, scheme), PARTED_UNITS * parted]
         features = {"mouth": np.append(mouth, turn / FEATURE_TURN_UNIT_DEG)}
         needed = {"mouth": parted}
         # Seen from the side, width and corners are confused with the depth of the lips, which landmarks do not tell.
         sideways = 1 / (1 + (yaw / SIDEWAYS_DEG) ** 2)
         certain = {"mouth": np.array([1, 1, sideways, sideways, 1, 1, 1])}
-        lid_gaps_cm = zip(self._eyes, self._lid_gaps_cm, strict=True)
-        closures = [1 - lid_gap_cm(points, eye) / neutral_cm for eye, neutral_cm in lid_gaps_cm]
+        closures = [eye_closure(points, eye, gap_cm) for eye, gap_cm in self._neutral_lid_gaps_cm]
         for name, own, other, sign in zip(
             ("right_eye", "left_eye"), closures, closures[::-1], (-1.0, 1.0), strict=True
         ):
