@@ -22,6 +22,7 @@ from relit_camera.base.concurrency.threads import limit_threads
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.config.settings import RelitSettings, TrackerSettings
 from relit_camera.base.images.image_files import write_display
+from relit_camera.base.images.image_quality import ssim
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.images.resize import letterbox
 from relit_camera.base.rotations import angles_from_rotation
@@ -41,6 +42,8 @@ OPEN_MOUTH, SHUT_EYE, TURNED_DEG = 0.1, 0.13, (22.0, 40.0)
 RIMS = {"open mouth": 0.1, "shut eyes": 0.3, "far half": -0.06, "near half": -0.06, "face": -0.06}
 """By how much each region reaches beyond the hull of its landmarks, in parts of its smaller side. Where it ends at the
 face's outline, that does not count: outlines that differ by a pixel would be all of the error."""
+IDENTITY = "face, SSIM"
+"""Whether it is still the same person: how alike the structure of the aligned face is, in luma."""
 SIDE_PX = 200
 """Width of a face in which regions are compared."""
 PERSON = 200
@@ -121,7 +124,10 @@ def crop(
 def compare(
     truth: Run, mattes: list[DisplayImage], runs: dict[str, Run]
 ) -> tuple[dict[tuple[str, str], list[float]], list[NDArray[np.uint8]]]:
-    """PSNR in dB by region and way, a value a frame; and rows of a contact sheet: the truth, then each way."""
+    """PSNR in dB by region and way, a value a frame, and the SSIM of the face; and rows of a contact sheet.
+
+    A row shows the truth, then each way.
+    """
     scheme = landmark_scheme(truth.states[0].scheme)
     found: dict[tuple[str, str], list[float]] = {}
     rows = []
@@ -151,6 +157,8 @@ def compare(
                 got = crop(run.pictures[index], run.states[index].landmarks[members], onto, (width, height))
                 got = with_best_gain(got, want, inside)
                 found.setdefault((name, way), []).append(codes_psnr(got, want, inside))
+                if name == "face":
+                    found.setdefault((IDENTITY, way), []).append(ssim(got, want, inside.astype(np.float32)))
                 shown.append(got)
             if name != "face":
                 pieces = [letterbox(each, (240, 160), (0, 0, 0), cv2.INTER_CUBIC) for each in shown]
@@ -201,9 +209,10 @@ def main() -> None:
     runs = {way: Run(pictures, track(pictures)) for way, pictures in shown.items()}
     found, rows = compare(Run(truth, track(truth)), mattes, runs)
     print(f"{'region':12s} frames {'  '.join(f'{way:>6s}' for way in WAYS)}")
-    for name in ("open mouth", "shut eyes", "far half", "near half", "face"):
+    for name in (*RIMS, IDENTITY):
         if (name, "plain") in found:
-            means = "  ".join(f"{np.mean(found[name, way]):6.2f}" for way in WAYS)
+            digits = 3 if name == IDENTITY else 2
+            means = "  ".join(f"{np.mean(found[name, way]):6.{digits}f}" for way in WAYS)
             print(f"{name:12s} {len(found[name, 'plain']):6d} {means}")
     driven = track(driver)
     for way, run in runs.items():
