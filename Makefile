@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
 PROCESSES ?= $(shell expr $$(nproc 2>/dev/null || echo 2) + 1)
+# Tests that take both cores, and the measurement of what a picture costs, which tells nothing beside others.
+BY_THEMSELVES := tests/vm tests/browser tests/pipewire tests/lab/bench/test_recorded_cost.py
+TOGETHER := -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder $(BY_THEMSELVES:%=--ignore=%)
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
@@ -60,8 +63,9 @@ tool-install: setup ## the wheel as users install it, used from an empty home; m
 # What is compiled once need not be by each of the hundreds of processes that tests start.
 pytest: export PYTHONDONTWRITEBYTECODE =
 pytest: setup ## the tests alone, in one process more than there are cores; make pytest PROCESSES=4
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire
-	# By themselves: browser and emulated machine take both cores, and tests that hold in real time would not.
+	$(BIN)/python -m pytest $(TOGETHER)
+	$(BIN)/python -m pytest tests/lab/bench/test_recorded_cost.py
+	# Browser and emulated machine would leave no core to tests that hold in real time.
 	# Of the browser's tests each may run in any process: those of a file take up to four minutes.
 	$(BIN)/python -m pytest tests/pipewire
 	$(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
@@ -74,7 +78,7 @@ fuzz: setup ## mutated files on every reader, for an hour; make fuzz FUZZ="--sec
 	$(BIN)/python -m tests.fuzz.fuzzing $(FUZZ)
 
 coverage: setup ## the first of these with the share of lines that they execute: build/coverage/index.html
-	$(BIN)/python -m pytest -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder --ignore=tests/vm --ignore=tests/browser --ignore=tests/pipewire --cov --cov-report=
+	$(BIN)/python -m pytest $(TOGETHER) --cov --cov-report=
 	$(BIN)/python scripts/coverage_summary.py
 	$(BIN)/coverage html --quiet --directory build/coverage
 
