@@ -63,13 +63,15 @@ tool-install: setup ## the wheel as users install it, used from an empty home; m
 # What is compiled once need not be by each of the hundreds of processes that tests start.
 pytest: export PYTHONDONTWRITEBYTECODE =
 pytest: setup ## the tests alone, in one process more than there are cores; make pytest PROCESSES=4
-	$(BIN)/python -m pytest $(TOGETHER)
-	$(BIN)/python -m pytest tests/lab/bench/test_recorded_cost.py
+	rm -f build/durations.json
+	TEST_PART=together $(BIN)/python -m pytest $(TOGETHER)
+	TEST_PART=cost $(BIN)/python -m pytest tests/lab/bench/test_recorded_cost.py
 	# Browser and emulated machine would leave no core to tests that hold in real time.
 	# Of the browser's tests each may run in any process: those of a file take up to four minutes.
-	$(BIN)/python -m pytest tests/pipewire
-	$(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
-	$(BIN)/python -m pytest tests/vm
+	TEST_PART=pipewire $(BIN)/python -m pytest tests/pipewire
+	TEST_PART=browser $(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
+	TEST_PART=vm $(BIN)/python -m pytest tests/vm
+	$(BIN)/python -m tests.gate.durations
 
 studies: setup ## the long tests that `make test` leaves out
 	$(BIN)/python -m pytest -m study tests

@@ -20,6 +20,7 @@ TABLES = {
     "what the panel costs": ("what", "measured", "at most"),
     "readers of the virtual camera": ("reader", "v4l2loopback", "saw"),
     "a camera in PipeWire that is killed and started again": ("packages", "camera", "longest gap for GStreamer"),
+    "a camera whose keeper goes on": ("what happens", "longest gap between pictures"),
     "relit run in PipeWire": ("packages", "reader", "mean difference from what is published, of 255"),
     "the keeper of a camera in PipeWire": ("packages", "memory"),
     "readers of the camera in PipeWire": ("packages", "reader", "largest difference of 255"),

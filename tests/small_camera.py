@@ -23,7 +23,8 @@ from relit_camera.devices.sources.source import Source, SourceInfo
 from relit_camera.face.face_state import FaceState, Tracker
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.live.scene.scene_controller import SceneController
-from relit_camera.live.status.camera_status import DegradationCode
+from relit_camera.live.status.camera_status import Degradation, DegradationCode
+from relit_camera.live.supervision.pipeline_health import HealthLimits
 from relit_camera.subject.subject import Subject
 from tests.generated_subject import small_subject
 
@@ -31,6 +32,8 @@ SIZE = (128, 96)
 FPS = 20.0
 WAIT_S = 60.0
 """Long enough for a slow machine that has much else to do."""
+PATIENT = CameraTimings(stale_after_s=WAIT_S, pipeline=HealthLimits(hang_timeout_s=WAIT_S, abandon_timeout_s=WAIT_S))
+"""With these nothing that only has to wait for a processor looks like a fault."""
 
 
 class SteadyTracker(SyntheticTracker):
@@ -111,12 +114,16 @@ class Camera:
         return found
 
     def degraded(self) -> set[DegradationCode]:
-        """The codes of all that works less well than asked."""
-        return {degradation.code for degradation in self.camera_service.status().degraded}
+        """The codes of all that works less well than asked, but for the detail that a busy machine costs."""
+        return {degradation.code for degradation in self._degradations()}
 
     def troubles(self) -> str:
-        """All that works less well than asked, as one text."""
-        return "\n".join(f"{t.what}: {t.why}; {t.cure}" for t in self.camera_service.status().degraded)
+        """The same as one text."""
+        return "\n".join(f"{t.what}: {t.why}; {t.cure}" for t in self._degradations())
+
+    def _degradations(self) -> list[Degradation]:
+        degraded = self.camera_service.status().degraded
+        return [each for each in degraded if each.code is not DegradationCode.REDUCED_QUALITY]
 
 
 @contextmanager

@@ -12,11 +12,10 @@ from pathlib import Path
 import pytest
 
 from tests.cli.relit_command import Material, environment, write_material
-from tests.devices.keeper.stand_in_sink import VARIABLE, Noted, noted
-from tests.small_camera import wait_until
+from tests.devices.keeper.stand_in_sink import VARIABLE, Noted, noted, runs
+from tests.small_camera import WAIT_S, wait_until
 
 pytestmark = [
-    pytest.mark.real_time,
     pytest.mark.timeout(240),
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="keepers are Linux's"),
 ]
@@ -33,8 +32,8 @@ from relit_camera.cli.main import run
 run()
 """
 """`relit` for which the sink `null` is one that a keeper holds, and that notes its pictures."""
-MOST_GAP_S = 1.0
-"""Two hundred milliseconds where the machine has time; this also where it has not."""
+LONGEST_GAP_S = 10.0
+"""After which Chromium gives a camera up. It is two hundred milliseconds where the machine has time."""
 
 
 @pytest.fixture(scope="module")
@@ -68,11 +67,11 @@ def start(tmp_path: Path, material: Material) -> Iterator[Callable[[], subproces
     for camera in started:
         if camera.poll() is None:
             camera.send_signal(signal.SIGTERM)
-        camera.communicate(timeout=20)
+        camera.communicate(timeout=WAIT_S)
 
 
 def test_its_virtual_camera_goes_on_through_kill_9_and_ends_when_it_is_told_to(
-    tmp_path: Path, start: Callable[[], subprocess.Popen[str]]
+    tmp_path: Path, start: Callable[[], subprocess.Popen[str]], note_row: Callable[[str, tuple[str, ...]], None]
 ) -> None:
     def shown() -> list[Noted]:
         return noted(tmp_path / "pictures")
@@ -82,16 +81,14 @@ def test_its_virtual_camera_goes_on_through_kill_9_and_ends_when_it_is_told_to(
     camera.kill()
     camera.wait()
     at_death = len(shown())
+    wait_until(lambda: len(shown()) > at_death + 10)  # without a camera
     camera = start()
-    assert len(shown()) > at_death + 10  # without a camera
     started = len(shown())
     wait_until(lambda: len(shown()) > started + 20)
     camera.send_signal(signal.SIGTERM)
-    assert camera.wait(20) == 0
-    ended = len(shown())
-    gaps = [later.at - earlier.at for earlier, later in pairwise(shown())]
-    print(f"longest gap {1000 * max(gaps):.0f} ms")
-    assert max(gaps) < MOST_GAP_S
-    assert len({picture.process for picture in shown()}) == 1
-    with pytest.raises(AssertionError, match="did not come about"):
-        wait_until(lambda: len(shown()) > ended, 0.5)
+    assert camera.wait(WAIT_S) == 0
+    (keeper,) = {picture.process for picture in shown()}
+    wait_until(lambda: not runs(keeper))
+    gap_s = max(later.at - earlier.at for earlier, later in pairwise(shown()))
+    note_row("a camera whose keeper goes on", ("relit run is killed and started again", f"{1e3 * gap_s:.0f} ms"))
+    assert gap_s < LONGEST_GAP_S

@@ -63,7 +63,7 @@ class FakeCapture:
         self.picture = np.zeros((size[1], size[0], 3), np.uint8)
         self.picture[:] = (10, 20, 200)  # BGR
         self.threads: set[int] = set()
-        self.unstick = threading.Event()
+        self.is_stuck, self.unstick = threading.Event(), threading.Event()
 
     def isOpened(self):
         self.threads.add(threading.get_ident())
@@ -72,7 +72,8 @@ class FakeCapture:
     def read(self):
         self.threads.add(threading.get_ident())
         if self.mode == "stuck":
-            self.unstick.wait(20)
+            self.is_stuck.set()
+            self.unstick.wait(60)
             return False, None
         time.sleep(self.interval_s)
         return (True, self.picture.copy()) if self.mode == "ok" else (False, None)

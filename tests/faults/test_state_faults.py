@@ -21,11 +21,13 @@ from relit_camera.face.face_state import FaceState
 from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.supervision.pipeline_health import HealthLimits
 from relit_camera.subject.subject_file import write_subject
-from tests.faults.watched_camera import Survived, TimedSink, watched_camera
+from tests.faults.watched_camera import HANG_S, MOST_STOP_S, STOP_S, Survived, TimedSink, watched_camera
 from tests.generated_subject import small_subject
 from tests.small_camera import (
     FPS,
+    PATIENT,
     SIZE,
+    WAIT_S,
     SteadyTracker,
     difference,
     grey,
@@ -34,9 +36,8 @@ from tests.small_camera import (
     wait_until,
 )
 
-pytestmark = pytest.mark.real_time
-
 SOON_STALE = CameraTimings(stale_after_s=0.3)
+SOON_STOPPED = CameraTimings(stop_timeout_s=STOP_S)
 
 
 def overwritten(path: Path) -> None:
@@ -64,7 +65,7 @@ def test_a_subject_file_is_spoilt_while_in_use(
 ) -> None:
     file = tmp_path / "me.relit"
     write_subject(file, small_subject())
-    with watched_camera(tmp_path / "data") as watched:
+    with watched_camera(tmp_path / "data", timings=PATIENT) as watched:
         watched.camera.scene_controller.load_configured_subject(str(file))
         watched.goes_on(10)
         watched.begin()
@@ -82,29 +83,35 @@ def test_a_subject_file_is_spoilt_while_in_use(
 @pytest.mark.parametrize("jump_s", [-7200.0, 86400.0 * 365])
 def test_the_clock_jumps(jump_s: float, tmp_path: Path, survived: Survived, monkeypatch: pytest.MonkeyPatch) -> None:
     real = time.time
-    with watched_camera(tmp_path) as watched:
+    with watched_camera(tmp_path, timings=PATIENT) as watched:
         monkeypatch.setattr(time, "time", lambda: real() + jump_s)
-        time.sleep(0.5)
-        watched.goes_on(10)
+        watched.goes_on(20)
         assert watched.reports_nothing()
-        assert 0 < watched.camera.camera_service.status().latency_ms.p95 < 5000
+        assert 0 < watched.camera.camera_service.status().latency_ms.p95 < 1e3 * WAIT_S
         survived(f"the clock jumps by {jump_s / 3600:+.0f} h", watched)
 
 
 class FaultySink(TimedSink):
-    """Raises while `error` is set, hangs while `release` is not; counts only what it took."""
+    """Raises while `error` is set, hangs (as `is_stuck` says then) while `release` is not; counts only what it took."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.error: Exception | None = None
-        self.release = threading.Event()
+        self.release, self.is_stuck = threading.Event(), threading.Event()
         self.release.set()
 
     def write(self, image: DisplayImage) -> None:
         if self.error is not None:
             raise self.error
-        self.release.wait(60)
+        if not self.release.is_set():
+            self.is_stuck.set()
+            self.release.wait(HANG_S)
         super().write(image)
+
+    def hang(self) -> None:
+        """Hang from now on, until it is released; wait until it does."""
+        self.release.clear()
+        wait_until(self.is_stuck.is_set)
 
 
 def test_the_virtual_camera_is_gone_for_a_while(tmp_path: Path) -> None:
@@ -120,14 +127,13 @@ def test_the_virtual_camera_is_gone_for_a_while(tmp_path: Path) -> None:
 
 def test_it_stops_in_time_while_the_driver_hangs(tmp_path: Path) -> None:
     sink = FaultySink()
-    with running_camera(tmp_path, sink=sink) as camera:
+    with running_camera(tmp_path, sink=sink, timings=SOON_STOPPED) as camera:
         sink.wait_for(3)
-        sink.release.clear()
-        time.sleep(0.2)
+        sink.hang()
         began = time.monotonic()
         camera.camera_service.stop()
-        assert time.monotonic() - began < 3
-        assert camera.camera_service.hung_threads == ["publisher"]
+        assert time.monotonic() - began < MOST_STOP_S
+        wait_until(lambda: camera.camera_service.hung_threads == ["publisher"])
         sink.release.set()
 
 
@@ -138,7 +144,7 @@ def test_the_end_of_a_recording_is_waited_for(tmp_path: Path) -> None:
         def describe(self) -> SinkInfo:
             return SinkInfo("file", "rec.mp4", SIZE)
 
-    for seconds, disk_timeout_s, lost in ((1.5, 20.0, False), (60.0, 0.5, True)):
+    for disk_timeout_s, lost in ((WAIT_S, False), (0.5, True)):
         timings = CameraTimings(stop_timeout_s=0.5, disk_timeout_s=disk_timeout_s)
         sink = Recording()
         with ExitStack() as ended:
@@ -146,9 +152,9 @@ def test_the_end_of_a_recording_is_waited_for(tmp_path: Path) -> None:
                 ended.enter_context(pytest.raises(StorageError, match="the disk does not answer"))
             with running_camera(tmp_path, sink=sink, timings=timings) as camera:
                 sink.wait_for(3)
-                sink.release.clear()
-                time.sleep(0.2)
-                threading.Timer(seconds, sink.release.set).start()
+                sink.hang()
+                if not lost:
+                    threading.Timer(3 * timings.stop_timeout_s, sink.release.set).start()
                 camera.camera_service.stop()
         sink.release.set()
 
@@ -172,7 +178,7 @@ class LateTracker(SteadyTracker):
         self.release.set()
 
     def track(self, frame: Frame) -> FaceState:
-        self.release.wait(60)
+        self.release.wait(HANG_S)
         return super().track(frame)
 
 
@@ -182,7 +188,7 @@ def test_a_late_picture_does_not_replace_the_placeholder(tmp_path: Path) -> None
 
     def play() -> Iterator[TimedImage]:
         yield grey(), 0.0
-        more.wait(60)
+        more.wait(HANG_S)
         yield grey(), 1 / FPS
 
     source = PlaybackSource(SourceInfo("still", "memory", SIZE, FPS), play())
@@ -190,12 +196,12 @@ def test_a_late_picture_does_not_replace_the_placeholder(tmp_path: Path) -> None
         wait_until(lambda: camera.status()["state"] == "live")
         tracker.release.clear()
         more.set()
-        wait_until(lambda: difference(camera.sink.new[-1], waiting) == 0)
+        wait_until(lambda: difference(camera.sink.new[-1], waiting) == 0 and camera.status()["state"] == "waiting")
         with camera.camera_service.events.listen() as events:
             shown, count = len(camera.sink.new), camera.sink.count
             tracker.release.set()
             wait_until(lambda: camera.camera_service.status().frames.dropped == 1)
-            wait_until(lambda: camera.sink.count > count + 20)
+            wait_until(lambda: camera.sink.count > count + 10)
             assert len(camera.sink.new) == shown
             assert events.empty()  # nor is it said to be live
 

@@ -14,8 +14,15 @@ import numpy as np
 from relit_camera.base.images.image_types import DisplayImage
 from tests.small_camera import Camera, RememberingSink, running_camera, wait_until
 
-LONGEST_GAP_S = 1.0
-"""Between two published frames, whatever happens. Chromium gives a camera up after some ten seconds."""
+LONGEST_GAP_S = 10.0
+"""Between two published frames, whatever happens: Chromium gives a camera up after some ten seconds. It is a tenth of a
+second as a rule, which a busy machine makes longer."""
+STOP_S = 1.0
+"""`CameraTimings.stop_timeout_s` in these tests."""
+MOST_STOP_S = 10 * STOP_S
+"""Within which a camera has stopped whose parts hang for a minute."""
+HANG_S = 300.0
+"""How long what hangs does so, unless it is released: longer than any test waits."""
 
 
 @dataclass
@@ -54,6 +61,16 @@ class Watched:
     def reports(self, text: str) -> None:
         """Wait until the status reports this."""
         wait_until(lambda: text in self.camera.troubles())
+
+    def hangs(self, stage: str) -> None:
+        """Wait until a hang is reported while the pipeline is at a stage."""
+        supervisor = self.camera.camera_service._supervisor
+
+        def hangs_there() -> bool:
+            pipeline = supervisor.pipeline
+            return pipeline is not None and stage in pipeline.timer.running()
+
+        wait_until(lambda: "for some seconds (in: " in self.camera.troubles() and hangs_there())
 
     def reports_nothing(self) -> bool:
         """Whether the status reports no trouble."""

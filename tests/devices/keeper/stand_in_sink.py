@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import os
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+import psutil
 
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.devices.sinks.sink import SinkInfo, SinkOptions
@@ -47,6 +50,13 @@ class NotingSink:
 
 def open_noting(options: SinkOptions) -> NotingSink:
     return NotingSink(options.size)
+
+
+def runs(process: int) -> bool:
+    """Whether it is there, and more than a process that nobody has asked for its exit code."""
+    with suppress(psutil.NoSuchProcess):
+        return psutil.Process(process).status() != psutil.STATUS_ZOMBIE
+    return False
 
 
 def noted(path: Path) -> list[Noted]:

@@ -8,9 +8,8 @@ import socket
 import stat
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
@@ -23,16 +22,15 @@ from relit_camera.devices.device_users import KEEPER_MODULE
 from relit_camera.devices.keeper.keeper_socket import MessageSocket, mapped, require_private_folder, shared_memory
 from relit_camera.devices.keeper.kept_output import OutputOptions
 from relit_camera.devices.keeper.sink_keeper import SinkKeeper
-from tests.devices.keeper.stand_in_sink import FPS, KEEP_S, OPENER, PLACEHOLDER, VARIABLE, Noted, noted
-from tests.small_camera import wait_until
+from tests.devices.keeper.stand_in_sink import FPS, KEEP_S, OPENER, PLACEHOLDER, VARIABLE, Noted, noted, runs
+from tests.small_camera import WAIT_S, wait_until
 
 pytestmark = [
-    pytest.mark.real_time,
-    pytest.mark.timeout(90),
     pytest.mark.skipif(not sys.platform.startswith("linux"), reason="keepers are Linux's"),
 ]
 
-LONGEST_GAP_S = 0.2
+LONGEST_GAP_S = 10.0
+"""After which Chromium gives a camera up. How soon a keeper bridges what is missing is tested in virtual time."""
 ROOT = Path(__file__).resolve().parents[3]
 
 
@@ -42,10 +40,6 @@ class Stage:
     def __init__(self, folder: Path) -> None:
         self.folder, self.pictures = folder / "run", folder / "pictures.jsonl"
         self._cameras: list[subprocess.Popen[str]] = []
-        self._closing = threading.Event()
-        self._late_s = 0.0
-        self._measuring = threading.Thread(target=self._measure_lateness)
-        self._measuring.start()
 
     def camera(self, grey: int, version: str = "", width: int = 64, keep_s: float = KEEP_S) -> subprocess.Popen[str]:
         """Start a camera that shows this grey."""
@@ -66,27 +60,23 @@ class Stage:
 
     def wait_for(self, value: int, count: int = 20) -> None:
         """Wait until a grey was shown so often."""
-        wait_until(lambda: sum(picture.value == value for picture in self.shown()) >= count, 30)
+        wait_until(lambda: sum(picture.value == value for picture in self.shown()) >= count)
+
+    def goes_on(self, count: int = 20) -> None:
+        """Wait for so many more pictures."""
+        before = len(self.shown())
+        wait_until(lambda: len(self.shown()) >= before + count)
 
     def gap_s(self) -> float:
-        """The longest between two pictures, without what a busy machine makes any process wait."""
+        """The longest between two pictures."""
         times = [picture.at for picture in self.shown()]
-        return max(later - earlier for earlier, later in pairwise(times)) - self._late_s
-
-    def _measure_lateness(self) -> None:
-        before = time.monotonic()
-        while not self._closing.wait(0.01):
-            now = time.monotonic()
-            self._late_s = max(self._late_s, now - before - 0.01)
-            before = now
+        return max(later - earlier for earlier, later in pairwise(times))
 
     def keepers(self) -> set[int]:
         """The processes that have shown something and still run."""
-        return {process for process in {picture.process for picture in self.shown()} if _runs(process)}
+        return {process for process in {picture.process for picture in self.shown()} if runs(process)}
 
     def close(self) -> None:
-        self._closing.set()
-        self._measuring.join()
         for camera in self._cameras:
             camera.kill()
             camera.communicate()
@@ -102,82 +92,89 @@ def stage(tmp_path: Path) -> Iterator[Stage]:
     made.close()
 
 
-def _runs(process: int) -> bool:
-    """Whether it is there, and more than a process that nobody has asked for its exit code."""
-    with suppress(psutil.NoSuchProcess):
-        return psutil.Process(process).status() != psutil.STATUS_ZOMBIE
-    return False
+@pytest.fixture
+def bridged(stage: Stage, note_row: Callable[[str, tuple[str, ...]], None]) -> Callable[[str], None]:
+    """Called when pictures come again after something has happened: notes the gap, which no reader may have noticed."""
+
+    def note(what: str) -> None:
+        gap_s = stage.gap_s()
+        note_row("a camera whose keeper goes on", (what, f"{1e3 * gap_s:.0f} ms"))
+        assert gap_s < LONGEST_GAP_S
+
+    return note
 
 
 def leave(camera: subprocess.Popen[str], how: str) -> None:
     """Tell a camera to leave, and wait until it has."""
-    camera.communicate(f"{how}\n", timeout=20)
+    camera.communicate(f"{how}\n", timeout=WAIT_S)
     assert camera.returncode == 0
 
 
-def test_kill_9_and_a_new_start_are_no_gap_for_readers(stage: Stage) -> None:
+def test_kill_9_and_a_new_start_are_no_gap_for_readers(stage: Stage, bridged: Callable[[str], None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
     first.kill()
     first.wait()
-    time.sleep(1)  # nobody is there
+    stage.goes_on()  # nobody is there
     stage.camera(20)
     stage.wait_for(20)
     values = [picture.value for picture in stage.shown()]
     assert values[-1] == 20
     assert sorted(values, key=(PLACEHOLDER, 10, 20).index) == values
-    assert stage.gap_s() < LONGEST_GAP_S
     assert len({picture.process for picture in stage.shown()}) == 1
+    bridged("the camera is killed and started again")
 
 
 def test_a_camera_that_leaves_ends_its_keeper(stage: Stage) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
     leave(first, "end")
-    assert stage.keepers() == set()
-    last = stage.shown()[-1]
-    time.sleep(0.3)
-    assert stage.shown()[-1] == last
+    wait_until(lambda: stage.keepers() == set())
 
 
-def test_a_camera_that_is_restarted_hands_over(stage: Stage) -> None:
+def test_a_camera_that_is_restarted_hands_over(stage: Stage, bridged: Callable[[str], None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
     leave(first, "hand-over")
+    stage.goes_on()
     stage.camera(20)
     stage.wait_for(20)
-    assert stage.gap_s() < LONGEST_GAP_S
     assert len({picture.process for picture in stage.shown()}) == 1
+    bridged("the camera hands over")
 
 
-def test_a_camera_of_another_version_replaces_the_keeper(stage: Stage) -> None:
+def test_a_camera_of_another_version_replaces_the_keeper(stage: Stage, bridged: Callable[[str], None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
     first.kill()
     first.wait()
     stage.camera(20, version="another")
     stage.wait_for(20)
-    assert len({picture.process for picture in stage.shown()}) == 2
-    assert stage.gap_s() < 2 * LONGEST_GAP_S  # the device is closed and opened between them
-    assert len(stage.keepers()) == 1
+    old, new = dict.fromkeys(picture.process for picture in stage.shown())
+    assert stage.keepers() == {new}
+    # The old one goes on until the new one has started.
+    last_at = max(picture.at for picture in stage.shown() if picture.process == old)
+    assert last_at > psutil.Process(new).create_time() - time.time() + time.monotonic()
+    bridged("a camera of another version, whose keeper takes over")
 
 
-def test_a_camera_of_another_size_has_the_device_opened_anew(stage: Stage) -> None:
+def test_a_camera_of_another_size_has_the_device_opened_anew(stage: Stage, bridged: Callable[[str], None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
     first.kill()
     first.wait()
+    stage.goes_on()
     stage.camera(20, width=128)
     stage.wait_for(20)
-    assert stage.gap_s() < LONGEST_GAP_S
     assert len({picture.process for picture in stage.shown()}) == 1
+    bridged("a camera of another size")
 
 
 def test_a_second_camera_is_refused(stage: Stage) -> None:
     stage.camera(10)
     stage.wait_for(10)
     second = stage.camera(20)
-    _, said = second.communicate(timeout=20)
+    _, said = second.communicate(timeout=WAIT_S)
     assert second.returncode == 1
     assert said.strip() == (
         "another Relit Camera publishes to stand-in already; "
@@ -191,13 +188,13 @@ def test_a_keeper_that_nobody_comes_for_ends(stage: Stage) -> None:
     stage.wait_for(10)
     first.kill()
     first.wait()
-    gone_at = time.monotonic()
-    wait_until(lambda: not stage.keepers(), 20)
-    assert stage.shown()[-1].at - gone_at == pytest.approx(2, abs=1)
+    seen = len(stage.shown())
+    wait_until(lambda: not stage.keepers(), KEEP_S / 2)
+    assert len(stage.shown()) > seen + 10  # of some sixty
     assert not any(path.is_socket() for path in stage.folder.iterdir())
 
 
-def test_a_keeper_that_is_killed_is_replaced_at_once(stage: Stage) -> None:
+def test_a_keeper_that_is_killed_is_replaced_at_once(stage: Stage, bridged: Callable[[str], None]) -> None:
     stage.camera(10)
     stage.wait_for(10)
     (keeper,) = stage.keepers()
@@ -205,7 +202,7 @@ def test_a_keeper_that_is_killed_is_replaced_at_once(stage: Stage) -> None:
     seen = len(stage.shown())
     stage.wait_for(10, seen + 20)
     assert stage.shown()[-1].process != keeper
-    assert stage.gap_s() < 5  # a start of Python on a busy machine
+    bridged("the keeper is killed")
 
 
 ODD_KEEPER = """
@@ -237,7 +234,7 @@ def test_a_keeper_whose_answers_cannot_be_read_is_ended_and_replaced(stage: Stag
     odd = odd_keeper(stage, '{"info": {"pipewire": [1, ["cut in the mid')
     stage.camera(10)
     stage.wait_for(10)
-    assert odd.wait(1) == -signal.SIGKILL
+    assert odd.wait(WAIT_S) == -signal.SIGKILL
 
 
 def test_without_a_keeper_none_is_left_that_holds_the_virtual_camera(stage: Stage) -> None:
@@ -245,19 +242,19 @@ def test_without_a_keeper_none_is_left_that_holds_the_virtual_camera(stage: Stag
     camera = stage.camera(10)
     assert camera.stdout is not None
     assert "published without a keeper" in camera.stdout.readline()
-    assert odd.wait(1) == -signal.SIGKILL
+    assert odd.wait(WAIT_S) == -signal.SIGKILL
 
 
 def test_another_version_that_hears_no_goodbye_is_ended(stage: Stage) -> None:
     odd = odd_keeper(stage, '{"other_version": "0.0.1 1"}')
     stage.camera(10)
     stage.wait_for(10)
-    assert odd.wait(1) == -signal.SIGKILL
+    assert odd.wait(WAIT_S) == -signal.SIGKILL
 
 
 def test_a_keeper_of_another_camera_is_left_alone(stage: Stage) -> None:
     odd = odd_keeper(stage, '{"busy": "/dev/video10"}')
-    _, said = stage.camera(10).communicate(timeout=20)
+    _, said = stage.camera(10).communicate(timeout=WAIT_S)
     assert "publishes to /dev/video10 already" in said
     assert odd.poll() is None
 
@@ -269,15 +266,14 @@ def test_where_a_device_is_named_the_cure_is_another_one(stage: Stage) -> None:
         keeper.greet()
 
 
-def test_a_camera_that_is_stopped_for_a_while_is_bridged(stage: Stage) -> None:
+def test_a_camera_that_is_stopped_for_a_while_is_bridged(stage: Stage, bridged: Callable[[str], None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
     first.send_signal(signal.SIGSTOP)
-    time.sleep(2)
+    stage.goes_on()
     first.send_signal(signal.SIGCONT)
-    seen = len(stage.shown())
-    stage.wait_for(10, seen)
-    assert stage.gap_s() < LONGEST_GAP_S
+    stage.goes_on()
+    bridged("the camera stands still")
 
 
 def test_its_socket_is_its_user_s_alone_and_it_is_small(stage: Stage) -> None:

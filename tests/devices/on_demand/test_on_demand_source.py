@@ -17,10 +17,8 @@ from relit_camera.devices.sources.source import SourceInfo, SourceState
 from relit_camera.devices.sources.webcam_source import WebcamSource
 from relit_camera.live.publishing.placeholder_image import placeholder
 from tests.devices.fake_devices import FakeCapture, FakeTree
-from tests.small_camera import SIZE, difference, grey, running_camera, wait_until
+from tests.small_camera import PATIENT, SIZE, difference, grey, running_camera, wait_until
 from tests.virtual_clock import VirtualClock
-
-pytestmark = pytest.mark.real_time
 
 
 class CountingSource:
@@ -179,7 +177,7 @@ def test_a_webcam_is_really_closed(tmp_path: Path) -> None:
         assert len(captures) == turn
         wanted.on = False
         source.read(0.01)
-        assert captures[-1].released
+        wait_until(lambda: captures[-1].released)
     source.close()
 
 
@@ -216,7 +214,7 @@ def test_the_camera_lives_on_while_its_webcam_is_released(tmp_path: Path) -> Non
     demand = DemandMonitor(readers, idle_timeout_s=0.3)
     source = OnDemandSource(cameras(), cameras, demand.wanted)
     released = placeholder(SIZE, "the webcam is off until somebody looks")
-    with running_camera(tmp_path, source=source) as camera:
+    with running_camera(tmp_path, source=source, timings=PATIENT) as camera:
         wait_until(lambda: camera.status()["state"] == "released")
         wait_until(lambda: difference(camera.sink.new[-1], released) == 0)
         assert camera.status()["degraded"] == []
