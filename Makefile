@@ -71,7 +71,7 @@ pytest: setup ## the tests alone, in one process more than there are cores; make
 	TEST_PART=pipewire $(BIN)/python -m pytest tests/pipewire
 	TEST_PART=browser $(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
 	TEST_PART=vm $(BIN)/python -m pytest tests/vm
-	$(BIN)/python -m tests.gate.durations
+	$(BIN)/python -m tests.durations
 
 studies: setup ## the long tests that `make test` leaves out
 	$(BIN)/python -m pytest -m study tests

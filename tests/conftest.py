@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from tests.cli.relit_command import Material, write_material
 from tests.made_once import run_folder
 
-pytest_plugins = ["tests.report_tables", "tests.gate.durations"]
+pytest_plugins = ["tests.report_tables", "tests.durations"]
 
 # A test's time depends on what else the machine does: pytest-timeout holds the whole, not each example.
 # The same examples on every run, so that a red run is of the change it tests; HYPOTHESIS_PROFILE=explore seeks others.

@@ -195,6 +195,7 @@ def tried(overlay: Overlay, mutant: Mutant, files: Sequence[str], times: Mapping
 
 def run(mutants: Sequence[Mutant], tests: Path, marks: str, jobs: int, most_s: float, out: Path) -> dict[str, Any]:
     """Try mutants, and write what is found as it is found; what the file holds already is not done again."""
+    out.parent.mkdir(parents=True, exist_ok=True)
     results: dict[str, Any] = json.loads(out.read_text()) if out.exists() else {"times": {}, "mutants": {}}
     files, free, writing = TestFiles(tests), queue.SimpleQueue[Overlay](), Lock()
     ranks = {mutant.id: files.near(mutant.module) for mutant in mutants if mutant.id not in results["mutants"]}
@@ -312,7 +313,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     running.add_argument("--real-time", action="store_true", help="such tests too; with --jobs 1 on an idle machine")
     running.add_argument("--jobs", type=int, default=2)
     running.add_argument("--most", type=float, default=MOST_S, metavar="SECONDS", help="of tests for a mutant")
-    running.add_argument("--out", type=Path, default=Path("mutation.json"), help="what it holds is not done again")
+    running.add_argument(
+        "--out", type=Path, default=ROOT / "build/mutation.json", help="what it holds is not done again"
+    )
     comparing = commands.add_parser("compare")
     comparing.add_argument("before", type=Path)
     comparing.add_argument("after", type=Path)

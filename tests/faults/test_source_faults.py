@@ -109,7 +109,7 @@ def test_it_stops_in_time_while_the_webcam_hangs(tmp_path: Path, tree: FakeTree)
         wait_until(hanging.is_stuck.is_set)
         camera_service, began = watched.camera.camera_service, time.monotonic()
         camera_service.stop()
-        assert time.monotonic() - began < MOST_STOP_S
+        assert watched.lateness.unexplained_s(began, time.monotonic()) < MOST_STOP_S
         # What else is late on a busy machine ends.
         wait_until(lambda: camera_service.hung_threads == ["source-webcam"])
         hanging.unstick.set()

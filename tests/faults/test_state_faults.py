@@ -23,6 +23,7 @@ from relit_camera.live.supervision.pipeline_health import HealthLimits
 from relit_camera.subject.subject_file import write_subject
 from tests.faults.watched_camera import HANG_S, MOST_STOP_S, STOP_S, Survived, TimedSink, watched_camera
 from tests.generated_subject import small_subject
+from tests.lateness import Lateness
 from tests.small_camera import (
     FPS,
     PATIENT,
@@ -127,12 +128,12 @@ def test_the_virtual_camera_is_gone_for_a_while(tmp_path: Path) -> None:
 
 def test_it_stops_in_time_while_the_driver_hangs(tmp_path: Path) -> None:
     sink = FaultySink()
-    with running_camera(tmp_path, sink=sink, timings=SOON_STOPPED) as camera:
+    with Lateness() as lateness, running_camera(tmp_path, sink=sink, timings=SOON_STOPPED) as camera:
         sink.wait_for(3)
         sink.hang()
         began = time.monotonic()
         camera.camera_service.stop()
-        assert time.monotonic() - began < MOST_STOP_S
+        assert lateness.unexplained_s(began, time.monotonic()) < MOST_STOP_S
         wait_until(lambda: camera.camera_service.hung_threads == ["publisher"])
         sink.release.set()
 
@@ -166,7 +167,7 @@ def test_a_picture_that_gave_way_does_not_come_back_by_holding(tmp_path: Path) -
         for frozen in (True, False):
             camera.put("freeze", frozen=frozen)
             count = camera.sink.count
-            wait_until(lambda count=count: camera.sink.count > count + 10)  # type: ignore[misc]
+            wait_until(lambda count=count: camera.sink.count > count + 20)  # type: ignore[misc]
             assert difference(camera.sink.new[-1], waiting) == 0
 
 
@@ -201,7 +202,7 @@ def test_a_late_picture_does_not_replace_the_placeholder(tmp_path: Path) -> None
             shown, count = len(camera.sink.new), camera.sink.count
             tracker.release.set()
             wait_until(lambda: camera.camera_service.status().frames.dropped == 1)
-            wait_until(lambda: camera.sink.count > count + 10)
+            wait_until(lambda: camera.sink.count > count + 20)
             assert len(camera.sink.new) == shown
             assert events.empty()  # nor is it said to be live
 

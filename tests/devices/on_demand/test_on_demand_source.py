@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -214,7 +215,7 @@ def test_the_camera_lives_on_while_its_webcam_is_released(tmp_path: Path) -> Non
     demand = DemandMonitor(readers, idle_timeout_s=0.3)
     source = OnDemandSource(cameras(), cameras, demand.wanted)
     released = placeholder(SIZE, "the webcam is off until somebody looks")
-    with running_camera(tmp_path, source=source, timings=PATIENT) as camera:
+    with running_camera(tmp_path, source=source, timings=replace(PATIENT, stale_after_s=0.5)) as camera:
         wait_until(lambda: camera.status()["state"] == "released")
         wait_until(lambda: difference(camera.sink.new[-1], released) == 0)
         assert camera.status()["degraded"] == []

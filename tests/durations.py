@@ -1,19 +1,19 @@
 """How long each test took: `build/durations.json`, to which every part of `make pytest` adds its own.
 
-`python -m tests.gate.durations` prints it, summed by folder.
+`python -m tests.durations` prints it, summed by folder.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 FILE = ROOT / "build" / "durations.json"
 PART_VARIABLE = "TEST_PART"
 """Names the part of the tests that a pytest process runs. Where it is not set nothing is stored."""
@@ -24,11 +24,11 @@ class _Stopwatch:
 
     def __init__(self, part: str) -> None:
         self._part = part
-        self._seconds: Counter[str] = Counter()
+        self._seconds: defaultdict[str, float] = defaultdict(float)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         name, _, group = report.nodeid.rpartition("@")  # pytest-xdist adds the group, where there is one
-        self._seconds[name if name and "]" not in group else report.nodeid] += report.duration  # type: ignore[assignment]
+        self._seconds[name if name and "]" not in group else report.nodeid] += report.duration
 
     def pytest_sessionfinish(self) -> None:
         add_durations(self._part, self._seconds)
@@ -59,14 +59,15 @@ def read_durations(path: Path | None = None) -> dict[str, dict[str, float]]:
 def by_folder(durations: Mapping[str, Mapping[str, float]]) -> list[tuple[str, int, float]]:
     """Of each folder of `tests`, the longest first: its name, how many tests ran, and their seconds together."""
     count: Counter[str] = Counter()
-    seconds: Counter[str] = Counter()
+    seconds: defaultdict[str, float] = defaultdict(float)
     for tests in durations.values():
         for name, took in tests.items():
             places = name.partition("::")[0].split("/")
             folder = "/".join(places[:2]) if len(places) > 2 else "tests"
             count[folder] += 1
-            seconds[folder] += took  # type: ignore[assignment]
-    return [(folder, count[folder], took) for folder, took in seconds.most_common()]
+            seconds[folder] += took
+    longest_first = sorted(seconds, key=lambda folder: -seconds[folder])
+    return [(folder, count[folder], seconds[folder]) for folder in longest_first]
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.gate.durations import PART_VARIABLE, ROOT, add_durations, by_folder, read_durations
+from tests.durations import PART_VARIABLE, ROOT, add_durations, by_folder, read_durations
 
 
 def test_each_part_is_kept_beside_the_others(tmp_path: Path) -> None:
@@ -39,7 +39,7 @@ def test_a_run_stores_each_test_once(processes: tuple[str, ...], tmp_path: Path)
         "def test_that(of): time.sleep(0.2)\n"
     )
     program = (
-        "import sys, pytest; from pathlib import Path; from tests.gate import durations\n"
+        "import sys, pytest; from pathlib import Path; from tests import durations\n"
         "durations.FILE = Path('d.json').resolve()\n"
         "sys.exit(pytest.main(sys.argv[1:], plugins=[durations]))"
     )
