@@ -138,6 +138,14 @@ def test_errors_name_file_line_key_and_value(write: WriteConfig, text: str, line
     assert error.value.cure
 
 
+def test_a_wrong_part_of_a_list_that_the_file_has_shorter_is_refused(
+    write: WriteConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RELIT_SERVER__NAMES", '["a", "B"]')
+    with pytest.raises(ConfigError, match=r"server\.names\.1: .*'B'"):
+        load_settings(write("server:\n  names: [a]\n"))
+
+
 def test_broken_yaml_is_said_with_its_line(write: WriteConfig) -> None:
     path = write("server:\n  port: [1\nlog_level: info\n")
     with pytest.raises(ConfigError, match=rf"{path} line [234]: .*; correct the YAML"):

@@ -11,7 +11,7 @@ import pytest
 
 from relit_camera.base.errors import ImageError
 from relit_camera.base.images import image_files, image_limits
-from relit_camera.base.images.image_files import read_linear, read_mask, write_linear
+from relit_camera.base.images.image_files import decode_display, read_linear, read_mask, write_linear
 from relit_camera.base.images.image_limits import image_header_of_file
 
 GREY = np.array([[0, 51, 255], [102, 255, 0]], np.uint8)
@@ -89,3 +89,9 @@ def test_what_is_no_picture_is_said(tmp_path: Path) -> None:
     path.write_bytes(b"GIF89a" + bytes(100))
     with pytest.raises(ImageError, match="none of PNG, JPEG, WebP, BMP and TIFF"):
         read_linear(path)
+
+
+def test_codes_of_16_bits_are_shown_as_the_nearest_of_8() -> None:
+    codes = np.arange(1 << 16, dtype=np.uint16).reshape(256, 256)
+    shown = decode_display(cv2.imencode(".png", codes)[1].tobytes())
+    np.testing.assert_array_equal(shown, np.rint(codes / 257)[..., None].repeat(3, axis=2))

@@ -71,6 +71,15 @@ def test_a_side_of_a_tiff_file_stands_in_its_entry() -> None:
         image_header(tiff([(256, 16, 1, 64), (257, 4, 1, 64)]))
 
 
+@pytest.mark.parametrize("start", [b"P5\n#    WEBP", b"RIFF\0\0\0\0WAVE"], ids=["a picture of another kind", "a sound"])
+def test_a_webp_file_is_known_by_both_its_signatures(start: bytes) -> None:
+    """The first is a PGM picture of 9000x9000 pixels for OpenCV, with the header of a small WebP file in a comment."""
+    webp = encoded(".webp", 64, 64)
+    assert image_header(webp).size == (64, 64)
+    with pytest.raises(ValueError, match="none of PNG"):
+        image_header(start + webp[len(start) : 40].replace(b"\n", b" ") + b"\n9000 9000\n255\n")
+
+
 @pytest.mark.parametrize(
     ("width", "height", "pixel_bytes", "allowed"),
     [

@@ -296,6 +296,13 @@ def test_why_it_cannot_be_opened_is_told() -> None:
     assert keeper.step() is None
 
 
+def test_memory_that_its_pictures_would_not_fit_into_is_refused(bench: Bench) -> None:
+    short = memoryview(bench.memory)[:-1]
+    assert bench.keeper.handle({"memory": True}, short) == {
+        "error": ["DeviceError", "the keeper holds nothing of that size", ""]
+    }
+
+
 def test_the_same_picture_again_is_the_same_object(bench: Bench) -> None:
     bench.publish(7)
     assert bench.keeper.handle({"picture": 0, "repeatable": True}) == {}
