@@ -56,6 +56,13 @@ def test_an_outlier_does_not_move_it() -> None:
     np.testing.assert_allclose(neutral.pose.translation, (0, 0, -50), atol=0.5)
 
 
+@pytest.mark.parametrize("angles", [(12, 0, 0), (0, 0, 12), (0, 0, -12)], ids=["turned", "tilted right", "tilted left"])
+def test_the_straightest_frames_are_taken(angles: tuple[float, float, float]) -> None:
+    neutral, _ = feed(NeutralFaceFinder(), [face(*angles)] * 18 + [face()] * 15)
+    assert neutral is not None
+    np.testing.assert_allclose(angles_from_rotation(neutral.pose.rotation), 0, atol=0.5)
+
+
 def test_uncertain_and_lost_states_are_never_taken() -> None:
     assert feed(NeutralFaceFinder(), [face(status=FaceStatus.UNCERTAIN)] * 200)[0] is None
     assert feed(NeutralFaceFinder(any_pose=True), [face(status=FaceStatus.UNCERTAIN)] * 200)[0] is None

@@ -25,6 +25,15 @@ def test_each_thing_that_the_face_does_becomes_a_still_and_rest_does_not() -> No
     assert set(DOING) <= set(selection.covered)
 
 
+def test_what_nobody_is_asked_for_becomes_a_still_too_where_it_looks_different() -> None:
+    different = [tracked(110, moved_points(open_cm=1.0)), tracked(111, moved_points(shut=0.5))]
+    different += [tracked(112, moved_points(), pitch=16)]
+    alike = tracked(113, moved_points(open_cm=1.05))
+    chosen = {face.index for face in select_stills(film(*REST, *DOING.values(), *different, alike)).faces}
+    assert {110, 111, 112} <= chosen
+    assert 113 not in chosen
+
+
 def test_a_glance_gives_no_still() -> None:
     """Open eyes are the source image's, moved: a still of them would never show."""
     glance = tracked(150, moved_points(gaze_cm=0.3))

@@ -61,6 +61,15 @@ def test_a_stranger_who_takes_the_persons_place_is_found_out() -> None:
     assert isinstance(found[-1], FaceMismatch)
 
 
+def test_a_stranger_is_found_out_though_no_frame_was_without_a_face() -> None:
+    """What tells that somebody else came is then only that the neutral face was measured anew."""
+    check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
+    person, times = before_the_camera(), iter(np.arange(0, 60, 0.5))
+    assert all(check.check(person, NO_LIGHT_EXPLAINS, next(times)) is None for _ in range(20))
+    found = [check.check(stranger, NO_LIGHT_EXPLAINS, next(times)) for _ in range(10)]
+    assert isinstance(found[-1], FaceMismatch)
+
+
 def test_a_mismatch_is_over_when_the_subject_is_back_and_not_before() -> None:
     check, stranger = IdentityCheck(face_of(close_up())), before_the_camera(points=stranger_points())
     found = [check.check(stranger, NO_LIGHT_EXPLAINS, time_s) for time_s in (0.0, 1.9)][-1]
