@@ -88,11 +88,11 @@ def test_who_does_nothing_is_told_what_to_do() -> None:
     assert webcam.seconds < len(PROMPTS) * (TUNABLES.longest_s + 1)
 
 
-def test_nobody_before_the_webcam_ends_it_soon() -> None:
+def test_nobody_before_the_webcam_ends_it_soon_but_not_at_once() -> None:
     webcam = Webcam(lambda asked: None)
     with pytest.raises(CaptureError, match="no face is seen"):
         webcam.film()
-    assert webcam.seconds < 15
+    assert 5 < webcam.seconds < 15, "they may still be sitting down"
     assert not any(state.face for state in webcam.told)
 
 

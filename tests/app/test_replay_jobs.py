@@ -28,7 +28,9 @@ from tests.small_camera import wait_until
 class Room:
     """A scene with a subject of a file, a listener, and the jobs under test; its folder outlives it."""
 
-    def __init__(self, folder: Path, write: ReplayWriter, settings: RelitSettings | None = None) -> None:
+    def __init__(
+        self, folder: Path, write: ReplayWriter, settings: RelitSettings | None = None, event_interval_s: float = 0.0
+    ) -> None:
         storage = StorageSettings(data_dir=folder)
         self.folder = storage.replays
         self.scenes = SceneController(storage)
@@ -39,7 +41,7 @@ class Room:
         self._listening = events.listen()
         self.events = self._listening.__enter__()
         settings = (settings or RelitSettings()).model_copy(update={"storage": storage})
-        limits = ReplayLimits(timeout_s=120.0, event_interval_s=0.0)
+        limits = ReplayLimits(timeout_s=120.0, event_interval_s=event_interval_s)
         self.settings = settings
         self.jobs = ReplayJobs(self.folder, lambda: self.settings, self.scenes, events, write, limits)
 
@@ -203,6 +205,14 @@ def test_an_upload_that_breaks_off_or_is_removed_is_not_begun(room: Opener) -> N
     assert there.jobs.all() == []
 
 
+def test_the_end_is_told_however_soon_it_comes(tmp_path: Path) -> None:
+    there = Room(tmp_path, write_quickly, event_interval_s=3600.0)
+    with pytest.raises(OSError, match="gone"), there.jobs.receive("talk", "my talk.mov"):
+        raise OSError("the browser is gone")
+    assert there.stages() == ["receiving", "canceled"]
+    there.jobs.close()
+
+
 def test_work_that_cannot_begin_leaves_nothing(room: Opener, monkeypatch: pytest.MonkeyPatch) -> None:
     there = room(write_quickly)
 
@@ -259,6 +269,7 @@ def test_a_real_video_is_relit(tmp_path: Path) -> None:
     there.send(data=demo_files.CLIP.read_bytes())
     done = there.end()
     assert done.stage is ReplayStage.DONE, done
+    assert "no face" not in done.what
     before, after = probe_video(demo_files.CLIP), probe_video(there.jobs.video("talk"))
     assert (after.width, after.height, done.frames) == (before.width, before.height, before.frames)
     with VideoReader(demo_files.CLIP) as live, VideoReader(there.jobs.video("talk")) as relit:

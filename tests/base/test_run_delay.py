@@ -51,7 +51,7 @@ def test_a_thread_that_shares_a_processor_waits_for_it_and_one_that_sleeps_does_
         worker = threading.Thread(target=work)
         worker.start()
         worker.join()
-        assert waited[0] > 0.2
+        assert 0.2 < waited[0] < 60
         assert run_delay_s(sleeper.native_id) == before
     finally:
         woken.set()

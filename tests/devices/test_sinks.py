@@ -5,6 +5,7 @@ from itertools import repeat
 from pathlib import Path
 from types import SimpleNamespace
 
+import av
 import cv2
 import numpy as np
 import pytest
@@ -340,6 +341,8 @@ def test_a_file_keeps_the_times_of_publishing(tmp_path, monkeypatch):
         frames = list(video)
     assert [read_number(frame.image) for frame in frames] == [0, 1, 2, 3]
     assert [frame.time_s for frame in frames] == pytest.approx([0, 0.1, 0.15, 1.0], abs=1e-3)
+    with av.open(str(path)) as film:
+        assert film.streams.video[0].start_time == 0  # the reader counts from the first picture, players do not
 
 
 def test_a_file_that_failed_is_lost_and_says_so_to_the_end(tmp_path, monkeypatch):
