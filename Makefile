@@ -4,14 +4,9 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
-PROCESSES ?= $(shell expr $$(nproc 2>/dev/null || echo 2) + 1)
-# Tests that take both cores, and the measurement of what a picture costs, which tells nothing beside others.
-BY_THEMSELVES := tests/vm tests/browser tests/pipewire tests/lab/bench/test_recorded_cost.py
-TOGETHER := -n $(PROCESSES) --dist loadgroup --no-loadscope-reorder $(BY_THEMSELVES:%=--ignore=%)
-
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test check lint types layers scripts generated image-steps tool-install pytest studies fuzz coverage browser test-browser pipewire test-pipewire vm test-vm vm-picture clean
+.PHONY: help setup demo test test-all lint types layers scripts generated image-steps tool-install studies fuzz coverage browser pipewire test-pipewire vm test-vm vm-picture clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -25,9 +20,11 @@ $(INSTALLED): pyproject.toml scripts/setup.sh
 demo: setup ## show the camera in a browser with a bundled person, until Ctrl-C; make demo DEMO="--seconds 20 --headless"
 	$(BIN)/relit demo $(DEMO)
 
-test: check ## all checks and tests, as CI runs them
+test: setup ## the checks and tests that the change needs, as CI runs them; make test PARTS="lint unit"
+	$(BIN)/python -m tests.gate $(PREPARE) $(PARTS)
 
-check: lint types layers scripts generated image-steps pytest ## the same
+test-all: setup ## all of them, on Debian as root; notes what has passed in tests/gate/passed.json, to be committed
+	$(BIN)/python -m tests.gate --all --record
 
 lint: setup ## style and formatting
 	$(BIN)/ruff check
@@ -60,35 +57,19 @@ image-steps: setup ## the image's build without Docker: a wheel, installed by it
 tool-install: setup ## the wheel as users install it, used from an empty home; make tool-install WITH=pipx
 	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
-# What is compiled once need not be by each of the hundreds of processes that tests start.
-pytest: export PYTHONDONTWRITEBYTECODE =
-pytest: setup ## the tests alone, in one process more than there are cores; make pytest PROCESSES=4
-	rm -f build/durations.json
-	TEST_PART=together $(BIN)/python -m pytest $(TOGETHER)
-	TEST_PART=cost $(BIN)/python -m pytest tests/lab/bench/test_recorded_cost.py
-	# Browser and emulated machine would leave no core to tests that hold in real time.
-	# Of the browser's tests each may run in any process: those of a file take up to four minutes.
-	TEST_PART=pipewire $(BIN)/python -m pytest tests/pipewire
-	TEST_PART=browser $(BIN)/python -m pytest -n 2 --dist worksteal tests/browser
-	TEST_PART=vm $(BIN)/python -m pytest tests/vm
-	$(BIN)/python -m tests.durations
-
 studies: setup ## the long tests that `make test` leaves out
 	$(BIN)/python -m pytest -m study tests
 
 fuzz: setup ## mutated files on every reader, for an hour; make fuzz FUZZ="--seconds 60 --seed 3"
 	$(BIN)/python -m tests.fuzz.fuzzing $(FUZZ)
 
-coverage: setup ## the first of these with the share of lines that they execute: build/coverage/index.html
-	$(BIN)/python -m pytest $(TOGETHER) --cov --cov-report=
+coverage: setup ## the share of lines that tests execute: build/coverage/index.html
+	PYTEST_ADDOPTS="--cov --cov-report=" $(BIN)/python -m tests.gate unit runs captures faults
 	$(BIN)/python scripts/coverage_summary.py
 	$(BIN)/coverage html --quiet --directory build/coverage
 
 browser: ## Debian's Chromium, in which the panel is tested (root on Debian)
 	sh tests/browser/install.sh
-
-test-browser: setup ## the panel in a real browser
-	$(BIN)/python -m pytest tests/browser
 
 pipewire: ## PipeWire and its tools, unpacked into a folder, with which the camera in it is tested (Debian)
 	sh tests/pipewire/install.sh

@@ -11,6 +11,7 @@ from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
 from tests.cli.relit_command import Material, write_material
+from tests.gate.parts import PARTS_VARIABLE, part_of
 from tests.made_once import run_folder
 
 pytest_plugins = ["tests.report_tables", "tests.durations"]
@@ -54,14 +55,18 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Group the tests for `pytest -n 3 --dist loadgroup`, and order the groups.
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out the tests of parts that are not asked for (`tests.gate`); group and order the others.
 
     A group runs in one process, one test after another: the tests of a file, which share its fixtures; all tests marked
     `real_time`, which would else slow each other; and all that use the virtual machine. The longest groups come first,
     so that no process waits for the others at the end; `--no-loadscope-reorder` keeps that order. First of all hooks,
     as pytest-xdist's reads the groups.
     """
+    if chosen := os.environ.get(PARTS_VARIABLE, "").split():
+        left_out = [item for item in items if _part(item) not in chosen]
+        items[:] = [item for item in items if _part(item) in chosen]
+        config.hook.pytest_deselected(items=left_out)
     slow = {_group(item) for item in items if item.get_closest_marker("slow")}
     for item in items:
         item.add_marker(pytest.mark.xdist_group(_group(item)))
@@ -72,6 +77,11 @@ def _group(item: pytest.Item) -> str:
     if item.path.parent.name == "vm":
         return MACHINE
     return REAL_TIME if item.get_closest_marker("real_time") else item.nodeid.partition("::")[0]
+
+
+def _part(item: pytest.Item) -> str:
+    path = item.path.relative_to(item.config.rootpath).as_posix()
+    return part_of(path, slow=item.get_closest_marker("slow") is not None).name
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,4 +1,4 @@
-"""How long each test took: `build/durations.json`, to which every part of `make pytest` adds its own.
+"""How long each test took: `build/durations.json`, to which every part of the gate adds its own.
 
 `python -m tests.durations` prints it, summed by folder.
 """

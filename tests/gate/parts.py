@@ -1,0 +1,218 @@
+"""The parts of the gate: what each does, how long it usually takes, and which paths it is about.
+
+A part without paths runs for every change, the others when a file there differs from what it was when they last passed.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+PYTHON = sys.executable
+PARTS_VARIABLE = "TEST_PARTS"
+"""Names the parts whose tests a run of pytest takes; all of them where it is not set."""
+
+_CODE = ("service", "tests", "models", "scripts", "pyproject.toml")
+_PROGRAM = ("service", "models", "config.yaml", "pyproject.toml")
+_CAPTURE = (
+    *(f"service/relit_camera/{name}" for name in ("__init__.py", "plugins.py", "base", "devices", "light", "subject")),
+    *(f"service/relit_camera/{name}" for name in ("face", "capture", "lab", "cli", "app/demo", "app/setup")),
+    *(f"service/relit_camera/live/{name}" for name in ("compositing", "reenactment", "scene", "render_quality.py")),
+    "service/relit_studio",
+    "pyproject.toml",
+)
+_CAPTURE_TESTS = ("tests/capture", "tests/subject", "tests/light", "tests/fuzz")
+_CAPTURE_HELPERS = (
+    ":(glob)tests/*.py",
+    *(f"tests/{name}.py" for name in ("app/subject_builders", "cli/relit_command", "lab/lit_sphere", "live/people")),
+    "tests/replay/materials.py",
+)
+
+
+@dataclass(frozen=True)
+class Need:
+    """What a part needs of the machine, and how it is made ready.
+
+    Attributes:
+        command: makes it ready; exit status 69 where it cannot be had here.
+        variables: are set where it is ready, so that no test is skipped for want of it.
+    """
+
+    command: tuple[str, ...]
+    variables: Mapping[str, str] = field(default_factory=dict)
+
+
+NEEDS = {
+    "Chromium": Need(("sh", "tests/browser/install.sh"), {"BROWSER_NEEDED": "1"}),
+    "PipeWire": Need(("sh", "tests/pipewire/install.sh"), {"PIPEWIRE_NEEDED": "1"}),
+    "newer PipeWire": Need(("sh", "tests/pipewire/install.sh", "bookworm-backports"), {"PIPEWIRE_NEEDED": "1"}),
+    "public networks": Need((PYTHON, "-m", "tests.package_index"), {"PACKAGE_INDEX_NEEDED": "1"}),
+    "virtual machine": Need(("sh", "tests/vm/build.sh")),
+}
+
+
+@dataclass(frozen=True)
+class Part:
+    """A check, or a set of tests.
+
+    Attributes:
+        name: one word.
+        does: what it checks.
+        usual: how long it takes on two cores.
+        command: of a part that runs by itself. Those without one share a run of pytest.
+        beside: it runs while others do, its output shown if it fails.
+        tests: paths whose tests are of this part, unless an earlier part has them.
+        slow: only those of them that are marked `slow`.
+        about: git pathspecs of the files that it depends on, its own tests included.
+        needs: names in `NEEDS`.
+        variables: of the command's environment.
+    """
+
+    name: str
+    does: str
+    usual: str
+    command: tuple[str, ...] = ()
+    beside: bool = False
+    tests: tuple[str, ...] = ()
+    slow: bool = False
+    about: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    variables: Mapping[str, str] = field(default_factory=dict)
+
+
+def pytest_command(*arguments: str) -> tuple[str, ...]:
+    """A run of pytest."""
+    return (PYTHON, "-m", "pytest", "-q", *arguments)
+
+
+FLOWS = ("tests/browser/test_first_minute.py", "tests/browser/test_privacy.py")
+
+PARTS = (
+    Part(
+        "types",
+        "static types of all code",
+        "100 s",
+        ("make", "--no-print-directory", "types"),
+        beside=True,
+        about=(":(glob)**/*.py", "pyproject.toml"),
+    ),
+    Part(
+        "image",
+        "the image's build without Docker: the wheel, installed by itself, shows a picture",
+        "60 s",
+        ("make", "--no-print-directory", "image-steps"),
+        beside=True,
+        about=("docker", "pyproject.toml", "scripts/check_installed.py", "service", ":(exclude,glob)service/**/*.py"),
+    ),
+    Part(
+        "tools",
+        "the wheel as people install it, with uv, used from an empty home",
+        "40 s",
+        ("make", "--no-print-directory", "tool-install"),
+        beside=True,
+        about=("pyproject.toml", "scripts/check_tool_install.sh", "service", ":(exclude,glob)service/**/*.py"),
+    ),
+    Part("lint", "style and formatting", "2 s", ("make", "--no-print-directory", "lint")),
+    Part("layers", "which package may import which", "5 s", ("make", "--no-print-directory", "layers")),
+    Part("scripts", "shell scripts, Dockerfile, compose files", "3 s", ("make", "--no-print-directory", "scripts")),
+    Part(
+        "generated", "files built from code are what it builds", "10 s", ("make", "--no-print-directory", "generated")
+    ),
+    Part(
+        "cost",
+        "what a picture costs, beside its record",
+        "60 s",
+        pytest_command("tests/lab/bench/test_recorded_cost.py"),
+        tests=("tests/lab/bench/test_recorded_cost.py",),
+        about=(
+            *(f"service/relit_camera/{package}" for package in ("live", "face", "subject", "light", "base/images")),
+            "tests/lab/bench/test_recorded_cost.py",
+            "tests/recorded_cost.py",
+            "pyproject.toml",
+        ),
+        needs=("public networks",),
+    ),
+    Part(
+        "vm",
+        "the camera on a real kernel, in a virtual machine",
+        "6 min",
+        pytest_command("tests/vm"),
+        tests=("tests/vm",),
+        about=("service/relit_camera/devices", "service/relit_camera/live/publishing", "tests/vm", "pyproject.toml"),
+        needs=("virtual machine",),
+    ),
+    Part(
+        "pipewire",
+        "the camera in a PipeWire session",
+        "60 s",
+        pytest_command("tests/pipewire"),
+        tests=("tests/pipewire",),
+        needs=("PipeWire",),
+    ),
+    Part(
+        "newer",
+        "the same with the next PipeWire",
+        "60 s",
+        pytest_command("tests/pipewire"),
+        tests=("tests/pipewire",),
+        about=("service/relit_camera/devices", "tests/pipewire", "pyproject.toml"),
+        needs=("newer PipeWire",),
+        variables={"PIPEWIRE_SUITES": "bookworm-backports"},
+    ),
+    Part(
+        "flows",
+        "the main ways through the panel, in Chromium",
+        "60 s",
+        pytest_command("-n", "2", "--dist", "worksteal", *FLOWS),
+        tests=FLOWS,
+        needs=("Chromium",),
+    ),
+    Part(
+        "panel",
+        "all else in the panel",
+        "4 min",
+        pytest_command("-n", "2", "--dist", "worksteal", "tests/browser", *(f"--ignore={path}" for path in FLOWS)),
+        tests=("tests/browser",),
+        about=("service/relit_camera/api", "service/relit_camera/app", "tests/browser"),
+        needs=("Chromium",),
+    ),
+    Part(
+        "faults",
+        "the camera while its devices, files and networks fail",
+        "60 s",
+        tests=("tests/faults", "tests/test_crash.py", "tests/test_soak.py"),
+        about=(*_PROGRAM, "tests/faults", ":(glob)tests/*.py"),
+    ),
+    Part(
+        "captures",
+        "whole films and pictures become subjects; studies of their accuracy",
+        "2 min",
+        tests=_CAPTURE_TESTS,
+        slow=True,
+        about=(*_CAPTURE, *_CAPTURE_TESTS, *_CAPTURE_HELPERS),
+    ),
+    Part(
+        "runs",
+        "whole runs of the program: commands, jobs, replays",
+        "3 min",
+        tests=("tests",),
+        slow=True,
+        about=(*_PROGRAM, "tests"),
+    ),
+    Part("unit", "each unit, and the API", "3 min", tests=("tests",), needs=("public networks",)),
+)
+
+
+def part_of(path: str, slow: bool) -> Part:
+    """The part that a test is of.
+
+    Args:
+        path: of its file, from the repository's root.
+        slow: it is marked so.
+    """
+    return next(
+        part
+        for part in PARTS
+        if (slow or not part.slow) and any(path == each or path.startswith(f"{each}/") for each in part.tests)
+    )
