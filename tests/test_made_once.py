@@ -38,6 +38,21 @@ def test_who_asks_at_the_same_time_waits_for_the_one_that_is_made() -> None:
     assert (found[0] / "inside.txt").read_text() == "whole"
 
 
+def test_what_is_kept_is_made_anew_when_a_maker_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    monkeypatch.setattr("tests.made_once.KEPT", tmp_path / "kept")
+    makers = dict.fromkeys(["service/a"], "1")
+    monkeypatch.setattr("tests.made_once.digest", lambda paths: "".join(makers[path] for path in paths))
+    path = made_once("file.txt", lambda path: path.write_text("first"), makers)
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path_factory.mktemp("another run")))
+    assert made_once("file.txt", lambda path: path.write_text("second"), makers).read_text() == "first"
+    makers["service/a"] = "2"
+    assert made_once("file.txt", lambda path: path.write_text("third"), makers).read_text() == "third"
+    assert not path.exists()
+    assert [each.name for each in (tmp_path / "kept" / "file.txt").iterdir()] == ["2"]
+
+
 def test_what_failed_half_way_is_made_anew() -> None:
     def fail(path: Path) -> None:
         path.write_text("half")

@@ -15,18 +15,22 @@ PARTS_VARIABLE = "TEST_PARTS"
 
 _CODE = ("service", "tests", "models", "scripts", "pyproject.toml")
 _PROGRAM = ("service", "models", "config.yaml", "pyproject.toml")
-_CAPTURE = (
+CAPTURE = (
     *(f"service/relit_camera/{name}" for name in ("__init__.py", "plugins.py", "base", "devices", "light", "subject")),
     *(f"service/relit_camera/{name}" for name in ("face", "capture", "lab", "cli", "app/demo", "app/setup")),
     *(f"service/relit_camera/live/{name}" for name in ("compositing", "reenactment", "scene", "render_quality.py")),
     "service/relit_studio",
     "pyproject.toml",
 )
+"""The code by which people are rendered and become subjects."""
 _CAPTURE_TESTS = ("tests/capture", "tests/subject", "tests/light", "tests/fuzz")
 _CAPTURE_HELPERS = (
     ":(glob)tests/*.py",
     *(f"tests/{name}.py" for name in ("app/subject_builders", "cli/relit_command", "lab/lit_sphere", "live/people")),
     "tests/replay/materials.py",
+    "tests/gate/__init__.py",
+    "tests/gate/choice.py",
+    "tests/gate/parts.py",
 )
 
 
@@ -190,7 +194,7 @@ PARTS = (
         "2 min",
         tests=_CAPTURE_TESTS,
         slow=True,
-        about=(*_CAPTURE, *_CAPTURE_TESTS, *_CAPTURE_HELPERS),
+        about=(*CAPTURE, *_CAPTURE_TESTS, *_CAPTURE_HELPERS),
     ),
     Part(
         "runs",

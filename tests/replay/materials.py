@@ -13,6 +13,7 @@ from relit_camera.capture.subject_builder import build_subject
 from relit_camera.capture.subject_landmarks import read_landmarks
 from relit_camera.subject.subject_file import SUFFIX, write_subject
 from relit_studio.mannequin.__main__ import generate
+from tests.gate.parts import CAPTURE
 from tests.made_once import made_once
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,7 +40,8 @@ def shared_folder() -> Path:
 
 def mannequin() -> Path:
     """The generated person: `olat/lights.lp`, `clip.mp4` and its true track, two seconds long and small."""
-    return made_once("mannequin", lambda folder: generate(folder, size=160, lights=48, frames=48, quiet=True))
+    makers = (*CAPTURE, "tests/replay/materials.py")
+    return made_once("mannequin", lambda folder: generate(folder, size=160, lights=48, frames=48, quiet=True), makers)
 
 
 @cache
