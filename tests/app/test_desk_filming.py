@@ -109,7 +109,7 @@ class Desk:
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Iterator[Callable[[DeskBuilder], Desk]]:
+def desk(tmp_path: Path, forked_workers: None) -> Iterator[Callable[[DeskBuilder], Desk]]:
     desks: list[Desk] = []
 
     def make(build: DeskBuilder) -> Desk:

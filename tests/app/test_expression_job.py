@@ -120,7 +120,7 @@ Opener = Callable[..., Studio]
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Opener]:
+def studio(tmp_path: Path, forked_workers: None) -> Iterator[Opener]:
     studios: list[Studio] = []
 
     def make(build: FilmedBuilder, build_of_video: VideoBuilder = add_of_video) -> Studio:

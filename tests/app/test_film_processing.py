@@ -79,7 +79,7 @@ Opener = Callable[[FilmBuilder], Studio]
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Opener]:
+def studio(tmp_path: Path, forked_workers: None) -> Iterator[Opener]:
     studios: list[Studio] = []
 
     def make(build: FilmBuilder) -> Studio:

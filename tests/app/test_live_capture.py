@@ -81,7 +81,7 @@ class Studio:
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[Callable[[SubjectBuilder], Studio]]:
+def studio(tmp_path: Path, forked_workers: None) -> Iterator[Callable[[SubjectBuilder], Studio]]:
     studios: list[Studio] = []
 
     def make(build: SubjectBuilder) -> Studio:
