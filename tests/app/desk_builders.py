@@ -5,7 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from pathlib import Path
+from unittest.mock import patch
 
+from relit_camera.app.captures.desk.desk_worker import write_desk_subject
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_files import decode_display
 from relit_camera.base.storage.atomic_files import atomic_path
@@ -14,6 +16,7 @@ from relit_camera.subject.subject_file import write_subject
 from tests.app.subject_builders import captured
 
 HALF = b"half a subject"
+SMALL_PX = 128
 
 
 def check_and_build(frames: Sequence[bytes], setup: str, path: Path) -> Sequence[str]:
@@ -26,6 +29,12 @@ def check_and_build(frames: Sequence[bytes], setup: str, path: Path) -> Sequence
         raise CaptureError(f"levels of {min(levels):.0f} to {max(levels):.0f}", "a fault of the test")
     write_subject(path, captured("desk"))
     return ["it was bright"]
+
+
+def write_small_subject(frames: Sequence[bytes], setup: str, path: Path) -> Sequence[str]:
+    """What the camera's own builder writes, at half its width and height: most of the time goes into pixels."""
+    with patch("relit_camera.capture.desk.desk_capture.SIZE_PX", SMALL_PX):
+        return write_desk_subject(frames, setup, path)
 
 
 def refuse_desk(frames: Sequence[bytes], setup: str, path: Path) -> Sequence[str]:

@@ -16,7 +16,6 @@ import numpy as np
 
 from relit_camera.app.captures.desk.controls_note import ControlsNote
 from relit_camera.app.captures.desk.desk_filming import DeskFilming, FilmingTimings
-from relit_camera.app.captures.desk.desk_worker import write_desk_subject
 from relit_camera.base.array_types import Float32Array
 from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.config.settings import StorageSettings
@@ -33,6 +32,7 @@ from relit_camera.live.status.desk_status import DeskPlace, DeskStage
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.subject_file import read_subject
+from tests.app.desk_builders import SMALL_PX, write_small_subject
 from tests.capture.desk.bundled_person import bundled_person
 from tests.capture.instant.conftest import models, pulled_models
 from tests.devices.test_webcam_controls import FakeWebcam
@@ -85,7 +85,7 @@ def person_at_the_desk() -> SimulatedFrames:
     person = bundled_person()
     lights = np.zeros((0, MONITOR.patches.count), np.float32)
     pictures = person.patch_pictures(MONITOR)
-    return SimulatedFrames(person, pictures, lights, SimulatedWebcam(room=0.5), None, MONITOR)
+    return SimulatedFrames(person, pictures, lights, SimulatedWebcam(size=(480, 360), room=0.5), None, MONITOR)
 
 
 def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: Path) -> None:
@@ -98,7 +98,7 @@ def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: 
         recorder,
         scenes,
         EventHub(),
-        write_desk_subject,
+        write_small_subject,
         lambda: nullcontext(desk.webcam),
         ControlsNote(tmp_path, lambda: "fake webcam"),
         lambda: 1 / 20,
@@ -115,11 +115,12 @@ def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: 
     def webcam() -> None:
         random, index = np.random.default_rng(0), 0
         while not stop.is_set():
+            if filming.status().stage is DeskStage.BUILDING:
+                stop.wait(0.1)  # nobody looks; a picture takes the time of a core
+                continue
             captured_at = time.monotonic()  # a webcam's picture takes a moment, this one up to half a second
             recorder.offer(Frame(desk.picture(random), index, captured_at, index / 20))
             index += 1
-            if filming.status().stage is DeskStage.BUILDING:
-                stop.wait(0.5)  # nobody looks; a picture takes the time of a core
 
     threads = [threading.Thread(target=work) for work in (page, webcam)]
     for thread in threads:
@@ -138,10 +139,11 @@ def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: 
     assert scenes.scene.look.mode is Mode.RATIO
     found = read_subject(scenes.subject_path("me"))
     assert (found.metadata.rung, found.metadata.lights) == ("desk", MONITOR.patches.count)
+    assert (found.metadata.width, found.metadata.height) == (SMALL_PX, SMALL_PX)
     assert 0 < (found.metadata.measured_fraction or 0) < 0.2
     right, left = (np.zeros((32, 64, 3), np.float32) for _ in range(2))
     right[texel_directions()[..., 0] > 0.8] = left[texel_directions()[..., 0] < -0.8] = 1
     lit = luminance(BasisRelighter(found).relight(np.stack([right, left])))
     nose = found.landmarks[SCHEME][NOSE_TIP]
-    cheek = np.s_[int(nose[1]) - 10 : int(nose[1]) + 10, int(nose[0]) + 20 : int(nose[0]) + 45]
+    cheek = np.s_[int(nose[1]) - 5 : int(nose[1]) + 5, int(nose[0]) + 10 : int(nose[0]) + 22]
     assert lit[0][cheek].mean() > 3 * lit[1][cheek].mean(), "the right cheek is lit from the right"
