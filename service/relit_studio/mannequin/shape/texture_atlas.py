@@ -120,9 +120,11 @@ def _paint_brow(face: Albedo, brow: Float64Array, random: np.random.Generator) -
     for start in random.uniform(3, 89, 700):
         root = lower[int(start)] + (upper[int(start)] - lower[int(start)]) * random.uniform(0, 0.85)
         tip = upper[max(int(start - random.uniform(5, 12)), 0)]
+        ends = np.stack([root, root + 0.6 * (tip - root)])
         hair = np.zeros(face.shape[:2], np.uint8)
-        _line(hair, np.stack([root, root + 0.6 * (tip - root)]), 1)
-        mask += hair / 255.0
+        _line(hair, ends, 1)
+        (left, top), (right, bottom) = ends.min(axis=0).astype(int) - 3, ends.max(axis=0).astype(int) + 4
+        mask[top:bottom, left:right] += hair[top:bottom, left:right] / 255.0
     body = gaussian_filter(_filled(face.shape[:2], np.concatenate([upper, lower[::-1]])), 2.5)
     hairs = 1 - np.exp(-0.5 * gaussian_filter(mask, 0.6))
     fade = 0.55 * body + 0.6 * hairs
