@@ -304,7 +304,7 @@ def test_bench_says_what_is_missing_before_it_measures(out: Path) -> None:
 
 
 def test_a_command_told_to_end_leaves_nothing(out: Path, tmp_path: Path) -> None:
-    long = write_material(tmp_path, frames=1500)
+    long = write_material(tmp_path, frames=400)
     process = start(
         "replay", long.clip, "--subject", long.subject, "--environment", "studio", "--tracker", long.tracker,
         "--out", out / "x.mp4", folder=tmp_path,

@@ -12,6 +12,7 @@ import pytest
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.rotations import Rotation
 from relit_camera.capture.desk import desk_capture
+from relit_camera.capture.desk.desk_recording import DeskRecording
 from relit_camera.capture.desk.person import desk_face
 from relit_camera.face.detection.face_detector import Detection
 from relit_camera.face.head_pose import HeadPose
@@ -31,11 +32,20 @@ class Found:
         return self.faces
 
 
-def test_a_recorded_folder_becomes_a_subject(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module")
+def good() -> DeskRecording:
+    """A recording that becomes a subject."""
+    return film(lambertian_person())
+
+
+def test_a_recorded_folder_becomes_a_subject(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, good: DeskRecording
+) -> None:
+    monkeypatch.setattr(desk_capture, "SIZE_PX", 128)  # a quarter of the pixels, a third of the time
     # An ellipsoid is no person to a network.
     monkeypatch.setattr(desk_capture, "segment_person", lambda picture: None)
     monkeypatch.setattr(desk_capture, "find_mesh_landmarks", lambda picture: None)
-    folder, out = write_recording(tmp_path / "evening", film(lambertian_person())), tmp_path / "me.relit"
+    folder, out = write_recording(tmp_path / "evening", good), tmp_path / "me.relit"
     answer = call("capture", "desk", "--frames", folder, "--out", out)
     assert answer.code == 0, answer.err
     assert "6 patches" in answer.out
@@ -54,11 +64,12 @@ def test_what_is_missing_or_wrong_is_named_and_nothing_is_left(tmp_path: Path) -
     assert [path.name for path in tmp_path.iterdir()] == ["desk.json"]
 
 
-def test_a_bad_recording_is_one_clear_line_and_nothing_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bad_recording_is_one_clear_line_and_nothing_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, good: DeskRecording
+) -> None:
     monkeypatch.setattr(desk_capture, "segment_person", lambda picture: None)
     monkeypatch.setattr(desk_capture, "find_mesh_landmarks", lambda picture: None)
-    out, person = tmp_path / "me.relit", lambertian_person()
-    good = film(person)
+    out = tmp_path / "me.relit"
     frames = [good.frames[index] for index in range(len(good.frames))]
     walls = [np.full_like(frame, frame[:20, :20].mean(axis=(0, 1)).astype(np.uint8)) for frame in frames]
     gone = [*frames[:96], *walls[96:]]
@@ -86,23 +97,25 @@ def test_a_bad_recording_is_one_clear_line_and_nothing_is_left(tmp_path: Path, m
         ("white", replace(good, frames=[white[frame] for frame in frames]), [], "over-exposed"),
         ("small", replace(good, setup=searched), [small], "only 70 pixels high"),
         ("left", replace(good, frames=gone), [], "stay before the webcam"),
-        ("turned", film(person, turned, said=SETUP), [], "mirrored"),
+        ("turned", film(lambertian_person(), turned, said=SETUP), [], "mirrored"),
         ("nobody", replace(good, setup=searched), [], "no face is seen"),
         ("two", replace(good, setup=searched), [face, face], "two faces are seen"),
     ):
         monkeypatch.setattr(desk_face, "open_face_detector", lambda faces=faces: Found(faces))
-        folder = write_recording(tmp_path / name, recording)
+        folder = write_recording(tmp_path / name, recording, ".jpg")
         call("capture", "desk", "--frames", folder, "--out", out).complains(words)
         assert not out.exists()
 
 
-def test_somebody_who_looks_aside_is_told_and_nothing_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_somebody_who_looks_aside_is_told_and_nothing_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, good: DeskRecording
+) -> None:
     """The tracker follows a profile, but not from the front."""
     pose = HeadPose(Rotation.from_rotvec([0, np.radians(60), 0]), np.array([0.0, 0.0, -60.0]), 640.0)
     for visible, words in ((True, "turned away from the webcam by 60 degrees"), (False, "seen from the side")):
         state = SimpleNamespace(visible=visible, pose=pose, landmarks=np.zeros((478, 2), np.float32))
         monkeypatch.setattr(desk_face, "open_tracker", lambda name, options: None)
         monkeypatch.setattr(desk_face, "track_still", lambda picture, tracker, state=state: state)
-        folder = write_recording(tmp_path / words, film(lambertian_person()))
+        folder = write_recording(tmp_path / words, good, ".jpg")
         call("capture", "desk", "--frames", folder, "--out", tmp_path / "me.relit").complains(words)
         assert not (tmp_path / "me.relit").exists()

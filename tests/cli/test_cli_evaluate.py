@@ -64,8 +64,9 @@ def test_olat_prints_each_list(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     lights = folder / "captured" / "lights.lp"
     answer = call(
-        "evaluate", "olat", lights, folder / "truth", "--hold-out", "every=3", "--within-deg", 60, "--out", out
-    )
+        "evaluate", "olat", lights, folder / "truth", "--hold-out", "every=3", "--within-deg", 60, "--out", out,
+        "--method", "nearest", "--method", "barycentric",
+    )  # fmt: skip
     assert answer.code == 0, answer.err
     assert "captured/lights.lp, every 3" in answer.out
     assert "truth/lights.lp, every 3" in answer.out

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.capture.instant.instant_capture import build_instant_subject
@@ -38,11 +39,19 @@ def talking(talk: Path) -> list[np.ndarray]:
         return [frame.image for frame in frames]
 
 
-@pytest.fixture
-def subject(tmp_path: Path, talking: list[np.ndarray], models: Path) -> Path:
-    path = tmp_path / "me.relit"
-    write_subject(path, build_instant_subject(talking[:4], "talk"))
+@pytest.fixture(scope="module")
+def made_subject(tmp_path_factory: pytest.TempPathFactory, talking: list[np.ndarray], pulled_models: Path) -> Path:
+    path = tmp_path_factory.mktemp("subject") / "me.relit"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(FOLDER_VARIABLE, str(pulled_models))
+        write_subject(path, build_instant_subject(talking[:4], "talk"))
     return path
+
+
+@pytest.fixture
+def subject(made_subject: Path, models: Path) -> Path:
+    """Read by the tests, and written by none."""
+    return made_subject
 
 
 def test_a_film_of_the_person_adds_stills_and_says_what_they_show(tmp_path: Path, subject: Path, talk: Path) -> None:

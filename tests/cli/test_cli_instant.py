@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import cv2
@@ -19,13 +19,12 @@ from relit_camera.base.images.image_files import write_display
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.base.video.video_readers import VideoReader
 from relit_camera.base.video.video_writer import VideoWriter
-from relit_camera.capture.instant import frame_reading
+from relit_camera.capture.instant import frame_reading, median_picture
 from relit_camera.devices.sources.source import Source
 from relit_camera.devices.sources.webcam_source import WebcamSource
 from relit_camera.subject.subject_file import write_subject
 from tests.app.subject_builders import captured
 from tests.capture.instant.conftest import models, pulled_models
-from tests.capture.instant.lit_person import SKIN, picture_of, window
 from tests.cli.relit_command import call
 from tests.devices.fake_devices import FakeCapture, FakeTree
 
@@ -36,6 +35,7 @@ TURNED = 57
 """A frame of the bundled person's film in which they look aside, by 28 degrees."""
 
 
+@cache
 def film_frames() -> list[DisplayImage]:
     """The bundled person's film."""
     with VideoReader(demo_files.CLIP) as frames:
@@ -81,7 +81,10 @@ def test_a_person_comes_out_and_info_tells_the_rung(tmp_path: Path, models: Path
     assert f"{header['stills']} expression stills: " in answer.out
 
 
-def test_somebody_who_keeps_still_gives_a_subject_without_expression_stills(tmp_path: Path, models: Path) -> None:
+def test_somebody_who_keeps_still_gives_a_subject_without_expression_stills(
+    tmp_path: Path, models: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(median_picture, "SIDE_PX", median_picture.MIN_SIDE_PX)  # quicker
     first = film_frames()[0]
     write_display(tmp_path / "me.png", first)
     with VideoWriter(tmp_path / "me.mp4", (first.shape[1], first.shape[0]), 24.0) as writer:
@@ -164,12 +167,7 @@ def test_a_webcam_that_another_program_holds_is_told_and_nothing_is_left(
 
 
 def test_info_tells_of_a_subject_whose_rung_nobody_noted(tmp_path: Path) -> None:
-    from relit_camera.capture.instant.instant_capture import capture_from_picture
-
-    subject = capture_from_picture(picture_of(SKIN, window(0) * np.float32(0.2)), "webcam").subject
-    old = subject.metadata.model_copy(update={"rung": None, "expected_db": None, "measured_fraction": None})
-    object.__setattr__(subject, "metadata", old)
-    write_subject(tmp_path / "old.relit", subject)
+    write_subject(tmp_path / "old.relit", captured(None))
     assert "older version" in call("subject", "info", tmp_path / "old.relit").out
 
 
