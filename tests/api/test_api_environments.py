@@ -14,7 +14,8 @@ from relit_camera.light.environments.builtin.builtin_environments import BUILTIN
 from relit_camera.light.environments.environment_panorama import Environment
 from tests.api.api_client import Client, check_problem, decoded_picture, hdr, png
 from tests.api.fake_camera import FakeCamera
-from tests.generated_subject import generated_subject, small_subject
+from tests.app.subject_builders import captured
+from tests.generated_subject import small_subject
 from tests.small_camera import difference
 
 ENVIRONMENTS = "/api/v1/environments"
@@ -169,7 +170,7 @@ def test_another_person_has_other_pictures(client: Client, camera: FakeCamera) -
     camera.scene_controller.show_subject("small", small_subject())
     client.upload(ENVIRONMENTS, "room", hdr(), "room.hdr")
     one = client.get(f"{ENVIRONMENTS}/room/on-me.jpg").content
-    camera.scene_controller.show_subject("other", generated_subject(96, 128))
+    camera.scene_controller.show_subject("other", captured("film"))
     assert client.get(f"{ENVIRONMENTS}/room/on-me.jpg").content != one
     camera.scene_controller.environments.remove("room")
     client.upload(ENVIRONMENTS, "room", hdr(128, 64), "room.hdr")
