@@ -10,9 +10,9 @@ import pytest
 
 from relit_camera.app.captures.film.film_progress import SHARES
 from tests.api.api_client import decoded_picture
-from tests.capture.film.generated_film import FOCAL_PX, SIZE, write_film
+from tests.capture.film.generated_film import FOCAL_PX, SIZE
 from tests.capture.film.pipeline import unusable_films as films
-from tests.small_camera import Camera, running_camera
+from tests.small_camera import Camera, memory_source, running_camera
 
 PATIENCE_S = 240.0
 """For a machine that has much else to do; alone it takes half a minute."""
@@ -32,16 +32,15 @@ def followed(camera: Camera) -> list[dict[str, Any]]:
     while not told or told[-1]["stage"] in ("reading", "building"):
         assert time.monotonic() < ends_at, told[-1]
         told.append(camera.http.get("captures/film").raise_for_status().json())
-        time.sleep(0.05)
+        time.sleep(0.1)
     return told
 
 
 @pytest.mark.slow
 def test_a_film_is_sent_read_reported_and_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "models"))  # the head of this film is none that one knows
-    film = write_film(tmp_path / "evening.mp4", films.GOOD.codes())
-    with running_camera(tmp_path / "data") as camera:
-        with film.open("rb") as file:
+    with running_camera(tmp_path / "data", memory_source(count=1)) as camera:
+        with films.good_film().open("rb") as file:
             answer = camera.http.post("captures/film", data=FIELDS, files={"file": ("evening.mp4", file)})
         assert answer.status_code == 202, answer.text
         told = followed(camera)

@@ -41,10 +41,10 @@ def share_as_filmed(picture: DisplayImage) -> float:
 
 
 def check_nothing_as_filmed(camera: Camera) -> None:
-    """Every picture so far, and of the next second."""
+    """Every picture so far, and of the next half second."""
     camera.sink.wait_for(1)
     count = camera.sink.count
-    wait_until(lambda: camera.sink.count >= count + ONE_S)
+    wait_until(lambda: camera.sink.count >= count + ONE_S // 2)
     assert max(map(share_as_filmed, list(camera.sink.new))) < 0.02
     assert not camera.status()["unlit"]
 
@@ -122,7 +122,7 @@ def test_a_stranger(tmp_path: Path) -> None:
 @pytest.mark.parametrize("change", [{"split": 0.5}, {"split": 1.0}, {"blend": 0.0}])
 def test_as_filmed(tmp_path: Path, change: dict[str, float]) -> None:
     with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
-        camera.sink.wait_for(ONE_S)
+        camera.sink.wait_for(ONE_S // 4)
         assert camera.http.patch("lighting", json=change).status_code == 409
         check_nothing_as_filmed(camera)
         camera.http.patch("scene", json={"lighting": change, "unlit_allowed": True}).raise_for_status()
@@ -164,7 +164,7 @@ def test_the_fallback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, allowed: 
 
 def test_before_is_for_the_preview_alone_and_taken_from_nobody(tmp_path: Path) -> None:
     with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
-        camera.sink.wait_for(ONE_S)
+        camera.sink.wait_for(ONE_S // 4)
         with camera.http.stream("GET", "preview.mjpg", params={"before": "true"}) as body:
             picture = first_picture(body)
         assert likeness(picture) > 0.75

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from tests.capture.film.blinking_film import Blinking
 from tests.capture.film.blinking_film import film as blinking
-from tests.capture.film.generated_film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film
+from tests.capture.film.generated_film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film, write_film
+from tests.made_once import made_once
 
 GAMMA = 2.2
 FACE = (*HEAD, 9.5 * PX_PER_CM)
@@ -16,6 +18,12 @@ NAMED_BALL = f"{SIZE[0] / 2 + 70},{SIZE[1] / 2 - 80},30"
 """Nearly: a sphere off the picture's middle is seen as an ellipse. It need not be looked for then."""
 GOOD = Film(frames=120)
 LIT = np.array([GOOD.lit(index) for index in range(GOOD.frames)])
+
+
+def good_film() -> Path:
+    """The good film, written once in a test run."""
+    return made_once("good-film.mp4", lambda path: write_film(path, GOOD.codes()))
+
 
 Codes = np.ndarray
 """Frames (frames, height, width, 3), uint8."""
