@@ -117,7 +117,7 @@ def test_a_refusal_leaves_an_empty_folder_empty(good: np.ndarray, tmp_path: Path
 
 
 def test_a_film_that_is_barely_good_enough_gives_warnings(good: np.ndarray, tmp_path: Path) -> None:
-    shot = films.board_before_the_ball(good)
+    shot = films.drop_before_the_ball(good)
     answer = build(write_film(tmp_path / "film.mp4", shot.codes), shot, tmp_path)
     assert answer.code == 0, answer
     ball, focal = (
