@@ -5,8 +5,6 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-import pytest
-
 from relit_camera.app.setup.check_runner import KEPT_S, CheckRunner
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import WorkerError
@@ -56,6 +54,5 @@ def test_checks_that_fail_are_one_that_is_unknown() -> None:
     assert (check.state, check.what) == (CheckState.UNKNOWN, "the worker process died")
 
 
-@pytest.mark.real_time
 def test_they_run_in_a_process_of_their_own() -> None:
     assert CheckRunner(no_check).found(RelitSettings()) == ()

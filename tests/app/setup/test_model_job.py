@@ -2,33 +2,14 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 
 from relit_camera.app.setup.model_job import ModelJob, Pull
-from relit_camera.base.concurrency.worker_process import Progress
-from relit_camera.base.errors import ConflictError, DownloadError
+from relit_camera.base.errors import ConflictError
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.live.status.setup_status import ModelStage
+from tests.app.setup.stand_in_pulls import pull_for_ever, pull_nothing, pull_two
 from tests.small_camera import wait_until
-
-pytestmark = pytest.mark.real_time
-
-
-def pull_two(tell: Progress) -> None:
-    for step in range(1000):
-        tell("getting face_mesh", step, 1000)
-    tell("face_mesh: stored", 0, None)
-
-
-def pull_nothing(tell: Progress) -> None:
-    raise DownloadError("no host gives face_mesh", "check the network", ("no connection to example.org",))
-
-
-def pull_for_ever(tell: Progress) -> None:
-    tell("getting face_mesh", 1, 2)
-    time.sleep(600)
 
 
 class Job:

@@ -25,9 +25,7 @@ from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import DegradationCode
 from tests.devices.fake_devices import FakeCapture, FakeTree
 from tests.generated_subject import small_subject
-from tests.small_camera import FPS, SIZE, SteadyTracker, difference, wait_until
-
-pytestmark = pytest.mark.real_time
+from tests.small_camera import FPS, PATIENT, SIZE, WAIT_S, SteadyTracker, difference, wait_until
 
 
 class Output:
@@ -69,7 +67,9 @@ class BareMachine:
         )
         self.sink = ReopeningSink(self._virtual_camera, SIZE)
         tracker = SteadyTracker() if has_models else None
-        self.camera = CameraService(self.settings, scene_controller, self.source, self.sink, tracker, self._tracker)
+        self.camera = CameraService(
+            self.settings, scene_controller, self.source, self.sink, tracker, self._tracker, timings=PATIENT
+        )
 
     def _webcam(self, asked: SourceSettings) -> WebcamSource:
         capture = FakeCapture(size=SIZE, interval_s=1 / FPS)
@@ -96,7 +96,7 @@ class BareMachine:
         }
 
     def shown(self) -> DisplayImage:
-        found = self.camera.picture(0, 5.0)
+        found = self.camera.picture(0, WAIT_S)
         assert found is not None
         return found[1]
 
