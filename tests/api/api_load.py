@@ -121,7 +121,7 @@ def drive(url: str, seconds: float, rate: float = 50.0, previews: bool = True) -
         thread.join()
     took = time.monotonic() - began
     after, now = httpx.get(f"{api}scene").json(), httpx.get(f"{api}status").json()["frames"]
-    give_up = time.monotonic() + 5
+    give_up = time.monotonic() + 60
     while any(panel.scene.get("revision") != after["revision"] for panel in panels) and time.monotonic() < give_up:
         time.sleep(0.02)
     stopping.set()

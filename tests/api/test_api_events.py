@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import islice
+from types import SimpleNamespace
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
+from fastapi import FastAPI
 
 from relit_camera.api.routes import server_sent_events
 from relit_camera.api.server.http_server import ApiServer
 from relit_camera.base.config.look import Lighting, Look
 from tests.api.api_client import Client, hdr, png
 from tests.api.fake_camera import FakeCamera
-from tests.small_camera import wait_until
-
-pytestmark = pytest.mark.real_time
+from tests.lateness import Lateness
+from tests.small_camera import WAIT_S, wait_until
+from tests.virtual_clock import VirtualClock
 
 Happening = tuple[str, dict[str, Any]]
 
@@ -53,7 +58,7 @@ class Listener:
 
 @pytest.fixture
 def listener(server: ApiServer) -> Iterator[Listener]:
-    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
+    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=WAIT_S) as body:
         assert body.headers["content-type"].startswith("text/event-stream")
         yield Listener(body)
 
@@ -80,15 +85,15 @@ def test_a_listener_first_gets_what_stands(listener: Listener, camera: FakeCamer
 
 
 def test_two_listeners_hear_a_change_at_once(server: ApiServer, listener: Listener, client: Client) -> None:
-    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
+    with Lateness() as lateness, httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=WAIT_S) as body:
         other = Listener(body)
         listener.wait_for("status")
         other.wait_for("status")
-        started = time.monotonic()
+        began = time.monotonic()
         client.patch("/api/v1/lighting", {"yaw_deg": 25})
         for heard in (listener, other):
             assert heard.wait_for("scene")["lighting"]["yaw_deg"] == 25
-        assert time.monotonic() - started < 0.6
+        assert lateness.unexplained_s(began, time.monotonic()) < 0.6
 
 
 def test_changes_that_did_not_come_over_the_api_are_heard_too(listener: Listener, camera: FakeCamera) -> None:
@@ -124,28 +129,41 @@ def test_presets_that_change_are_named(listener: Listener, client: Client) -> No
     listener.wait_for("collection", name="presets")
 
 
-def test_status_comes_every_second(listener: Listener, monkeypatch: pytest.MonkeyPatch) -> None:
-    listener.wait_for("status")
-    started = time.monotonic()
-    listener.wait_for("status")
-    assert time.monotonic() - started == pytest.approx(server_sent_events.STATUS_INTERVAL_S, abs=0.4)
+def test_status_comes_every_second(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = VirtualClock()
+
+    async def sleep(seconds: float) -> None:
+        clock.sleep(seconds)
+
+    async def status_times(count: int) -> list[float]:
+        times = list[float]()
+        async for event in server_sent_events.event_stream(app.state.context):
+            if event.event == "status":
+                times.append(clock.now())
+            if len(times) == count:
+                break
+        return times
+
+    monkeypatch.setattr(server_sent_events, "time", SimpleNamespace(monotonic=clock.now))
+    monkeypatch.setattr(server_sent_events, "asyncio", SimpleNamespace(sleep=sleep))
+    times = asyncio.run(status_times(5))
+    assert np.diff(times) == pytest.approx(1.0, abs=1.5 * server_sent_events.SCENE_POLL_S)
 
 
 def test_the_heart_beats(server: ApiServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server_sent_events, "HEARTBEAT_INTERVAL_S", 0.2)
-    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
-        listener = Listener(body)
-        listener.wait_for("status")
-        listener.wait_for("status")
-        assert listener.comments >= 2
+    monkeypatch.setattr(server_sent_events, "HEARTBEAT_INTERVAL_S", 0.05)
+    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=WAIT_S) as body:
+        beats = (line for line in islice(body.iter_lines(), 100) if line.startswith(":"))
+        assert len(list(islice(beats, 2))) == 2
 
 
 def test_the_stream_ends_when_the_camera_does(listener: Listener, camera: FakeCamera) -> None:
-    listener.wait_for("status")
-    camera.stop()
-    started = time.monotonic()
-    assert [kind for kind, _ in listener if kind == "scene"] == []
-    assert time.monotonic() - started < 1
+    with Lateness() as lateness:
+        listener.wait_for("status")
+        camera.stop()
+        began = time.monotonic()
+        assert [kind for kind, _ in listener if kind == "scene"] == []
+        assert lateness.unexplained_s(began, time.monotonic()) < 1
 
 
 def test_a_listener_who_left_is_forgotten(
@@ -163,7 +181,7 @@ def test_a_listener_who_left_is_forgotten(
                 listening.remove(events)
 
     monkeypatch.setattr(camera.events, "listen", counted)
-    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=5) as body:
+    with httpx.stream("GET", f"{server.address.url}api/v1/events", timeout=WAIT_S) as body:
         listener = Listener(body)  # held: the answer is closed with the last reference to its lines
         listener.wait_for("status")
         assert len(listening) == 1

@@ -15,13 +15,14 @@ import httpx
 import pytest
 from fastapi import FastAPI
 
+from relit_camera.api.server import http_server
 from relit_camera.api.server.http_server import ApiServer, ServerAddress, start_api_server
 from relit_camera.api.server.listener import open_listener
 from relit_camera.base.config.settings import ServerSettings
 from relit_camera.base.errors import ConfigError, PortInUseError
 from tests.api.fake_camera import FakeCamera
-
-pytestmark = pytest.mark.real_time
+from tests.lateness import Lateness
+from tests.small_camera import WAIT_S
 
 
 def free_port() -> int:
@@ -78,17 +79,18 @@ def test_an_address_that_cannot_be_used_is_said(monkeypatch: pytest.MonkeyPatch)
         open_listener(ServerSettings(port=80))
 
 
-def test_it_ends_within_a_second_with_streams_open(app: FastAPI) -> None:
+def test_it_ends_within_a_second_with_streams_open(app: FastAPI, monkeypatch: pytest.MonkeyPatch) -> None:
     """The camera does not say that it stops here: the server alone must end its streams."""
+    monkeypatch.setattr(http_server, "SHUTDOWN_GRACE_S", WAIT_S)  # none is aborted
     server = start_api_server(app, ServerSettings(port=0))
     opened = threading.Barrier(4)
     ended: list[str] = []
 
     def look(path: str) -> None:
-        with httpx.stream("GET", f"{server.address.url}api/v1/{path}", timeout=5) as body:
+        with httpx.stream("GET", f"{server.address.url}api/v1/{path}", timeout=WAIT_S) as body:
             chunks = body.iter_bytes()
             next(chunks)
-            opened.wait(5)
+            opened.wait(WAIT_S)
             for _ in chunks:
                 pass
         ended.append(path)
@@ -97,12 +99,13 @@ def test_it_ends_within_a_second_with_streams_open(app: FastAPI) -> None:
     viewers = [threading.Thread(target=look, args=(path,)) for path in paths]
     for viewer in viewers:
         viewer.start()
-    opened.wait(5)
-    started = time.monotonic()
-    server.stop()
-    assert time.monotonic() - started < 1
+    opened.wait(WAIT_S)
+    with Lateness() as lateness:
+        began = time.monotonic()
+        server.stop(WAIT_S)
+        assert lateness.unexplained_s(began, time.monotonic()) < 1
     for viewer in viewers:
-        viewer.join(2)
+        viewer.join(WAIT_S)
     assert sorted(ended) == sorted(paths)  # whole answers: no viewer saw a broken connection
 
 
@@ -113,58 +116,60 @@ def test_an_answer_that_takes_too_long_is_a_503_not_a_traceback(
 
     def slow() -> None:
         begun.set()
-        release.wait(10)
+        release.wait(WAIT_S)
 
     monkeypatch.setattr(camera, "reset_neutral_pose", slow)
     answers: list[httpx.Response] = []
     server = start_api_server(app, ServerSettings(port=0))
     url = f"{server.address.url}api/v1/neutral-pose"
-    asking = threading.Thread(target=lambda: answers.append(httpx.post(url, timeout=10)))
+    asking = threading.Thread(target=lambda: answers.append(httpx.post(url, timeout=WAIT_S)))
     asking.start()
-    assert begun.wait(5)
-    started = time.monotonic()
-    with caplog.at_level(logging.ERROR):
-        server.stop(5)
-    assert time.monotonic() - started < 2
+    assert begun.wait(WAIT_S)
+    with Lateness() as lateness, caplog.at_level(logging.ERROR):
+        began = time.monotonic()
+        server.stop(WAIT_S)
+        assert lateness.unexplained_s(began, time.monotonic()) < 2
     release.set()
-    asking.join(5)
+    asking.join(WAIT_S)
     assert answers[0].status_code == 503
     assert "stopping" in answers[0].json()["what"]
     assert not any(record.exc_info for record in caplog.records)
 
 
 PROGRAM = """
-import signal, sys, threading, time
+import signal, sys, threading
 from pathlib import Path
 import cv2, numpy as np
 from tests.api.fake_camera import FakeCamera
 from relit_camera.api.app import create_app
-from relit_camera.api.server.http_server import start_api_server
+from relit_camera.api.server import http_server
 from relit_camera.base.config.settings import RelitSettings, ServerSettings, StorageSettings
 
 def work_in_opencv():
     picture = np.zeros((720, 1280, 3), np.float32)
-    until = time.monotonic() + 2
     print("at work", flush=True)
-    while time.monotonic() < until:
+    while not ended.is_set():
+        cv2.GaussianBlur(picture, (0, 0), 3)
+    for _ in range(10):
         cv2.GaussianBlur(picture, (0, 0), 3)
 
+http_server.SHUTDOWN_GRACE_S = 0.1
 folder = Path(sys.argv[1])
-stop = threading.Event()
-for number in (signal.SIGTERM, signal.SIGINT):
-    signal.signal(number, lambda *_: stop.set())
+stop, ended = threading.Event(), threading.Event()
+signal.signal(signal.SIGINT, lambda *_: print("interrupted", flush=True))
+signal.signal(signal.SIGTERM, lambda *_: stop.set())
 camera = FakeCamera(folder)
 camera.reset_neutral_pose = work_in_opencv
 app = create_app(camera, RelitSettings(storage=StorageSettings(data_dir=folder)))
-with start_api_server(app, ServerSettings(port=0)) as server:
+with http_server.start_api_server(app, ServerSettings(port=0)) as server:
     print(server.address.url, flush=True)
     while not stop.wait(0.1):
         pass
+ended.set()
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_signals_are_the_program_s_and_it_exits_clean(tmp_path: Path, number: signal.Signals) -> None:
+def test_signals_are_the_program_s_and_it_exits_clean(tmp_path: Path) -> None:
     """Also while an answer is being worked on: Python cuts daemon threads off inside C++ code, which aborts."""
     process = subprocess.Popen(
         [sys.executable, "-W", "error", "-c", PROGRAM, str(tmp_path)],
@@ -176,14 +181,16 @@ def test_signals_are_the_program_s_and_it_exits_clean(tmp_path: Path, number: si
     try:
         assert process.stdout is not None
         url = process.stdout.readline().strip()
-        asking = threading.Thread(target=lambda: httpx.post(f"{url}api/v1/neutral-pose", timeout=20))
+        asking = threading.Thread(target=lambda: httpx.post(f"{url}api/v1/neutral-pose", timeout=WAIT_S))
         asking.start()
         assert process.stdout.readline() == "at work\n"
-        with httpx.stream("GET", f"{url}api/v1/preview.mjpg", timeout=10) as body:
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.readline() == "interrupted\n"
+        with httpx.stream("GET", f"{url}api/v1/preview.mjpg", timeout=WAIT_S) as body:
             next(body.iter_bytes())
-            process.send_signal(number)
-            _, errors = process.communicate(timeout=20)
-        asking.join(5)
+            process.send_signal(signal.SIGTERM)
+            _, errors = process.communicate(timeout=WAIT_S)
+        asking.join(WAIT_S)
     finally:
         process.kill()
         process.wait()
@@ -193,10 +200,12 @@ def test_signals_are_the_program_s_and_it_exits_clean(tmp_path: Path, number: si
 
 def test_answers_do_not_wait_for_the_client_s_acknowledgement(server: ApiServer) -> None:
     """An answer is written in two parts: with Nagle's algorithm the second is sent 40 ms later."""
-    took = []
+
+    def took_s() -> float:
+        began = time.perf_counter()
+        client.get("healthz")
+        return time.perf_counter() - began
+
     with httpx.Client(base_url=server.address.url) as client:
-        for _ in range(20):
-            began = time.perf_counter()
-            client.get("healthz")
-            took.append(time.perf_counter() - began)
-    assert min(took[1:]) < 0.03
+        client.get("healthz")
+        assert any(took_s() < 0.03 for _ in range(200))
