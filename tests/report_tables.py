@@ -18,6 +18,7 @@ TABLES = {
     "faults survived": ("fault", "longest gap between frames", "lasted"),
     "steps in the browser": ("flow", "step", "took"),
     "what the panel costs": ("what", "measured", "at most"),
+    "two hundred viewers": ("frames a second", "longest gap between frames", "pictures for each"),
     "readers of the virtual camera": ("reader", "v4l2loopback", "saw"),
     "a camera in PipeWire that is killed and started again": ("packages", "camera", "longest gap for GStreamer"),
     "a camera whose keeper goes on": ("what happens", "longest gap between pictures"),

@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -15,16 +15,19 @@ import numpy as np
 import psutil
 import pytest
 
+from relit_camera.api import preview_stream
 from relit_camera.api.app import create_app
+from relit_camera.api.preview_stream import PreviewVariant, encode_preview
 from relit_camera.api.server import connection_timeouts
 from relit_camera.api.server.http_server import start_api_server
 from relit_camera.base.config.settings import RelitSettings, ServerSettings
+from relit_camera.base.images.image_types import DisplayImage
 from tests.api.fake_camera import FakeCamera
 from tests.api.many_viewers import connect
-from tests.cli.relit_command import start, write_material
-from tests.small_camera import FPS, Camera, running_camera, wait_until
-
-pytestmark = pytest.mark.real_time
+from tests.cli.relit_command import Material, start
+from tests.faults.watched_camera import TimedSink
+from tests.lateness import Lateness
+from tests.small_camera import FPS, PATIENT, WAIT_S, running_camera, wait_until
 
 VIEWERS = 200
 ROOT = Path(__file__).parents[2]
@@ -40,65 +43,80 @@ def many_viewers(url: str, count: int = VIEWERS) -> Iterator[subprocess.Popen[st
         assert process.stdout.readline() == "open\n"
         yield process
     finally:
-        process.communicate(timeout=20)
+        process.communicate(timeout=WAIT_S)
 
 
-def ask(viewers: subprocess.Popen[str]) -> list[int]:
-    """How many pictures each viewer has got since the last time."""
+def ask(viewers: subprocess.Popen[str]) -> np.ndarray:
+    """How many pictures each viewer has got."""
     assert viewers.stdin is not None
     assert viewers.stdout is not None
     viewers.stdin.write("\n")
     viewers.stdin.flush()
-    counts: list[int] = json.loads(viewers.stdout.readline())
-    return counts
+    return np.array(json.loads(viewers.stdout.readline()))
 
 
-def gaps(camera: Camera, seconds: float) -> list[float]:
-    """Seconds between the pictures that the sink is given, for a while."""
-    write, times = camera.sink.write, list[float]()
-
-    def timed(image: np.ndarray) -> None:
-        times.append(time.monotonic())
-        write(image)
-
-    camera.sink.write = timed  # type: ignore[method-assign]
-    time.sleep(seconds)
-    camera.sink.write = write  # type: ignore[method-assign]
-    return np.diff(times).tolist()
+IDLE = """
+import json, sys
+from tests.lateness import Lateness
+with Lateness() as lateness:
+    print("idle", flush=True)
+    times = json.loads(sys.stdin.readline())
+print(lateness.longest_gap_s(times))
+"""
+"""In a process of its own, which waits for the machine, but not for what this process does."""
 
 
-def test_the_camera_keeps_its_rate(tmp_path: Path) -> None:
-    process = psutil.Process()
-    with running_camera(tmp_path) as camera:
+@contextmanager
+def gap_meter() -> Iterator[Callable[[Sequence[float]], float]]:
+    """A function that tells the longest gap between times, but for what the machine made an idle process wait."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", IDLE], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "idle\n"
+        yield lambda times: float(process.communicate(json.dumps(times) + "\n", timeout=WAIT_S)[0])
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_the_camera_keeps_its_rate(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, note_row: Callable[[str, tuple[str, ...]], None]
+) -> None:
+    process, sink, encoded = psutil.Process(), TimedSink(), list[object]()
+
+    def encode(picture: DisplayImage, variant: PreviewVariant) -> bytes:
+        encoded.append(picture)
+        return encode_preview(picture, variant)
+
+    monkeypatch.setattr(preview_stream, "encode_preview", encode)
+    with gap_meter() as longest_gap_s, running_camera(tmp_path, sink=sink, timings=PATIENT) as camera:
         camera.http.get("snapshot.jpg").raise_for_status()
-        wait_until(lambda: len(camera.sink.new) > 2)
+        sink.wait_for(3)
         files, threads = process.num_fds(), process.num_threads()
-        alone = gaps(camera, 3)
         with many_viewers(f"{camera.http.base_url}preview.mjpg") as viewers:
-            ask(viewers)
-            watched = gaps(camera, 3)
-            got = ask(viewers)
+            before, began = ask(viewers), time.monotonic()
+            known, made, frames = len(sink.new), len(encoded), len(sink.times)
+            wait_until(lambda: (ask(viewers) - before).min() >= 6 and len(sink.times) > frames + 2 * FPS)
+            got, lasted_s = ask(viewers) - before, time.monotonic() - began
+            shown, times = len(sink.new) - known, sink.times[frames:]
+            made = len(encoded) - made
             most_threads = process.num_threads()
             camera.put("mode", mode="reenact")
         wait_until(lambda: process.num_fds() <= files)
-        # Idle threads of the pool end after ten seconds, when the next request comes.
-        wait_until(lambda: camera.status()["state"] == "live" and process.num_threads() <= threads, 20)
-    figures = {
-        "fps": [round(1 / np.mean(alone), 2), round(1 / np.mean(watched), 2)],
-        "longest_gap_ms": [round(1e3 * max(alone)), round(1e3 * max(watched))],
-        "pictures_each": [min(got), max(got)],
-        "threads": [threads, most_threads],
-    }
-    print(figures)
-    assert 1 / np.mean(watched) == pytest.approx(1 / np.mean(alone), rel=0.1)
-    assert 1 / np.mean(watched) == pytest.approx(FPS, rel=0.1)
-    assert max(watched) < 0.5  # the machine may be busy with others; a camera that is held up loses seconds
-    assert min(got) >= 6
+        wait_until(lambda: camera.status()["state"] == "live")
+        gap_s = longest_gap_s(times)
+    fps = (len(times) - 1) / (times[-1] - times[0])
+    note_row("two hundred viewers", (f"{fps:.1f}", f"{1e3 * gap_s:.0f} ms", f"{got.min()} to {got.max()}"))
+    assert gap_s < 0.5
+    assert fps > FPS / 3  # a busy machine costs a quarter of them
+    assert made <= shown + 2  # once for all of them; what is shown is counted a little before or after
+    assert got.sum() <= 1.2 * preview_stream.MAX_FRAMES_SENT_PER_S * lasted_s + VIEWERS
     assert most_threads <= threads + 4
 
 
-def test_it_ends_in_time_with_all_of_them_open(tmp_path: Path) -> None:
-    material = write_material(tmp_path)
+def test_it_ends_in_time_with_all_of_them_open(tmp_path: Path, material: Material) -> None:
     running = start(
         "run", "--source", material.clip, "--subject", material.subject, "--tracker", material.tracker,
         "--sink", "null", "--port", 0, folder=tmp_path,
@@ -106,11 +124,11 @@ def test_it_ends_in_time_with_all_of_them_open(tmp_path: Path) -> None:
     try:
         assert running.stdout is not None
         url = running.stdout.readline().split()[-1]
-        with many_viewers(f"{url}api/v1/preview.mjpg"):
+        with many_viewers(f"{url}api/v1/preview.mjpg"), Lateness() as lateness:
             began = time.monotonic()
             running.terminate()
-            _, errors = running.communicate(timeout=10)
-            assert time.monotonic() - began < 3
+            _, errors = running.communicate(timeout=WAIT_S)
+            assert lateness.unexplained_s(began, time.monotonic()) < 3
     finally:
         running.kill()
         running.wait()
@@ -122,27 +140,29 @@ def test_it_ends_in_time_with_all_of_them_open(tmp_path: Path) -> None:
 def test_who_takes_nothing_is_cut_off(
     tmp_path: Path, settings: RelitSettings, monkeypatch: pytest.MonkeyPatch, path: str
 ) -> None:
-    monkeypatch.setattr(connection_timeouts, "WRITE_TIMEOUT_S", 0.5)
+    monkeypatch.setattr(connection_timeouts, "WRITE_TIMEOUT_S", 0.2)
+    monkeypatch.setattr(connection_timeouts, "READ_TIMEOUT_S", 10 * WAIT_S)  # is not what cuts them off
     noise = np.random.default_rng(1).integers(0, 256, (720, 1280, 3), np.uint8)
     camera = FakeCamera(tmp_path, noise)
     with start_api_server(create_app(camera, settings), ServerSettings(port=0)) as server:
         before = psutil.Process().num_fds()
         url = f"{server.address.url}api/v1/{path}?"
-        with connect(url, 4096), connect(url, 4096):
-            wait_until(lambda: psutil.Process().num_fds() >= before + 4)
-            wait_until(lambda: psutil.Process().num_fds() <= before + 2, 5)  # our own ends of the two
+        with connect(url, 4096) as one, connect(url, 4096) as other:
+            for viewer in (one, other):
+                viewer.recv(1, socket.MSG_PEEK)  # the answer has begun
+            wait_until(lambda: psutil.Process().num_fds() <= before + 2)  # our own ends of the two
     camera.stop()
 
 
 def test_who_asks_nothing_is_cut_off(tmp_path: Path, settings: RelitSettings, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection_timeouts, "READ_TIMEOUT_S", 0.3)
+    monkeypatch.setattr(connection_timeouts, "READ_TIMEOUT_S", 0.1)
     camera = FakeCamera(tmp_path)
     with start_api_server(create_app(camera, settings), ServerSettings(port=0)) as server:
         for said in (b"", b"GET / HT", b"GET / HTTP/1.1\r\nHost: 127"):
-            with socket.create_connection((server.address.host, server.address.port), 5) as client:
+            with socket.create_connection((server.address.host, server.address.port), WAIT_S) as client:
                 client.sendall(said)
-                began = time.monotonic()
-                with suppress(ConnectionResetError):
+                with Lateness() as lateness, suppress(ConnectionResetError):
+                    began = time.monotonic()
                     assert client.recv(100) == b""
-                assert time.monotonic() - began < 2
+                assert lateness.unexplained_s(began, time.monotonic()) < 2
     camera.stop()
