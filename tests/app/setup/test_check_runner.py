@@ -5,15 +5,15 @@ from __future__ import annotations
 import threading
 from typing import Any
 
+import pytest
+
+from relit_camera.app.setup import check_runner
 from relit_camera.app.setup.check_runner import KEPT_S, CheckRunner
 from relit_camera.base.config.settings import RelitSettings
 from relit_camera.base.errors import WorkerError
 from relit_camera.live.status.setup_status import Check, CheckState
+from tests.app.setup.worker_stand_ins import no_check
 from tests.virtual_clock import VirtualClock
-
-
-def no_check(values: object) -> tuple[Check, ...]:
-    return ()
 
 
 class Runs:
@@ -54,5 +54,6 @@ def test_checks_that_fail_are_one_that_is_unknown() -> None:
     assert (check.state, check.what) == (CheckState.UNKNOWN, "the worker process died")
 
 
-def test_they_run_in_a_process_of_their_own() -> None:
+def test_they_run_in_a_process_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(check_runner, "TIMEOUT_S", 120.0)  # the process has to wait for others
     assert CheckRunner(no_check).found(RelitSettings()) == ()

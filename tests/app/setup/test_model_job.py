@@ -8,7 +8,7 @@ from relit_camera.app.setup.model_job import ModelJob, Pull
 from relit_camera.base.errors import ConflictError
 from relit_camera.live.status.event_hub import EventHub
 from relit_camera.live.status.setup_status import ModelStage
-from tests.app.setup.stand_in_pulls import pull_for_ever, pull_nothing, pull_two
+from tests.app.setup.worker_stand_ins import pull_for_ever, pull_nothing, pull_two
 from tests.small_camera import wait_until
 
 
