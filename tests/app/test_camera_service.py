@@ -134,7 +134,7 @@ def test_a_slow_pipeline_is_not_taken_for_a_slow_camera(tmp_path: Path) -> None:
 
 
 def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(tmp_path: Path) -> None:
-    with running_camera(tmp_path, timings=replace(PATIENT, stale_after_s=0.3)) as camera:
+    with running_camera(tmp_path, timings=replace(PATIENT, stale_after_s=0.5)) as camera:
         camera.sink.wait_for(3)
         camera.put("freeze", frozen=True)
         wait_until(lambda: camera.status()["state"] == "frozen")

@@ -64,20 +64,21 @@ class Listener:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.bind("\0" + address[1:] if address.startswith("@") else address)
 
-    def next(self) -> list[str]:
+    def next(self, timeout_s: float = WAIT_S) -> list[str]:
         """The lines of the next message; empty when none came in time."""
-        self._socket.settimeout(WAIT_S)
+        self._socket.settimeout(timeout_s)
         try:
             return self._socket.recv(4096).decode().split("\n")
         except TimeoutError:
             return []
 
-    def wait_for(self, fits: Callable[[list[str]], bool]) -> list[str]:
-        """The first message that fits; what came before it is passed over."""
-        while message := self.next():
-            if fits(message):
-                return message
-        raise AssertionError("no message came in time")
+    def wait_for(self, fits: Callable[[list[str]], bool]) -> None:
+        """Take messages up to the first that fits."""
+        deadline = time.monotonic() + WAIT_S
+        while (left := deadline - time.monotonic()) > 0:
+            if (message := self.next(left)) and fits(message):
+                return
+        raise AssertionError("no such message came")
 
     def close(self) -> None:
         self._socket.close()
