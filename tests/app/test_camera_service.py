@@ -20,6 +20,7 @@ from relit_camera.devices.sources.source import SourceInfo, SourceState, Threade
 from relit_camera.face.face_state import LOST, FaceState
 from relit_camera.live.publishing.placeholder_image import placeholder
 from relit_camera.live.status.camera_status import DegradationCode
+from relit_camera.live.supervision import pipeline_supervisor
 from relit_camera.live.supervision.camera_loop import LoopTimings
 from tests.lateness import Lateness
 from tests.small_camera import (
@@ -73,6 +74,13 @@ class SteppedSource(ThreadedSource):
             self._publish(Frame(self._picture, index, time.monotonic(), time_s))
 
 
+@pytest.fixture
+def full_quality(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are not made cheaper where a busy machine makes them late."""
+    monkeypatch.setattr(pipeline_supervisor, "next_quality", lambda state, *_: state)
+
+
+@pytest.mark.usefixtures("full_quality")
 def test_a_change_of_light_is_whole_in_the_next_frame(tmp_path: Path) -> None:
     source = SteppedSource()
     with running_camera(tmp_path, source, timings=PATIENT) as camera:
@@ -85,6 +93,7 @@ def test_a_change_of_light_is_whole_in_the_next_frame(tmp_path: Path) -> None:
             assert difference(after, source.step(camera.sink)) == 0
 
 
+@pytest.mark.usefixtures("full_quality")
 def test_an_eased_change_begins_in_the_next_frame(tmp_path: Path) -> None:
     source = SteppedSource()
     with running_camera(tmp_path, source, timings=PATIENT) as camera:
@@ -278,6 +287,7 @@ def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
         assert httpx.get(camera.http.base_url.join("/readyz")).json() == {"status": "ready"}
 
 
+@pytest.mark.usefixtures("full_quality")
 def test_ratio_falls_back_and_says_so_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     source = SteppedSource(noise.repeat(4, axis=0).repeat(4, axis=1))
