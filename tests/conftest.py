@@ -22,11 +22,6 @@ settings.register_profile("relit", deadline=None, derandomize=True)
 settings.register_profile("explore", deadline=None, max_examples=500)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "relit"))
 
-REAL_TIME = "real time"
-MACHINE = "virtual machine"
-GIVES_WAY = 5
-_BEGUN = pytest.StashKey[bool]()
-
 
 def pytest_configure() -> None:
     """Make the run's folder before the processes of pytest-xdist start, which share it; and keep out of the session.
@@ -42,41 +37,25 @@ def pytest_make_parametrize_id(val: object) -> str | None:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Let each process give way that begins with tests which hold at any speed, where others hold in real time.
-
-    Those are all in one process (see below), and wait most of their time: so there is a process more than cores.
-    """
-    several = os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1") != "1"
-    if several and not item.config.stash.get(_BEGUN, False):
-        item.config.stash[_BEGUN] = True
-        if not item.get_closest_marker("real_time"):
-            os.nice(GIVES_WAY)
-
-
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out the tests of parts that are not asked for (`tests.gate`); group and order the others.
 
-    A group runs in one process, one test after another: the tests of a file, which share its fixtures; all tests marked
-    `real_time`, which would else slow each other; and all that use the virtual machine. The longest groups come first,
-    so that no process waits for the others at the end; `--no-loadscope-reorder` keeps that order. First of all hooks,
-    as pytest-xdist's reads the groups.
+    A group runs in one process, one test after another: the tests of a file, which share its fixtures. Groups with slow
+    tests come first, so that no process waits for the others at the end; `--no-loadscope-reorder` keeps that order.
+    First of all hooks, as pytest-xdist's reads the groups.
     """
     if chosen := os.environ.get(PARTS_VARIABLE, "").split():
         left_out = [item for item in items if _part(item) not in chosen]
         items[:] = [item for item in items if _part(item) in chosen]
         config.hook.pytest_deselected(items=left_out)
-    slow = {_group(item) for item in items if item.get_closest_marker("slow")}
+    slow = {_file(item) for item in items if item.get_closest_marker("slow")}
     for item in items:
-        item.add_marker(pytest.mark.xdist_group(_group(item)))
-    items.sort(key=lambda item: (_group(item) != MACHINE, _group(item) != REAL_TIME, _group(item) not in slow))
+        item.add_marker(pytest.mark.xdist_group(_file(item)))
+    items.sort(key=lambda item: _file(item) not in slow)
 
 
-def _group(item: pytest.Item) -> str:
-    if item.path.parent.name == "vm":
-        return MACHINE
-    return REAL_TIME if item.get_closest_marker("real_time") else item.nodeid.partition("::")[0]
+def _file(item: pytest.Item) -> str:
+    return item.nodeid.partition("::")[0]
 
 
 def _part(item: pytest.Item) -> str:

@@ -310,7 +310,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
         command.add_argument("--seed", type=int, default=SEED)
         command.add_argument("--only", metavar="IDS", help="of these ids, between commas or in a file")
     running.add_argument("--tests", type=Path, default=ROOT, metavar="CHECKOUT", help="whose tests are run")
-    running.add_argument("--real-time", action="store_true", help="such tests too; with --jobs 1 on an idle machine")
     running.add_argument("--jobs", type=int, default=2)
     running.add_argument("--most", type=float, default=MOST_S, metavar="SECONDS", help="of tests for a mutant")
     running.add_argument(
@@ -327,8 +326,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.command == "list":
         print("\n".join(map(str, mutants)))
         return
-    marks = "not study" if options.real_time else "not study and not real_time"
-    results = run(mutants, options.tests.resolve(), marks, options.jobs, options.most, options.out)
+    results = run(mutants, options.tests.resolve(), "not study", options.jobs, options.most, options.out)
     print(table(results["mutants"].values()))
 
 

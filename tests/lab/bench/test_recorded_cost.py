@@ -26,7 +26,6 @@ def measured(data: Path, most: Mapping[str, float]) -> Iterator[list[CameraCost]
 
 
 @pytest.mark.slow
-@pytest.mark.real_time
 def test_a_picture_costs_about_what_it_did(note_row: Callable[[str, tuple[str, ...]], None], tmp_path: Path) -> None:
     record = recorded()
     before = {cost["mode"]: cost["mesh_runs"] for cost in record["short"]}
