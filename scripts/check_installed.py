@@ -42,15 +42,28 @@ def main() -> str | None:
 
 def _shows_a_picture() -> bool:
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("RELIT_", "XDG_", "PYTHON"))}
-    command = [str(Path(sys.executable).parent / "relit"), "demo", "--headless", "--seconds", "20", "--port", "0"]
-    with tempfile.TemporaryDirectory() as empty:
-        done = subprocess.run(  # noqa: S603 - our own command
-            command, cwd=empty, env={**kept, "HOME": empty}, capture_output=True, text=True, timeout=300, check=False
-        )
-    if "First picture" not in done.stdout or done.returncode != 0:
-        print(done.stdout, done.stderr, file=sys.stderr)
-        return False
-    return True
+    command = [str(Path(sys.executable).parent / "relit"), "demo", "--headless", "--seconds", "300", "--port", "0"]
+    said = ""
+    with (
+        tempfile.TemporaryDirectory() as empty,
+        subprocess.Popen(  # noqa: S603 - our own command
+            command,
+            cwd=empty,
+            env={**kept, "HOME": empty},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        ) as demo,
+    ):
+        assert demo.stdout is not None
+        for line in demo.stdout:
+            said += line
+            if "First picture" in line:
+                demo.terminate()
+        if demo.wait() == 0 and "First picture" in said:
+            return True
+    print(said, file=sys.stderr)
+    return False
 
 
 if __name__ == "__main__":
