@@ -19,8 +19,8 @@ from tests.vm.readers import FRAMES, NODE, READERS, Watcher, difference, finds_l
 pytestmark = pytest.mark.timeout(900)
 
 LARGER = (480, 270)
-MOST_GAP_MS = 1000
-"""While the camera is killed and started again: on an emulated machine with ten pictures a second, and a busy host."""
+MOST_GAP_SHARE = 0.1
+"""Of the time from `kill -9` until the new camera is live: both take the longer, the busier the host."""
 
 
 def test_where_nobody_publishes_readers_find_no_camera(machine: Machine) -> None:
@@ -76,55 +76,42 @@ class TestWhileItRuns:
         listed = json.loads(relit(machine, "devices --json").output)["virtual_cameras"]
         assert listed == [{"label": "Relit Camera", "node": NODE, "ours": True, "size": list(SIZE)}]
 
+    def test_a_reader_stays_through_kill_stop_and_another_size(
+        self, camera: Camera, machine: Machine, version: str, saw: Callable[[str, str], None]
+    ) -> None:
+        """Last of those of this camera, which it kills."""
+        with Watcher(machine, "generations") as watcher:
+            before = watcher.wait_for(30)
+            saw("OpenCV, while the camera runs", f"longest gap {longest_gap_s(before):.2f} s")
+            killed = len(watcher.rows())
+            camera.kill()
+            watcher.wait_for(50, after=killed)
+            away = watcher.rows()[killed - 1 :]
+            saw("OpenCV, after `kill -9`", f"longest gap {longest_gap_s(away):.2f} s")
+            with running(machine) as second:
+                live = len(watcher.rows())
+                again = watcher.wait_for(5, after=live + 2)  # buffers may still hold pictures of before
+                assert second.stop().status == 0
+            stopped = len(watcher.rows())
+            with running(machine, size=LARGER):
+                other = watcher.wait_for(5, after=stopped + 2)
+                image = watcher.stop()
+        rows = watcher.rows()
+        assert all(row["size"] == list(SIZE) for row in rows), "the size must stay while somebody reads"
+        for generation in (rows[:killed], again, other):
+            numbers = [row["number"] for row in generation]
+            assert None not in numbers[-5:]
+            assert numbers[-1] > numbers[-5]
+        number = read_number(image)
+        assert number is not None
+        assert difference(image, draw_pattern(SIZE, number)) <= 6
+        nobody = rows[killed - 1 : live + 1]
+        saw("OpenCV, until the new camera is live", f"longest gap {longest_gap_s(nobody):.2f} s")
+        assert longest_gap_s(nobody) < MOST_GAP_SHARE * (nobody[-1]["at"] - nobody[0]["at"])
+        gap_s = rows[stopped]["at"] - rows[stopped - 1]["at"]
+        saw("OpenCV, reading on", f"stop and start with another size: goes on after {gap_s:.0f} s")
 
-def test_a_reader_stays_through_kill_stop_and_another_size(
-    machine: Machine, version: str, saw: Callable[[str, str], None]
-) -> None:
-    with running(machine) as camera, Watcher(machine, "generations") as watcher:
-        watcher.wait_for(5)
-        killed = len(watcher.rows())
-        camera.kill()
-        with running(machine) as camera:
-            live = len(watcher.rows())
-            again = watcher.wait_for(5, after=live + 2)  # buffers may still hold pictures of before
-            assert camera.stop().status == 0
-        stopped = len(watcher.rows())
-        with running(machine, size=LARGER):
-            other = watcher.wait_for(5, after=stopped + 2)
-            image = watcher.stop()
-    rows = watcher.rows()
-    assert all(row["size"] == list(SIZE) for row in rows), "the size must stay while somebody reads"
-    for generation in (rows[:killed], again, other):
-        numbers = [row["number"] for row in generation]
-        assert None not in numbers[-5:]
-        assert numbers[-1] > numbers[-5]
-    number = read_number(image)
-    assert number is not None
-    assert difference(image, draw_pattern(SIZE, number)) <= 6
-    gap_s = rows[stopped]["at"] - rows[stopped - 1]["at"]
-    saw("OpenCV, reading on", f"stop and start with another size: goes on after {gap_s:.0f} s")
 
-
-def test_kill_9_and_a_new_start_are_no_gap_for_a_reader(
-    machine: Machine, version: str, saw: Callable[[str, str], None]
-) -> None:
-    def longest_gap_ms(rows: list[dict[str, Any]]) -> float:
-        return 1000 * max(later["at"] - earlier["at"] for earlier, later in pairwise(rows))
-
-    with running(machine) as camera, Watcher(machine, "kept") as watcher:
-        before = watcher.wait_for(30)
-        saw("OpenCV, while the camera runs", f"longest gap {longest_gap_ms(before):.0f} ms")
-        killed = len(watcher.rows())
-        camera.kill()
-        watcher.wait_for(50, after=killed)
-        away = watcher.rows()[killed - 1 :]
-        saw("OpenCV, after `kill -9`", f"longest gap {longest_gap_ms(away):.0f} ms")
-        with running(machine) as camera:
-            live = len(watcher.rows())
-            again = watcher.wait_for(5, after=live + 2)
-            watcher.stop()
-            assert camera.stop().status == 0
-    rows = watcher.rows()[killed - 1 : live + 1]
-    saw("OpenCV, until the new camera is live", f"longest gap {longest_gap_ms(rows):.0f} ms")
-    assert [row["number"] for row in again][-1] is not None
-    assert longest_gap_ms(rows) < MOST_GAP_MS
+def longest_gap_s(rows: list[dict[str, Any]]) -> float:
+    """Between two pictures that follow each other."""
+    return max(later["at"] - earlier["at"] for earlier, later in pairwise(rows))
