@@ -10,12 +10,15 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 from importlib.metadata import distribution
 from pathlib import Path
 
 import relit_camera
 
 SOURCE = Path(__file__).resolve().parents[1] / "service" / "relit_camera"
+TIME_LIMIT_S = 300.0
+"""Within which the demonstration shows a picture and ends, else it is killed."""
 
 
 def main() -> str | None:
@@ -42,7 +45,7 @@ def main() -> str | None:
 
 def _shows_a_picture() -> bool:
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("RELIT_", "XDG_", "PYTHON"))}
-    command = [str(Path(sys.executable).parent / "relit"), "demo", "--headless", "--seconds", "300", "--port", "0"]
+    command = [str(Path(sys.executable).parent / "relit"), "demo", "--headless", "--port", "0"]
     said = ""
     with (
         tempfile.TemporaryDirectory() as empty,
@@ -56,12 +59,16 @@ def _shows_a_picture() -> bool:
         ) as demo,
     ):
         assert demo.stdout is not None
+        hung = threading.Timer(TIME_LIMIT_S, demo.kill)
+        hung.start()
         for line in demo.stdout:
             said += line
             if "First picture" in line:
                 demo.terminate()
-        if demo.wait() == 0 and "First picture" in said:
-            return True
+        ended_well = demo.wait() == 0
+        hung.cancel()
+    if ended_well and "First picture" in said:
+        return True
     print(said, file=sys.stderr)
     return False
 
