@@ -7,7 +7,7 @@ import socket
 import subprocess
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,13 +15,13 @@ import httpx
 import pytest
 
 from relit_camera.live.publishing.publisher import RETRY_S
-from tests.cli.relit_command import Material, call, finish, start
-from tests.small_camera import wait_until
-
-pytestmark = pytest.mark.real_time
+from tests.cli.relit_command import Answer, Material, call, finish, start
+from tests.lateness import Lateness
+from tests.small_camera import WAIT_S, wait_until
 
 END_S = 3.0
-START_S = 60.0
+"""But for what a busy machine makes any process wait."""
+CLIP_FRAMES = 40
 
 
 def arguments(material: Material, *more: object) -> list[object]:
@@ -46,7 +46,7 @@ def running(
         assert process.stdout is not None
         line = process.stdout.readline()
         assert "the panel is at http://127.0.0.1:" in line, (line, process.stderr and process.stderr.read())
-        with httpx.Client(base_url=line.split()[-1] + "api/v1/", timeout=START_S) as http:
+        with httpx.Client(base_url=line.split()[-1] + "api/v1/", timeout=WAIT_S) as http:
             yield process, http
     finally:
         process.kill()
@@ -55,11 +55,19 @@ def running(
 
 def wait_for_uptime(http: httpx.Client, uptime_s: float) -> None:
     """Wait until the camera has run for so long by its own clock, however slow the machine is."""
-    wait_until(lambda: bool(http.get("status").json()["uptime_s"] >= uptime_s), START_S)
+    wait_until(lambda: bool(http.get("status").json()["uptime_s"] >= uptime_s))
 
 
 def wait_for_state(http: httpx.Client, state: str) -> None:
-    wait_until(lambda: bool(http.get("status").json()["state"] == state), START_S)
+    wait_until(lambda: bool(http.get("status").json()["state"] == state))
+
+
+def troubles(http: httpx.Client) -> dict[str, str]:
+    """By code, what works less well than asked, but for the detail that a busy machine costs."""
+    degraded = http.get("status").json()["degraded"]
+    found = {each["code"]: f"{each['what']}: {each['why']}; {each['cure']}" for each in degraded}
+    found.pop("reduced-quality", None)
+    return found
 
 
 class Viewer(threading.Thread):
@@ -84,72 +92,80 @@ class Viewer(threading.Thread):
             self.error = repr(error)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_signal_ends_it_within_three_seconds_with_two_previews_open(
-    number: signal.Signals, material: Material, tmp_path: Path
-) -> None:
-    with running(material, tmp_path) as (process, http):
-        viewers = [Viewer(http), Viewer(http)]
-        for viewer in viewers:
-            viewer.start()
-        for viewer in viewers:
-            assert viewer.began.wait(START_S), (viewer.bytes, viewer.error)
+def check_end(process: subprocess.Popen[str], http: httpx.Client, number: signal.Signals) -> None:
+    """The signal ends it within three seconds, with two previews open."""
+    viewers = [Viewer(http), Viewer(http)]
+    for viewer in viewers:
+        viewer.start()
+    for viewer in viewers:
+        assert viewer.began.wait(WAIT_S), (viewer.bytes, viewer.error)
+    with Lateness() as lateness:
         began = time.monotonic()
         process.send_signal(number)
-        assert process.wait(START_S) == 0
-        took_s = time.monotonic() - began
-        assert took_s < END_S, f"it took {took_s:.1f} s"
-        assert process.stderr is not None
-        assert process.stderr.read() == ""
-        for viewer in viewers:
-            viewer.join(START_S)
-            assert not viewer.is_alive()
+        assert process.wait(WAIT_S) == 0
+        took_s = lateness.unexplained_s(began, time.monotonic())
+    assert took_s < END_S, f"it took {took_s:.1f} s"
+    assert process.stderr is not None
+    assert [line for line in process.stderr if " INFO " not in line and not line.startswith("INFO ")] == []
+    for viewer in viewers:
+        viewer.join(WAIT_S)
+        assert not viewer.is_alive()
 
 
-def test_light_changes_while_it_runs_and_the_clip_loops(material: Material, tmp_path: Path) -> None:
-    with running(material, tmp_path) as (_, http):
+def test_light_changes_while_it_runs_the_clip_loops_and_sigterm_ends_it(material: Material, tmp_path: Path) -> None:
+    with running(material, tmp_path, "--environment", "sunset", "--mode", "ratio") as (process, http):
+        assert http.get("lighting").json()["environment"] == "sunset"
+        assert http.get("mode").json() == {"mode": "ratio"}
         first = http.get("snapshot.jpg").raise_for_status().content
         assert first.startswith(b"\xff\xd8")
         body = {"environment": None, "lamps": [{"azimuth_deg": 90}], "transition_s": 0}
         assert http.put("lighting", json=body).status_code == 200
-        wait_for_uptime(http, 3.5)  # the clip lasts two seconds
+
+        def frames_of_the_clip() -> int:
+            frames = http.get("status").json()["frames"]
+            return int(frames["composed"] + frames["dropped"])
+
+        wait_until(lambda: frames_of_the_clip() > CLIP_FRAMES + 5)
         wait_for_state(http, "live")
         status = http.get("status").json()
         assert status["frames"]["published"] > 20
-        assert status["degraded"] == []
         assert status["source"].startswith("file ")
+        assert troubles(http) == {}
         assert http.get("lighting").json()["lamps"][0]["azimuth_deg"] == 90
+        check_end(process, http, signal.SIGTERM)
 
 
-def test_on_demand_the_source_waits_for_a_viewer(material: Material, tmp_path: Path) -> None:
-    with running(material, tmp_path, "--on-demand") as (_, http):
+def test_on_demand_the_source_waits_for_a_viewer_and_ctrl_c_ends_it(material: Material, tmp_path: Path) -> None:
+    with running(material, tmp_path, "--on-demand") as (process, http):
+
+        def published() -> int:
+            return int(http.get("status").json()["frames"]["published"])
+
+        def is_live_when_looked_at() -> bool:
+            assert http.get("snapshot.jpg").status_code == 200
+            return bool(http.get("status").json()["state"] == "live")
+
         wait_for_state(http, "released")
-        published = http.get("status").json()["frames"]["published"]
-        assert http.get("snapshot.jpg").status_code == 200
-        wait_for_state(http, "live")
+        wait_until(is_live_when_looked_at)
         wait_for_state(http, "released")  # five seconds later
-        assert http.get("status").json()["frames"]["published"] > published + 40
-        assert http.get("status").json()["degraded"] == []
-
-
-def test_environment_of_a_file_lights_this_run(material: Material, tmp_path: Path) -> None:
-    with running(material, tmp_path, "--environment", "sunset", "--mode", "ratio") as (_, http):
-        assert http.get("lighting").json()["environment"] == "sunset"
-        assert http.get("mode").json() == {"mode": "ratio"}
+        before = published()
+        wait_until(lambda: published() > before + 10)
+        assert http.get("status").json()["state"] == "released"
+        assert troubles(http) == {}
+        check_end(process, http, signal.SIGINT)
 
 
 def test_a_disk_that_is_full_loses_the_file_not_the_camera(material: Material, tmp_path: Path) -> None:
     recording = tmp_path / "recording.mp4"
     with running(material, tmp_path, "--sink", recording, full_at=20) as (process, http):
-        wait_until(lambda: bool(http.get("status").json()["degraded"]), START_S)
-        status = http.get("status").json()
-        assert status["degraded"][0]["what"] == "sink failed"
-        assert "recording.mp4: File too large" in status["degraded"][0]["why"]
+        wait_until(lambda: "sink-failed" in troubles(http))
+        assert troubles(http)["sink-failed"].startswith("sink failed: ")
+        assert "recording.mp4: File too large" in troubles(http)["sink-failed"]
         assert http.get("snapshot.jpg").status_code == 200
-        wait_for_uptime(http, status["uptime_s"] + RETRY_S + 0.5)  # the publisher has tried again
-        assert http.get("status").json()["state"] == "live"
+        wait_for_uptime(http, http.get("status").json()["uptime_s"] + RETRY_S + 0.5)  # the publisher has tried again
+        wait_for_state(http, "live")
         process.send_signal(signal.SIGTERM)
-        assert process.wait(START_S) == 1
+        assert process.wait(WAIT_S) == 1
         assert process.stderr is not None
         said = process.stderr.read().splitlines()
         assert said[-1].startswith(f"relit: cannot write {recording}: File too large;")
@@ -157,23 +173,28 @@ def test_a_disk_that_is_full_loses_the_file_not_the_camera(material: Material, t
     assert not [path.name for path in tmp_path.iterdir() if "recording" in path.name]
 
 
-def test_port_in_use(material: Material, tmp_path: Path) -> None:
+@pytest.fixture
+def refused(material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Answer]:
+    """Calls `relit run` in this process, whose own signals stay as they are, with options that it refuses."""
+    monkeypatch.setenv("RELIT_STORAGE__DATA_DIR", str(tmp_path / "data"))
+    monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    return lambda *options: call(*arguments(material, *options))
+
+
+def test_port_in_use(refused: Callable[..., Answer]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        answer = finish(*arguments(material)[:6], port, *arguments(material)[7:], folder=tmp_path)
-    answer.complains(f"port {port}", "in use", "--port")
+        refused("--port", port).complains(f"port {port}", "in use", "--port")
 
 
-def test_missing_camera(material: Material, tmp_path: Path) -> None:
-    options = arguments(material, "--strict")
-    options[2] = "No Such Camera"
-    finish(*options, folder=tmp_path).complains("No Such Camera")
+def test_missing_camera(refused: Callable[..., Answer]) -> None:
+    refused("--strict", "--source", "No Such Camera").complains("No Such Camera")
 
 
 def test_missing_virtual_camera(material: Material, tmp_path: Path) -> None:
-    options = arguments(material, "--strict")
-    options[4] = "/dev/video97"
-    finish(*options, folder=tmp_path).complains("/dev/video97")
+    options = arguments(material, "--strict", "--sink", "/dev/video97")
+    finish(*options, folder=tmp_path).complains("/dev/video97")  # a process of its own: it holds the camera's lock
     assert not (tmp_path / "data").exists()
 
 
@@ -183,14 +204,11 @@ def test_it_starts_without_devices_and_models_and_says_what_to_do(
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
     missing = ("--source", "No Such Camera", "--sink", "/dev/video97", "--tracker", "mesh", "--no-pull")
     with running(material, tmp_path, *missing) as (process, http):
-
-        def told() -> dict[str, str]:
-            return {each["code"]: f"{each['why']}; {each['cure']}" for each in http.get("status").json()["degraded"]}
-
-        wait_until(lambda: told().keys() >= {"source-failed", "sink-failed", "models-missing"}, START_S)
-        assert "there is no webcam 'No Such Camera'" in told()["source-failed"]
-        assert "/dev/video97" in told()["sink-failed"]
-        assert "run `relit models pull" in told()["models-missing"]
+        wait_until(lambda: troubles(http).keys() >= {"source-failed", "sink-failed", "models-missing"})
+        told = troubles(http)
+        assert "there is no webcam 'No Such Camera'" in told["source-failed"]
+        assert "/dev/video97" in told["sink-failed"]
+        assert "run `relit models pull" in told["models-missing"]
         assert http.get("snapshot.jpg").content.startswith(b"\xff\xd8")  # the placeholder
         assert http.get("source").json()["what"] == "there is no webcam 'No Such Camera'"
         assert "face_detector_yunet" in http.get("models").json()["missing"]
@@ -198,17 +216,16 @@ def test_it_starts_without_devices_and_models_and_says_what_to_do(
         assert states["models"] == states["webcam"] == "failed"
         # The page recovers by itself: another source is chosen, and the tracker needs no models.
         assert http.patch("source", json={"device": "pattern"}).status_code == 200
-        wait_until(lambda: "source-failed" not in told(), START_S)
+        wait_until(lambda: "source-failed" not in troubles(http))
         process.send_signal(signal.SIGTERM)
-        assert process.wait(START_S) == 0
+        assert process.wait(WAIT_S) == 0
         assert process.stderr is not None
         said = process.stderr.read()
         assert "Waiting: there is no webcam 'No Such Camera'; " in said
         assert "Traceback" not in said
 
 
-def test_missing_subject_model_and_track(material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no-models"))
+def test_missing_subject_model_and_track(refused: Callable[..., Answer]) -> None:
     for changed, words in (
         (("--subject", "nobody"), ("nobody", "there are")),
         (("--tracker", "mesh", "--strict"), ("relit models pull",)),
@@ -217,17 +234,17 @@ def test_missing_subject_model_and_track(material: Material, tmp_path: Path, mon
         (("--source", "none.mp4"), ("none.mp4",)),
         (("--sink", "picture.gif"), ("picture.gif", ".mp4")),
     ):
-        call(*arguments(material, *changed)).complains(*words)
+        refused(*changed).complains(*words)
 
 
 def test_the_configuration_is_edited_while_it_runs(material: Material, tmp_path: Path) -> None:
     config = tmp_path / "mine.yaml"
     config.write_text("look: {lighting: {environment: studio}}\n", encoding="utf-8")
 
-    def told(process_http: httpx.Client) -> str:
-        return " ".join(f"{each['what']}: {each['why']}" for each in process_http.get("status").json()["degraded"])
+    def told(http: httpx.Client) -> str:
+        return " ".join(troubles(http).values())
 
-    with running(material, tmp_path, config=config, check_period_s=0.2) as (process, http):
+    with running(material, tmp_path, config=config, check_period_s=0.05) as (process, http):
         assert http.put("background", json={"kind": "color", "color": "#102030"}).status_code == 200
         for wrong, why in (
             ("look: {lighting: {environment", "line 1"),
@@ -237,16 +254,16 @@ def test_the_configuration_is_edited_while_it_runs(material: Material, tmp_path:
             ("\0\xff", "mine.yaml"),
         ):
             config.write_text(wrong, encoding="latin-1")
-            wait_until(lambda why=why: why in told(http), START_S)  # type: ignore[misc]
+            wait_until(lambda why=why: why in told(http))  # type: ignore[misc]
             assert http.get("lighting").json()["environment"] == "studio"  # kept as it was
         config.unlink()
-        wait_until(lambda: "no configuration file" in told(http), START_S)
+        wait_until(lambda: "no configuration file" in told(http))
         assert http.put("lighting", json={"environment": "studio", "saturation": 0.5}).status_code == 200
         config.write_text("look: {lighting: {environment: sunset}}\noutput: {fps: 25}\n", encoding="utf-8")
-        wait_until(lambda: http.get("lighting").json()["environment"] == "sunset", START_S)
+        wait_until(lambda: http.get("lighting").json()["environment"] == "sunset")
         assert http.get("lighting").json()["saturation"] == 0.5  # set by the API, not edited
         assert "output counts from the next start" in told(http)
         assert http.get("background").json()["color"] == "#102030"  # what was not edited stays as it was set
         config.write_text("look: {lighting: {environment: party}}\n", encoding="utf-8")
-        wait_until(lambda: http.get("lighting").json()["environment"] == "party" and told(http) == "", START_S)
+        wait_until(lambda: http.get("lighting").json()["environment"] == "party" and told(http) == "")
         assert process.poll() is None
