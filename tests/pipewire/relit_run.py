@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from relit_camera.app.demo.demo_files import CLIP, MATTES, SUBJECT, TRACK
 from tests.cli.relit_command import COMMAND
-from tests.pipewire.session import Session, wait_for
+from tests.pipewire.session import WAIT_S, Session, wait_for
 
-START_S = 60.0
 SIZE = (1280, 720)
 
 
@@ -47,7 +46,7 @@ class RelitRun:
             )
         self._listener.start()
         try:
-            wait_for(lambda: self._said or self.process.poll() is not None, "relit run", START_S)
+            wait_for(lambda: self._said or self.process.poll() is not None, "relit run")
             assert self._said, (folder / "relit.log").read_text()
         except BaseException:
             self.__exit__()
@@ -64,7 +63,7 @@ class RelitRun:
 
     def get(self, path: str) -> Any:
         """What a resource of the API says."""
-        with urllib.request.urlopen(self.api + path, timeout=20) as answer:
+        with urllib.request.urlopen(self.api + path, timeout=WAIT_S) as answer:
             return json.load(answer)
 
     def put(self, path: str, value: object) -> None:
@@ -73,12 +72,12 @@ class RelitRun:
         request = urllib.request.Request(
             self.api + path, data=json.dumps(value).encode(), headers=headers, method="PUT"
         )
-        with urllib.request.urlopen(request, timeout=20):
+        with urllib.request.urlopen(request, timeout=WAIT_S):
             pass
 
     def snapshot(self) -> NDArray[np.uint8]:
         """The newest published picture, sRGB RGB."""
-        with urllib.request.urlopen(self.api + "snapshot.jpg", timeout=20) as answer:
+        with urllib.request.urlopen(self.api + "snapshot.jpg", timeout=WAIT_S) as answer:
             image = cv2.imdecode(np.frombuffer(answer.read(), np.uint8), cv2.IMREAD_COLOR)
         assert image is not None
         return np.asarray(image[..., ::-1], np.uint8)

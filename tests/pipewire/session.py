@@ -21,8 +21,8 @@ from relit_camera.devices.device_users import KEEPER_MODULE
 T = TypeVar("T")
 
 CACHE_VARIABLE = "PIPEWIRE_TEST_CACHE"
-START_S = 20.0
-"""How long a daemon may take to start; a busy machine needs seconds."""
+WAIT_S = 120.0
+"""How long to wait for anything; a busy machine needs a minute for `relit run` to start."""
 
 BUS = """<!DOCTYPE busconfig PUBLIC "-//freedesktop//DTD D-Bus Bus Configuration 1.0//EN"
  "http://www.freedesktop.org/standards/dbus/1.0/busconfig.dtd">
@@ -135,7 +135,7 @@ class Session:
         self._end("wireplumber")
         self._end("pipewire")
 
-    def run(self, *command: str, timeout_s: float = START_S) -> subprocess.CompletedProcess[bytes]:
+    def run(self, *command: str, timeout_s: float = WAIT_S) -> subprocess.CompletedProcess[bytes]:
         """Run a program of the session to its end."""
         return subprocess.run(
             command, env=self.environment, cwd=self.folder, capture_output=True, timeout=timeout_s, check=False
@@ -209,7 +209,7 @@ class Session:
             process.wait()
 
 
-def wait_for(ask: Callable[[], T | None], what: str, seconds: float = START_S) -> T:
+def wait_for(ask: Callable[[], T | None], what: str, seconds: float = WAIT_S) -> T:
     """Ask until the answer is true, and give it.
 
     Raises:

@@ -9,15 +9,14 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from relit_camera.devices.keeper.keeper_process import PROTOCOL, VERSION
+from tests.lateness import Lateness
 from tests.pipewire.conftest import PatternCamera
-from tests.pipewire.reader import Gap, Reader
-from tests.pipewire.session import Session, wait_for
+from tests.pipewire.reader import Reader
+from tests.pipewire.session import WAIT_S, Session, wait_for
 from tests.pipewire.test_pipewire_camera import LABEL, WITHIN, Notes, found
 
-pytestmark = [pytest.mark.real_time, pytest.mark.timeout(120)]
-
-MOST_GAP_S = 1.0
-"""Two hundred milliseconds where the machine has time; this also where it has not, but for what all must wait then."""
+LONGEST_GAP_S = 1.0
+"""But for what a busy machine makes any process wait. It is two hundred milliseconds where the machine has time."""
 KEPT = "--keep-s", "60"
 OTHER_VERSION = f"0.0.0 {PROTOCOL}"
 StartCamera = Callable[..., PatternCamera]
@@ -39,6 +38,13 @@ def reader(session: Session) -> Iterator[Callable[[], Reader]]:
         each.close()
 
 
+@pytest.fixture
+def lateness() -> Iterator[Lateness]:
+    """What the machine makes any process wait during the test."""
+    with Lateness() as measured:
+        yield measured
+
+
 @pytest.fixture(autouse=True)
 def none_left(session: Session) -> Iterator[None]:
     """Whatever a test does, it leaves no keeper to the next one."""
@@ -47,18 +53,14 @@ def none_left(session: Session) -> Iterator[None]:
     wait_for(lambda: found(session) is None, "the camera to go")
 
 
-def check(reader: Reader) -> None:
-    """The call went on, with pictures all the time, all of them right."""
+def check(reader: Reader, lateness: Lateness) -> float:
+    """The call went on, with pictures all the time, all of them right; gives the longest gap, in seconds."""
     assert reader.goes_on
-    assert reader.has_all
-    seen = list(reader.seen)
+    seen = {each.planes: each for each in list(reader.seen)}.values()  # what is repeated is looked at once
     assert all(each.worst <= WITHIN for each in seen), max(each.worst for each in seen)
-    check_gap(reader.longest_gap())
-
-
-def check_gap(gap: Gap) -> None:
-    """No longer than is allowed, but for what the machine made everybody wait in it."""
-    assert gap.seconds - gap.late_s <= MOST_GAP_S, gap
+    gap_s = lateness.longest_gap_s(list(reader.times))
+    assert gap_s <= LONGEST_GAP_S
+    return gap_s
 
 
 def serial(session: Session) -> object:
@@ -67,8 +69,13 @@ def serial(session: Session) -> object:
     return properties["object.serial"]
 
 
-def test_kill_9_and_a_new_start_end_no_call(
-    session: Session, camera: StartCamera, reader: Callable[[], Reader], suite: str, note_row: Notes
+def test_kill_9_the_placeholder_and_a_new_start_end_no_call(
+    session: Session,
+    camera: StartCamera,
+    reader: Callable[[], Reader],
+    lateness: Lateness,
+    suite: str,
+    note_row: Notes,
 ) -> None:
     first = camera(*KEPT)
     call, node = reader(), serial(session)
@@ -76,40 +83,37 @@ def test_kill_9_and_a_new_start_end_no_call(
     assert any("gst" in name for name in told["names"]), told
     first.process.kill()
     first.process.wait()
-    call.wait_for_pictures(60)  # without a camera
+    call.wait_for_pictures()  # without a camera
     last = call.seen[-1].number
     assert last is not None
+    wait_for(lambda: call.seen[-1].number is None, "the placeholder")
+    call.wait_for_pictures()
     second = camera(*KEPT)
     second.wait_for("the same reader", readers=1, wanted=True, sink="camera PipeWire")
     call.wait_for_another(than=last)
     call.wait_for_pictures()
     assert serial(session) == node
-    check(call)
-    row = suite, "pattern", f"{1000 * call.longest_gap().seconds:.0f} ms"
-    note_row("a camera in PipeWire that is killed and started again", row)
+    gap_s = check(call, lateness)
+    note_row("a camera in PipeWire that is killed and started again", (suite, "pattern", f"{1e3 * gap_s:.0f} ms"))
 
 
-@pytest.mark.parametrize(
-    "other",
-    [("--version", OTHER_VERSION), ("--width", "640", "--height", "360"), ("--fps", "25")],
-    ids=["version", "size", "rate"],
-)
 def test_an_upgrade_and_other_settings_end_no_call(
-    session: Session, camera: StartCamera, reader: Callable[[], Reader], other: tuple[str, ...]
+    session: Session, camera: StartCamera, reader: Callable[[], Reader], lateness: Lateness
 ) -> None:
-    first = camera(*KEPT)
+    shown = camera(*KEPT)
     call, node = reader(), serial(session)
-    first.process.kill()
-    first.process.wait()
-    call.wait_for_pictures()
-    last = call.seen[-1].number
-    second = camera(*KEPT, *other)
-    second.wait_for("the same reader", readers=1, error=None)
-    call.wait_for_another(than=last)
-    call.wait_for_pictures()
-    assert serial(session) == node
-    assert call.goes_on
-    check_gap(call.longest_gap())
+    for other in (("--version", OTHER_VERSION), ("--width", "640", "--height", "360"), ("--fps", "25")):
+        shown.process.kill()
+        shown.process.wait()
+        call.wait_for_pictures()
+        last = call.seen[-1].number
+        shown = camera(*KEPT, *other)
+        shown.wait_for(f"the same reader, with {other}", readers=1, error=None)
+        call.wait_for_another(than=last)
+        call.wait_for_pictures()
+        assert serial(session) == node
+        assert call.goes_on
+    assert lateness.longest_gap_s(list(call.times)) <= LONGEST_GAP_S
 
 
 def test_where_nobody_reads_an_upgrade_brings_its_own_keeper(session: Session, camera: StartCamera) -> None:
@@ -130,7 +134,7 @@ def test_a_camera_that_stops_takes_its_node_away(session: Session, camera: Start
     shown = camera(*KEPT)
     wait_for(lambda: found(session), "the camera in pw-dump")
     shown.process.send_signal(signal.SIGTERM)
-    assert shown.process.wait(10) == 0
+    assert shown.process.wait(WAIT_S) == 0
     wait_for(lambda: not session.keepers(), "its keeper to end")
     wait_for(lambda: found(session) is None, "the camera to go")
 
@@ -147,29 +151,18 @@ def test_who_comes_and_goes_without_a_camera_is_known_to_the_next_one(
     second.wait_for("one reads", readers=1, wanted=True)
     call.close()
     second.wait_for("nobody reads", readers=0)
-    second.wait_for("the webcam is let go of", wanted=False)
 
 
-def test_a_camera_that_hangs_is_bridged(session: Session, camera: StartCamera, reader: Callable[[], Reader]) -> None:
-    shown = camera(*KEPT)
-    call = reader()
-    shown.process.send_signal(signal.SIGSTOP)
-    call.wait_for_pictures(60)
-    shown.process.send_signal(signal.SIGCONT)
-    call.wait_for_pictures()
-    check(call)
-
-
-def test_the_placeholder_follows_the_last_picture(
-    session: Session, camera: StartCamera, reader: Callable[[], Reader]
+def test_a_camera_that_hangs_is_bridged(
+    session: Session, camera: StartCamera, reader: Callable[[], Reader], lateness: Lateness
 ) -> None:
     shown = camera(*KEPT)
     call = reader()
-    shown.process.kill()
-    shown.process.wait()
-    wait_for(lambda: call.seen[-1].number is None, "the placeholder")
+    shown.process.send_signal(signal.SIGSTOP)
+    call.wait_for_pictures(40)
+    shown.process.send_signal(signal.SIGCONT)
     call.wait_for_pictures()
-    check(call)
+    check(call, lateness)
 
 
 def test_a_keeper_that_is_killed_is_replaced(session: Session, camera: StartCamera) -> None:
@@ -178,8 +171,10 @@ def test_a_keeper_that_is_killed_is_replaced(session: Session, camera: StartCame
     node = serial(session)
     (keeper,) = session.keepers()
     os.kill(keeper.pid, signal.SIGKILL)
+    # Until another one is there the camera may be published without.
+    wait_for(lambda: [each.pid for each in session.keepers()] not in ([], [keeper.pid]), "another keeper")
     wait_for(lambda: (found(session) or {}).get("object.serial", node) != node, "another node")
-    assert shown.last["error"] is None
+    shown.wait_for("published", error=None)
     assert shown.process.poll() is None
     assert len(session.keepers()) == 1
 
