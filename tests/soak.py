@@ -2,7 +2,7 @@
 
 Somebody looks at the preview all the time, and opens it anew twice a minute. With `--changes` so many random changes a
 second are made through the API meanwhile (`tests.soak_changes`); what is measured is then measured in the scene of the
-start, to which the camera is brought back for each sample. Half a minute of that runs in CI, the long runs by hand.
+start, to which the camera is brought back for each sample. Twenty seconds of that run in CI, the long runs by hand.
 """
 
 from __future__ import annotations
