@@ -6,8 +6,8 @@ tests may be those of another one (`run --tests`), as a mutant's name depends on
 
 A mutant is written into a copy of the checkout. Tests run in the order of their nearness to the mutated module, for
 some time for each mutant: what lives may still be noticed by a test that is farther away. Left out are tests marked
-`study`, those marked `real_time` but with `--real-time`, the suites of the browser, the virtual machine and PipeWire,
-files that take longer than a minute, and tests that fail without a mutant.
+`study`, the suites of the browser, the virtual machine and PipeWire, files that take longer than a minute, and tests
+that fail without a mutant.
 """
 
 from __future__ import annotations
