@@ -92,13 +92,13 @@ def mostly_weak(codes: Codes) -> Shot:
 
 
 def no_ball(codes: Codes) -> Shot:
-    without = codes.copy()
-    without[:, 30:110, 150:240] = codes[:, 30:110, 0:90]
+    without = codes[:60].copy()
+    without[:, 30:110, 150:240] = codes[:60, 30:110, 0:90]
     return Shot(without)
 
 
 def ball_cut_off(codes: Codes) -> Shot:
-    return Shot(codes[:, :, :194])
+    return Shot(codes[:60, :, :194])
 
 
 def named_ball_cut_off(codes: Codes) -> Shot:
@@ -106,7 +106,7 @@ def named_ball_cut_off(codes: Codes) -> Shot:
 
 
 def ball_over_exposed(codes: Codes) -> Shot:
-    white = codes.copy()
+    white = codes[:60].copy()
     white[:, circle(190.6, 69, 30)] = 255
     return Shot(white)
 
@@ -124,7 +124,7 @@ def lamp_on_one_side(codes: Codes) -> Shot:
 
 
 def few_directions(codes: Codes) -> Shot:
-    return Shot(codes[:75])
+    return Shot(codes[:75], {"ball": NAMED_BALL})
 
 
 def narrow_sweep(codes: Codes) -> Shot:
@@ -140,7 +140,7 @@ def enhanced(codes: Codes) -> Shot:
 def walked_away(codes: Codes) -> Shot:
     gone = codes.copy()
     gone[70:, 90:] = np.median(codes[70:, 20:60, :60], axis=(1, 2))[:, None, None]
-    return Shot(gone)
+    return Shot(gone, {"ball": NAMED_BALL})
 
 
 def _black_when_dark(codes: Codes, since: int = 0) -> Codes:
@@ -154,13 +154,13 @@ def _black_when_dark(codes: Codes, since: int = 0) -> Codes:
 
 def black_without_the_flash(codes: Codes) -> Shot:
     """But for the first three dark frames."""
-    return Shot(_black_when_dark(codes, since=6))
+    return Shot(_black_when_dark(codes, since=6), {"ball": NAMED_BALL})
 
 
 def black_about_a_small_circle(codes: Codes) -> Shot:
     """The film begins without the flash; the circle that is given holds nothing but black."""
     black = _black_when_dark(codes)[int(np.argmin(LIT)) :][:60]
-    return Shot(black, {"face": f"{HEAD[0]},{HEAD[1]},30"})
+    return Shot(black, {"ball": NAMED_BALL, "face": f"{HEAD[0]},{HEAD[1]},30"})
 
 
 def nobody(codes: Codes) -> Shot:
@@ -168,7 +168,7 @@ def nobody(codes: Codes) -> Shot:
     floor = codes.copy()
     floor[:, 90:] = np.median(codes[LIT == 0][:, 90:, :60], axis=(0, 2))[:, None]
     floor[LIT == 1, 285:] = 150
-    return Shot(floor, {"face": None})
+    return Shot(floor[:60], {"ball": NAMED_BALL, "face": None})
 
 
 def drop_before_the_ball(codes: Codes) -> Shot:
@@ -189,4 +189,4 @@ def sun_on_the_face(codes: Codes) -> Shot:
     for row in (135, 147, 162):
         for column in (85, 98, 112, 125):
             sunny[:, circle(column, row, 2.5)] = 20
-    return Shot(sunny, {"face": f"{HEAD[0]},{HEAD[1]},26"})
+    return Shot(sunny, {"ball": NAMED_BALL, "face": f"{HEAD[0]},{HEAD[1]},26"})
