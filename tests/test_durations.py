@@ -30,6 +30,7 @@ def test_folders_are_summed_over_parts_the_longest_first() -> None:
     assert by_folder({"units": units, "others": others}) == [("tests", 1, 9.0), ("tests/live", 3, 6.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [(), ("-n", "2", "--dist", "loadgroup")])
 def test_a_run_stores_each_test_once(processes: tuple[str, ...], tmp_path: Path) -> None:
     (tmp_path / "test_it.py").write_text(

@@ -19,6 +19,7 @@ def test_a_fault(note_row, name):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", [0, 2])
 def test_rows_are_printed_sorted(tmp_path: Path, processes: int) -> None:
     (tmp_path / "test_notes.py").write_text(NOTES)

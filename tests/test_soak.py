@@ -65,6 +65,7 @@ def test_what_is_wrong_is_said(samples: list[Sample], exit_code: int | None, sai
     assert [word in line for word, line in zip(said, wrong, strict=True)] == [True]
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_changed_all_the_time_keeps_no_more_than_its_caches() -> None:
     # In so short a time the places that it keeps are still being read: some 60 MiB. A picture that each of the changes
     # left behind would be hundreds.

@@ -108,6 +108,7 @@ def test_a_body_that_does_not_come_is_not_waited_for(camera: FakeCamera, setting
         assert is_cut_off(client)
 
 
+@pytest.mark.slow
 def test_a_body_that_comes_slowly_is_taken(server: ApiServer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connection_timeouts, "MIN_BODY_BYTES_PER_TIMEOUT", 10)
     body = b'{"name": null}' + b" " * 200
@@ -120,6 +121,7 @@ def test_a_body_that_comes_slowly_is_taken(server: ApiServer, monkeypatch: pytes
         assert client.recv(1 << 16).startswith(b"HTTP/1.1 200")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["events", "preview.mjpg"])
 def test_a_stream_that_is_taken_goes_on(server: ApiServer, path: str) -> None:
     with connect(server) as client:
@@ -127,6 +129,7 @@ def test_a_stream_that_is_taken_goes_on(server: ApiServer, path: str) -> None:
         assert not is_cut_off(client)
 
 
+@pytest.mark.slow
 def test_who_asks_again_in_time_stays(server: ApiServer) -> None:
     with connect(server) as client:
         for _ in range(8):

@@ -126,6 +126,7 @@ def test_a_name_that_is_no_name_is_refused(client: Client) -> None:
     check_problem(client.get(f"{ENVIRONMENTS}/%2e%2e%2f%2e%2e%2fetc"), 404)
 
 
+@pytest.mark.slow
 def test_a_place_on_the_person_who_is_shown(client: Client, camera: FakeCamera) -> None:
     path = f"{ENVIRONMENTS}/sunset/on-me.jpg"
     check_problem(client.get(path), 404)
@@ -141,6 +142,7 @@ def test_a_place_on_the_person_who_is_shown(client: Client, camera: FakeCamera) 
     assert client.get(path).content == first.content
 
 
+@pytest.mark.slow
 def test_other_pictures_do_not_wait_for_one_that_is_made_in_the_background(
     client: Client, camera: FakeCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:

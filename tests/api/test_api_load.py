@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.api.api_load import drive
 from tests.small_camera import PATIENT, running_camera
 
 
+@pytest.mark.slow
 def test_no_change_is_lost(tmp_path: Path) -> None:
     with running_camera(tmp_path, timings=PATIENT) as camera:
         camera.sink.wait_for(1)

@@ -22,6 +22,7 @@ def stored(camera: FakeCamera) -> list[Path]:
     return [path for path in folder.rglob("*") if path.is_file()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SENT)
 def test_a_file_that_lies_is_refused_at_once(client: Client, camera: FakeCamera, name: str) -> None:
     file = FINDS[name]

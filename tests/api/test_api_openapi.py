@@ -100,6 +100,7 @@ def test_fields_are_snake_case_and_explained(described: dict[str, Any]) -> None:
     assert "right" in schemas["Lighting"]["properties"]["yaw_deg"]["description"]
 
 
+@pytest.mark.slow
 def test_the_command_writes_it(tmp_path: Path) -> None:
     target = tmp_path / "openapi.json"
     command = [sys.executable, "-W", "error", "-m", "relit_camera.api.openapi.openapi_export", str(target)]

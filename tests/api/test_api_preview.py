@@ -110,6 +110,7 @@ def test_viewers_of_one_variant_share_each_encoding(camera: FakeCamera, monkeypa
     assert all(len(same) == 1 for same in files.values())
 
 
+@pytest.mark.slow
 def test_encoding_takes_a_small_share_of_a_core(camera: FakeCamera, monkeypatch: pytest.MonkeyPatch) -> None:
     encodings = []
 

@@ -109,6 +109,7 @@ def test_it_ends_within_a_second_with_streams_open(app: FastAPI, monkeypatch: py
     assert sorted(ended) == sorted(paths)  # whole answers: no viewer saw a broken connection
 
 
+@pytest.mark.slow
 def test_an_answer_that_takes_too_long_is_a_503_not_a_traceback(
     app: FastAPI, camera: FakeCamera, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -169,6 +170,7 @@ ended.set()
 """
 
 
+@pytest.mark.slow
 def test_signals_are_the_program_s_and_it_exits_clean(tmp_path: Path) -> None:
     """Also while an answer is being worked on: Python cuts daemon threads off inside C++ code, which aborts."""
     process = subprocess.Popen(

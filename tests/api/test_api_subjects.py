@@ -146,6 +146,7 @@ def test_a_subject_of_that_name_is_no_demo_person(client: Client, stored: Path) 
     check_problem(client.post("/api/v1/demo-subject"), 409)
 
 
+@pytest.mark.slow
 def test_a_subject_s_file_is_sent_and_stored(client: Client, camera: FakeCamera, stored: Path) -> None:
     data = (stored / "ada.relit").read_bytes()
     answer = client.upload("/api/v1/subjects", "bea", data, "evening.relit")

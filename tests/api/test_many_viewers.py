@@ -81,6 +81,7 @@ def gap_meter() -> Iterator[Callable[[Sequence[float]], float]]:
         process.communicate()
 
 
+@pytest.mark.slow
 def test_the_camera_keeps_its_rate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, note_row: Callable[[str, tuple[str, ...]], None]
 ) -> None:
@@ -114,6 +115,7 @@ def test_the_camera_keeps_its_rate(
     assert most_threads <= threads + 4
 
 
+@pytest.mark.slow
 def test_it_ends_in_time_with_all_of_them_open(tmp_path: Path, material: Material) -> None:
     running = start(
         "run", "--source", material.clip, "--subject", material.subject, "--tracker", material.tracker,

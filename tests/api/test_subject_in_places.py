@@ -6,12 +6,15 @@ import gc
 import weakref
 from dataclasses import replace
 
+import pytest
+
 from relit_camera.api.subject_in_places import SubjectInPlaces
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.environments.environment_store import EnvironmentStore
 from tests.generated_subject import small_subject
 
 
+@pytest.mark.slow
 def test_the_picture_is_kept_and_the_environment_is_not() -> None:
     store, subject, places = EnvironmentStore(), small_subject(), SubjectInPlaces()
     loaded: list[weakref.ref[Environment]] = []
@@ -29,6 +32,7 @@ def test_the_picture_is_kept_and_the_environment_is_not() -> None:
     assert places.jpeg(subject, "place", lambda: load("party")).result(30) != first
 
 
+@pytest.mark.slow
 def test_a_subject_that_is_shown_no_more_is_not_kept() -> None:
     subject, places = replace(small_subject()), SubjectInPlaces()
     places.jpeg(subject, "place", lambda: EnvironmentStore().load("sunset")).result(30)

@@ -93,6 +93,7 @@ def test_a_change_of_light_is_whole_in_the_next_frame(tmp_path: Path) -> None:
             assert difference(after, source.step(camera.sink)) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("full_quality")
 def test_an_eased_change_begins_in_the_next_frame(tmp_path: Path) -> None:
     source = SteppedSource()
@@ -131,6 +132,7 @@ class SlowTracker(SteadyTracker):
         return super().track(frame)
 
 
+@pytest.mark.slow
 def test_a_slow_pipeline_is_not_taken_for_a_slow_camera(tmp_path: Path) -> None:
     with running_camera(tmp_path, tracker=SlowTracker(), timings=PATIENT) as camera:
         wait_until(
@@ -142,6 +144,7 @@ def test_a_slow_pipeline_is_not_taken_for_a_slow_camera(tmp_path: Path) -> None:
         assert status.fps.camera > 1.8 * status.fps.pipeline > 0
 
 
+@pytest.mark.slow
 def test_frozen_holds_the_picture_for_as_long_as_it_is_asked_to(tmp_path: Path) -> None:
     with running_camera(tmp_path, timings=replace(PATIENT, stale_after_s=0.5)) as camera:
         camera.sink.wait_for(3)
@@ -186,6 +189,7 @@ class FailingTracker(SteadyTracker):
 IMPATIENT = replace(PATIENT, loop=LoopTimings(source_retry_s=0.1), pipeline=replace(PATIENT.pipeline, retry_s=0.1))
 
 
+@pytest.mark.slow
 def test_a_frame_that_raises_does_not_stop_publishing(tmp_path: Path) -> None:
     tracker = FailingTracker()
     with running_camera(tmp_path, tracker=tracker, timings=IMPATIENT) as camera:
@@ -213,6 +217,7 @@ def test_without_a_face_it_searches_and_shows_the_source_image(tmp_path: Path) -
         assert camera.troubles() == ""
 
 
+@pytest.mark.slow
 def test_a_source_that_ends_leaves_the_placeholder(tmp_path: Path) -> None:
     with running_camera(tmp_path, source=memory_source(count=8), timings=replace(PATIENT, stale_after_s=0.3)) as camera:
         wait_until(lambda: camera.status()["state"] == "waiting")
@@ -238,6 +243,7 @@ class BrokenSource:
         return getattr(self._inner, name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("error", "cure"),
     [(VideoError("clip.mp4 is damaged", "copy it again"), "copy it again"), (KeyError("x"), "a fault of ours")],
@@ -287,6 +293,7 @@ def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
         assert httpx.get(camera.http.base_url.join("/readyz")).json() == {"status": "ready"}
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("full_quality")
 def test_ratio_falls_back_and_says_so_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
@@ -306,6 +313,7 @@ def test_ratio_falls_back_and_says_so_where_the_face_is_not_the_subjects(tmp_pat
         source.step(camera.sink)
 
 
+@pytest.mark.slow
 def test_a_missing_matte_model_is_reported_and_pictures_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "no-models"))
     with running_camera(tmp_path, look=Look(mode=Mode.RATIO), timings=IMPATIENT) as camera:

@@ -35,6 +35,7 @@ def hold_and_wait(folder: Path) -> None:
         signal.pause()
 
 
+@pytest.mark.slow
 def test_a_camera_that_was_killed_leaves_a_note_that_puts_the_controls_back(tmp_path: Path) -> None:
     code = (
         f"from pathlib import Path; from tests.app.test_controls_note import *; hold_and_wait(Path({str(tmp_path)!r}))"

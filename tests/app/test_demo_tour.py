@@ -33,6 +33,7 @@ def test_it_begins_as_filmed_and_relights_in_many_places() -> None:
     assert None in places  # lamps alone
 
 
+@pytest.mark.slow
 def test_every_look_can_be_shown(scene_controller: SceneController) -> None:
     for time_s in np.arange(0, TOUR_S, 0.25):
         _, look = tour_at(float(time_s))
@@ -136,6 +137,7 @@ def test_where_nothing_moves_nothing_is_changed(scene_controller: SceneControlle
     assert scene_controller.scene is before
 
 
+@pytest.mark.slow
 def test_a_caption_is_told_again_for_who_comes_late(scene_controller: SceneController) -> None:
     told: list[str] = []
     guide = DemoRunner(scene_controller, lambda: True, told.append)

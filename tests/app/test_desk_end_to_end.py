@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from relit_camera.app.captures.desk.controls_note import ControlsNote
 from relit_camera.app.captures.desk.desk_filming import DeskFilming, FilmingTimings
@@ -88,6 +89,7 @@ def person_at_the_desk() -> SimulatedFrames:
     return SimulatedFrames(person, pictures, lights, SimulatedWebcam(size=(480, 360), room=0.5), None, MONITOR)
 
 
+@pytest.mark.slow
 def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: Path) -> None:
     desk, stop = Desk(person_at_the_desk()), threading.Event()
     scenes = SceneController(StorageSettings(data_dir=tmp_path))

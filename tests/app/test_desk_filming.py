@@ -121,6 +121,7 @@ def desk(tmp_path: Path, forked_workers: None) -> Iterator[Callable[[DeskBuilder
         each.close()
 
 
+@pytest.mark.slow
 def test_a_capture_ends_with_a_stored_subject_and_the_webcam_as_it_was(desk: Callable[[DeskBuilder], Desk]) -> None:
     there = desk(check_and_build)
     there.start()
@@ -131,6 +132,7 @@ def test_a_capture_ends_with_a_stored_subject_and_the_webcam_as_it_was(desk: Cal
     assert there.webcam.values == there.before
 
 
+@pytest.mark.slow
 def test_what_the_worker_refuses_is_told_and_nothing_is_stored(desk: Callable[[DeskBuilder], Desk]) -> None:
     there = desk(refuse_desk)
     there.start()
@@ -141,6 +143,7 @@ def test_what_the_worker_refuses_is_told_and_nothing_is_stored(desk: Callable[[D
     assert there.webcam.values == there.before
 
 
+@pytest.mark.slow
 def test_a_canceled_worker_leaves_nothing(desk: Callable[[DeskBuilder], Desk]) -> None:
     """Nor does it replace the subject that is there."""
     there = desk(begin_and_wait)
@@ -164,6 +167,7 @@ def test_a_page_that_is_closed_midway_ends_it_and_frees_the_webcam(desk: Callabl
     assert there.scenes.subjects.names() == []
 
 
+@pytest.mark.slow
 def test_the_exposure_is_found_under_white_however_late_the_page_shows_it(desk: Callable[[DeskBuilder], Desk]) -> None:
     there = desk(check_and_build)
     there.shows_from = time.monotonic() + 0.8
@@ -185,6 +189,7 @@ def test_it_can_be_canceled_while_it_films(desk: Callable[[DeskBuilder], Desk]) 
     assert not there.note.path.exists()
 
 
+@pytest.mark.slow
 def test_a_webcam_that_gives_no_frames_is_told(desk: Callable[[DeskBuilder], Desk]) -> None:
     there = desk(check_and_build)
     there.webcam_on = False

@@ -37,6 +37,7 @@ def check(seen: TrackedFilm, chosen: int, residual: float, face: SourceFace | No
     _require_same_person(seen, [seen.faces[0], seen.faces[chosen]], face or subject(), residual)
 
 
+@pytest.mark.slow
 def test_a_still_of_somebody_who_visits_for_five_seconds_is_refused() -> None:
     seen = visit(120, 270)
     check(seen, 40, UNLIKE)

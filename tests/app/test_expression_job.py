@@ -134,6 +134,7 @@ def studio(tmp_path: Path, forked_workers: None) -> Iterator[Opener]:
         each.job.close()
 
 
+@pytest.mark.slow
 def test_the_subject_that_is_shown_has_its_stills_at_once_in_the_same_mode(studio: Opener) -> None:
     there = studio(add_still)
     before = there.scenes.scene

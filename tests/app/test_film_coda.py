@@ -34,6 +34,7 @@ def test_an_end_that_gives_none_leaves_the_subject_as_it_is(tmp_path: Path, monk
     assert "relit models pull" in told
 
 
+@pytest.mark.slow
 def test_an_end_in_which_somebody_talks_gives_stills(shared: Path, models: Path) -> None:
     talk = shared / "driving" / "adam_talk.mp4"
     with VideoReader(talk) as reader:

@@ -80,6 +80,7 @@ def test_a_film_is_sent_read_reported_and_shown(tmp_path: Path, monkeypatch: pyt
         assert list((tmp_path / "data" / "captures" / "film").iterdir()) == []
 
 
+@pytest.mark.slow
 def test_what_is_no_film_is_told_and_can_be_forgotten(tmp_path: Path) -> None:
     with running_camera(tmp_path / "data") as camera:
         sent = {"file": ("evening.mp4", b"no film at all")}

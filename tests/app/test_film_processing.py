@@ -93,6 +93,7 @@ def studio(tmp_path: Path, forked_workers: None) -> Iterator[Opener]:
         each.capture.close()
 
 
+@pytest.mark.slow
 def test_a_film_becomes_a_subject_that_is_shown_and_the_film_is_deleted(studio: Opener) -> None:
     there = studio(build_film)
     assert there.capture.status() == FilmCaptureStatus()

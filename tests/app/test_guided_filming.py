@@ -80,6 +80,7 @@ def test_what_somebody_cannot_do_is_asked_for_some_seconds_and_passed_over() -> 
     assert webcam.seconds < 30 + TUNABLES.longest_s
 
 
+@pytest.mark.slow
 def test_who_does_nothing_is_told_what_to_do() -> None:
     webcam = Webcam(lambda asked: NEUTRAL)
     with pytest.raises(CaptureError, match="does too little") as caught:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 RENDER_A_FRAME_IN_EACH_MODE = """
 import sys
 import relit_camera.app.run_camera, relit_camera.api.app, relit_camera.api.server.http_server
@@ -28,6 +30,7 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
 """
 
 
+@pytest.mark.slow
 def test_the_camera_renders_without_scipy_and_onnx() -> None:
     done = subprocess.run(
         [sys.executable, "-c", RENDER_A_FRAME_IN_EACH_MODE], check=True, capture_output=True, text=True

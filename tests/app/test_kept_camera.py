@@ -74,6 +74,7 @@ def lateness() -> Iterator[Lateness]:
         yield measured
 
 
+@pytest.mark.slow
 def test_its_virtual_camera_goes_on_through_kill_9_and_ends_when_it_is_told_to(
     tmp_path: Path,
     start: Callable[[], subprocess.Popen[str]],

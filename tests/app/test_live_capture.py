@@ -192,6 +192,7 @@ def test_a_failure_leaves_what_another_capture_has_finished(
     assert list(finished.parent.iterdir()) == [finished]
 
 
+@pytest.mark.slow
 def test_a_camera_without_frames_is_a_failure(studio: Callable[[SubjectBuilder], Studio]) -> None:
     camera = studio(build)
     camera.on = False
@@ -298,6 +299,7 @@ def test_who_asks_during_a_pause_while_the_webcam_is_taken_ends_nothing(tmp_path
         camera.close()
 
 
+@pytest.mark.slow
 def test_who_asks_during_a_pause_begins_at_once(tmp_path: Path) -> None:
     camera = Studio(tmp_path, refuse, replace(TIMINGS, retry_s=600.0))
     try:

@@ -262,6 +262,7 @@ def test_nobody_to_relight_names_and_suffixes_are_told_first(room: Opener) -> No
     assert not there.folder.exists()
 
 
+@pytest.mark.slow
 def test_a_real_video_is_relit(tmp_path: Path) -> None:
     """Half a second of the demonstration's clip, with its recorded track: no network is needed."""
     clip = tmp_path / "clip.mp4"

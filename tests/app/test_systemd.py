@@ -237,6 +237,7 @@ def service(listener: Listener, material: Material, folder: Path) -> Iterator[su
         process.communicate()
 
 
+@pytest.mark.slow
 def test_a_real_camera_is_ready_alive_silent_when_it_hangs_and_says_when_it_stops(
     listener: Listener, material: Material, tmp_path: Path
 ) -> None:

@@ -92,6 +92,7 @@ def test_it_is_published_once_that_is_confirmed_and_no_longer_when_it_is_withdra
         wait_until(lambda: share_as_filmed(camera.sink.new[-1]) < 0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "sees",
     [lambda index: False, lambda index: index < 25, lambda index: index % 20 < 10],
@@ -108,6 +109,7 @@ def test_a_head_that_is_bowed_at_the_start(tmp_path: Path) -> None:
         check_nothing_as_filmed(camera)
 
 
+@pytest.mark.slow
 def test_a_stranger(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     filmed = noise.repeat(4, axis=0).repeat(4, axis=1)
@@ -119,6 +121,7 @@ def test_a_stranger(tmp_path: Path) -> None:
             assert (np.abs(picture.astype(int) - filmed) <= 2).all(axis=2).mean() < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [{"split": 0.5}, {"split": 1.0}, {"blend": 0.0}])
 def test_as_filmed(tmp_path: Path, change: dict[str, float]) -> None:
     with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
@@ -162,6 +165,7 @@ def test_the_fallback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, allowed: 
             check_nothing_as_filmed(camera)
 
 
+@pytest.mark.slow
 def test_before_is_for_the_preview_alone_and_taken_from_nobody(tmp_path: Path) -> None:
     with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
         camera.sink.wait_for(ONE_S // 4)

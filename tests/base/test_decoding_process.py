@@ -40,6 +40,7 @@ def test_an_error_with_a_cure_arrives_whole(process: DecodingProcess) -> None:
         process.decode(refuse)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harm", [fail, die, spin], ids=["an error that nobody expects", "death", "processor time"])
 def test_a_file_that_ends_its_decoder_is_at_fault_and_the_next_is_decoded(
     process: DecodingProcess, harm: object
@@ -57,6 +58,7 @@ def test_memory_is_limited(process: DecodingProcess) -> None:
     assert len(process.decode(take_memory, 10 << 20).arrays[0]) == 10 << 20
 
 
+@pytest.mark.slow
 def test_time_is_limited() -> None:
     process = DecodingProcess(timeout_s=0.5)
     with pytest.raises(InputError, match="too much time"):
@@ -64,6 +66,7 @@ def test_time_is_limited() -> None:
     process.close()
 
 
+@pytest.mark.slow
 def test_it_ends_when_nothing_comes_and_starts_again() -> None:
     process = DecodingProcess(idle_s=0.2)
     first = process.decode(numbered, 0).facts["process"]
@@ -77,6 +80,7 @@ def test_it_ends_when_nothing_comes_and_starts_again() -> None:
     assert not psutil.pid_exists(second)
 
 
+@pytest.mark.slow
 def test_a_program_that_stops_does_not_wait_for_a_file(process: DecodingProcess) -> None:
     process.decode(numbered, 0)
     stopping = threading.Timer(0.3, process.interrupt)
@@ -88,6 +92,7 @@ def test_a_program_that_stops_does_not_wait_for_a_file(process: DecodingProcess)
     assert process.decode(numbered, 4).arrays[0][0, 0] == 4
 
 
+@pytest.mark.slow
 def test_a_program_that_stops_starts_no_worker_for_those_who_wait(process: DecodingProcess) -> None:
     process.decode(numbered, 0)
     told: list[str] = []
@@ -140,6 +145,7 @@ def test_the_wait_for_other_files_is_bounded() -> None:
     process.close()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is limited on Linux")
 @pytest.mark.parametrize("harm", ["numpy", "cause", "death"])
 def test_little_free_memory_is_not_told_as_a_harmful_file(harm: str) -> None:
@@ -167,6 +173,7 @@ def test_callers_wait_for_each_other(process: DecodingProcess) -> None:
     assert sorted(results) == [0, 1, 2, 3, 4, 5]
 
 
+@pytest.mark.slow
 def test_nothing_is_left_behind(process: DecodingProcess, tmp_path: Path) -> None:
     process.decode(numbered, 0)
     open_files = psutil.Process().num_fds()

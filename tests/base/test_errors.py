@@ -7,6 +7,8 @@ import pickle
 import re
 from pathlib import Path
 
+import pytest
+
 import relit_camera
 from relit_camera.base import errors
 
@@ -46,6 +48,7 @@ def test_the_docstring_shows_the_tree() -> None:
     assert parents == bases
 
 
+@pytest.mark.slow
 def test_public_errors_are_defined_in_the_tree_alone() -> None:
     strays = []
     for path in PACKAGE.rglob("*.py"):

@@ -20,6 +20,7 @@ def test_of_a_thread_that_is_not_there_nothing_is_told() -> None:
     assert run_delay_s(2**22 + 1) == 0.0
 
 
+@pytest.mark.slow
 @needs_linux
 def test_a_thread_that_shares_a_processor_waits_for_it_and_one_that_sleeps_does_not() -> None:
     processor = min(os.sched_getaffinity(0))

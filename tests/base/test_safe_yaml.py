@@ -98,6 +98,7 @@ VALUES = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.dictionaries(WORDS, VALUES, max_size=4))
 def test_what_is_written_is_read(value: dict[str, Any]) -> None:
     assert parse_yaml(yaml_text(value)) == value

@@ -45,6 +45,7 @@ def test_a_fault_and_a_death_are_errors() -> None:
         run_in_worker_process(die, timeout_s=30)
 
 
+@pytest.mark.slow
 def test_a_worker_that_takes_too_long_is_ended(tmp_path: Path) -> None:
     with pytest.raises(WorkerError, match="more than 1 s"):
         run_in_worker_process(sleep, tmp_path / "process", timeout_s=1)

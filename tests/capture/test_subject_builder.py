@@ -24,6 +24,7 @@ def subject(samples: OlatSamples) -> Subject:
     return build_subject(samples, "barycentric", "ball", landmarks={})
 
 
+@pytest.mark.slow
 def test_the_shape_is_in_the_subject_whatever_the_method(samples: OlatSamples, subject: Subject) -> None:
     truth, inside = sphere_surface(SIZE)
     assert subject.normals is not None
@@ -68,6 +69,7 @@ def test_the_header_says_what_was_reached(subject: Subject) -> None:
     assert 0 < meta.bytes_share < 1
 
 
+@pytest.mark.slow
 def test_the_shape_can_be_left_out(samples: OlatSamples) -> None:
     told: list[tuple[int, int]] = []
     subject = build_subject(

@@ -73,6 +73,7 @@ def edit_line(lights: Path, number: int, text: str) -> None:
 # Videos
 
 
+@pytest.mark.slow
 def test_video_without_a_face(material: Material, out: Path, tmp_path: Path) -> None:
     track = read_track(material.track)
     lost = tuple(TrackFrame(time_s=f.time_s, found=False, status=FaceStatus.LOST) for f in track.frames)
@@ -280,6 +281,7 @@ def test_model_with_the_wrong_sha256(out: Path, tmp_path: Path, monkeypatch: pyt
 # Where results go
 
 
+@pytest.mark.slow
 def test_folder_that_does_not_exist(material: Material, out: Path, lights: Path) -> None:
     for answer in (
         relight(material.subject, out, light="0,0", out=out / "new" / "x.png"),
@@ -303,6 +305,7 @@ def test_bench_says_what_is_missing_before_it_measures(out: Path) -> None:
     call("bench", "--video", out / "none.mp4").complains("none.mp4")
 
 
+@pytest.mark.slow
 def test_a_command_told_to_end_leaves_nothing(out: Path, tmp_path: Path) -> None:
     long = write_material(tmp_path, frames=400)
     process = start(
@@ -386,6 +389,7 @@ def full_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(folder)], check=True)
 
 
+@pytest.mark.slow
 def test_full_disk(full_disk: Path, material: Material, lights: Path) -> None:
     (full_disk / "filler").write_bytes(bytes(60 << 10))
     for answer in (
@@ -402,6 +406,7 @@ def without_coverage(variables: dict[str, str]) -> dict[str, str]:
     return {name: value for name, value in variables.items() if not name.startswith("COVERAGE_")}
 
 
+@pytest.mark.slow
 def test_file_size_limit_stands_for_a_full_disk(material: Material, out: Path, tmp_path: Path) -> None:
     """Where no disk can be mounted: the kernel refuses to let a file grow, as a full disk does."""
     limit = 20_000
@@ -435,6 +440,7 @@ def test_settings_at_fault(material: Material, out: Path, tmp_path: Path, monkey
     relight(material.subject, out, light="0,0").complains("output.fps")
 
 
+@pytest.mark.slow
 def test_a_process_says_the_same(material: Material, out: Path, tmp_path: Path) -> None:
     finish("relight", tmp_path / "nobody.relit", "--light", "0,0", "--out", out / "x.png", folder=tmp_path).complains(
         "nobody"

@@ -73,6 +73,7 @@ def content(subject: Path) -> tuple[dict[str, Any], dict[str, bytes]]:
         return header, {name: file.get_tensor(name).tobytes() for name in file.keys()}  # noqa: SIM118
 
 
+@pytest.mark.slow
 def test_options_are_followed_and_told(built: Built) -> None:
     assert built.answer.code == 0, built.answer
     told, subject = report(built.folder), read_subject(built.folder / "me.relit").metadata
@@ -123,6 +124,7 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return film
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [(), ("--method", "barycentric")])
 def test_the_film_is_not_read_again(options: tuple[str, ...], kept: Path) -> None:
     """Nor for another method: what the film gave does not depend on it."""

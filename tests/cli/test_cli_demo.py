@@ -67,6 +67,7 @@ def snapshot(http: httpx.Client) -> np.ndarray:
     return decoded_picture(answer.content).astype(np.float32)
 
 
+@pytest.mark.slow
 def test_it_says_what_there_is_not_and_when_the_first_picture_came(demo: tuple[list[str], httpx.Client]) -> None:
     said = "\n".join(demo[0])
     assert "No public models" in said
@@ -87,6 +88,7 @@ def test_the_bundled_person_is_live_and_in_ratio(demo: tuple[list[str], httpx.Cl
     assert demo[1].get("scene").json()["rung"] == "pictures"
 
 
+@pytest.mark.slow
 def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[str], httpx.Client]) -> None:
     _, http = demo
     seen = set[tuple[str, float]]()
@@ -107,6 +109,7 @@ def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[
     wait_until(lambda: bool(np.abs(snapshot(http) - party).mean() > 10))
 
 
+@pytest.mark.slow
 def test_it_ends_by_itself_when_told_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no models"))
     process = start("demo", "--headless", "--port", 0, "--seconds", 1, folder=tmp_path)
@@ -131,6 +134,7 @@ def test_the_clip_its_track_and_its_mattes_are_of_one_length_and_large_enough() 
     assert max(mouths) - min(mouths) > 0.1
 
 
+@pytest.mark.slow
 def test_the_clip_does_not_flicker() -> None:
     """The wall behind is still: what it changes from frame to frame is what the codec and noise do."""
     with VideoReader(demo_files.CLIP) as video:
@@ -145,6 +149,7 @@ def test_credits_are_with_the_person() -> None:
     assert "ICT-FaceKit" in text
 
 
+@pytest.mark.slow
 def test_the_panel_is_told_how_the_bundled_person_was_captured(tmp_path: Path) -> None:
     noted = demo_files.noted_subject(tmp_path / "demo")
     told = read_metadata(noted)

@@ -38,6 +38,7 @@ def good() -> DeskRecording:
     return film(lambertian_person())
 
 
+@pytest.mark.slow
 def test_a_recorded_folder_becomes_a_subject(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, good: DeskRecording
 ) -> None:
@@ -64,6 +65,7 @@ def test_what_is_missing_or_wrong_is_named_and_nothing_is_left(tmp_path: Path) -
     assert [path.name for path in tmp_path.iterdir()] == ["desk.json"]
 
 
+@pytest.mark.slow
 def test_a_bad_recording_is_one_clear_line_and_nothing_is_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, good: DeskRecording
 ) -> None:
@@ -107,6 +109,7 @@ def test_a_bad_recording_is_one_clear_line_and_nothing_is_left(
         assert not out.exists()
 
 
+@pytest.mark.slow
 def test_somebody_who_looks_aside_is_told_and_nothing_is_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, good: DeskRecording
 ) -> None:

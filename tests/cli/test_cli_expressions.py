@@ -54,6 +54,7 @@ def subject(made_subject: Path, models: Path) -> Path:
     return made_subject
 
 
+@pytest.mark.slow
 def test_a_film_of_the_person_adds_stills_and_says_what_they_show(tmp_path: Path, subject: Path, talk: Path) -> None:
     out = tmp_path / "with.relit"
     answer = call("capture", "expressions", talk, "--subject", subject, "--out", out)
@@ -68,6 +69,7 @@ def test_a_film_of_the_person_adds_stills_and_says_what_they_show(tmp_path: Path
     assert out.stat().st_size - subject.stat().st_size < 6 << 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -90,6 +92,7 @@ def test_a_film_that_gives_none_is_refused_and_nothing_is_written(
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_another_person_is_refused(tmp_path: Path, subject: Path, shared: Path) -> None:
     other = shared / "driving" / "liveportrait_d9.mp4"
     call("capture", "expressions", other, "--subject", subject, "--out", tmp_path / "with.relit").complains(

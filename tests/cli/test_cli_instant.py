@@ -69,6 +69,7 @@ def test_where_nothing_can_be_written_it_says_so_at_once(tmp_path: Path) -> None
     call("capture", "instant", tmp_path / "me.png", "--out", tmp_path / "no" / "me.relit").complains("cannot write")
 
 
+@pytest.mark.slow
 def test_a_person_comes_out_and_info_tells_the_rung(tmp_path: Path, models: Path) -> None:
     answer = call("capture", "instant", demo_files.CLIP, "--out", tmp_path / "me.relit")
     assert answer.code == 0, answer
@@ -81,6 +82,7 @@ def test_a_person_comes_out_and_info_tells_the_rung(tmp_path: Path, models: Path
     assert f"{header['stills']} expression stills: " in answer.out
 
 
+@pytest.mark.slow
 def test_somebody_who_keeps_still_gives_a_subject_without_expression_stills(
     tmp_path: Path, models: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -146,6 +148,7 @@ def test_what_is_no_use_is_one_line_and_nothing_is_left(
     assert left(tmp_path) == [source.name]
 
 
+@pytest.mark.slow
 def test_a_webcam_that_another_program_holds_is_told_and_nothing_is_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

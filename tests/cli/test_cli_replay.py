@@ -24,6 +24,7 @@ def done(answer: Answer) -> Answer:
     return answer
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["reenact", "ratio"])
 def test_replay_writes_video_report_and_sheet(mode: str, material: Material, tmp_path: Path) -> None:
     answer = done(
@@ -61,6 +62,7 @@ def test_track_plays_back_as_it_was_recorded(material: Material, tmp_path: Path)
         assert b["mouth"] == pytest.approx(a["mouth"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["planar", "barycentric", "nearest", "ptm", "gp", "thesis", "default"])
 def test_import_and_info(method: str, tmp_path: Path) -> None:
     lights = write_lights(tmp_path / "capture", sphere_samples(40, 24))

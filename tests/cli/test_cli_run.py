@@ -112,6 +112,7 @@ def check_end(process: subprocess.Popen[str], http: httpx.Client, number: signal
         assert not viewer.is_alive()
 
 
+@pytest.mark.slow
 def test_light_changes_while_it_runs_the_clip_loops_and_sigterm_ends_it(material: Material, tmp_path: Path) -> None:
     with running(material, tmp_path, "--environment", "sunset", "--mode", "ratio") as (process, http):
         assert http.get("lighting").json()["environment"] == "sunset"
@@ -135,6 +136,7 @@ def test_light_changes_while_it_runs_the_clip_loops_and_sigterm_ends_it(material
         check_end(process, http, signal.SIGTERM)
 
 
+@pytest.mark.slow
 def test_on_demand_the_source_waits_for_a_viewer_and_ctrl_c_ends_it(material: Material, tmp_path: Path) -> None:
     with running(material, tmp_path, "--on-demand") as (process, http):
 
@@ -155,6 +157,7 @@ def test_on_demand_the_source_waits_for_a_viewer_and_ctrl_c_ends_it(material: Ma
         check_end(process, http, signal.SIGINT)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_loses_the_file_not_the_camera(material: Material, tmp_path: Path) -> None:
     recording = tmp_path / "recording.mp4"
     with running(material, tmp_path, "--sink", recording, full_at=20) as (process, http):
@@ -192,12 +195,14 @@ def test_missing_camera(refused: Callable[..., Answer]) -> None:
     refused("--strict", "--source", "No Such Camera").complains("No Such Camera")
 
 
+@pytest.mark.slow
 def test_missing_virtual_camera(material: Material, tmp_path: Path) -> None:
     options = arguments(material, "--strict", "--sink", "/dev/video97")
     finish(*options, folder=tmp_path).complains("/dev/video97")  # a process of its own: it holds the camera's lock
     assert not (tmp_path / "data").exists()
 
 
+@pytest.mark.slow
 def test_it_starts_without_devices_and_models_and_says_what_to_do(
     material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -237,6 +242,7 @@ def test_missing_subject_model_and_track(refused: Callable[..., Answer]) -> None
         refused(*changed).complains(*words)
 
 
+@pytest.mark.slow
 def test_the_configuration_is_edited_while_it_runs(material: Material, tmp_path: Path) -> None:
     config = tmp_path / "mine.yaml"
     config.write_text("look: {lighting: {environment: studio}}\n", encoding="utf-8")

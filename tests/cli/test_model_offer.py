@@ -105,6 +105,7 @@ def at_terminal(tmp_path: Path) -> Callable[..., tuple[int, str]]:
     return run
 
 
+@pytest.mark.slow
 def test_no_is_clear_and_remembered(at_terminal: Callable[..., tuple[int, str]], tmp_path: Path) -> None:
     status, shown = at_terminal("n\n")
     assert status == 1

@@ -130,6 +130,7 @@ def test_playback_drops_what_nobody_came_for():
     source.close()
 
 
+@pytest.mark.slow
 def test_playback_does_not_rush_after_a_pause():
     times = []
 
@@ -337,6 +338,7 @@ def test_a_silent_webcam_is_stalled_then_reopened(tree):
     source.close()
 
 
+@pytest.mark.slow
 def test_a_stuck_webcam_is_stalled_and_does_not_hold_up_closing(tree):
     capture = FakeCapture()
     source, _ = webcam(tree, capture)
@@ -373,6 +375,7 @@ def test_an_unplugged_webcam_comes_back_under_another_node(tree):
     source.close()
 
 
+@pytest.mark.slow
 def test_a_busy_webcam_is_tried_again_at_growing_pauses(tree):
     busy = [FakeCapture(opened=False) for _ in range(3)]
     source, opener = webcam(tree, *busy)

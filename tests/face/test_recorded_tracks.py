@@ -62,6 +62,7 @@ def correlation(first: np.ndarray, second: np.ndarray) -> float:
     return float(np.corrcoef(first, second)[0, 1])
 
 
+@pytest.mark.slow
 def test_every_frame_is_found(replay: Replay):
     assert [state.status for state in replay.states] == [FaceStatus.FOUND] * 96
 

@@ -14,6 +14,7 @@ MOST_SECONDS = 60.0
 """On a busy machine fewer are tried."""
 
 
+@pytest.mark.slow
 def test_every_sound_file_of_the_corpus_is_read_by_a_reader_that_can_be_judged() -> None:
     with Judge(lowered=True) as judge:
         for kind, files in corpus().items():

@@ -27,6 +27,7 @@ def judge() -> Iterator[Judge]:
         yield one
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FINDS)
 def test_a_file_that_lies_takes_little_memory_and_time(judge: Judge, tmp_path: Path, name: str) -> None:
     file = FINDS[name]
@@ -41,6 +42,7 @@ def test_a_file_that_lies_takes_little_memory_and_time(judge: Judge, tmp_path: P
                 read(path)
 
 
+@pytest.mark.slow
 def test_what_is_judged_is_memory_time_files_and_errors(judge: Judge) -> None:
     found = " ".join(judge.judge("harmful", ".txt", b""))
     for wrong in ("ZeroDivisionError", "MiB", " s", "left behind b.txt", "a file is left open"):

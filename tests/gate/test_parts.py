@@ -69,7 +69,7 @@ def test_a_part_is_about_all_that_its_tests_import(part: Part, monkeypatch: pyte
     graph = grimp.build_graph("relit_camera", "relit_studio", "tests")
     for command_line in [name for name in graph.modules if name.startswith("relit_camera.cli")]:
         graph.remove_module(command_line)
-    prefixes = tuple(path.replace("/", ".") for path in part.tests)
+    prefixes = tuple(f"{path.replace('/', '.')}." for path in part.tests)
     tests = [name for name in graph.modules if name.startswith(prefixes)]
     imported = set().union(*(graph.find_upstream_modules(name) for name in tests)) | set(tests)
     about = set(files(part.about))
@@ -84,6 +84,7 @@ def _path(module: str) -> str:
     return package if (ROOT / package).exists() else f"{folder}{path}.py"
 
 
+@pytest.mark.slow
 def test_pytest_takes_the_tests_of_the_parts_asked_for() -> None:
     environment = {**os.environ, PARTS_VARIABLE: "faults", "PYTEST_ADDOPTS": ""}
     command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "tests/test_crash.py", "tests/test_layout.py"]

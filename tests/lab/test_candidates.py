@@ -99,6 +99,7 @@ def test_a_subject_answers_as_the_method_that_built_it() -> None:
     np.testing.assert_allclose(answered.maps_at(query, np.array([5])), seen[:, [5]].transpose(1, 0, 2), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_subject_of_a_method_with_shadows_answers_from_its_map() -> None:
     samples = shadowed(cap(60, 50), SIZE)
     subject = build_subject(samples, "thesis", "lights.lp", landmarks={})

@@ -109,6 +109,7 @@ def test_what_a_report_does_not_tell_is_null(compare: Compare, report: Document)
     assert "not told" in capture_text(errors)
 
 
+@pytest.mark.slow
 def test_the_report_is_whole_in_itself(compare: Compare, report: Document) -> None:
     errors = compare(report)
     outline = Outline()

@@ -37,6 +37,7 @@ def by_name(report: FieldReport) -> dict[str, dict[str, float]]:
     return figures
 
 
+@pytest.mark.slow
 def test_errors_are_at_the_sides(report: FieldReport) -> None:
     figures = by_name(report)
     assert figures["barycentric"]["sides_over_middle"] > 2
@@ -97,6 +98,7 @@ def test_nothing_left_to_compare_is_an_error() -> None:
         evaluate_field(candidates, samples.directions, samples, truth, {}, [])
 
 
+@pytest.mark.slow
 def test_the_page_is_whole_in_itself_and_every_figure_has_a_caption(report: FieldReport) -> None:
     page = field_page(report, "Ball <&>")
     outline = Outline()

@@ -38,6 +38,7 @@ def test_only_surrounded_lights_are_left_out() -> None:
     assert len(result.left_out) == -(-(len(samples.directions) - 16) // 4)
 
 
+@pytest.mark.slow
 def test_more_left_out_is_harder_and_the_nearest_light_is_worst() -> None:
     samples = lambert(cap(120, 60))
     few, many = (evaluate_hold_out("ball", samples, every, METHODS) for every in (4, 2))
@@ -49,6 +50,7 @@ def test_more_left_out_is_harder_and_the_nearest_light_is_worst() -> None:
     assert harder["barycentric"].raw_peak_255_db < scores["barycentric"].raw_peak_255_db
 
 
+@pytest.mark.slow
 def test_the_figure_is_the_error_at_peak_one() -> None:
     samples = lambert(cap(120, 50))
     result = evaluate_hold_out("ball", samples, 4, ["nearest"])
@@ -61,6 +63,7 @@ def test_the_figure_is_the_error_at_peak_one() -> None:
     assert result.scores[0].raw_peak_255_db == pytest.approx(np.mean(-10 * np.log10(errors)), abs=1e-3)
 
 
+@pytest.mark.slow
 def test_flashes_of_varying_strength_and_small_motions_are_undone_by_one_transform_for_all() -> None:
     samples = lambert(cap(70, 60), 40)
     gains = np.random.default_rng(3).uniform(0.8, 1.25, len(samples.directions)).astype(np.float32)
@@ -85,6 +88,7 @@ def test_the_gain_is_that_of_the_strobe_and_not_of_a_method_that_is_too_dark() -
     np.testing.assert_allclose(found.sum(axis=(1, 2, 3)) / truth.sum(axis=(1, 2, 3)), 1, atol=0.015)
 
 
+@pytest.mark.slow
 def test_pictures_that_no_light_could_make_are_neither_used_nor_asked_for() -> None:
     samples = lambert(cap(70, 60), 40)
     pictures = samples.pictures.copy()
@@ -95,6 +99,7 @@ def test_pictures_that_no_light_could_make_are_neither_used_nor_asked_for() -> N
     assert "picture 4 rejected" in holdout_text([result])
 
 
+@pytest.mark.slow
 def test_the_ring_is_compared_where_it_is_asked_for_and_only_there() -> None:
     samples = lambert(cap(60, 50))
     assert [score.method for score in evaluate_hold_out("ball", samples, 4, [BLACK_RING_METHOD]).scores] == [
@@ -116,6 +121,7 @@ def test_a_wrong_hold_out_is_one_clear_error(wrong: str) -> None:
         parse_hold_out(wrong)
 
 
+@pytest.mark.slow
 def test_reports_hold_every_list_and_method() -> None:
     results = [evaluate_hold_out(name, lambert(cap(60, 50)), 2, METHODS) for name in ("a.lp", "b.lp")]
     page, text, figures = holdout_page(results), holdout_text(results), json.loads(json.dumps(holdout_json(results)))

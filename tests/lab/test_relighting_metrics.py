@@ -24,6 +24,7 @@ def truth() -> GroundTruth:
     return GroundTruth(lambert(grid(32)))
 
 
+@pytest.mark.slow
 def test_weights_on_the_thesis_grid_are_the_cosine_of_the_elevation(truth: GroundTruth) -> None:
     elevation = np.pi * (0.5 - (np.arange(32) + 0.5) / 32)
     np.testing.assert_allclose(truth.weights.reshape(32, 64), np.repeat(np.cos(elevation)[:, None], 64, axis=1))

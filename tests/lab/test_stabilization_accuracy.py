@@ -50,6 +50,7 @@ def report(film: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) ->
         return compare_stabilization(*film)
 
 
+@pytest.mark.slow
 def test_none_leaves_the_motion_as_it_is(report: StabilizationReport) -> None:
     none = report.errors[0]
     shift = np.array([[move.x, move.y] for move in wandering(FRAMES)])[report.index]

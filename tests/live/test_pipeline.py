@@ -134,6 +134,7 @@ def test_a_lost_face_eases_to_neutral_and_says_so() -> None:
     assert motions[-1].rotation.magnitude() < 1e-6
 
 
+@pytest.mark.slow
 def test_blend_goes_from_the_live_picture_to_the_relit_one() -> None:
     image = grey(150)
 
@@ -147,6 +148,7 @@ def test_blend_goes_from_the_live_picture_to_the_relit_one() -> None:
     assert live.mean() > half.mean() + 5 > relit.mean() + 10
 
 
+@pytest.mark.slow
 def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     image = np.ascontiguousarray(noise.repeat(4, axis=0).repeat(4, axis=1))

@@ -98,6 +98,7 @@ def test_a_subject_is_built_by_a_plug_in_method() -> None:
     assert "example" in METHODS.names()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("installed")
 def test_relit_run_takes_plug_ins_from_its_configuration(
     material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -191,6 +192,7 @@ def test_a_plug_in_that_fails_later_is_told_from_a_fault_of_ours() -> None:
     assert degradation.cure == "this is a fault of ours: report it"
 
 
+@pytest.mark.slow
 def test_a_command_names_the_package_whose_plug_in_fails(
     material: Material, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -33,6 +33,7 @@ def played(folder: Path) -> Played:
     return play(read_case(folder), folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", case_folders(), ids=lambda folder: folder.name)
 def test_case(folder: Path) -> None:
     try:
@@ -78,6 +79,7 @@ def correlation(mode: str, column: int) -> float:
     return r
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["reenact", "ratio"])
 def test_head_turns_with_the_driver(mode: str) -> None:
     assert correlation(mode, 0) >= LEAST_CORRELATION

@@ -106,6 +106,7 @@ def test_only_what_is_missing_is_rendered(tmp_path: Path, worker: list[str]) -> 
     assert render(scene(), Camera(64), Quality(), wanted, command=["/no/such/program"]) == {}
 
 
+@pytest.mark.slow
 def test_a_worker_that_does_not_end_is_ended(
     tmp_path: Path, worker: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -60,6 +60,7 @@ def rendered(generated: Path, tmp_path: Path) -> tuple[Path, Path]:
     return field, clip
 
 
+@pytest.mark.slow
 def test_the_demo_has_all_it_needs(rendered: tuple[Path, Path], tmp_path: Path) -> None:
     made = make_bundle(*rendered, tmp_path / "out", 6)
     assert sorted(path.name for path in made) == ["CREDITS.md", "adam.relit", "clip.mp4", "mattes.npz", "track.json"]

@@ -61,6 +61,7 @@ def spotted(height: int, width: int, radius: float) -> TwoTermField:
     return TwoTermField(pictures, np.linspace(0, 1, TEXELS, dtype=np.float32))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("height", "width", "radius"), [(160, 160, 16), (96, 300, 14), (400, 300, 34)])
 def test_a_bright_spot_is_seen(height: int, width: int, radius: float, pool: ThreadPoolExecutor) -> None:
     """One of a few percent of the pixels, which few clusters of 128 have."""

@@ -20,6 +20,7 @@ def relit(subject: Subject) -> np.ndarray:
     return BasisRelighter(subject).relight(builtin_light_map("sunset")[None])[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(64, 48), (63, 49)])
 def test_it_is_relit_as_the_means_of_its_pixels_are(size: tuple[int, int]) -> None:
     whole = synthetic_subject(*size)
@@ -36,6 +37,7 @@ def test_it_is_relit_as_the_means_of_its_pixels_are(size: tuple[int, int]) -> No
         np.testing.assert_allclose(points, whole.landmarks[scheme] / 2)
 
 
+@pytest.mark.slow
 def test_each_block_with_a_pixel_has_one_row_and_no_other_has() -> None:
     whole = synthetic_subject(40, 32)
     basis = half_size_basis(whole.basis, whole.size)
@@ -47,6 +49,7 @@ def test_each_block_with_a_pixel_has_one_row_and_no_other_has() -> None:
     assert basis.values.dtype == whole.basis.values.dtype
 
 
+@pytest.mark.slow
 def test_a_cluster_that_is_the_largest_nowhere_is_left_out() -> None:
     whole = synthetic_subject(32, 32)
     basis, (count, places) = whole.basis, whole.basis.pixels.shape

@@ -56,6 +56,7 @@ def relit(name: str, subject: Subject, light: np.ndarray) -> np.ndarray:
     return open_relighter(name, subject).relight(light[None])[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_agrees_with_the_field_summed_by_hand(
     sphere: Subject, sphere_field: np.ndarray, coloured_light: np.ndarray, name: str
@@ -105,6 +106,7 @@ def test_few_components_are_relit_by_whole_pictures(few: Subject, coloured_light
     assert not relighter.relight(np.zeros((1, 32, 64, 3), np.float32)).any()
 
 
+@pytest.mark.slow
 def test_the_bundled_person_under_lamps_all_round() -> None:
     """Packed, with few components, and dark from behind: there one code a value showed blotches."""
     subject = read_subject(demo_files.SUBJECT)
@@ -330,6 +332,7 @@ def _lamp(direction: np.ndarray) -> np.ndarray:
     return np.repeat(lobe[..., None], 3, axis=2).astype(np.float32)
 
 
+@pytest.mark.slow
 def test_a_subject_of_texels_returns_captured_frames_too_and_nearly_the_field_between_them() -> None:
     """The blend decides pixel by pixel, so its file holds texels, not weights of captured lights."""
     samples = sphere_samples(90, 32)

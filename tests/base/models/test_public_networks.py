@@ -66,6 +66,7 @@ def test_a_public_network_computes_what_another_conversion_does(name: str, share
         np.testing.assert_allclose(found[output], expected[output], rtol=0, atol=tolerance)
 
 
+@pytest.mark.slow
 def test_our_mesh_is_as_fast_as_the_other(shared: Path) -> None:
     sessions = both("face_mesh", shared / "models")
     feed = {"image": np.random.default_rng(0).random((1, 256, 256, 3), np.float32)}

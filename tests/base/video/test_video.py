@@ -223,6 +223,7 @@ def pictures_alive() -> int:
     return sum(isinstance(thing, av.VideoFrame) for thing in gc.get_objects())
 
 
+@pytest.mark.slow
 def test_pictures_read_are_freed_at_once(tmp_path: Path) -> None:
     path = write(tmp_path / "clip.mp4", noise(30))
     gc.collect()
@@ -396,6 +397,7 @@ def test_unknown_suffixes_and_folders_are_refused(tmp_path: Path) -> None:
         VideoWriter(tmp_path / "nowhere" / "clip.mp4", (64, 48), 30)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [20_000, 200])
 def test_a_full_disk_is_one_clear_error(tmp_path: Path, limit: int) -> None:
     # A limit on file size, in a process of its own, stands for a full disk: the same failing write.
@@ -435,6 +437,7 @@ REAL_CLIPS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REAL_CLIPS)
 def test_real_clips_are_read_whole(shared: Path, name: str) -> None:
     width, height, fps, count = REAL_CLIPS[name]

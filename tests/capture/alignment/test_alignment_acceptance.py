@@ -26,6 +26,7 @@ def corrupt() -> OlatSamples:
     return OlatSamples(pictures, DIRECTIONS, disc())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [
@@ -46,6 +47,7 @@ def test_exact_pictures_are_left_alone(make: Callable[[], OlatSamples]) -> None:
     assert found.messages[0].startswith("pictures left as they are")
 
 
+@pytest.mark.slow
 def test_what_moved_is_aligned_and_what_is_corrupt_left_out() -> None:
     still = scene()[3]
     samples = corrupt()
@@ -62,6 +64,7 @@ def test_what_moved_is_aligned_and_what_is_corrupt_left_out() -> None:
     assert "torn" in found.messages[2]
 
 
+@pytest.mark.slow
 def test_of_still_pictures_the_corrupt_ones_alone_go() -> None:
     pictures = scene()[3].copy()
     pictures[BLACK] = 0.002
@@ -71,6 +74,7 @@ def test_of_still_pictures_the_corrupt_ones_alone_go() -> None:
     assert found.messages[1].startswith("left out: 003.png: black")
 
 
+@pytest.mark.slow
 def test_who_wants_it_as_is_gets_it_and_who_wants_it_aligned_too() -> None:
     samples = corrupt()
     assert align_if_better(samples, NAMES, False).samples is samples

@@ -46,6 +46,7 @@ def off(pictures: NDArray[np.float32], still: NDArray[np.float32]) -> float:
     return float(np.sqrt(np.mean(np.square(pictures - still)[:, disc() > 0])))
 
 
+@pytest.mark.slow
 def test_motions_and_strengths_are_found() -> None:
     moves, strobes, pictures, still = scene()
     found = align_samples(pictures, DIRECTIONS, disc())
@@ -67,6 +68,7 @@ def test_motions_and_strengths_are_found() -> None:
     assert off(aligned.pictures, still) < 0.5 * off(pictures, still)
 
 
+@pytest.mark.slow
 def test_a_set_that_lies_well_is_left_alone() -> None:
     _, _, _, still = scene()
     found = align_samples(still, DIRECTIONS, disc())
@@ -74,6 +76,7 @@ def test_a_set_that_lies_well_is_left_alone() -> None:
     assert found.gains == pytest.approx(1, abs=0.02)
 
 
+@pytest.mark.slow
 def test_corrupt_pictures_are_named() -> None:
     _, _, pictures, still = scene()
     broken = pictures.copy()
@@ -100,6 +103,7 @@ def test_of_pictures_that_do_not_belong_together_nothing_is_made() -> None:
         align_samples(pictures, directions, disc()).samples(samples)
 
 
+@pytest.mark.slow
 def test_light_from_behind_keeps_its_strength() -> None:
     behind = np.array([direction_from_degrees(150, 10), direction_from_degrees(-140, 20)])
     _, _, _, still = scene()
@@ -132,6 +136,7 @@ def test_large_pictures_are_measured_at_a_smaller_size(monkeypatch: pytest.Monke
     assert off(found.pictures(pictures), still) < 0.55 * off(pictures, still)
 
 
+@pytest.mark.slow
 def test_the_model_predicts_what_follows_its_law() -> None:
     _, _, _, still = scene()
     predicted = predict_pictures(still, DIRECTIONS, disc())

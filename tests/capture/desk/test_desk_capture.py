@@ -58,6 +58,7 @@ def without(recording: DeskRecording, left_out: Sequence[int]) -> DeskRecording:
     return replace(recording, frames=frames)
 
 
+@pytest.mark.slow
 def test_each_pattern_is_told_in_the_pictures(recording: DeskRecording) -> None:
     count = len(recording.setup.patterns)
     assert patterns_of(recording) == list(range(count))
@@ -74,6 +75,7 @@ def test_no_clock_is_trusted(recording: DeskRecording) -> None:
     assert len(found) >= len(recording.setup.patterns) - 1
 
 
+@pytest.mark.slow
 def test_normals_and_skin_of_the_person_come_back(recording: DeskRecording, person: SimulatedPerson) -> None:
     found = measure_desk_samples(recording)
     assert found.warnings == [NO_EYES]
@@ -95,6 +97,7 @@ def test_normals_and_skin_of_the_person_come_back(recording: DeskRecording, pers
     assert np.mean(np.abs(samples.matte - matte)[np.abs(points[0]) < 9]) < 0.06
 
 
+@pytest.mark.slow
 def test_dark_skin_stays_dark(monkeypatch: pytest.MonkeyPatch) -> None:
     """The exposure makes both equally bright; the whites of the eyes tell them apart."""
     monkeypatch.setattr(desk_capture, "find_mesh_landmarks", lambda picture: face_landmarks(len(picture)))
@@ -129,6 +132,7 @@ def test_a_face_from_the_side_is_refused(
             find_mesh_landmarks(picture)
 
 
+@pytest.mark.slow
 def test_a_head_that_moves_is_aligned(person: SimulatedPerson) -> None:
     moving = replace(WEBCAM, motion_mm=2.5, frames_a_pattern=4, fade_frames=1)
     shifts = measure_desk_samples(film(person, webcam=moving)).samples.pictures
@@ -138,6 +142,7 @@ def test_a_head_that_moves_is_aligned(person: SimulatedPerson) -> None:
     assert error < 0.06
 
 
+@pytest.mark.slow
 def test_the_picture_in_the_room_s_light_is_laid_on_the_others(person: SimulatedPerson) -> None:
     """In a room so dark that the frames before black show nothing of it."""
     webcam = replace(WEBCAM, room=0.001)
@@ -155,6 +160,7 @@ def test_the_picture_in_the_room_s_light_is_laid_on_the_others(person: Simulated
     assert np.corrcoef(*details)[0, 1] > 0.97
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", ["mirrored", "upside down", "turned by half"])
 def test_a_turned_screen_is_refused(person: SimulatedPerson, turned: str) -> None:
     grid = SETUP.patches
@@ -176,6 +182,7 @@ def wall_alone(frame: DisplayImage) -> DisplayImage:
     return np.clip(wall + noise, 0, 255).astype(np.uint8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("begins", "ends"), [(0.25, 1.0), (0.5, 1.0), (0.75, 1.0), (0.45, 0.6)])
 def test_a_person_who_leaves_midway_is_told(recording: DeskRecording, begins: float, ends: float) -> None:
     count = len(recording.frames)
@@ -232,6 +239,7 @@ def test_a_still_picture_shows_no_patterns(recording: DeskRecording) -> None:
         measure_desk_samples(still)
 
 
+@pytest.mark.slow
 def test_a_bright_room_drowns_the_patterns(person: SimulatedPerson) -> None:
     with pytest.raises(CaptureError, match="patterns are"):
         measure_desk_samples(film(person, webcam=replace(WEBCAM, room=100.0)))
@@ -264,6 +272,7 @@ def test_exposure_is_checked(recording: DeskRecording, factor: float, message: s
         measure_desk_samples(replace(recording, frames=frames))
 
 
+@pytest.mark.slow
 def test_automatic_exposure_is_refused_and_changing_color_noted(person: SimulatedPerson) -> None:
     length = (WEBCAM.frames_a_pattern + WEBCAM.fade_frames) * len(SETUP.patterns)
 
@@ -285,6 +294,7 @@ def test_a_small_face_is_refused(person: SimulatedPerson) -> None:
         measure_desk_samples(film(person, webcam=replace(WEBCAM, size=(240, 180))))
 
 
+@pytest.mark.slow
 def test_one_patch_at_a_time_works_too(person: SimulatedPerson) -> None:
     slow = SETUP.model_copy(update={"sequence": standard_sequence(3, 2, one_by_one=True)})
     recording = film(person, slow)

@@ -199,6 +199,7 @@ def test_too_few_frames_are_no_patterns() -> None:
             find_plateaus(np.linspace(0.1, 0.2, count * 4, dtype=np.float32).reshape(count, 2, 2), "srgb")
 
 
+@pytest.mark.slow
 def test_a_long_recording_is_parted_in_bounded_time_and_memory() -> None:
     levels = np.tile(np.repeat([0.2, 0.7], [700, 50]), 4)
     cells = levels[:, None, None] + 0.002 * np.random.default_rng(0).normal(size=(len(levels), 24, 32))

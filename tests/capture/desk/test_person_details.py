@@ -25,6 +25,7 @@ def relit(field: LambertianField, environment: str) -> Float32Array:
     return np.asarray(seen.reshape(SIZE, SIZE, 3), np.float32)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("environment", ["window", "overcast"])
 def test_hair_is_as_bright_as_in_the_room(environment: str) -> None:
     """A field whose hair is too dark by half becomes right; that of the skin stays, whatever the picture's exposure."""

@@ -66,6 +66,7 @@ def no_networks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(desk_capture, "find_mesh_landmarks", lambda picture: None)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_networks")
 def test_both_are_told_of_a_whole_recording() -> None:
     """Before a screen whose white has 70 % of the light of all its patches, and at a distance that is wrong."""

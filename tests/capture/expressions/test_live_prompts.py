@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from relit_camera.base.images.image_types import Frame
 from relit_camera.capture.expressions.film_tracking import FaceCollection
 from relit_camera.capture.expressions.live_prompts import NEUTRAL, PROMPTS, TUNABLES, LiveCoverage, PromptSequence
@@ -50,6 +52,7 @@ def test_what_turns_out_not_to_be_covered_is_asked_for_again() -> None:
     assert prompts.name == list(PROMPTS)[2]
 
 
+@pytest.mark.slow
 def test_what_is_covered_is_judged_anew_when_the_neutral_face_is_known_better() -> None:
     """Whoever looks aside while they are asked to look ahead is not turned when they do."""
     doing = "turned right"

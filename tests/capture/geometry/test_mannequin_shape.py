@@ -33,6 +33,7 @@ def found(view: View) -> Geometry:
     return estimate_geometry(pictures, directions, view.matte(), Camera(SIZE).focal_px)
 
 
+@pytest.mark.slow
 def test_normals_of_the_skin(found: Geometry, view: View, skin: np.ndarray) -> None:
     error = angles_deg(found.normals, view.normals(), skin)
     assert error.mean() < 4
@@ -55,6 +56,7 @@ def test_depth_of_the_face(found: Geometry, view: View, skin: np.ndarray) -> Non
     assert ((seen - offset) / scale - truth).std() < 0.15
 
 
+@pytest.mark.slow
 def test_light_not_captured(found: Geometry, view: View, skin: np.ndarray) -> None:
     """Which of its light reaches the skin, against what a picture under it shows."""
     directions = front_lights(11, 0.2)

@@ -58,6 +58,7 @@ def test_hair_and_clothes_have_no_shadow_edges(field: GenericField) -> None:
     assert response.diffuse[vague][facing > 0.3].min() > 0.2
 
 
+@pytest.mark.slow
 def test_compressed_it_is_the_same_field(field: GenericField, matte: np.ndarray) -> None:
     maps = [builtin_environment(name).light_map for name in BUILTIN_NAMES]
     target = CompressionTarget(texel_db=38.0, maps=maps)

@@ -42,6 +42,7 @@ def frames_of(path: Path, count: int) -> list[DisplayImage]:
     return frames[:: max(1, len(frames) // count)]
 
 
+@pytest.mark.slow
 def test_it_is_an_ordinary_subject(subject: Subject, tmp_path: Path) -> None:
     write_subject(tmp_path / "me.relit", subject)
     again = read_subject(tmp_path / "me.relit")
@@ -88,6 +89,7 @@ def test_in_another_light_it_looks_as_the_person_does_there(subject: Subject, az
         assert psnr(relit * gain, truth, matte) > psnr(tinted.astype(np.float32), truth, matte) + 5
 
 
+@pytest.mark.slow
 def test_light_that_the_head_does_not_explain_is_not_kept_as_color() -> None:
     light = window(-45)
     light *= 0.7 / facing_irradiance(light)
@@ -104,6 +106,7 @@ def test_light_that_the_head_does_not_explain_is_not_kept_as_color() -> None:
     assert left / right == pytest.approx(1, abs=0.15)
 
 
+@pytest.mark.slow
 def test_a_harsh_room_is_noticed() -> None:
     soft, harsh = window(0), window(85, 5, 30, around=0.0)
     assert not capture_from_picture(picture_of(SKIN, soft * np.float32(0.7 / facing_irradiance(soft))), "a").warnings
@@ -137,6 +140,7 @@ def test_without_networks_it_says_what_gets_them(tmp_path: Path, monkeypatch: py
 class TestOnRealPictures:
     """With the networks, on recordings of people."""
 
+    @pytest.mark.slow
     def test_a_clip_gives_a_subject(self, shared: Path) -> None:
         subject = build_instant_subject(frames_of(shared / "driving" / "liveportrait_d0.mp4", 12), "clip.mp4")
         assert subject.size == (256, 256)
@@ -144,16 +148,19 @@ class TestOnRealPictures:
         assert subject.metadata.psnr_db > 30
         assert 0.2 < float((subject.matte > 0.5).mean()) < 0.8
 
+    @pytest.mark.slow
     def test_the_picture_is_the_calm_face_of_a_clip_that_ends_in_a_smile(self, shared: Path) -> None:
         subject = build_instant_subject(frames_of(shared / "driving" / "liveportrait_d0.mp4", 12), "clip.mp4")
         points = subject.landmarks["mesh478"]
         width = np.linalg.norm(points[61] - points[291]) / np.linalg.norm(points[33] - points[263])
         assert width < 0.62
 
+    @pytest.mark.slow
     def test_one_picture_is_enough(self, shared: Path) -> None:
         captured = capture_instant([read_display(shared / "portraits" / "uniface_portrait1.jpg")], "portrait")
         assert captured.frames == 1
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("name", "words"),
         [("nobody", "no face"), ("two", "two faces"), ("small", "pixels high"), ("profile", "turned away"),
@@ -176,5 +183,6 @@ class TestOnRealPictures:
         with pytest.raises(CaptureError, match=words):
             build_instant_subject([picture], "picture.png")
 
+    @pytest.mark.slow
     def test_a_skull_on_a_sweater_is_no_second_face(self, shared: Path) -> None:
         assert capture_instant(frames_of(shared / "driving" / "asl_yes.mkv", 8), "clip").frames > 1

@@ -72,6 +72,7 @@ def test_of_what_casts_a_shadow_and_is_not_in_the_picture_interpolation_knows_no
     assert error(Blend(), samples, truth) < min(0.95 * plain, thesis)
 
 
+@pytest.mark.slow
 def test_of_what_is_in_the_picture_they_know_much_more() -> None:
     samples, truth = lambert(CAPTURED, SIZE), lambert(BETWEEN, SIZE).pictures.reshape(len(BETWEEN), -1, 3)
     plain = error(SphericalBarycentric(), samples, truth)
@@ -99,6 +100,7 @@ def test_texels_are_exact_directions_and_blocks_are_pixels(method: ReflectanceMe
     np.testing.assert_allclose(field.dense(400, 440), field.at(texel_vectors(), pixels).transpose(1, 0, 2), atol=1e-5)
 
 
+@pytest.mark.slow
 def test_beyond_the_sampled_region_the_blend_is_the_model_and_goes_on() -> None:
     """A white ball lit from 40 degrees outside of what was captured: interpolation has long been black."""
     samples = lambert(cap(60, 50), SIZE)
@@ -135,6 +137,7 @@ def shadow_free_brightness(directions: NDArray[np.float64], pixels: NDArray[np.i
     return float(lambert(directions, SIZE).pictures.reshape(1, -1, 3)[:, pixels].mean())
 
 
+@pytest.mark.slow
 def test_inside_the_region_the_blend_is_the_mean_of_its_parts(samples: OlatSamples) -> None:
     pixels = inside(samples)[:50]
     field = Blend().build(samples)
@@ -144,6 +147,7 @@ def test_inside_the_region_the_blend_is_the_mean_of_its_parts(samples: OlatSampl
     np.testing.assert_allclose(field.at(BETWEEN, pixels), expected, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_the_model_has_the_larger_fraction_where_the_shape_tells_the_shadows() -> None:
     bare, hidden = (
         choose_model_fraction(AppearanceMethod().build(make(CAPTURED, SIZE))) for make in (lambert, shadowed)

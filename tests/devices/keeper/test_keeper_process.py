@@ -110,6 +110,7 @@ def leave(camera: subprocess.Popen[str], how: str) -> None:
     assert camera.returncode == 0
 
 
+@pytest.mark.slow
 def test_kill_9_and_a_new_start_are_no_gap_for_readers(stage: Stage, bridged: Callable[..., None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
@@ -125,6 +126,7 @@ def test_kill_9_and_a_new_start_are_no_gap_for_readers(stage: Stage, bridged: Ca
     bridged("the camera is killed and started again")
 
 
+@pytest.mark.slow
 def test_a_camera_that_leaves_ends_its_keeper(stage: Stage) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
@@ -132,6 +134,7 @@ def test_a_camera_that_leaves_ends_its_keeper(stage: Stage) -> None:
     wait_until(lambda: stage.keepers() == set())
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_restarted_hands_over(stage: Stage, bridged: Callable[..., None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
@@ -143,6 +146,7 @@ def test_a_camera_that_is_restarted_hands_over(stage: Stage, bridged: Callable[.
     bridged("the camera hands over")
 
 
+@pytest.mark.slow
 def test_a_camera_of_another_version_replaces_the_keeper(stage: Stage, bridged: Callable[..., None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
@@ -158,6 +162,7 @@ def test_a_camera_of_another_version_replaces_the_keeper(stage: Stage, bridged: 
     bridged("a camera of another version, whose keeper takes over", 2 * LONGEST_GAP_S)  # the device is opened again
 
 
+@pytest.mark.slow
 def test_a_camera_of_another_size_has_the_device_opened_anew(stage: Stage, bridged: Callable[..., None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
@@ -170,6 +175,7 @@ def test_a_camera_of_another_size_has_the_device_opened_anew(stage: Stage, bridg
     bridged("a camera of another size")
 
 
+@pytest.mark.slow
 def test_a_second_camera_is_refused(stage: Stage) -> None:
     stage.camera(10)
     stage.wait_for(10)
@@ -183,6 +189,7 @@ def test_a_second_camera_is_refused(stage: Stage) -> None:
     stage.wait_for(10, len(stage.shown()) + 5)
 
 
+@pytest.mark.slow
 def test_a_keeper_that_nobody_comes_for_ends(stage: Stage) -> None:
     first = stage.camera(10, keep_s=2)
     stage.wait_for(10)
@@ -194,6 +201,7 @@ def test_a_keeper_that_nobody_comes_for_ends(stage: Stage) -> None:
     assert not any(path.is_socket() for path in stage.folder.iterdir())
 
 
+@pytest.mark.slow
 def test_a_keeper_that_is_killed_is_replaced_at_once(stage: Stage, bridged: Callable[..., None]) -> None:
     stage.camera(10)
     stage.wait_for(10)
@@ -230,6 +238,7 @@ def odd_keeper(stage: Stage, answer: str, path: Path | None = None) -> subproces
     return odd
 
 
+@pytest.mark.slow
 def test_a_keeper_whose_answers_cannot_be_read_is_ended_and_replaced(stage: Stage) -> None:
     odd = odd_keeper(stage, '{"info": {"pipewire": [1, ["cut in the mid')
     stage.camera(10)
@@ -237,6 +246,7 @@ def test_a_keeper_whose_answers_cannot_be_read_is_ended_and_replaced(stage: Stag
     assert odd.wait(WAIT_S) == -signal.SIGKILL
 
 
+@pytest.mark.slow
 def test_without_a_keeper_none_is_left_that_holds_the_virtual_camera(stage: Stage) -> None:
     odd = odd_keeper(stage, "")
     camera = stage.camera(10)
@@ -245,6 +255,7 @@ def test_without_a_keeper_none_is_left_that_holds_the_virtual_camera(stage: Stag
     assert odd.wait(WAIT_S) == -signal.SIGKILL
 
 
+@pytest.mark.slow
 def test_another_version_that_hears_no_goodbye_is_ended(stage: Stage) -> None:
     odd = odd_keeper(stage, '{"other_version": "0.0.1 1"}')
     stage.camera(10)
@@ -266,6 +277,7 @@ def test_where_a_device_is_named_the_cure_is_another_one(stage: Stage) -> None:
         keeper.greet()
 
 
+@pytest.mark.slow
 def test_a_camera_that_is_stopped_for_a_while_is_bridged(stage: Stage, bridged: Callable[..., None]) -> None:
     first = stage.camera(10)
     stage.wait_for(10)
@@ -276,6 +288,7 @@ def test_a_camera_that_is_stopped_for_a_while_is_bridged(stage: Stage, bridged: 
     bridged("the camera stands still")
 
 
+@pytest.mark.slow
 def test_its_socket_is_its_user_s_alone_and_it_is_small(stage: Stage) -> None:
     stage.camera(10)
     stage.wait_for(10)

@@ -210,6 +210,7 @@ def test_another_system_says_that_it_cannot(monkeypatch: pytest.MonkeyPatch) -> 
         DemandWatch(NamedSink("camera", "OBS"))
 
 
+@pytest.mark.slow
 def test_the_camera_lives_on_while_its_webcam_is_released(tmp_path: Path) -> None:
     cameras, readers = Cameras(), Switch()
     demand = DemandMonitor(readers, idle_timeout_s=0.3)

@@ -128,6 +128,7 @@ def test_no_part_is_measured_over_a_longer_time_than_its_whole(monkeypatch: pyte
     assert (cost.latency_p50_ms, cost.latency_p95_ms, cost.degraded) == (3.0, 4.0, ["matte: is slow"])
 
 
+@pytest.mark.slow
 def test_a_camera_that_cannot_run_says_why(material: Material, tmp_path: Path) -> None:
     settings = settings_of(material, tmp_path).model_copy(update={"subject": str(tmp_path / "none.relit")})
     with pytest.raises(RelitError, match=r"none\.relit"):
@@ -208,6 +209,7 @@ def test_the_installed_network_is_faster_than_the_published_one() -> None:
     assert 0.3 < installed_mesh_runs() < 0.95
 
 
+@pytest.mark.slow
 def test_bench_measures_each_combination(monkeypatch: pytest.MonkeyPatch, material: Material) -> None:
     asked = []
 

@@ -33,6 +33,7 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(preview, "preview_curve", partial(preview.preview_curve, viewer_counts=VIEWERS, seconds=0.5))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small")
 def test_the_command_writes_plots_and_figures(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
@@ -78,6 +79,7 @@ def test_the_random_subject_is_relit_alike_by_basis_and_matrix() -> None:
     assert np.sqrt(np.mean((dense - basis) ** 2)) < 0.01 * np.abs(dense).max()
 
 
+@pytest.mark.slow
 def test_the_dense_matrix_is_left_out_where_it_is_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(relighting, "DENSE_SIDE_PX", 8)
     pixels, _ = relighting.relighting_curves(MeshRun(), (8, 16), (8,), 8, 0.0, 1 << 20)

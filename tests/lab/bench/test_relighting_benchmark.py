@@ -18,6 +18,7 @@ from relit_camera.lab.bench.synthetic_subject import LIGHT_COUNT, synthetic_subj
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 
 
+@pytest.mark.slow
 def test_relighting_is_compared_in_one_run() -> None:
     subject = synthetic_subject(30, 40)
     assert subject.metadata.lights == LIGHT_COUNT
@@ -31,6 +32,7 @@ def test_relighting_is_compared_in_one_run() -> None:
     assert result["naive_ms"] > result["basis_ms"]  # type: ignore[operator]
 
 
+@pytest.mark.slow
 def test_the_sample_subject_is_lit_from_where_the_light_is() -> None:
     from relit_camera.capture.reflectance.directional_light import relight_from_direction
     from relit_camera.light.directions import direction_from_degrees

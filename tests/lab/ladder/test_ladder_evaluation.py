@@ -70,6 +70,7 @@ def result() -> Iterator[RoomResult]:
         yield next(iter(results))
 
 
+@pytest.mark.slow
 def test_the_truth_beats_the_tint(result: RoomResult) -> None:
     figures = result.figures
     assert list(figures) == ["tint", "full", "cut", "nobody"]

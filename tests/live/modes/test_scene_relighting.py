@@ -7,6 +7,7 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
+import pytest
 
 from relit_camera.base.config.look import Look
 from relit_camera.base.images.image_quality import psnr
@@ -58,6 +59,7 @@ def head_and_body(light: LightMap, index: int) -> np.ndarray:
     return head * (1 - fraction) + body * fraction
 
 
+@pytest.mark.slow
 def test_a_turning_head_is_relit_in_every_second_frame_and_lit_rightly_in_all() -> None:
     ours, relighter = made()
     pictures = [ours.relight(SUNSET, turn(index), index / 30, 2) for index in range(30)]
@@ -77,6 +79,7 @@ def test_a_change_of_light_is_eased_in_every_frame() -> None:
     assert psnr(seen[-1], truth(PARTY, 0)) > 60
 
 
+@pytest.mark.slow
 def test_scene_and_room_are_relit_together_and_combined() -> None:
     ours, relighter = made()
     room: LightMap = builtin_environment("window").light_map

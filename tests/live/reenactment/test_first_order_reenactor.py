@@ -128,6 +128,7 @@ def test_the_far_outline_alone_is_drawn_anew(yaw: float, half_size: bool, monkey
         assert (np.sign(yaw) * (changed - SIZE[0] / 2) > -CELL * (1 + half_size)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half_size", [False, True])
 @pytest.mark.parametrize("yaws", [np.arange(22, 29, 0.2), np.arange(-29, -22, 0.2)], ids=["right", "left"])
 def test_the_outline_of_a_head_that_turns_slowly_goes_along_evenly(

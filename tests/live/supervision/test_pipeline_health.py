@@ -467,6 +467,7 @@ def possible_events(health: PipelineHealth, at: float) -> Iterator[Event]:
         yield WorkerEnded(worker)
 
 
+@pytest.mark.slow
 def test_every_order_of_up_to_eight_events() -> None:
     """All of them, 3 s apart: long enough for a hang, a pause to end, or a worker to be abandoned."""
     reached = {PipelineHealth()}

@@ -196,6 +196,7 @@ class Simulation:
         return self.workers[-1]
 
 
+@pytest.mark.slow
 def test_all_is_well_for_ten_minutes() -> None:
     simulation = Simulation()
     simulation.run(600.0)

@@ -56,6 +56,7 @@ def truth_of(folder: Path) -> dict[str, Any]:
     return document
 
 
+@pytest.mark.slow
 def test_a_plain_clip_is_exposed_as_the_truth_says(
     take: Take, frames: list[tuple[Path, float]], tmp_path: Path
 ) -> None:
@@ -72,6 +73,7 @@ def test_a_plain_clip_is_exposed_as_the_truth_says(
     assert matte[2].max() < 5
 
 
+@pytest.mark.slow
 def test_a_webcams_picture_divided_by_its_gains_is_the_light(
     take: Take, frames: list[tuple[Path, float]], tmp_path: Path
 ) -> None:

@@ -154,6 +154,7 @@ def test_nobody_is_found_while_nobody_is_there(person: Person, tmp_path: Path) -
     assert [len(truth["landmarks66_hidden"]) for truth in truths] == [0, 66, 0]
 
 
+@pytest.mark.slow
 def test_a_raised_mug_covers_the_mouth_and_not_the_eyes(person: Person) -> None:
     take = Take(person, HANDS, CAMERA)
     at_rest, raised, drinking, passing = (frame_truth(take, time_s) for time_s in (0.0, 1.55, 2.4, 6.0))

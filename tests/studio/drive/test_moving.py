@@ -55,6 +55,7 @@ def test_the_live_clip_is_its_own_truth(clip: Path) -> None:
     assert len(shown) == FRAMES - FIRST_FRAME
 
 
+@pytest.mark.slow
 def test_a_mode_is_compared_frame_by_frame(clip: Path) -> None:
     truth, studio = read_truth(clip), EnvironmentStore().resolve("studio")
     subject = read_subject(DEMO / "adam.relit")
@@ -64,6 +65,7 @@ def test_a_mode_is_compared_frame_by_frame(clip: Path) -> None:
     assert sheet.shape[1] > 4 * 100
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("models")
 def test_an_instant_subject_is_of_the_person_in_the_clip(clip: Path) -> None:
     subject = capture_from_clip(clip)

@@ -21,6 +21,7 @@ def lit_from(name: str, azimuth_deg: float, elevation_deg: float) -> float:
     return float(wall / front)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROOMS)
 def test_a_room_is_light_all_round(name: str) -> None:
     light_map = Room(paint_room(name)).light_map
@@ -29,20 +30,24 @@ def test_a_room_is_light_all_round(name: str) -> None:
     assert light_map.min() > 0
 
 
+@pytest.mark.slow
 def test_soft_light_comes_from_the_front() -> None:
     assert lit_from("soft", *LEFT) < 1.5
     assert lit_from("soft", *RIGHT) > 0.3
 
 
+@pytest.mark.slow
 def test_a_side_window_lights_the_pictures_left_and_little_else() -> None:
     assert lit_from("side-window", *LEFT) > 2
     assert lit_from("side-window", *RIGHT) < 0.3
 
 
+@pytest.mark.slow
 def test_ceiling_light_comes_from_above() -> None:
     assert lit_from("ceiling", *UP) > 2
 
 
+@pytest.mark.slow
 def test_a_screen_at_night_lights_what_faces_it() -> None:
     for place in (LEFT, RIGHT, UP):
         assert lit_from("screen", *place) < 0.5

@@ -60,6 +60,7 @@ def white_sky(rows: int) -> tuple[np.ndarray, np.ndarray]:
     return texel_directions(rows, 2 * rows).reshape(-1, 3), texel_solid_angles(rows, 2 * rows).ravel() / np.pi
 
 
+@pytest.mark.slow
 def test_white_convex_body_in_a_white_room_reads_one() -> None:
     directions, weights = white_sky(8)
     solved = solve(ball(1.0), CAMERA, directions, SETTINGS)
@@ -80,6 +81,7 @@ def test_hemispherical_bowl_sees_itself_and_the_sky_half_and_half() -> None:
     np.testing.assert_allclose((seen + between.sky)[inner], 1, atol=0.06)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("albedo", [1.0, 0.5])
 def test_bowl_in_a_white_room_reads_what_all_its_bounces_add_up_to(albedo: float) -> None:
     # B = ρ (½ + ½ B): a white bowl loses nothing and reads 1, whatever its shape.
@@ -152,6 +154,7 @@ def reduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_reduced_field_is_imported_as_it_was_solved(reduced: Path) -> None:
     samples = import_samples(reduced / "lights.lp")
     assert samples.pictures.shape == (128, 48, 64, 3)

@@ -60,6 +60,7 @@ def test_one_light_is_albedo_times_cosine_where_nothing_shades(view: View) -> No
     assert np.mean(np.abs(ratio[facing] - 1) < 0.15) > 0.8
 
 
+@pytest.mark.slow
 def test_many_lights_add_up(view: View) -> None:
     directions = fibonacci_directions(6)
     power = np.arange(1, 7)[:, None] * np.array([0.1, 0.2, 0.3])
@@ -70,6 +71,7 @@ def test_many_lights_add_up(view: View) -> None:
     assert psnr(together, sharp, view.matte()) > 26
 
 
+@pytest.mark.slow
 def test_soft_light_hardly_depends_on_how_many_lights_stand_for_it(view: View) -> None:
     white = np.ones((32, 64, 3), np.float32)
     few, many = (view.under_lights(lights_from_map(white, count)) for count in (32, 160))

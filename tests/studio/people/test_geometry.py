@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from relit_camera.base.easing import smoothstep
@@ -69,6 +70,7 @@ def test_smoothstep_goes_either_way() -> None:
     np.testing.assert_allclose(smoothstep([0, 1], 1, 0), [1, 0])
 
 
+@pytest.mark.slow
 def test_nearest_points_are_those_of_a_dense_search() -> None:
     rng = np.random.default_rng(5)
     x, y = np.meshgrid(np.linspace(-2, 2, 15), np.linspace(-2, 2, 15))

@@ -29,6 +29,7 @@ def distance_outside(person: Person, points: np.ndarray) -> np.ndarray:
     return np.asarray(((points - person.neutral[skin][nearest]) * normals[nearest]).sum(axis=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("style", get_args(HairStyle))
 def test_hair_stays_out_of_the_head_and_the_face(person: Person, style: HairStyle) -> None:
     hair = grow_hair(person.model, person.neutral, NOTHING, Traits("x", 4, hair=style), fraction=0.08)

@@ -27,6 +27,7 @@ def gray(value: float) -> DisplayImage:
     return np.full((4, 4, 3), round(value), np.uint8)
 
 
+@pytest.mark.slow
 def test_only_missing_pictures_are_rendered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     paths = [tmp_path / f"{index}.png" for index in range(3)]
     write_display(paths[1], gray(99))

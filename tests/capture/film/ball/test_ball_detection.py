@@ -63,6 +63,7 @@ def frames() -> list[LinearImage]:
     return film(SCENE)
 
 
+@pytest.mark.slow
 def test_a_ball_among_other_round_things(frames: list[LinearImage]) -> None:
     (ball,) = find_balls(sample_frames(with_decoys(frames)), GIVEN)
     center, radius = off(ball.outline, SCENE.outline())
@@ -73,6 +74,7 @@ def test_a_ball_among_other_round_things(frames: list[LinearImage]) -> None:
     assert ball.evidence > 0.6
 
 
+@pytest.mark.slow
 def test_other_round_things_are_no_balls(frames: list[LinearImage]) -> None:
     plain = np.full_like(frames[0], 0.06)
     with pytest.raises(CaptureError, match="no mirror ball was found") as refusal:
@@ -80,6 +82,7 @@ def test_other_round_things_are_no_balls(frames: list[LinearImage]) -> None:
     assert "--ball X,Y,RADIUS" in refusal.value.cure
 
 
+@pytest.mark.slow
 def test_two_balls() -> None:
     left = MirrorScene(center=np.array([-14.0, 5.0, -58.0]), radius_cm=4.0, noise=0.002)
     pairs = zip(film(SCENE), film(left), strict=True)
@@ -115,6 +118,7 @@ def test_a_given_circle_is_taken_as_it_is(frames: list[LinearImage]) -> None:
         ball_from_outline(sample_frames(frames), BallOutline(100, 3, 20), GIVEN)
 
 
+@pytest.mark.slow
 def test_a_second_ball_that_is_missing_beside_a_given_one_is_refused(frames: list[LinearImage]) -> None:
     given = BallOutline(*SCENE.outline())
     with pytest.raises(
@@ -123,6 +127,7 @@ def test_a_second_ball_that_is_missing_beside_a_given_one_is_refused(frames: lis
         find_balls(sample_frames(frames), GIVEN, 2, [given])
 
 
+@pytest.mark.slow
 def test_the_outline_corrects_the_focal_length() -> None:
     scene = MirrorScene(size=(320, 400), center=np.array([17.0, 26.0, -60.0]), radius_cm=6.5, noise=0.002)
     guess = typical_focal_length(scene.size)
@@ -177,11 +182,13 @@ def found(photographs: list[LinearImage]) -> DetectedBall:
     return find_balls(sample, typical_focal_length(sample.size))[0]
 
 
+@pytest.mark.slow
 def test_a_real_ball(found: DetectedBall, published: tuple[float, float, float]) -> None:
     assert max(off(found.outline, published)) < 0.01
     assert found.highlight_visibility == 1
 
 
+@pytest.mark.slow
 def test_real_lights_and_never_the_second_highlight(
     shared: Path, photographs: list[LinearImage], found: DetectedBall, published: tuple[float, float, float]
 ) -> None:

@@ -35,6 +35,7 @@ def frames() -> list[LinearImage]:
     return whole + covered + [pushed.photograph(lamps[i // 2 + 5] if i % 2 else None, seed=40 + i) for i in range(6)]
 
 
+@pytest.mark.slow
 def test_hidden_and_moved_frames_are_episodes(frames: list[LinearImage]) -> None:
     tracker = BallTracker(sample_frames(frames), OUTLINE)
     found = find_episodes([tracker.observe(index, frame) for index, frame in enumerate(frames)], OUTLINE.radius)

@@ -39,6 +39,7 @@ def kinds_of(flashes: Flashes) -> np.ndarray:
     return np.array([frame.kind.value for frame in flashes.frames])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STEADY)
 def test_whole_and_partial_frames_are_distinguished(name: str) -> None:
     scene = STEADY[name]
@@ -56,6 +57,7 @@ def test_whole_and_partial_frames_are_distinguished(name: str) -> None:
     assert len(np.unique(flash[bright & (kinds == "bright")])) >= 0.95 * len(np.unique(flash[bright]))
 
 
+@pytest.mark.slow
 def test_the_shutter_is_found() -> None:
     shutter = detect_flashes(film(ORDINARY)[0]).shutter
     assert shutter.exposure_s == pytest.approx(1 / 60, rel=0.1)
@@ -64,6 +66,7 @@ def test_the_shutter_is_found() -> None:
     assert detect_flashes(film(STEADY["held upright: columns"])[0]).shutter.by_columns
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_flash_that_jitters_is_followed(seed: int) -> None:
     seen, lit = film(Blinking(jitter_s=0.002, hz=4.7, seed=seed))
@@ -72,6 +75,7 @@ def test_a_flash_that_jitters_is_followed(seed: int) -> None:
     assert (kinds[lit.min(axis=1) >= 0.98] == "bright").mean() > 0.9
 
 
+@pytest.mark.slow
 def test_gains_are_read_where_the_flash_does_not_reach() -> None:
     seen, _ = film(replace(ORDINARY, hunting=0.3))
     signal = detect_flashes(seen).signal
@@ -81,6 +85,7 @@ def test_gains_are_read_where_the_flash_does_not_reach() -> None:
     assert np.ptp(detect_flashes(film(STEADY["no part shows the gain"])[0]).signal.gains) == 0
 
 
+@pytest.mark.slow
 def test_flashes_that_point_elsewhere_are_rejected() -> None:
     scene = replace(ORDINARY, lapses=(3.0, 6.1))
     seen, lit = film(scene)
@@ -97,6 +102,7 @@ def test_flashes_that_point_elsewhere_are_rejected() -> None:
     assert (kinds[bright & (away > 0.4)] == "bright").mean() > 0.95
 
 
+@pytest.mark.slow
 def test_a_frame_that_a_hand_darkens_is_rejected() -> None:
     seen, lit = film(ORDINARY)
     index = int(np.flatnonzero(lit.min(axis=1) >= 0.98)[20])
@@ -107,6 +113,7 @@ def test_a_frame_that_a_hand_darkens_is_rejected() -> None:
     assert frame.reason == "not lit like the bright frames beside it"
 
 
+@pytest.mark.slow
 def test_only_the_circle_counts_where_the_face_is_known() -> None:
     seen, _ = film(ORDINARY)
     cells = seen.cells.copy()
@@ -116,6 +123,7 @@ def test_only_the_circle_counts_where_the_face_is_known() -> None:
     assert flashes.schedule.frequency_hz == pytest.approx(5.07, rel=0.01)
 
 
+@pytest.mark.slow
 def test_indices_and_times() -> None:
     seen, _ = film(ORDINARY)
     flashes = detect_flashes(seen)
@@ -153,6 +161,7 @@ def test_a_light_that_is_waved() -> None:
         detect_flashes(constant(seen, level))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", [Blinking(fps=24, hz=8, exposure_s=1 / 25), Blinking(fps=30, hz=12)])
 def test_a_flash_too_fast_for_the_frames(scene: Blinking) -> None:
     with pytest.raises(CaptureError, match=r"too fast for \d+ frames a second.*let it blink at most [45] times"):

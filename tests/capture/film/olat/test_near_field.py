@@ -49,6 +49,7 @@ def test_a_picture_under_a_near_lamp_becomes_one_under_a_distant_lamp() -> None:
         assert corrected.mean() < 0.03 < 0.08 < as_is.mean()
 
 
+@pytest.mark.slow
 def test_strengths_are_recovered() -> None:
     film = Film(frames=60)
     indices = range(60)
@@ -65,6 +66,7 @@ def test_strengths_are_recovered() -> None:
     assert np.median(found.misfit) < 0.05
 
 
+@pytest.mark.slow
 def test_flashes_that_light_no_skin_do_not_affect_others() -> None:
     film, spoilt = Film(frames=60), [10, 30]
     pictures = film_pictures(film, range(60))
@@ -99,6 +101,7 @@ def test_the_direction_of_a_lamp_far_away_is_the_same_everywhere() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_tilt_of_a_lamp_that_points_beside_the_head() -> None:
     film = Film(frames=60)
     pictures = film_pictures(film, range(60))

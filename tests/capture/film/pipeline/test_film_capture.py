@@ -27,6 +27,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> CaptureResult:
         return build_samples(write_film(tmp_path_factory.mktemp("film") / "film.mp4", Film().codes()), OPTIONS)
 
 
+@pytest.mark.slow
 def test_lamps_gains_and_motion_are_those_of_the_film(built: CaptureResult) -> None:
     film, frames = Film(), built.findings.report()["frames"]
     bright = [frame for frame in frames if frame["kind"] == "bright"]

@@ -54,6 +54,7 @@ def off_deg(lamps: LampPositions) -> np.ndarray:
     return np.array([degrees_between(direction, FILM.lamp_cm(index)) for direction, index in pairs])
 
 
+@pytest.mark.slow
 def test_the_lamps_distance_is_measured(built: CaptureResult) -> None:
     lamps = built.findings.lamps
     ratio = lamps.distances.cm / true_cm(lamps)

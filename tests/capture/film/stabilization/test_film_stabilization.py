@@ -50,6 +50,7 @@ def flashes(video: tuple[Path, list[Move]]) -> Flashes:
     return detect_flashes(measure_brightness(video[0]), CIRCLE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("refine", "degrees", "pixels"), [(False, 0.12, 0.2), (True, 0.08, 0.12)])
 def test_a_face_is_followed_through_a_video(
     video: tuple[Path, list[Move]], flashes: Flashes, refine: bool, degrees: float, pixels: float
@@ -67,6 +68,7 @@ def test_a_face_is_followed_through_a_video(
     assert looked[-1] > 100
 
 
+@pytest.mark.slow
 def test_the_reference_stays_where_it_is(video: tuple[Path, list[Move]], flashes: Flashes) -> None:
     path, _ = video
     found = stabilize_film(path, flashes, CIRCLE)
@@ -81,6 +83,7 @@ def test_the_reference_stays_where_it_is(video: tuple[Path, list[Move]], flashes
     assert np.hypot(*transforms_to_array(found.transforms)[:, 1:].mean(axis=0)) < 4
 
 
+@pytest.mark.slow
 def test_a_face_that_goes_away(tmp_path: Path) -> None:
     moves = [Move(0, max(0, 4 * (index - 40)), 0) for index in range(120)]
     path = film_moving(tmp_path / "clip.mp4", moves)
@@ -88,6 +91,7 @@ def test_a_face_that_goes_away(tmp_path: Path) -> None:
         stabilize_film(path, detect_flashes(measure_brightness(path)), CIRCLE)
 
 
+@pytest.mark.slow
 def test_frames_of_a_short_absence_are_lost(tmp_path: Path) -> None:
     moves = wandering(180)
     usual, another = texture(), texture(seed=9)
@@ -103,12 +107,14 @@ def test_frames_of_a_short_absence_are_lost(tmp_path: Path) -> None:
     assert shift < 0.15
 
 
+@pytest.mark.slow
 def test_a_face_without_features(tmp_path: Path) -> None:
     path = film_moving(tmp_path / "clip.mp4", wandering(60), [np.full(SIZE[::-1], 0.5, np.float32)] * 60)
     with pytest.raises(CaptureError, match=r"nothing that can be followed.*make the room .* brighter"):
         stabilize_film(path, detect_flashes(measure_brightness(path)), CIRCLE)
 
 
+@pytest.mark.slow
 def test_large_faces_are_followed_at_a_smaller_size(
     video: tuple[Path, list[Move]], flashes: Flashes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -161,6 +167,7 @@ def lights() -> list[tuple[int, int]]:
     return [(azimuth, elevation) for elevation in (-30, 0, 30, 60) for azimuth in range(-60, 61, 20)]
 
 
+@pytest.mark.slow
 def test_pictures_under_different_light_are_aligned_to_predictions() -> None:
     face = texture()
     moves = wandering(28, seed=7, pixels=2.0, degrees=0.6)

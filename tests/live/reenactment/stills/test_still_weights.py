@@ -97,6 +97,7 @@ def test_no_weight_jumps_and_few_stills_show_at_once() -> None:
     assert before.sum() > 0.99
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_weights_are_continuous_along_random_paths(seed: int) -> None:
     """Ten seconds of a driver who moves smoothly: what is drawn changes as slowly, also past ties between stills.
@@ -161,6 +162,7 @@ def test_noise_does_not_bring_a_still_whose_mouth_is_nearly_neutral(own_cm: floa
         assert not settled(weights, moved)["mouth"], cm
 
 
+@pytest.mark.slow
 def test_weights_follow_time_and_not_the_number_of_frames(weights: StillWeights) -> None:
     rest, opened = (weights.doing(expression(open_cm=cm).astype(float), Rotation.identity()) for cm in (0.0, 1.0))
 

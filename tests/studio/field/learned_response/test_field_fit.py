@@ -31,6 +31,7 @@ def test_the_slope_is_that_of_the_error() -> None:
         assert slope[pixel, output] == pytest.approx((errors[0] - errors[1]) / 2e-4, rel=0.02, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_it_learns_which_answer_to_believe_and_what_to_add() -> None:
     network = fit_field_network([made_up_field(seed) for seed in range(4)], QUICK_FIELD)
     unseen = made_up_field(9)

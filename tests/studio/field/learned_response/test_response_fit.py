@@ -95,6 +95,7 @@ def test_skin_that_is_brighter_in_all_light_is_expected_half_so() -> None:
     assert gained[person.skin > 0].mean() == pytest.approx(0.1 * QUICK.believed, abs=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("models")
 def test_a_person_who_was_not_learned_from_answers_as_learned(bundled_person: OlatSamples) -> None:
     person = known_response(bundled_person, training_lights(24), LAMP_DEG)
@@ -103,6 +104,7 @@ def test_a_person_who_was_not_learned_from_answers_as_learned(bundled_person: Ol
     assert learned < 0.95 * generic
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("models")
 def test_the_command_learns_and_says_how_well(
     bundled_person: OlatSamples, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
