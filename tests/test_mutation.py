@@ -81,6 +81,7 @@ def test_each_folder_has_its_share() -> None:
     assert sum(allotted({"a": 1, "b": 1, "c": 1}, 10).values()) == 10
 
 
+@pytest.mark.slow
 def test_the_choice_is_fixed_and_each_mutant_can_be_compiled(tmp_path: Path) -> None:
     folder = "service/relit_camera/light"
     shutil.copytree(ROOT / folder, tmp_path / folder)

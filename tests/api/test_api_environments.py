@@ -168,6 +168,7 @@ def test_other_pictures_do_not_wait_for_one_that_is_made_in_the_background(
         assert made.result().status_code == 200
 
 
+@pytest.mark.slow
 def test_another_person_has_other_pictures(client: Client, camera: FakeCamera) -> None:
     camera.scene_controller.show_subject("small", small_subject())
     client.upload(ENVIRONMENTS, "room", hdr(), "room.hdr")

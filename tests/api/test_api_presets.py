@@ -96,6 +96,7 @@ def test_a_store_without_a_folder_is_empty(tmp_path: Path) -> None:
         store.remove("x")
 
 
+@pytest.mark.slow
 def test_a_preset_keeps_no_subject_that_is_not_stored(client: Client, camera: FakeCamera) -> None:
     camera.scene_controller.show_subject("guest", small_subject())
     assert client.request("PUT", f"{PRESETS}/mine").json()["subject"] is None

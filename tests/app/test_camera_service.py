@@ -283,6 +283,7 @@ def test_a_camera_that_never_came_is_reported_and_waited_for(tmp_path: Path) -> 
         wait_until(lambda: "is unplugged" in camera.troubles())
 
 
+@pytest.mark.slow
 def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
     with running_camera(tmp_path, timings=PATIENT) as camera:
         camera.sink.wait_for(3)

@@ -157,6 +157,7 @@ def test_a_canceled_worker_leaves_nothing(desk: Callable[[DeskBuilder], Desk]) -
     assert (folder / "desk.relit").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_page_that_is_closed_midway_ends_it_and_frees_the_webcam(desk: Callable[[DeskBuilder], Desk]) -> None:
     there = desk(check_and_build)
     there.closed_after = 5

@@ -45,6 +45,7 @@ def test_a_still_of_somebody_who_visits_for_five_seconds_is_refused() -> None:
         check(seen, 195, UNLIKE)
 
 
+@pytest.mark.slow
 def test_a_grimace_and_a_face_that_light_explains_pass() -> None:
     check(visit(120, 270), 195, ALIKE)
     faces = [tracked(i, moved_points(open_cm=1.5) if i % 30 == 0 else SCHEME.canonical) for i in range(120)]

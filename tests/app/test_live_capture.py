@@ -284,6 +284,7 @@ def test_attempts_pause_while_another_capture_needs_the_webcam(studio: Callable[
     wait_until(lambda: "filming" in camera.stages())
 
 
+@pytest.mark.slow
 def test_who_asks_during_a_pause_while_the_webcam_is_taken_ends_nothing(tmp_path: Path) -> None:
     camera = Studio(tmp_path, refuse, replace(TIMINGS, retry_s=600.0))
     try:

@@ -45,6 +45,7 @@ def kept_mib(how: str) -> list[int]:
     return [int(line) for line in subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()]
 
 
+@pytest.mark.slow
 def test_a_thread_takes_what_another_has_freed() -> None:
     assert kept_mib("shared")[0] < 40
     assert kept_mib("apart")[0] > 70  # else glibc needs no telling any more

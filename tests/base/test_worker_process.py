@@ -22,9 +22,20 @@ from tests.base.work import add, count_up, die, fail, refuse, sleep, take_memory
 from tests.small_camera import wait_until
 
 
+BEFORE = set[psutil.Process]()
+
+
+@pytest.fixture(autouse=True)
+def before() -> None:
+    """Workers of other files' tests in the same process, which may take a while to end, are none of ours."""
+    BEFORE.clear()
+    BEFORE.update(workers())
+
+
 def workers() -> list[psutil.Process]:
-    """The worker processes of this process that run."""
-    return [child for child in psutil.Process().children() if "spawn_main" in " ".join(child.cmdline())]
+    """The worker processes that this test has started and that run."""
+    children = [child for child in psutil.Process().children() if child not in BEFORE]
+    return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
 
 
 def test_the_result_comes_from_another_process_of_low_priority() -> None:

@@ -41,6 +41,7 @@ def test_the_shape_is_in_the_subject_whatever_the_method(samples: OlatSamples, s
     assert subject.normals.dtype == subject.albedo.dtype == np.float16
 
 
+@pytest.mark.slow
 def test_horizons_come_back_within_half_a_step(samples: OlatSamples, subject: Subject) -> None:
     assert subject.horizons is not None
     assert subject.horizons.dtype == np.uint8

@@ -21,6 +21,8 @@ from tests.api.api_client import decoded_picture
 from tests.cli.relit_command import call, start
 from tests.small_camera import WAIT_S, wait_until
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[list[str], httpx.Client]]:
@@ -67,7 +69,6 @@ def snapshot(http: httpx.Client) -> np.ndarray:
     return decoded_picture(answer.content).astype(np.float32)
 
 
-@pytest.mark.slow
 def test_it_says_what_there_is_not_and_when_the_first_picture_came(demo: tuple[list[str], httpx.Client]) -> None:
     said = "\n".join(demo[0])
     assert "No public models" in said
@@ -88,7 +89,6 @@ def test_the_bundled_person_is_live_and_in_ratio(demo: tuple[list[str], httpx.Cl
     assert demo[1].get("scene").json()["rung"] == "pictures"
 
 
-@pytest.mark.slow
 def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[str], httpx.Client]) -> None:
     _, http = demo
     seen = set[tuple[str, float]]()
@@ -109,7 +109,6 @@ def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[
     wait_until(lambda: bool(np.abs(snapshot(http) - party).mean() > 10))
 
 
-@pytest.mark.slow
 def test_it_ends_by_itself_when_told_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "no models"))
     process = start("demo", "--headless", "--port", 0, "--seconds", 1, folder=tmp_path)
@@ -134,7 +133,6 @@ def test_the_clip_its_track_and_its_mattes_are_of_one_length_and_large_enough() 
     assert max(mouths) - min(mouths) > 0.1
 
 
-@pytest.mark.slow
 def test_the_clip_does_not_flicker() -> None:
     """The wall behind is still: what it changes from frame to frame is what the codec and noise do."""
     with VideoReader(demo_files.CLIP) as video:
@@ -149,7 +147,6 @@ def test_credits_are_with_the_person() -> None:
     assert "ICT-FaceKit" in text
 
 
-@pytest.mark.slow
 def test_the_panel_is_told_how_the_bundled_person_was_captured(tmp_path: Path) -> None:
     noted = demo_files.noted_subject(tmp_path / "demo")
     told = read_metadata(noted)

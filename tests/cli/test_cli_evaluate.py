@@ -15,6 +15,8 @@ from tests.lab.capture_documents import documents
 from tests.lab.lit_sphere import cap, grid, lambert
 from tests.synthetic import write_lights
 
+pytestmark = pytest.mark.slow
+
 PARTY = ("--environment", "party")
 """One, since the built-in environments take a while to paint."""
 
@@ -28,7 +30,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_field_compares_every_method_and_writes_a_report(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     answer = call(
@@ -44,7 +45,6 @@ def test_field_compares_every_method_and_writes_a_report(folder: Path, tmp_path:
     assert files(tmp_path) == {"report.html"}
 
 
-@pytest.mark.slow
 def test_field_compares_a_subject(folder: Path, tmp_path: Path) -> None:
     subject = tmp_path / "ball.relit"
     assert call("capture", "import", folder / "captured" / "lights.lp", "--out", subject).code == 0
@@ -62,7 +62,6 @@ def test_field_takes_fewer_lights(folder: Path) -> None:
     assert figures["captured_lights"] == -(-(directions[:, 2] >= np.cos(np.radians(40))).sum() // 2)
 
 
-@pytest.mark.slow
 def test_olat_prints_each_list(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     lights = folder / "captured" / "lights.lp"
@@ -108,7 +107,6 @@ def test_capture_compares_a_report_with_the_truth(tmp_path: Path) -> None:
     assert "focal length: 2.000" in call(*command).out
 
 
-@pytest.mark.slow
 def test_what_is_wrong_is_said_in_one_line_and_leaves_nothing(folder: Path, tmp_path: Path) -> None:
     captured, truth, out = folder / "captured", folder / "truth", tmp_path / "report.html"
     write_lights(tmp_path / "small", lambert(cap(60, 50), 12))

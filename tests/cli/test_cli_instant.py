@@ -28,6 +28,8 @@ from tests.capture.instant.conftest import models, pulled_models
 from tests.cli.relit_command import call
 from tests.devices.fake_devices import FakeCapture, FakeTree
 
+pytestmark = pytest.mark.slow
+
 __all__ = ["models", "pulled_models"]
 
 
@@ -69,7 +71,6 @@ def test_where_nothing_can_be_written_it_says_so_at_once(tmp_path: Path) -> None
     call("capture", "instant", tmp_path / "me.png", "--out", tmp_path / "no" / "me.relit").complains("cannot write")
 
 
-@pytest.mark.slow
 def test_a_person_comes_out_and_info_tells_the_rung(tmp_path: Path, models: Path) -> None:
     answer = call("capture", "instant", demo_files.CLIP, "--out", tmp_path / "me.relit")
     assert answer.code == 0, answer
@@ -82,7 +83,6 @@ def test_a_person_comes_out_and_info_tells_the_rung(tmp_path: Path, models: Path
     assert f"{header['stills']} expression stills: " in answer.out
 
 
-@pytest.mark.slow
 def test_somebody_who_keeps_still_gives_a_subject_without_expression_stills(
     tmp_path: Path, models: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,7 +148,6 @@ def test_what_is_no_use_is_one_line_and_nothing_is_left(
     assert left(tmp_path) == [source.name]
 
 
-@pytest.mark.slow
 def test_a_webcam_that_another_program_holds_is_told_and_nothing_is_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

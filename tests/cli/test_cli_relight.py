@@ -24,6 +24,8 @@ from tests.cli.relit_command import Answer, Material, call
 from tests.replay.materials import subject_file
 from tests.synthetic import render_sphere, sphere_samples, sphere_surface, write_lights
 
+pytestmark = pytest.mark.slow
+
 SETS = {"yaleB02/lights_clean.lp": "linear", "adam/lights.lp": "srgb"}
 PICKED = 4
 
@@ -58,7 +60,6 @@ def sphere(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "sphere.relit"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
 def test_captured_direction_returns_the_captured_frame(name: str, shared: Path, tmp_path: Path) -> None:
     lights, gamma = shared / "olat" / name, SETS[name]
@@ -93,7 +94,6 @@ def test_white_environment_gives_the_sum_picture(name: str, shared: Path, tmp_pa
     assert quality >= 40
 
 
-@pytest.mark.slow
 def test_generated_sphere_under_a_captured_and_a_white_light(sphere: Path, tmp_path: Path) -> None:
     samples = sphere_samples()
     out = tmp_path / "one.npy"

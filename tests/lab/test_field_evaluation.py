@@ -45,6 +45,7 @@ def test_errors_are_at_the_sides(report: FieldReport) -> None:
     assert min(profile[2], profile[-3]) > 1.7 * profile[10:14].max()
 
 
+@pytest.mark.slow
 def test_what_was_not_sampled_dominates_and_the_ring_helps(report: FieldReport) -> None:
     figures = by_name(report)
     assert figures["barycentric"]["error_whole"] > 5 * figures["barycentric"]["error_in_region"]

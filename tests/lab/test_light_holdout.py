@@ -27,6 +27,7 @@ from tests.lab.lit_sphere import cap, lambert
 METHODS = ["barycentric", "planar", "visibility", "rbf", "nearest"]
 
 
+@pytest.mark.slow
 def test_only_surrounded_lights_are_left_out() -> None:
     samples = lambert(cap(120, 50))
     assert set(interior_lights(samples.directions)) | set(boundary_lights(samples.directions)) == set(

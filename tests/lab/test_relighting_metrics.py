@@ -38,6 +38,7 @@ def test_weights_of_a_coarser_grid_are_shared_out_by_row() -> None:
     assert weights.sum() == pytest.approx(fine.sum() * 16)
 
 
+@pytest.mark.slow
 def test_a_constant_error_is_itself(truth: GroundTruth) -> None:
     wrong = truth.colors + np.array([0.1, 0.0, -0.2], np.float32)
     error = pixel_errors(squared_distances(wrong, truth.colors), truth.weights)

@@ -123,6 +123,7 @@ def test_videos_that_do_not_fit_are_one_clear_error(truth: Path, tmp_path: Path)
         compare_videos(truth, truth, write(tmp_path / "black.mp4", [MATTE * 0] * 8))
 
 
+@pytest.mark.slow
 def test_the_report_is_whole_in_itself(truth: Path, matte: Path) -> None:
     angles = np.stack([np.linspace(-20, 20, 8), np.zeros(8), np.zeros(8)], axis=1)
     points = np.random.default_rng(7).normal(size=(8, 5, 2))

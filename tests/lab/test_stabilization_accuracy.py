@@ -24,6 +24,8 @@ from relit_camera.lab.evaluate.stabilization.stabilization_accuracy import (
 from tests.capture.film.moving_face_film import CIRCLE, SIZE, Move, film_moving, moved, texture, wandering
 from tests.lab.html_outline import Outline
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 90
 
 
@@ -50,7 +52,6 @@ def report(film: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) ->
         return compare_stabilization(*film)
 
 
-@pytest.mark.slow
 def test_none_leaves_the_motion_as_it_is(report: StabilizationReport) -> None:
     none = report.errors[0]
     shift = np.array([[move.x, move.y] for move in wandering(FRAMES)])[report.index]

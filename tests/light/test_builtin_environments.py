@@ -35,6 +35,7 @@ def test_the_canvas_turns_into_map_axes() -> None:
     assert (right[:, 0] > 0.5).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BUILTIN_NAMES)
 def test_each_is_light(name: str) -> None:
     environment = builtin_environment(name)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import gc
 
 import numpy as np
+import pytest
 
 from relit_camera.light.environments.environment_panorama import Environment, Panorama, environment_from_panorama
 from relit_camera.light.environments.recent_environments import RecentEnvironments
+
+pytestmark = pytest.mark.slow
 
 HEIGHT = 32
 PACKED_BYTES = HEIGHT * 2 * HEIGHT * 3 * 2

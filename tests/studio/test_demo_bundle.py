@@ -24,6 +24,8 @@ from relit_studio import demo_bundle
 from relit_studio.demo_bundle import make_bundle
 from tests.app.still_builders import grey_still
 
+pytestmark = pytest.mark.slow
+
 SIDE = 96
 BUILT: list[Subject] = []
 
@@ -60,7 +62,6 @@ def rendered(generated: Path, tmp_path: Path) -> tuple[Path, Path]:
     return field, clip
 
 
-@pytest.mark.slow
 def test_the_demo_has_all_it_needs(rendered: tuple[Path, Path], tmp_path: Path) -> None:
     made = make_bundle(*rendered, tmp_path / "out", 6)
     assert sorted(path.name for path in made) == ["CREDITS.md", "adam.relit", "clip.mp4", "mattes.npz", "track.json"]

@@ -25,6 +25,8 @@ from relit_camera.subject.reflectance_field import TEXELS, ReflectanceField
 from tests.lab.lit_sphere import cap, shadowed
 from tests.subject.handmade_basis import rows_by_hand
 
+pytestmark = pytest.mark.slow
+
 SIZE = 48
 MAP = builtin_light_map("sunset")
 TARGET = CompressionTarget(texel_db=42, light_db=45, maps=[MAP])
@@ -75,7 +77,6 @@ def picture(colours: NDArray) -> NDArray[np.float32]:
     return np.ascontiguousarray(colours, np.float32).reshape(SIZE, SIZE, 3)
 
 
-@pytest.mark.slow
 def test_every_texel_and_light_comes_back_as_asked(
     samples: OlatSamples, dense: NDArray[np.float32], found: CompressedField, rows: NDArray[np.float64]
 ) -> None:
@@ -115,7 +116,6 @@ def test_the_worst_map_is_told(
     assert reached > 45
 
 
-@pytest.mark.slow
 def test_real_places_that_it_was_not_tried_on_come_back(
     shared: Path,
     samples: OlatSamples,
@@ -156,7 +156,6 @@ def test_where_every_threshold_is_too_large_it_is_the_least_and_else_the_largest
     assert _largest_threshold(lambda threshold: error, 0.55) == pytest.approx(found, rel=0.02)
 
 
-@pytest.mark.slow
 def test_more_is_kept_where_more_is_asked(samples: OlatSamples, found: CompressedField) -> None:
     better = compress_field(
         SharpVisibilityInterpolation().build(samples), samples.pictures, samples.matte, CompressionTarget(50, 53)
@@ -166,7 +165,6 @@ def test_more_is_kept_where_more_is_asked(samples: OlatSamples, found: Compresse
     assert better.quality.map_db is None
 
 
-@pytest.mark.slow
 def test_a_field_of_low_rank_needs_no_more_components_than_it_has(samples: OlatSamples) -> None:
     """Barycentric weights: no more independent answers than lights."""
     counted = Counted(SphericalBarycentric().build(samples))
@@ -177,7 +175,6 @@ def test_a_field_of_low_rank_needs_no_more_components_than_it_has(samples: OlatS
     assert max(counted.asked) <= TILE_WIDTH
 
 
-@pytest.mark.slow
 def test_progress_runs_to_the_end(samples: OlatSamples) -> None:
     told: list[tuple[int, int]] = []
     compress_field(

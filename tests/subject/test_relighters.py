@@ -68,6 +68,7 @@ def test_agrees_with_the_field_summed_by_hand(
     assert psnr(picture, expected, sphere.matte) > ACCURACY_DB[name]
 
 
+@pytest.mark.slow
 def test_many_components_are_relit_by_clusters(sphere: Subject) -> None:
     assert isinstance(BasisRelighter(sphere)._pictures, ClusterPictures)
 
@@ -85,6 +86,7 @@ def few() -> Subject:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("values", [np.int8, np.float16])
 def test_few_components_are_relit_by_whole_pictures(few: Subject, coloured_light: np.ndarray, values: type) -> None:
     subject = replace(few, basis=replace(few.basis, values=few.basis.values.astype(values)))

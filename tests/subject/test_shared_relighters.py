@@ -155,6 +155,7 @@ def test_the_same_person_in_another_size_shares_the_coefficients_of_few_componen
     np.testing.assert_array_equal(second.relight(light), BasisRelighter(half).relight(light))
 
 
+@pytest.mark.slow
 def test_mixes_of_half_floats_are_not_shared() -> None:
     """In 8 bits their units depend on the values, which are others at half the size."""
     shared, whole = SharedRelighters(), sphere_of_many_lights()

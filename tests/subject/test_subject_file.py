@@ -233,6 +233,7 @@ def test_a_file_of_version_1_is_read(subject: Subject, path: Path) -> None:
     np.testing.assert_allclose(read.pictures(light), subject.pictures(light), atol=2e-3)
 
 
+@pytest.mark.slow
 def test_the_demonstration_is_read_as_it_was_shipped() -> None:
     """Format version 1, its principal pictures as WebP: what it showed before, it shows."""
     read = read_subject(demo_files.SUBJECT)

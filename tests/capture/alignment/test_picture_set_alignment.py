@@ -128,6 +128,7 @@ def test_one_picture_is_aligned_to_its_prediction(strength: float) -> None:
         assert off(apply_alignment(picture, transform, gain)[None], still[index][None]) < 0.02
 
 
+@pytest.mark.slow
 def test_large_pictures_are_measured_at_a_smaller_size(monkeypatch: pytest.MonkeyPatch) -> None:
     smaller = replace(picture_set_alignment.TUNABLES, largest_side_px=140)
     monkeypatch.setattr(picture_set_alignment, "TUNABLES", smaller)

@@ -64,6 +64,7 @@ def test_each_pattern_is_told_in_the_pictures(recording: DeskRecording) -> None:
     assert patterns_of(recording) == list(range(count))
 
 
+@pytest.mark.slow
 def test_no_clock_is_trusted(recording: DeskRecording) -> None:
     """Frames that were dropped and repeated, and others before and after the patterns."""
     random = np.random.default_rng(1)

@@ -11,6 +11,8 @@ from relit_studio.mannequin.rendering.renderer import View
 from relit_studio.mannequin.shape.figure import Posture
 from tests.capture.geometry.shapes import angles_deg, front_lights
 
+pytestmark = pytest.mark.slow
+
 SIZE = 64
 
 
@@ -33,7 +35,6 @@ def found(view: View) -> Geometry:
     return estimate_geometry(pictures, directions, view.matte(), Camera(SIZE).focal_px)
 
 
-@pytest.mark.slow
 def test_normals_of_the_skin(found: Geometry, view: View, skin: np.ndarray) -> None:
     error = angles_deg(found.normals, view.normals(), skin)
     assert error.mean() < 4
@@ -56,7 +57,6 @@ def test_depth_of_the_face(found: Geometry, view: View, skin: np.ndarray) -> Non
     assert ((seen - offset) / scale - truth).std() < 0.15
 
 
-@pytest.mark.slow
 def test_light_not_captured(found: Geometry, view: View, skin: np.ndarray) -> None:
     """Which of its light reaches the skin, against what a picture under it shows."""
     directions = front_lights(11, 0.2)

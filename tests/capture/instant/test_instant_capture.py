@@ -59,6 +59,7 @@ def test_it_is_an_ordinary_subject(subject: Subject, tmp_path: Path) -> None:
     assert not again.depth[again.matte == 0].any()
 
 
+@pytest.mark.slow
 def test_the_source_image_is_the_picture_itself(subject: Subject) -> None:
     light = window(-45)
     light *= 0.7 / facing_irradiance(light)

@@ -64,6 +64,7 @@ def test_the_default_is_the_blend() -> None:
     assert isinstance(open_method("default"), Blend)
 
 
+@pytest.mark.slow
 def test_of_what_casts_a_shadow_and_is_not_in_the_picture_interpolation_knows_no_more(
     samples: OlatSamples, truth: NDArray
 ) -> None:

@@ -17,8 +17,9 @@ from relit_camera.lab.evaluate.ladder.desk_rung import filmed_before, read_scree
 from relit_camera.lab.evaluate.ladder.known_person import SubjectFolder, known_person
 from tests.lab.ladder.known_head import PIXELS_PER_CM, head_samples, known_head
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 def test_the_simulated_person_has_the_known_field_and_the_heads_scale() -> None:
     simulated, samples = simulated_person(known_head()), head_samples()
     assert simulated.pixels_per_cm == pytest.approx(PIXELS_PER_CM, rel=0.03)
@@ -29,7 +30,6 @@ def test_the_simulated_person_has_the_known_field_and_the_heads_scale() -> None:
     assert simulated.field.size == samples.matte.shape
 
 
-@pytest.mark.slow
 def test_rendered_pictures_before_a_screen_take_the_place_of_the_simulated_ones() -> None:
     person = known_head()
     rendered = simulated_person(person).patch_pictures(MONITOR)

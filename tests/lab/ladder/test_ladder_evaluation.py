@@ -30,6 +30,8 @@ from relit_camera.subject.subject import Subject
 from tests.lab.html_outline import Outline
 from tests.lab.ladder.known_head import SIZE, KnownFace, head_landmarks, head_samples, known_head
 
+pytestmark = pytest.mark.slow
+
 ENLARGED, SHIFT = 1.5, (9.0, 4.0)
 
 
@@ -70,7 +72,6 @@ def result() -> Iterator[RoomResult]:
         yield next(iter(results))
 
 
-@pytest.mark.slow
 def test_the_truth_beats_the_tint(result: RoomResult) -> None:
     figures = result.figures
     assert list(figures) == ["tint", "full", "cut", "nobody"]

@@ -14,6 +14,8 @@ from relit_camera.light.environments.environment_panorama import (
 )
 from tests.lab.ladder.known_head import known_head
 
+pytestmark = pytest.mark.slow
+
 
 def gray_room(radiance: float = 1.0) -> Environment:
     return environment_from_panorama("gray", panorama_from_radiance(np.full((64, 128, 3), radiance, np.float32)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from relit_camera.light.environments.builtin.builtin_light_maps import builtin_light_map
 from relit_studio.cameras.pinhole import Pinhole
@@ -29,6 +30,7 @@ def test_the_camera_that_is_told_sees_points_where_they_are(person: Person) -> N
     np.testing.assert_allclose(found, points - camera.position_cm, atol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_solved_field_is_filmed_at_its_distance(tmp_path: Path) -> None:
     write_solver_field(
         tmp_path, SolverSettings(width=32, height=24, map_rows=4, bundles=8, rays=32, supersampling=1, shadow=96)

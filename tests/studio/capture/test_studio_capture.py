@@ -30,6 +30,8 @@ from relit_studio.capture.recording import record
 from relit_studio.commands.capture import capture
 from relit_studio.mannequin.outputs.olat import write_olat
 
+pytestmark = pytest.mark.slow
+
 WIDTH, HEIGHT = 90, 120
 PLAIN = Stages(gamma=False, noise=False, auto_exposure=False, white_balance=False, h264=False)
 
@@ -67,7 +69,6 @@ def lit_rows(frame: dict[str, Any]) -> np.ndarray:
     return np.asarray(np.interp(np.arange(HEIGHT) + 0.5, y, fraction))
 
 
-@pytest.mark.slow
 def test_a_frame_for_every_thirtieth_of_three_seconds(plain: tuple[np.ndarray, dict[str, Any]]) -> None:
     light, truth = plain
     assert light.shape == (90, HEIGHT, WIDTH, 3)
@@ -185,7 +186,6 @@ def brief() -> Scene:
     return Scene(MannequinPerson(phone_camera(66, 88), light_map), room, Timing(seconds=1 / 3), seed=2)
 
 
-@pytest.mark.slow
 def test_interrupted_capture_goes_on_and_ends_the_same(brief: Scene, tmp_path: Path) -> None:
     def stop_after(count: int) -> Callable[[int, int], None]:
         def progress(done: int, total: int) -> None:
@@ -214,7 +214,6 @@ def test_interrupted_capture_goes_on_and_ends_the_same(brief: Scene, tmp_path: P
     assert (gains[:, 2] == 1).all()
 
 
-@pytest.mark.slow
 def test_a_second_ball_is_filmed_and_told(brief: Scene, tmp_path: Path) -> None:
     scene = Scene(brief.person, brief.room, brief.timing, seed=2, balls=2)
     record(scene, PLAIN, tmp_path, "overcast", 2)
@@ -240,7 +239,6 @@ def test_a_second_ball_is_filmed_and_told(brief: Scene, tmp_path: Path) -> None:
     np.testing.assert_allclose(light["light"]["at_second_ball"], toward / np.linalg.norm(toward), atol=1e-5)
 
 
-@pytest.mark.slow
 def test_frames_of_other_settings_are_not_taken_up(brief: Scene, tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         record(brief, Stages(), tmp_path, "overcast", 2, _interrupt)
@@ -250,7 +248,6 @@ def test_frames_of_other_settings_are_not_taken_up(brief: Scene, tmp_path: Path)
     np.testing.assert_allclose(frames[0], np.clip(plain_light, 0, 255), atol=0.51)
 
 
-@pytest.mark.slow
 def test_frames_of_another_ambient_light_are_not_taken_up(brief: Scene, tmp_path: Path) -> None:
     room, light_map = dimmed(EnvironmentStore().load("overcast"), 0.3)
     lighter = Scene(MannequinPerson(brief.camera, light_map), room, brief.timing, seed=2)
@@ -276,7 +273,6 @@ def field(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_person_of_a_field_looks_like_the_one_rendered_anew(field: Path) -> None:
     _, light_map = dimmed(EnvironmentStore().load("window"), 0.5)
     interpolated = FieldPerson(field, 64, light_map)

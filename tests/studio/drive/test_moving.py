@@ -46,6 +46,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_live_clip_is_its_own_truth(clip: Path) -> None:
     truth = read_truth(clip)
     assert len(truth) == FRAMES

@@ -17,6 +17,8 @@ from relit_studio.field.solver_transport import bounce_light, transport
 from relit_studio.field.transport_solver import SolverSettings, solve, write_solver_field
 from relit_studio.mannequin.shape.mesh import grid_triangles
 
+pytestmark = pytest.mark.slow
+
 CAMERA = Pinhole(48, 36, 60.0)
 SETTINGS = SolverSettings(bounces=1, bundles=24, rays=64, supersampling=2, shadow=240)
 AWAY = np.array([0.0, 0.0, -50.0])
@@ -60,7 +62,6 @@ def white_sky(rows: int) -> tuple[np.ndarray, np.ndarray]:
     return texel_directions(rows, 2 * rows).reshape(-1, 3), texel_solid_angles(rows, 2 * rows).ravel() / np.pi
 
 
-@pytest.mark.slow
 def test_white_convex_body_in_a_white_room_reads_one() -> None:
     directions, weights = white_sky(8)
     solved = solve(ball(1.0), CAMERA, directions, SETTINGS)
@@ -81,7 +82,6 @@ def test_hemispherical_bowl_sees_itself_and_the_sky_half_and_half() -> None:
     np.testing.assert_allclose((seen + between.sky)[inner], 1, atol=0.06)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("albedo", [1.0, 0.5])
 def test_bowl_in_a_white_room_reads_what_all_its_bounces_add_up_to(albedo: float) -> None:
     # B = ρ (½ + ½ B): a white bowl loses nothing and reads 1, whatever its shape.
@@ -154,7 +154,6 @@ def reduced(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_reduced_field_is_imported_as_it_was_solved(reduced: Path) -> None:
     samples = import_samples(reduced / "lights.lp")
     assert samples.pictures.shape == (128, 48, 64, 3)

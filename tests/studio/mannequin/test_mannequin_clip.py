@@ -19,6 +19,8 @@ from relit_studio.mannequin.outputs.mannequin_performance import FRAMES, frame_t
 from relit_studio.mannequin.rendering.distant_lights import room
 from relit_studio.mannequin.rendering.mannequin_camera import Camera
 
+pytestmark = pytest.mark.slow
+
 SMALL = Camera(64)
 
 
@@ -41,7 +43,6 @@ def test_performance_turns_talks_blinks_and_smiles_without_jumps() -> None:
     assert len(postures) == FRAMES
 
 
-@pytest.mark.slow
 def test_track_plays_back_the_truth(generated: Path) -> None:
     tracker = RecordedTracker(TrackerOptions(argument=str(generated / "track.json")))
     truth = json.loads((generated / "truth.json").read_text())
@@ -69,7 +70,6 @@ def test_frames_are_exposed_and_the_wall_is_seen(generated: Path) -> None:
     assert 60 < picture[:20].mean() < 200
 
 
-@pytest.mark.slow
 def test_the_same_frames_under_another_light() -> None:
     times = frame_times()[[0, 30]].tolist()
     light = room()

@@ -14,6 +14,8 @@ import pytest
 from relit_camera.capture.picture_import import import_samples
 from relit_studio.mannequin.__main__ import main
 
+pytestmark = pytest.mark.slow
+
 ARGUMENTS = ["--size", "96", "--lights", "12", "--frames", "3"]
 
 
@@ -22,7 +24,6 @@ def digests(folder: Path) -> dict[str, str]:
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
-@pytest.mark.slow
 def test_one_light_pictures_import(generated: Path) -> None:
     samples = import_samples(generated / "olat" / "lights.lp")
     assert samples.pictures.shape == (12, 96, 96, 3)
@@ -46,7 +47,6 @@ def test_landmarks_and_geometry_lie_beside_them(generated: Path) -> None:
     assert np.linalg.norm(np.array(nearest) + 0.5 - points[4]) < 2.5
 
 
-@pytest.mark.slow
 def test_a_second_run_in_another_process_writes_the_same_bytes(generated: Path, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "relit_studio.mannequin", "--out", str(tmp_path / "again"), *ARGUMENTS]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
@@ -55,7 +55,6 @@ def test_a_second_run_in_another_process_writes_the_same_bytes(generated: Path, 
     assert digests(tmp_path / "again") == digests(generated)
 
 
-@pytest.mark.slow
 def test_output_replaces_its_own_names_only(generated: Path, tmp_path: Path) -> None:
     (tmp_path / "olat").mkdir()
     (tmp_path / "olat" / "old.png").touch()

@@ -19,6 +19,8 @@ from relit_studio.mannequin.rendering.mannequin_camera import Camera
 from relit_studio.mannequin.rendering.renderer import View
 from relit_studio.mannequin.shape.figure import Posture
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -28,7 +30,6 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-@pytest.mark.slow
 def test_the_field_has_a_linear_picture_for_every_texel(made: Path) -> None:
     samples = import_samples(made / "field" / "lights.lp")
     np.testing.assert_allclose(samples.directions, texel_directions(3, 6).reshape(-1, 3), atol=1e-6)

@@ -33,6 +33,7 @@ def test_lambert_under_light_from_all_sides_is_pi() -> None:
     np.testing.assert_allclose(summed, np.pi, rtol=0.005)
 
 
+@pytest.mark.slow
 def test_gloss_gives_back_about_the_fraction_it_is_named_by() -> None:
     lights = fibonacci_directions(20000)
     flat = patch(np.array([[0, 0, 1.0]]), shine=0.05, exponent=60)

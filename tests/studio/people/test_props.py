@@ -30,6 +30,7 @@ def directed_edges(solid: Solid) -> np.ndarray:
     return np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [lambda: throw_mug()[0], lambda: throw_mug()[1], gripping_hand, open_hand, sew_sleeve])
 def test_surfaces_are_closed_and_face_outward(make: Callable[[], Solid]) -> None:
     solid = make()

@@ -31,6 +31,7 @@ def kept(view: PinholeView, frames: list[LinearImage]) -> BallCrops:
     return film
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", [SMALL, LARGE], ids=["small", "large"])
 def test_a_crop_gives_the_same_highlight_as_the_whole_frame(scene: MirrorScene) -> None:
     frames = [scene.photograph(lamp, seed=n) for n, lamp in enumerate([None, *LAMPS])]

@@ -45,6 +45,7 @@ def test_hidden_and_moved_frames_are_episodes(frames: list[LinearImage]) -> None
     assert found[1].dy == pytest.approx(-SHIFT_CM[1] * scale, abs=0.3)
 
 
+@pytest.mark.slow
 def test_a_ball_that_stays_has_no_episodes(frames: list[LinearImage]) -> None:
     tracker = BallTracker(sample_frames(frames[:12]), OUTLINE)
     observations = [tracker.observe(index, frame) for index, frame in enumerate(frames[:12])]

@@ -17,6 +17,8 @@ from relit_camera.capture.film.pipeline.film_capture import CaptureResult, build
 from tests.capture.film.ball.mirror_scene import degrees_between
 from tests.capture.film.generated_film import FOCAL_PX, HEAD, PX_PER_CM, SIZE, Film, write_film
 
+pytestmark = pytest.mark.slow
+
 OPTIONS = CaptureOptions(gamma=2.2, size=96, focal_px=FOCAL_PX, face=FaceCircle(*HEAD, 9.5 * PX_PER_CM))
 
 
@@ -27,7 +29,6 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> CaptureResult:
         return build_samples(write_film(tmp_path_factory.mktemp("film") / "film.mp4", Film().codes()), OPTIONS)
 
 
-@pytest.mark.slow
 def test_lamps_gains_and_motion_are_those_of_the_film(built: CaptureResult) -> None:
     film, frames = Film(), built.findings.report()["frames"]
     bright = [frame for frame in frames if frame["kind"] == "bright"]

@@ -19,6 +19,8 @@ from relit_camera.capture.film.pipeline.film_capture import CaptureResult, build
 from tests.capture.film.ball.mirror_scene import degrees_between
 from tests.capture.film.generated_film import FOCAL_PX, HEAD, PX_PER_CM, Film, with_ball, write_film
 
+pytestmark = pytest.mark.slow
+
 FILM = Film(frames=120, distance_cm=80, sway=12, second=with_ball(-85, 75, 1))
 OPTIONS = CaptureOptions(gamma=2.2, size=64, focal_px=FOCAL_PX, face=FaceCircle(*HEAD, 9.5 * PX_PER_CM), balls=2)
 
@@ -54,7 +56,6 @@ def off_deg(lamps: LampPositions) -> np.ndarray:
     return np.array([degrees_between(direction, FILM.lamp_cm(index)) for direction, index in pairs])
 
 
-@pytest.mark.slow
 def test_the_lamps_distance_is_measured(built: CaptureResult) -> None:
     lamps = built.findings.lamps
     ratio = lamps.distances.cm / true_cm(lamps)

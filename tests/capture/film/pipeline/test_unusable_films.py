@@ -14,6 +14,8 @@ from tests.capture.film.pipeline import unusable_films as films
 from tests.capture.film.pipeline.unusable_films import Shot
 from tests.cli.relit_command import Answer, call
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def good() -> np.ndarray:
@@ -46,7 +48,6 @@ def build(film: Path, shot: Shot, folder: Path) -> Answer:
     return call("capture", "build", film, *into, *shot.arguments, "--threads", 1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "what", "cure"),
     [
@@ -94,7 +95,6 @@ def _hole_in_the_middle(film: bytes) -> bytes:
     return film[:middle] + bytes(4000) + film[middle + 4000 :]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "what", "cure"),
     [
@@ -118,7 +118,6 @@ def test_a_refusal_leaves_an_empty_folder_empty(good: np.ndarray, tmp_path: Path
     assert contents(tmp_path) == before
 
 
-@pytest.mark.slow
 def test_a_film_that_is_barely_good_enough_gives_warnings(good: np.ndarray, tmp_path: Path) -> None:
     shot = films.drop_before_the_ball(good)
     answer = build(write_film(tmp_path / "film.mp4", shot.codes), shot, tmp_path)

@@ -33,6 +33,7 @@ def shown(subject: Subject, moved: np.ndarray, picture: np.ndarray, turn: float 
     return moved_by(reenactor, picture, driver, live_frame()).image[..., :3].copy()
 
 
+@pytest.mark.slow
 def test_at_rest_a_subject_with_stills_looks_as_one_without() -> None:
     picture = relit(close_up(), soft_light())
     np.testing.assert_array_equal(shown(with_stills(), expression(), picture), shown(close_up(), expression(), picture))
@@ -69,6 +70,7 @@ def test_what_a_still_shows_between_the_lips_is_in_the_picture() -> None:
     assert with_spot.astype(int).sum(axis=2).max() > without.astype(int).sum(axis=2).max() + 60
 
 
+@pytest.mark.slow
 def test_a_driver_in_a_scheme_that_stills_do_not_have_sees_none() -> None:
     """Stills are of one scheme: with other landmarks the source image alone is moved."""
     from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
