@@ -21,7 +21,6 @@ from relit_camera.base.errors import CaptureError, WorkerError
 from tests.base.work import add, count_up, die, fail, refuse, sleep, take_memory
 from tests.small_camera import wait_until
 
-
 BEFORE = set[psutil.Process]()
 
 
