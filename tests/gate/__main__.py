@@ -113,7 +113,7 @@ def run_steps(steps: Sequence[Step], prepare: bool) -> list[Result]:
     needed = {need for step in steps for part in step.parts for need in part.needs} if prepare else set()
     checks = [step for step in steps if not step.beside and not step.parts[0].tests]
     together = [step for step in steps if not step.parts[0].command]
-    alone = [step for step in steps if step.parts[0].command and step.parts[0].tests]
+    alone = [step for step in steps if step.parts[0].command and step.parts[0].tests and not step.beside]
     results: list[Result] = []
     # Debian's packages are installed one after another, and nobody waits for more than their own.
     with ThreadPoolExecutor(1) as installing, ThreadPoolExecutor(1) as second:

@@ -65,7 +65,7 @@ class Part:
         does: what it checks.
         usual: how long it takes on two cores.
         command: of a part that runs by itself. Those without one share a run of pytest.
-        beside: it runs while others do, its output shown if it fails.
+        beside: it runs while the tests that share a run do, its output shown if it fails.
         tests: paths whose tests are of this part, unless an earlier part has them.
         slow: only those of them that are marked `slow`.
         about: git pathspecs of the files that it depends on, its own tests included.
@@ -117,12 +117,10 @@ PARTS = (
         beside=True,
         about=("pyproject.toml", "scripts/check_tool_install.sh", "service", ":(exclude,glob)service/**/*.py"),
     ),
-    Part("lint", "style and formatting", "2 s", ("make", "--no-print-directory", "lint")),
-    Part("layers", "which package may import which", "5 s", ("make", "--no-print-directory", "layers")),
-    Part("scripts", "shell scripts, Dockerfile, compose files", "3 s", ("make", "--no-print-directory", "scripts")),
-    Part(
-        "generated", "files built from code are what it builds", "10 s", ("make", "--no-print-directory", "generated")
-    ),
+    Part("lint", "style and formatting", "1 s", ("make", "--no-print-directory", "lint")),
+    Part("layers", "which package may import which", "1 s", ("make", "--no-print-directory", "layers")),
+    Part("scripts", "shell scripts, Dockerfile, compose files", "1 s", ("make", "--no-print-directory", "scripts")),
+    Part("generated", "files built from code are what it builds", "3 s", ("make", "--no-print-directory", "generated")),
     Part(
         "cost",
         "what a picture costs, beside its record",
@@ -149,16 +147,18 @@ PARTS = (
     Part(
         "pipewire",
         "the camera in a PipeWire session",
-        "60 s",
+        "2 min",
         pytest_command("tests/pipewire"),
+        beside=True,
         tests=("tests/pipewire",),
         needs=("PipeWire",),
     ),
     Part(
         "newer",
         "the same with the next PipeWire",
-        "60 s",
+        "2 min",
         pytest_command("tests/pipewire"),
+        beside=True,
         tests=("tests/pipewire",),
         about=("service/relit_camera/devices", "tests/pipewire", "pyproject.toml"),
         needs=("newer PipeWire",),
@@ -167,7 +167,7 @@ PARTS = (
     Part(
         "flows",
         "the main ways through the panel, in Chromium",
-        "60 s",
+        "95 s",
         pytest_command("-n", "2", "--dist", "worksteal", *FLOWS),
         tests=FLOWS,
         needs=("Chromium",),
@@ -204,7 +204,7 @@ PARTS = (
         slow=True,
         about=(*_PROGRAM, "tests"),
     ),
-    Part("unit", "each unit, and the API", "3 min", tests=("tests",), needs=("public networks",)),
+    Part("unit", "each unit, and the API", "2 min", tests=("tests",), needs=("public networks",)),
 )
 
 
