@@ -1,7 +1,6 @@
 import contextlib
 import errno
 import inspect
-import os
 from itertools import repeat
 from pathlib import Path
 from types import SimpleNamespace
@@ -267,7 +266,7 @@ def test_a_device_that_is_not_free_is_let_go_at_once(tree, monkeypatch, capabili
     with pytest.raises(OSError, match=message) as raised:
         camera_module.LoopbackCamera(SIZE, str(tree.dev / "video10"))
     assert raised.value.errno == errno.EBUSY
-    opened = [os.readlink(each) for each in Path("/proc/self/fd").iterdir() if each.is_symlink()]
+    opened = [str(each.readlink()) for each in Path("/proc/self/fd").iterdir() if each.is_symlink()]
     assert str(tree.dev / "video10") not in opened
 
 
