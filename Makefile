@@ -55,7 +55,7 @@ image-steps: setup ## the image's build without Docker: a wheel, installed by it
 	rm -rf build/image
 
 tool-install: setup ## the wheel as users install it, used from an empty home; make tool-install WITH=pipx
-	PYTHON=$(BIN)/python sh scripts/check_tool_install.sh $(or $(WITH),uv)
+	PYTHON=$(BIN)/python UV=$(abspath $(BIN))/uv sh scripts/check_tool_install.sh $(or $(WITH),uv)
 
 studies: setup ## the long tests that `make test` leaves out
 	$(BIN)/python -m pytest -m study tests
@@ -88,4 +88,4 @@ vm-picture: setup vm ## the call shown in docs/virtual-camera.md
 	$(BIN)/python -m tests.vm.picture docs/pictures/call.jpg
 
 clean: ## remove what the targets made, the virtual environment too
-	rm -rf $(VENV) build dist test-failures .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .coverage .coverage.*
+	rm -rf $(VENV) build dist test-failures .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis .coverage .coverage.* $${XDG_CACHE_HOME:-$$HOME/.cache}/relit-camera-tests

@@ -27,6 +27,6 @@ if ! "$venv/bin/python" -m pip --version >/dev/null 2>&1; then
 fi
 
 # uv takes a third of the time. It does not read pip's configuration, with which some networks are reached.
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check uv
-"$venv/bin/python" -m uv pip install --quiet --python "$venv/bin/python" --editable '.[dev]' ||
-    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+pip() { "$venv/bin/python" -m pip install --quiet --disable-pip-version-check "$@"; }
+{ pip uv && "$venv/bin/python" -m uv pip install --quiet --python "$venv/bin/python" --editable '.[dev]'; } ||
+    pip --editable '.[dev]'

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 ROOT = Path(__file__).resolve().parents[1]
 FILE = ROOT / "build" / "durations.json"
@@ -46,7 +47,8 @@ def add_durations(part: str, seconds: Mapping[str, float], path: Path | None = N
     path = path or FILE
     path.parent.mkdir(parents=True, exist_ok=True)
     rounded = {name: round(took, 3) for name, took in sorted(seconds.items())}
-    path.write_text(json.dumps(read_durations(path) | {part: rounded}, indent=0) + "\n")
+    with FileLock(path.with_suffix(".lock")):  # parts run beside each other
+        path.write_text(json.dumps(read_durations(path) | {part: rounded}, indent=0) + "\n")
 
 
 def read_durations(path: Path | None = None) -> dict[str, dict[str, float]]:

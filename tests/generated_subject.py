@@ -17,7 +17,7 @@ def generated_subject(width: int, height: int) -> Subject:
     path = made_once(
         f"generated-{width}x{height}.relit",
         lambda path: write_subject(path, synthetic_subject(width, height)),
-        CAPTURE,
+        (*CAPTURE, "tests/generated_subject.py"),
     )
     return read_subject(path)
 

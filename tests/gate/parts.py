@@ -13,7 +13,8 @@ PYTHON = sys.executable
 PARTS_VARIABLE = "TEST_PARTS"
 """Names the parts whose tests a run of pytest takes; all of them where it is not set."""
 
-_CODE = ("service", "tests", "models", "scripts", "pyproject.toml")
+_PACKAGED = ("pyproject.toml", "README.md", "LICENSE", "service", ":(exclude,glob)service/**/[!_]*.py")
+"""What decides what is in the wheel. That its modules import nothing else is tested by `tests/test_layout.py`."""
 _PROGRAM = ("service", "models", "config.yaml", "pyproject.toml")
 CAPTURE = (
     *(f"service/relit_camera/{name}" for name in ("__init__.py", "plugins.py", "base", "devices", "light", "subject")),
@@ -24,14 +25,16 @@ CAPTURE = (
 )
 """The code by which people are rendered and become subjects."""
 _CAPTURE_TESTS = ("tests/capture", "tests/subject", "tests/light", "tests/fuzz")
-_CAPTURE_HELPERS = (
-    ":(glob)tests/*.py",
-    *(f"tests/{name}.py" for name in ("app/subject_builders", "cli/relit_command", "lab/lit_sphere", "live/people")),
-    "tests/replay/materials.py",
-    "tests/gate/__init__.py",
-    "tests/gate/choice.py",
-    "tests/gate/parts.py",
+_ON_DEVICES = (
+    *(
+        f"service/relit_camera/{name}"
+        for name in ("devices", "app", "cli", "live/publishing", "live/camera_control.py")
+    ),
+    "pyproject.toml",
 )
+"""The code that meets a real camera, a driver or a call app; what goes on behind it is tested without them."""
+_HELPERS = (":(glob)tests/*.py", ":(glob)tests/**/[!t]*.py", ":(glob)tests/**/t[!e]*.py", ":(glob)tests/**/te[!s]*.py")
+"""What tests import from each other: all of their files but the tests themselves."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class Need:
     """What a part needs of the machine, and how it is made ready.
 
     Attributes:
-        command: makes it ready; exit status 69 where it cannot be had here.
+        command: makes it ready; exit status 69 where it cannot be had here, any other but 0 is a failure.
         variables: are set where it is ready, so that no test is skipped for want of it.
     """
 
@@ -47,13 +50,15 @@ class Need:
     variables: Mapping[str, str] = field(default_factory=dict)
 
 
+UNAVAILABLE = 69
 NEEDS = {
+    "public networks": Need((PYTHON, "-m", "tests.package_index"), {"PACKAGE_INDEX_NEEDED": "1"}),
     "Chromium": Need(("sh", "tests/browser/install.sh"), {"BROWSER_NEEDED": "1"}),
     "PipeWire": Need(("sh", "tests/pipewire/install.sh"), {"PIPEWIRE_NEEDED": "1"}),
     "newer PipeWire": Need(("sh", "tests/pipewire/install.sh", "bookworm-backports"), {"PIPEWIRE_NEEDED": "1"}),
-    "public networks": Need((PYTHON, "-m", "tests.package_index"), {"PACKAGE_INDEX_NEEDED": "1"}),
-    "virtual machine": Need(("sh", "tests/vm/build.sh")),
+    "virtual machine": Need(("sh", "tests/vm/build.sh"), {"VM_NEEDED": "1"}),
 }
+"""In the order in which they are made ready, one after another."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,8 @@ class Part:
         tests: paths whose tests are of this part, unless an earlier part has them.
         slow: only those of them that are marked `slow`.
         about: git pathspecs of the files that it depends on, its own tests included.
-        needs: names in `NEEDS`.
+        needs: what all of it needs of the machine, as named in `NEEDS`; it is left out where that cannot be had.
+        wants: what some of its tests need, which are skipped where that cannot be had.
         variables: of the command's environment.
     """
 
@@ -82,6 +88,7 @@ class Part:
     slow: bool = False
     about: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    wants: tuple[str, ...] = ()
     variables: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -107,7 +114,7 @@ PARTS = (
         "60 s",
         ("make", "--no-print-directory", "image-steps"),
         beside=True,
-        about=("docker", "pyproject.toml", "scripts/check_installed.py", "service", ":(exclude,glob)service/**/*.py"),
+        about=("docker", *_PACKAGED, "scripts/check_installed.py"),
     ),
     Part(
         "tools",
@@ -115,7 +122,7 @@ PARTS = (
         "40 s",
         ("make", "--no-print-directory", "tool-install"),
         beside=True,
-        about=("pyproject.toml", "scripts/check_tool_install.sh", "service", ":(exclude,glob)service/**/*.py"),
+        about=(*_PACKAGED, "scripts/check_tool_install.sh"),
     ),
     Part("lint", "style and formatting", "1 s", ("make", "--no-print-directory", "lint")),
     Part("layers", "which package may import which", "1 s", ("make", "--no-print-directory", "layers")),
@@ -128,10 +135,11 @@ PARTS = (
         pytest_command("tests/lab/bench/test_recorded_cost.py"),
         tests=("tests/lab/bench/test_recorded_cost.py",),
         about=(
-            *(f"service/relit_camera/{package}" for package in ("live", "face", "subject", "light", "base/images")),
-            "tests/lab/bench/test_recorded_cost.py",
-            "tests/recorded_cost.py",
-            "pyproject.toml",
+            *_PROGRAM,
+            ":(exclude)service/relit_camera/api/panel",
+            "docs/performance.json",
+            *_HELPERS,
+            "tests/lab/bench",
         ),
         needs=("public networks",),
     ),
@@ -141,7 +149,13 @@ PARTS = (
         "6 min",
         pytest_command("tests/vm"),
         tests=("tests/vm",),
-        about=("service/relit_camera/devices", "service/relit_camera/live/publishing", "tests/vm", "pyproject.toml"),
+        about=(
+            *_ON_DEVICES,
+            "service/relit_camera/capture/desk",
+            "service/relit_camera/api/server",
+            "tests/vm",
+            *_HELPERS,
+        ),
         needs=("virtual machine",),
     ),
     Part(
@@ -160,7 +174,7 @@ PARTS = (
         pytest_command("tests/pipewire"),
         beside=True,
         tests=("tests/pipewire",),
-        about=("service/relit_camera/devices", "tests/pipewire", "pyproject.toml"),
+        about=(*_ON_DEVICES, "tests/pipewire", *_HELPERS),
         needs=("newer PipeWire",),
         variables={"PIPEWIRE_SUITES": "bookworm-backports"},
     ),
@@ -171,6 +185,7 @@ PARTS = (
         pytest_command("-n", "2", "--dist", "worksteal", *FLOWS),
         tests=FLOWS,
         needs=("Chromium",),
+        wants=("public networks",),
     ),
     Part(
         "panel",
@@ -178,15 +193,19 @@ PARTS = (
         "4 min",
         pytest_command("-n", "2", "--dist", "worksteal", "tests/browser", *(f"--ignore={path}" for path in FLOWS)),
         tests=("tests/browser",),
-        about=("service/relit_camera/api", "service/relit_camera/app", "tests/browser"),
+        about=(
+            *(f"service/relit_camera/{name}" for name in ("api", "app", "cli", "light", "devices/device_discovery.py")),
+            *("pyproject.toml", "config.yaml", "tests/browser", "tests/devices", *_HELPERS),
+        ),
         needs=("Chromium",),
+        wants=("public networks",),
     ),
     Part(
         "faults",
         "the camera while its devices, files and networks fail",
         "60 s",
         tests=("tests/faults", "tests/test_crash.py", "tests/test_soak.py"),
-        about=(*_PROGRAM, "tests/faults", ":(glob)tests/*.py"),
+        about=(*_PROGRAM, "tests/faults", *_HELPERS),
     ),
     Part(
         "captures",
@@ -194,7 +213,8 @@ PARTS = (
         "2 min",
         tests=_CAPTURE_TESTS,
         slow=True,
-        about=(*CAPTURE, *_CAPTURE_TESTS, *_CAPTURE_HELPERS),
+        wants=("public networks",),
+        about=(*CAPTURE, *_CAPTURE_TESTS, *_HELPERS),
     ),
     Part(
         "runs",
@@ -202,9 +222,10 @@ PARTS = (
         "3 min",
         tests=("tests",),
         slow=True,
-        about=(*_PROGRAM, "tests"),
+        wants=("public networks",),
+        about=(*_PROGRAM, "scripts", "docker", "tests", ":(exclude)tests/gate/passed.json"),
     ),
-    Part("unit", "each unit, and the API", "2 min", tests=("tests",), needs=("public networks",)),
+    Part("unit", "each unit, and the API", "2 min", tests=("tests",), wants=("public networks",)),
 )
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
-from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
 
 from tests.gate import __main__ as gate
-from tests.gate.parts import NEEDS, PARTS, PARTS_VARIABLE, Need, Part
+from tests.gate.choice import Pass, digest, files
+from tests.gate.parts import NEEDS, PARTS, PARTS_VARIABLE, UNAVAILABLE, Need, Part
 
 
 def python(code: str) -> tuple[str, ...]:
@@ -30,6 +31,9 @@ def test_all_parts_run_checks_first_and_tests_that_run_alone_last() -> None:
 def log(tmp_path: Path) -> Path:
     """Where the steps below write that they ran."""
     return tmp_path / "log"
+
+
+UNAVAILABLE_HERE = f"import sys; print('no apt here', file=sys.stderr); sys.exit({UNAVAILABLE})"
 
 
 def step(name: str, log: Path, code: str = "", **of: object) -> gate.Step:
@@ -56,7 +60,7 @@ def test_the_first_check_that_fails_ends_it(log: Path, capfd: pytest.CaptureFixt
 
 def test_what_runs_beside_others_is_shown_only_if_it_fails(log: Path, capfd: pytest.CaptureFixture[str]) -> None:
     steps = [
-        step("quiet", log, "print('nobody need know')", beside=True),
+        step("quiet", log, "print('nobody need know\\n7 passed')", beside=True),
         step("loud", log, "print('what is wrong'); raise SystemExit(1)", beside=True),
         step("later", log, tests=("tests",)),
     ]
@@ -64,6 +68,7 @@ def test_what_runs_beside_others_is_shown_only_if_it_fails(log: Path, capfd: pyt
     assert [(result.step.name, result.passed) for result in results] == [("quiet", True), ("loud", False)]
     printed = capfd.readouterr().out
     assert "nobody need know" not in printed
+    assert "-- quiet: passed after 0 s: 7 passed" in printed
     assert "what is wrong" in printed
 
 
@@ -71,7 +76,7 @@ def test_what_is_ready_is_told_to_tests_and_what_is_missing_to_people(
     log: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(NEEDS, "Chromium", Need(python(""), {"BROWSER_NEEDED": "1"}))
-    monkeypatch.setitem(NEEDS, "PipeWire", Need(python("raise SystemExit('no apt here')")))
+    monkeypatch.setitem(NEEDS, "PipeWire", Need(python(UNAVAILABLE_HERE)))
     look = f"import os; open({str(log)!r}, 'a').write(os.environ.get('BROWSER_NEEDED', 'unset') + ' ')"
     monkeypatch.delenv("BROWSER_NEEDED", raising=False)
     steps = [
@@ -95,10 +100,62 @@ def test_without_preparing_nothing_is_installed(log: Path, monkeypatch: pytest.M
     assert log.read_text() == "panel "
 
 
-def test_tests_that_share_a_run_are_run_but_not_on_record_where_something_is_missing() -> None:
-    ready: Future[str] = Future()
-    ready.set_result("public networks: none here")
-    part = Part("unit", "each unit", "1 s", needs=("public networks",))
-    shared = gate.Step("unit", "each unit", "1 s", python(""), (part,))
-    result = gate.run_step(shared, {"public networks": ready})
-    assert (result.ran, result.passed, result.missing) == (True, True, "public networks: none here")
+def test_a_need_that_fails_to_be_made_ready_fails_the_part(
+    log: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(NEEDS, "PipeWire", Need(python("raise SystemExit('the script is broken')")))
+    (result,) = gate.run_steps([step("sound", log, tests=("tests",), needs=("PipeWire",))], prepare=True)
+    assert (result.passed, result.ran) == (False, False)
+    assert not log.exists()
+    assert "the script is broken" in capfd.readouterr().out
+
+
+def test_tests_that_want_what_is_missing_are_run_and_it_is_said(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(NEEDS, "public networks", Need(python(UNAVAILABLE_HERE)))
+    (result,) = gate.run_steps([step("unit", log, tests=("tests",), wants=("public networks",))], prepare=True)
+    assert (result.ran, result.passed, result.missing) == (True, True, "public networks: no apt here")
+
+
+def test_on_record_goes_what_ran_whole_and_passed(monkeypatch: pytest.MonkeyPatch) -> None:
+    digests = {"before": "1"}
+    monkeypatch.setattr(gate, "digest", lambda about: digests[about[0]])
+    monkeypatch.setattr(gate, "this_commit", lambda: "abc")
+    step = gate.steps_of([Part("vm", "the camera", "1 s", python(""), tests=("tests/vm",), about=("before",))])[0]
+    good = gate.Result(step)
+    assert gate.passes([good], {"vm": "1"}) == {"vm": Pass("abc", "1")}
+    for bad in ({"passed": False}, {"ran": False}, {"missing": "Chromium: no apt here"}):
+        assert gate.passes([dataclasses.replace(good, **bad)], {"vm": "1"}) == {}
+    assert gate.passes([good], {"vm": "another when it began"}) == {}
+    always = gate.steps_of([Part("lint", "style", "1 s", python(""))])[0]
+    assert gate.passes([gate.Result(always)], {}) == {}
+
+
+def test_no_part_is_about_the_record_of_passes() -> None:
+    assert not [part.name for part in PARTS if "tests/gate/passed.json" in files(part.about) and part.about]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "everything", "runs_all"), [([], "", False), (["--all"], "", True), ([], "1", True)]
+)
+def test_every_part_runs_where_all_are_asked_for(
+    arguments: list[str],
+    everything: str,
+    runs_all: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    passed = {part.name: Pass("abc", digest(part.about)) for part in PARTS if part.about}
+    monkeypatch.setattr(gate, "read_passed", lambda: passed)
+    monkeypatch.setenv("CI_ALL", everything)
+    monkeypatch.setattr(sys, "argv", ["gate", "--list", *arguments])
+    assert gate.main() == 0
+    assert ("left out: vm" not in capsys.readouterr().out) == runs_all
+
+
+def test_a_part_that_there_is_not_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["gate", "linnt"])
+    with pytest.raises(SystemExit):
+        gate.main()
+    assert "no part is called linnt" in capsys.readouterr().err

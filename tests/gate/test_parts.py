@@ -13,8 +13,7 @@ from tests.gate.choice import ROOT, files
 from tests.gate.parts import NEEDS, PARTS, PARTS_VARIABLE, Part, part_of
 
 CONDITIONAL = [part for part in PARTS if part.about]
-OF_ONE_PACKAGE = [part for part in PARTS if part.name == "captures"]
-"""Parts that are not about the whole program, though their tests import it."""
+IN_PROCESS = {"captures", "faults", "runs", "cost"}
 
 
 def test_names_are_words_that_occur_once() -> None:
@@ -62,19 +61,25 @@ def test_each_test_is_of_one_part(path: str, slow: bool, name: str) -> None:
     assert part_of(path, slow).name == name
 
 
-@pytest.mark.parametrize("part", OF_ONE_PACKAGE, ids=lambda part: part.name)
-def test_a_part_is_about_all_that_its_tests_import(part: Part, monkeypatch: pytest.MonkeyPatch) -> None:
-    """But for the command line, by which tests call what they are about, and the live camera behind it."""
-    monkeypatch.syspath_prepend(str(ROOT))
-    graph = grimp.build_graph("relit_camera", "relit_studio", "tests")
-    for command_line in [name for name in graph.modules if name.startswith("relit_camera.cli")]:
-        graph.remove_module(command_line)
-    prefixes = tuple(f"{path.replace('/', '.')}." for path in part.tests)
-    tests = [name for name in graph.modules if name.startswith(prefixes)]
+@pytest.fixture(scope="module")
+def graph() -> grimp.ImportGraph:
+    """What imports what; but for the command line, by which tests call what they are about."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT))
+        found = grimp.build_graph("relit_camera", "relit_studio", "tests")
+    for command_line in [name for name in found.modules if name.startswith("relit_camera.cli")]:
+        found.remove_module(command_line)
+    return found
+
+
+@pytest.mark.parametrize("part", CONDITIONAL, ids=lambda part: part.name)
+def test_a_part_is_about_what_its_tests_import(part: Part, graph: grimp.ImportGraph) -> None:
+    """Of other tests' files all of them; of the program all where they run in the test's process."""
+    prefixes = tuple(path.removesuffix(".py").replace("/", ".") for path in part.tests)
+    tests = [name for name in graph.modules for prefix in prefixes if name == prefix or name.startswith(f"{prefix}.")]
     imported = set().union(*(graph.find_upstream_modules(name) for name in tests)) | set(tests)
-    about = set(files(part.about))
-    missing = [name for name in sorted(imported) if _path(name) not in about]
-    assert not missing
+    asked = imported if part.name in IN_PROCESS else {name for name in imported if name.startswith("tests.")}
+    assert [name for name in sorted(asked) if _path(name) not in set(files(part.about))] == []
 
 
 def _path(module: str) -> str:

@@ -16,6 +16,9 @@ CHOSEN = os.environ.get("RELIT_VM_VERSIONS", "").split()
 VERSIONS = CHOSEN or ["0.15.0"]
 """Of Debian 13. `make test-vm` tries 0.12.7 of Debian 12 and 0.13.2 of its backports too, for which CI has no time."""
 
+NEEDED_VARIABLE = "VM_NEEDED"
+"""Set, as in CI, where a missing machine fails the tests instead of skipping them."""
+
 NEWEST = pytest.mark.parametrize("version", VERSIONS[-1:], indirect=True)
 """For what does not depend on the version."""
 LONG = pytest.mark.parametrize("version", CHOSEN or VERSIONS[-1:], indirect=True)
@@ -29,6 +32,8 @@ AT_LENGTH = pytest.mark.skipif(not CHOSEN, reason="takes minutes: `make test-vm`
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The disk with the program."""
     if reason := what_is_missing():
+        if os.environ.get(NEEDED_VARIABLE):
+            pytest.fail(reason)
         pytest.skip(reason)
     return program_disk(tmp_path_factory.mktemp("program"))
 
