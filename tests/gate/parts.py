@@ -131,7 +131,7 @@ PARTS = (
     Part(
         "cost",
         "what a picture costs, beside its record",
-        "60 s",
+        "30 s",
         pytest_command("tests/lab/bench/test_recorded_cost.py"),
         tests=("tests/lab/bench/test_recorded_cost.py",),
         about=(
