@@ -61,12 +61,15 @@ def _shows_a_picture() -> bool:
         assert demo.stdout is not None
         hung = threading.Timer(TIME_LIMIT_S, demo.kill)
         hung.start()
-        for line in demo.stdout:
-            said += line
-            if "First picture" in line:
-                demo.terminate()
-        ended_well = demo.wait() == 0
-        hung.cancel()
+        try:
+            for line in demo.stdout:
+                said += line
+                if "First picture" in line:
+                    demo.terminate()
+            ended_well = demo.wait() == 0
+        finally:
+            hung.cancel()
+            demo.kill()  # where this is interrupted
     if ended_well and "First picture" in said:
         return True
     print(said, file=sys.stderr)

@@ -36,6 +36,7 @@ from relit_camera.live.scene.background_store import BackgroundStore
 from relit_camera.subject.subject_file import read_subject, write_subject
 from relit_camera.subject.subject_store import SubjectStore
 from tests.cli.relit_command import environment, start, write_material
+from tests.small_camera import WAIT_S
 
 ROOT = Path(__file__).resolve().parents[1]
 NAMES = ("one", "two")
@@ -199,7 +200,7 @@ def run(kills: int, seed: int, say: Callable[[str], None] = lambda line: None) -
                 wrong += [f"{file} was not swept" for file in stayed if any(p.stat().st_size for p in data.rglob(file))]
             if number == kills:
                 camera.send_signal(signal.SIGTERM)
-                camera.communicate(timeout=10)
+                camera.communicate(timeout=WAIT_S)
                 writer.kill()
                 writer.communicate()
                 break

@@ -24,7 +24,7 @@ import httpx
 import psutil
 
 from tests.cli.relit_command import start, write_material
-from tests.lateness import Lateness
+from tests.lateness import spinning
 from tests.small_camera import WAIT_S
 from tests.soak_changes import RandomChanges
 
@@ -45,7 +45,7 @@ VIEW_S = 30.0
 DRIFT_MS = 3.0
 """The median latency of the last third may be above that of the first by this much."""
 END_S = 3.0
-"""But for what a busy machine makes any process wait."""
+"""By the processor time that a busy machine leaves to any process meanwhile."""
 
 
 @dataclass(frozen=True)
@@ -162,15 +162,15 @@ def taken(http: httpx.Client, watched: psutil.Process, time_s: float) -> Sample:
 
 def stop(process: subprocess.Popen[str]) -> int | None:
     """Tell the camera to end; returns its exit code, None if it did not end in time."""
-    with Lateness() as lateness:
-        began = time.monotonic()
+    with spinning() as spun_s:
+        before_s = spun_s()
         process.terminate()
         try:
             process.communicate(timeout=WAIT_S)
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
-        took_s = lateness.unexplained_s(began, time.monotonic())
+        took_s = spun_s() - before_s
     return process.returncode if took_s <= END_S else None
 
 

@@ -14,6 +14,7 @@ from relit_camera.app.demo.tour import TOUR_STOPS, DemoRunner, tour_at
 from relit_camera.base.config.look import Lighting, Look, Mode
 from relit_camera.base.config.settings import StorageSettings
 from relit_camera.live.scene.scene_controller import SceneController
+from tests.small_camera import WAIT_S, wait_until
 
 TOUR_S = sum(stop.seconds for stop in TOUR_STOPS)
 
@@ -62,18 +63,11 @@ def test_half_and_half_is_held_long_enough_to_be_seen() -> None:
     assert (splits == 0.5).sum() * 0.05 > 0.8
 
 
-def wait_for(happens: object, limit_s: float = 5.0) -> None:
-    until = time.monotonic() + limit_s
-    while not happens():  # type: ignore[operator]
-        assert time.monotonic() < until
-        time.sleep(0.01)
-
-
 def test_the_guide_tells_what_is_shown(scene_controller: SceneController) -> None:
     told: list[str] = []
     guide = DemoRunner(scene_controller, lambda: True, told.append)
     guide.start()
-    wait_for(lambda: len(told) == 1)
+    wait_until(lambda: len(told) == 1)
     guide.stop()
     assert told == [TOUR_STOPS[0].caption, ""]
 
@@ -85,7 +79,7 @@ def test_the_guide_moves_the_look_along(scene_controller: SceneController, monke
     start = time.perf_counter()
     guide = DemoRunner(scene_controller, lambda: True, lambda caption: None)
     guide.start()
-    deadline = time.perf_counter() + 5
+    deadline = time.perf_counter() + WAIT_S
     while scene_controller.scene.look.lighting.split == 1 and time.perf_counter() < deadline:
         time.sleep(0.02)
     guide.stop()
@@ -98,7 +92,7 @@ def test_whoever_changes_the_look_has_the_camera(scene_controller: SceneControll
     guide.start()
     mine = Look(lighting=Lighting(environment="party"))
     scene_controller.set_look(mine)
-    assert ended.wait(5)
+    assert ended.wait(WAIT_S)
     assert scene_controller.scene.look == mine
     guide.stop()
 
@@ -113,18 +107,22 @@ def test_before_and_after_goes_with_the_tour_but_not_ones_own(scene_controller: 
     scene_controller.update_look(
         lambda look: look.model_copy(update={"lighting": look.lighting.model_copy(update=changes)})
     )
-    assert ended.wait(5)
+    assert ended.wait(WAIT_S)
     guide.stop()
     assert scene_controller.scene.look.lighting.environment == "party"
     assert scene_controller.scene.look.lighting.split == mine
 
 
-def test_whoever_freezes_the_picture_has_the_camera(scene_controller: SceneController) -> None:
+def test_whoever_freezes_the_picture_has_the_camera(
+    scene_controller: SceneController, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = time.monotonic()
+    monkeypatch.setattr("relit_camera.app.demo.tour.time.monotonic", lambda: now)  # the first stop, where nothing moves
     ended = threading.Event()
     guide = DemoRunner(scene_controller, lambda: True, lambda caption: ended.set() if caption == "" else None)
     guide.start()
     scene_controller.set_frozen(True)
-    assert ended.wait(1.5)  # within the first stop, where nothing moves
+    assert ended.wait(WAIT_S)
     guide.stop()
 
 
@@ -142,7 +140,7 @@ def test_a_caption_is_told_again_for_who_comes_late(scene_controller: SceneContr
     told: list[str] = []
     guide = DemoRunner(scene_controller, lambda: True, told.append)
     guide.start()
-    wait_for(lambda: len(told) == 2)
+    wait_until(lambda: len(told) == 2)
     guide.stop()
     assert told == [TOUR_STOPS[0].caption] * 2 + [""]
 
@@ -155,7 +153,7 @@ def test_the_tour_waits_until_there_is_something_to_see(scene_controller: SceneC
     time.sleep(0.2)
     assert told == []
     ready.set()
-    wait_for(lambda: told == [TOUR_STOPS[0].caption])
+    wait_until(lambda: told == [TOUR_STOPS[0].caption])
     guide.stop()
 
 

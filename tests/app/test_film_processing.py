@@ -27,7 +27,7 @@ from relit_camera.live.status.film_status import FilmCaptureStatus, FilmOptions,
 from relit_camera.subject.subject_file import write_subject
 from tests.app.film_builders import FILM, build_film, die_of_film, keep_and_wait, refuse_film
 from tests.app.subject_builders import captured
-from tests.small_camera import wait_until
+from tests.small_camera import WAIT_S, wait_until
 from tests.virtual_clock import VirtualClock
 
 
@@ -202,12 +202,12 @@ def test_an_upload_that_is_canceled_is_not_begun(studio: Opener) -> None:
         with there.capture.receive("me", "evening.mp4", FilmOptions()) as upload:
             upload.path.write_bytes(FILM)
             cancel.start()
-            assert upload.canceled.wait(10)
+            assert upload.canceled.wait(WAIT_S)
             upload.require_wanted()
 
     with pytest.raises(ConflictError, match="was canceled"):
         send_while_somebody_cancels()
-    cancel.join(10)
+    cancel.join(WAIT_S)
     assert [each.stage for each in ended] == [FilmStage.IDLE]  # once the upload had ended
     assert there.files() == set()
     assert there.told() == ["receiving", "idle"]

@@ -23,7 +23,7 @@ from relit_camera.live.status.event_hub import EventHub
 from relit_camera.subject.subject_file import write_subject
 from tests.app.subject_builders import build, captured, refuse, refuse_once, take_long
 from tests.app.told_stages import stages_until
-from tests.small_camera import wait_until
+from tests.small_camera import WAIT_S, wait_until
 
 TIMINGS = LiveCaptureTimings(frames=3, interval_s=0.0, filming_timeout_s=2.0, building_timeout_s=120.0, retry_s=0.05)
 
@@ -290,7 +290,7 @@ def test_who_asks_during_a_pause_while_the_webcam_is_taken_ends_nothing(tmp_path
     try:
         camera.capture.start("me", until_done=True)
         wait_until(lambda: camera.capture.status().stage is CaptureStage.FAILED)
-        assert camera.webcam.acquire(timeout=5)
+        assert camera.webcam.acquire(timeout=WAIT_S)
         with pytest.raises(ConflictError, match="another capture runs"):
             camera.capture.start("you")
         assert camera.capture._job.is_running

@@ -24,7 +24,7 @@ from relit_camera.live.status.replay_status import ReplayStage, ReplayStatus
 from relit_camera.subject.subject_file import write_subject
 from tests.app.replay_writers import VIDEO, refuse_video, write_half_and_wait, write_quickly
 from tests.app.subject_builders import captured
-from tests.small_camera import wait_until
+from tests.small_camera import WAIT_S, wait_until
 
 
 class Room:
@@ -97,7 +97,7 @@ def test_a_video_is_relit_as_the_scene_says_whole_and_kept(room: Opener) -> None
     assert done == ReplayStatus("talk", ReplayStage.DONE, 1.0, 30, path, what)
     assert there.jobs.video("talk").read_text() == "16 pixels at 40, split 0 by mesh"
     assert there.files() == {"talk.mp4"}
-    told = [there.events.get(timeout=10.0).data for _ in range(4)]
+    told = [there.events.get(timeout=WAIT_S).data for _ in range(4)]
     assert [each["stage"] for each in told] == ["receiving", "working", "working", "done"]
     assert (told[2]["progress"], told[2]["frames"]) == (0.5, 15)
     again = room(write_quickly)
@@ -197,12 +197,12 @@ def test_an_upload_that_breaks_off_or_is_removed_is_not_begun(room: Opener) -> N
         with there.jobs.receive("talk", "my talk.mov") as upload:
             upload.path.write_bytes(VIDEO)
             remove.start()
-            assert upload.canceled.wait(10)
+            assert upload.canceled.wait(WAIT_S)
             upload.require_wanted()
 
     with pytest.raises(ConflictError, match="canceled"):
         send_while_somebody_removes()
-    remove.join(10)
+    remove.join(WAIT_S)
     assert there.files() == set()
     assert there.jobs.all() == []
 

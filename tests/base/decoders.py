@@ -42,7 +42,7 @@ def spin() -> Decoded:
 
 
 def sleep() -> Decoded:
-    time.sleep(60)
+    time.sleep(600)
     return Decoded()
 
 

@@ -85,10 +85,8 @@ def test_a_program_that_stops_does_not_wait_for_a_file(process: DecodingProcess)
     process.decode(numbered, 0)
     stopping = threading.Timer(0.3, process.interrupt)
     stopping.start()
-    began = time.monotonic()
-    with pytest.raises(NotReadyError, match="the program stops"):
+    with pytest.raises(NotReadyError, match="the program stops"):  # and not that the file takes too much time
         process.decode(sleep)
-    assert time.monotonic() - began < 10
     assert process.decode(numbered, 4).arrays[0][0, 0] == 4
 
 

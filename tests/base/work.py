@@ -28,7 +28,7 @@ def die() -> None:
 
 def sleep(file: Path) -> None:
     file.write_text(str(os.getpid()))
-    time.sleep(60)
+    time.sleep(600)
 
 
 def count_up(last: int, tell: Progress) -> str:

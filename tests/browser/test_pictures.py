@@ -10,7 +10,7 @@ from playwright.sync_api import Page, Route, expect
 from tests.browser.browser_pages import OpenPage
 from tests.browser.cameras import FakeServer
 from tests.browser.panel import BUILT_IN_PLACES, open_panel
-from tests.small_camera import wait_until
+from tests.small_camera import WAIT_S, wait_until
 
 SIDES = """canvas => {
   const {width, height} = canvas;
@@ -80,7 +80,7 @@ def test_a_place_is_never_grey_while_its_picture_on_oneself_is_made(fake: FakeSe
     began = time.monotonic()
     while not pictures.evaluate_all(loaded):
         page.wait_for_timeout(50)
-        assert time.monotonic() < began + 10
+        assert time.monotonic() < began + WAIT_S
     page.evaluate(
         """() => { window.grey = 0;
           new MutationObserver(() => {

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
 
+from relit_camera.base.errors import LightsError
 from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.capture.reflectance.method_registry import method_names
+from relit_camera.lab.evaluate import light_holdout
 from tests.cli.relit_command import Answer, call, files
 from tests.lab.capture_documents import documents
 from tests.lab.lit_sphere import cap, grid, lambert
@@ -73,6 +77,18 @@ def test_olat_prints_each_list(folder: Path, tmp_path: Path) -> None:
     assert "captured/lights.lp, every 3" in answer.out
     assert "truth/lights.lp, every 3" in answer.out
     assert "nearest" in out.read_text()
+
+
+def test_olat_compares_every_method(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compared: list[str] = []
+
+    def note(samples: object, inside: object, names: Sequence[str]) -> NoReturn:
+        compared.extend(names)
+        raise LightsError("not computed", "look at the names alone")
+
+    monkeypatch.setattr(light_holdout, "method_candidates", note)
+    call("evaluate", "olat", folder / "captured").complains("not computed")
+    assert compared == method_names()
 
 
 def test_frontal_predicts_the_other_lights(folder: Path, tmp_path: Path) -> None:

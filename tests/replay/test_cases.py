@@ -85,6 +85,7 @@ def test_head_turns_with_the_driver(mode: str) -> None:
     assert correlation(mode, 0) >= LEAST_CORRELATION
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["reenact", "ratio"])
 def test_mouth_opens_with_the_driver(mode: str) -> None:
     assert correlation(mode, 1) >= LEAST_CORRELATION

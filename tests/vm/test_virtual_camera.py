@@ -21,6 +21,8 @@ pytestmark = pytest.mark.timeout(900)
 LARGER = (480, 270)
 MOST_GAP_SHARE = 0.1
 """Of the time from `kill -9` until the new camera is live: both take the longer, the busier the host."""
+MOST_GAP_S = 5.0
+"""However busy it is: programs give a camera up after some ten seconds."""
 
 
 def test_where_nobody_publishes_readers_find_no_camera(machine: Machine) -> None:
@@ -107,7 +109,7 @@ class TestWhileItRuns:
         assert difference(image, draw_pattern(SIZE, number)) <= 6
         nobody = rows[killed - 1 : live + 1]
         saw("OpenCV, until the new camera is live", f"longest gap {longest_gap_s(nobody):.2f} s")
-        assert longest_gap_s(nobody) < MOST_GAP_SHARE * (nobody[-1]["at"] - nobody[0]["at"])
+        assert longest_gap_s(nobody) < min(MOST_GAP_SHARE * (nobody[-1]["at"] - nobody[0]["at"]), MOST_GAP_S)
         gap_s = rows[stopped]["at"] - rows[stopped - 1]["at"]
         saw("OpenCV, reading on", f"stop and start with another size: goes on after {gap_s:.0f} s")
 

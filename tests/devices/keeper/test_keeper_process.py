@@ -128,7 +128,7 @@ def test_kill_9_and_a_new_start_are_no_gap_for_readers(stage: Stage, bridged: Ca
 
 @pytest.mark.slow
 def test_a_camera_that_leaves_ends_its_keeper(stage: Stage) -> None:
-    first = stage.camera(10)
+    first = stage.camera(10, keep_s=10 * WAIT_S)
     stage.wait_for(10)
     leave(first, "end")
     wait_until(lambda: stage.keepers() == set())
