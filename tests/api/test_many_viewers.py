@@ -81,6 +81,11 @@ def gap_meter() -> Iterator[Callable[[Sequence[float]], float]]:
         process.communicate()
 
 
+def rate(times: Sequence[float]) -> float:
+    """Pictures a second."""
+    return (len(times) - 1) / (times[-1] - times[0])
+
+
 @pytest.mark.slow
 def test_the_camera_keeps_its_rate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, note_row: Callable[[str, tuple[str, ...]], None]
@@ -95,6 +100,9 @@ def test_the_camera_keeps_its_rate(
     with gap_meter() as longest_gap_s, running_camera(tmp_path, sink=sink, timings=PATIENT) as camera:
         camera.http.get("snapshot.jpg").raise_for_status()
         sink.wait_for(3)
+        frames = len(sink.times)
+        wait_until(lambda: len(sink.times) > frames + FPS)
+        alone_fps = rate(sink.times[frames:])
         files, threads = process.num_fds(), process.num_threads()
         with many_viewers(f"{camera.http.base_url}preview.mjpg") as viewers:
             began, before = time.monotonic(), ask(viewers)
@@ -107,10 +115,9 @@ def test_the_camera_keeps_its_rate(
         wait_until(lambda: process.num_fds() <= files)
         wait_until(lambda: camera.status()["state"] == "live")
         gap_s = longest_gap_s(times)
-    fps = (len(times) - 1) / (times[-1] - times[0])
-    note_row("two hundred viewers", (f"{fps:.1f}", f"{1e3 * gap_s:.0f} ms", f"{got.min()} to {got.max()}"))
+    note_row("two hundred viewers", (f"{rate(times):.1f}", f"{1e3 * gap_s:.0f} ms", f"{got.min()} to {got.max()}"))
     assert gap_s < 0.5
-    assert fps > FPS / 3  # a busy machine costs a quarter of them
+    assert rate(times) > alone_fps / 2  # a busy machine costs a quarter of them
     assert made <= most_made  # each is encoded once, for all of them
     assert most_threads <= threads + 4
 
