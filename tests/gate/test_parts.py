@@ -79,7 +79,8 @@ def test_a_part_is_about_what_its_tests_import(part: Part, graph: grimp.ImportGr
     tests = [name for name in graph.modules for prefix in prefixes if name == prefix or name.startswith(f"{prefix}.")]
     imported = set().union(*(graph.find_upstream_modules(name) for name in tests)) | set(tests)
     asked = imported if part.name in IN_PROCESS else {name for name in imported if name.startswith("tests.")}
-    assert [name for name in sorted(asked) if _path(name) not in set(files(part.about))] == []
+    about = set(files(part.about))
+    assert [name for name in sorted(asked) if _path(name) not in about] == []
 
 
 def _path(module: str) -> str:
