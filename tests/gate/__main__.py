@@ -15,6 +15,7 @@ import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from tests.durations import FILE, PART_VARIABLE
 from tests.durations import main as print_durations
@@ -22,10 +23,24 @@ from tests.gate.choice import ROOT, Choice, Pass, choose, digest, read_passed, t
 from tests.gate.parts import NEEDS, PARTS, PARTS_VARIABLE, UNAVAILABLE, Part, pytest_command
 
 
+class Kind(StrEnum):
+    """When a step runs."""
+
+    CHECK = "check"
+    """First, one after another."""
+    TOGETHER = "together"
+    """Then the tests that share a run of pytest."""
+    BESIDE = "beside"
+    """While these run, one after another."""
+    ALONE = "alone"
+    """In the end, one after another."""
+
+
 @dataclass(frozen=True)
 class Step:
     """One command, which may be several parts' tests."""
 
+    kind: Kind
     name: str
     does: str
     usual: str
@@ -33,27 +48,29 @@ class Step:
     parts: tuple[Part, ...]
     variables: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def beside(self) -> bool:
-        """It runs while others do."""
-        return any(part.beside for part in self.parts)
-
 
 def steps_of(parts: Sequence[Part]) -> list[Step]:
-    """The commands that run these parts: checks, the parts that share a run of pytest, then tests that run alone."""
+    """The commands that run these parts."""
     steps = [
-        Step(part.name, part.does, part.usual, part.command, (part,), part.variables) for part in parts if part.command
+        Step(_kind_of(part), part.name, part.does, part.usual, part.command, (part,), part.variables)
+        for part in parts
+        if part.command
     ]
     if shared := tuple(part for part in parts if not part.command):
         # One process more than there are cores, as tests wait much of their time.
         processes = str((os.cpu_count() or 2) + 1)
         together = pytest_command("-n", processes, "--dist", "loadgroup", "--no-loadscope-reorder", "tests")
-        checks = sum(not step.parts[0].tests for step in steps)
         names = " ".join(part.name for part in shared)
         does = "; ".join(part.does for part in shared)
         usual = " + ".join(part.usual for part in shared)
-        steps.insert(checks, Step(names, does, usual, together, shared, {PARTS_VARIABLE: names}))
+        steps.append(Step(Kind.TOGETHER, names, does, usual, together, shared, {PARTS_VARIABLE: names}))
     return steps
+
+
+def _kind_of(part: Part) -> Kind:
+    if part.beside:
+        return Kind.BESIDE
+    return Kind.ALONE if part.tests else Kind.CHECK
 
 
 @dataclass(frozen=True)
@@ -102,13 +119,13 @@ def run_step(step: Step, ready: Ready) -> Result:
     # What is compiled once need not be by each of the hundreds of processes that tests start.
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     print(f"-- {step.name}: {step.does} (usually {step.usual})", flush=True)
-    begun = time.monotonic()
-    ended = subprocess.run(step.command, cwd=ROOT, env=environment, capture_output=step.beside, text=True, check=False)
+    begun, hidden = time.monotonic(), step.kind is Kind.BESIDE
+    ended = subprocess.run(step.command, cwd=ROOT, env=environment, capture_output=hidden, text=True, check=False)
     took = time.monotonic() - begun
     last = ""
-    if step.beside and ended.returncode:
+    if hidden and ended.returncode:
         print(ended.stdout, ended.stderr, sep="")
-    elif step.beside and ended.stdout.strip():
+    elif hidden and ended.stdout.strip():
         last = f": {ended.stdout.strip().splitlines()[-1]}"
     print(f"-- {step.name}: {'failed' if ended.returncode else 'passed'} after {took:.0f} s{last}", flush=True)
     return Result(step, took, ended.returncode == 0, told)
@@ -117,11 +134,9 @@ def run_step(step: Step, ready: Ready) -> Result:
 def run_steps(steps: Sequence[Step], prepare: bool) -> list[Result]:
     """Run the steps up to the first that fails: checks; tests together, the longer checks beside them; tests alone."""
     needed = {need for step in steps for part in step.parts for need in part.needs + part.wants} if prepare else set()
-    checks = [step for step in steps if not step.beside and not step.parts[0].tests]
-    together = [step for step in steps if not step.parts[0].command]
-    alone = [step for step in steps if step.parts[0].command and step.parts[0].tests and not step.beside]
+    checks, together, beside, alone = ([step for step in steps if step.kind is kind] for kind in Kind)
     results: list[Result] = []
-    # Debian's packages are installed one after another, and nobody waits for more than their own.
+    # Debian's packages are installed one after another, in the order of the table.
     with ThreadPoolExecutor(1) as installing, ThreadPoolExecutor(1) as second:
         ready = {name: installing.submit(make_ready, name) for name in NEEDS if name in needed}
         try:
@@ -129,9 +144,9 @@ def run_steps(steps: Sequence[Step], prepare: bool) -> list[Result]:
                 results.append(run_step(step, ready))
                 if not results[-1].passed:
                     return results
-            beside = [second.submit(run_step, step, ready) for step in steps if step.beside]
+            meanwhile = [second.submit(run_step, step, ready) for step in beside]
             results += [run_step(step, ready) for step in together]
-            results += [each.result() for each in beside]
+            results += [each.result() for each in meanwhile]
             for step in alone:
                 if not all(result.passed for result in results):
                     break

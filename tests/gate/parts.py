@@ -24,7 +24,12 @@ CAPTURE = (
     "pyproject.toml",
 )
 """The code by which people are rendered and become subjects."""
-_CAPTURE_TESTS = ("tests/capture", "tests/subject", "tests/light", "tests/fuzz")
+_CAPTURE_TESTS = (
+    *(f"tests/{name}" for name in ("capture", "subject", "light", "fuzz", "base/images")),
+    *(f"tests/studio/{name}" for name in ("capture", "field/test_solver.py", "mannequin", "people")),
+    *(f"tests/cli/test_cli_{name}.py" for name in ("desk", "evaluate")),
+    "tests/lab/test_stabilization_accuracy.py",
+)
 _ON_DEVICES = (
     *(
         f"service/relit_camera/{name}"
@@ -92,6 +97,11 @@ class Part:
     variables: Mapping[str, str] = field(default_factory=dict)
 
 
+def make_command(target: str) -> tuple[str, ...]:
+    """A target of the Makefile."""
+    return ("make", "--no-print-directory", target)
+
+
 def pytest_command(*arguments: str) -> tuple[str, ...]:
     """A run of pytest."""
     return (PYTHON, "-m", "pytest", "-q", *arguments)
@@ -104,7 +114,7 @@ PARTS = (
         "types",
         "static types of all code",
         "100 s",
-        ("make", "--no-print-directory", "types"),
+        make_command("types"),
         beside=True,
         about=(":(glob)**/*.py", "pyproject.toml"),
     ),
@@ -112,7 +122,7 @@ PARTS = (
         "image",
         "the image's build without Docker: the wheel, installed by itself, shows a picture",
         "60 s",
-        ("make", "--no-print-directory", "image-steps"),
+        make_command("image-steps"),
         beside=True,
         about=("docker", *_PACKAGED, "scripts/check_installed.py"),
     ),
@@ -120,14 +130,14 @@ PARTS = (
         "tools",
         "the wheel as people install it, with uv, used from an empty home",
         "40 s",
-        ("make", "--no-print-directory", "tool-install"),
+        make_command("tool-install"),
         beside=True,
         about=(*_PACKAGED, "scripts/check_tool_install.sh"),
     ),
-    Part("lint", "style and formatting", "1 s", ("make", "--no-print-directory", "lint")),
-    Part("layers", "which package may import which", "1 s", ("make", "--no-print-directory", "layers")),
-    Part("scripts", "shell scripts, Dockerfile, compose files", "1 s", ("make", "--no-print-directory", "scripts")),
-    Part("generated", "files built from code are what it builds", "3 s", ("make", "--no-print-directory", "generated")),
+    Part("lint", "style and formatting", "1 s", make_command("lint")),
+    Part("layers", "which package may import which", "1 s", make_command("layers")),
+    Part("scripts", "shell scripts, Dockerfile, compose files", "1 s", make_command("scripts")),
+    Part("generated", "files built from code are what it builds", "3 s", make_command("generated")),
     Part(
         "cost",
         "what a picture costs, beside its record",

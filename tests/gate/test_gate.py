@@ -17,14 +17,16 @@ def python(code: str) -> tuple[str, ...]:
     return (sys.executable, "-c", code)
 
 
-def test_all_parts_run_checks_first_and_tests_that_run_alone_last() -> None:
+def test_every_part_runs_in_a_step_of_its_kind() -> None:
     steps = gate.steps_of(PARTS)
     assert sorted(part.name for step in steps for part in step.parts) == sorted(part.name for part in PARTS)
     (together,) = [step for step in steps if len(step.parts) > 1]
     assert together.variables[PARTS_VARIABLE].split() == [part.name for part in together.parts]
-    at = steps.index(together)
-    assert {step.parts[0].tests for step in steps[:at]} == {()}
-    assert () not in {step.parts[0].tests for step in steps[at + 1 :]}
+    assert together.kind is gate.Kind.TOGETHER
+    of_kind = {kind: {bool(step.parts[0].tests) for step in steps if step.kind is kind} for kind in gate.Kind}
+    assert of_kind[gate.Kind.CHECK] == {False}
+    assert of_kind[gate.Kind.ALONE] == {True}
+    assert all(step.parts[0].beside is (step.kind is gate.Kind.BESIDE) for step in steps)
 
 
 @pytest.fixture
