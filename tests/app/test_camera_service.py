@@ -30,7 +30,6 @@ from tests.small_camera import (
     WAIT_S,
     RememberingSink,
     SteadyTracker,
-    StrangerTracker,
     difference,
     grey,
     memory_source,
@@ -292,26 +291,6 @@ def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
         count = camera.sink.count
         wait_until(lambda: camera.sink.count > count + 2)
         assert httpx.get(camera.http.base_url.join("/readyz")).json() == {"status": "ready"}
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("full_quality")
-def test_ratio_falls_back_and_says_so_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
-    noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
-    source = SteppedSource(noise.repeat(4, axis=0).repeat(4, axis=1))
-    with running_camera(tmp_path, source, StrangerTracker(), look=Look(mode=Mode.RATIO), timings=PATIENT) as camera:
-        camera.sink.wait_for(1)  # the placeholder
-        for _ in range(6):
-            source.step(camera.sink, 0.5)
-        wait_until(lambda: DegradationCode.FACE_MISMATCH in camera.degraded())
-        assert camera.status()["mode"] == "ratio"
-        degraded = camera.status()["degraded"]
-        assert isinstance(degraded, list)
-        (mismatch,) = [each for each in degraded if each["code"] == "face-mismatch"]
-        assert "choose your own subject" in mismatch["cure"]
-        source.step(camera.sink)
-        camera.put("mode", mode="reenact")
-        source.step(camera.sink)
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.face.face_state import LOST, FaceState, Tracker
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.live.pipeline import Pipeline
+from relit_camera.live.publishing.what_is_shown import Shown
 from relit_camera.live.scene.scene import Scene
 from tests.generated_subject import small_subject
 from tests.small_camera import SteadyTracker
@@ -71,7 +72,7 @@ def test_the_report_of_a_frame(tmp_path: Path) -> None:
     assert set(told) == {"index", "time_s", "state", "pose", "stage_ms"}
     assert isinstance(told["pose"], dict)
     assert set(told["pose"]) == {"yaw", "pitch", "roll"}
-    assert ReplayedFrame(0, 0.0, None, {}).as_json()["pose"] is None
+    assert ReplayedFrame(0, 0.0, None, Shown.RELIT, {}).as_json()["pose"] is None
 
 
 def test_the_light_changes_at_its_time(tmp_path: Path) -> None:

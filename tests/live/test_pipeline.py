@@ -8,6 +8,7 @@ import weakref
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,25 +17,28 @@ import pytest
 from relit_camera.app.wiring import make_follower, make_pipeline, mode_factories
 from relit_camera.base.config.look import ColorBackground, Lamp, Lighting, Look, Mode
 from relit_camera.base.config.settings import InferenceSettings, RelitSettings
-from relit_camera.base.errors import ModelError, SubjectError
-from relit_camera.base.images.image_types import Alpha, Frame, LinearImage
+from relit_camera.base.errors import ModelError
+from relit_camera.base.images.image_types import Alpha, Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
+from relit_camera.base.rotations import Rotation, angles_from_rotation, rotation_from_angles
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
+from relit_camera.face.head_pose import project
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
 from relit_camera.live.modes.frame_fitting import fit_frame
-from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
+from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
+from relit_camera.live.modes.scene_relighting import SceneRelighting
 from relit_camera.live.pipeline import Pipeline, subject_troubles
-from relit_camera.live.reenactment.reenactor import WarpedLayer
-from relit_camera.live.reenactment.rest_layer import RestLayer
+from relit_camera.live.publishing.what_is_shown import Shown
+from relit_camera.live.reenactment.source_image import find_source_face
 from relit_camera.live.render_quality import FULL_QUALITY, QUALITY_LEVELS, RenderQuality
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.status.camera_status import DegradationCode
 from relit_camera.subject.relighting.relighter import Relighter, open_relighter
 from relit_camera.subject.subject import Subject
 from tests.generated_subject import small_subject
-from tests.small_camera import SIZE, SteadyTracker, StrangerTracker, difference, grey
+from tests.small_camera import SIZE, SteadyTracker, difference, grey
 
 CPU = RelitSettings(inference=InferenceSettings(provider="cpu"))
 STUDIO = builtin_environment("studio")
@@ -148,25 +152,6 @@ def test_blend_goes_from_the_live_picture_to_the_relit_one() -> None:
     assert live.mean() > half.mean() + 5 > relit.mean() + 10
 
 
-@pytest.mark.slow
-def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None:
-    noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
-    image = np.ascontiguousarray(noise.repeat(4, axis=0).repeat(4, axis=1))
-    made, ratio = pipeline(StrangerTracker()), scene(mode=Mode.RATIO)
-    for index in range(100):
-        last = made.process(frame(index, image), ratio).image
-    assert [trouble.what for trouble in made.troubles] == ["mode reenact is shown in place of mode ratio"]
-    still = made.process(frame(100, image), scene()).image
-    assert difference(last, still) < 2
-    private = pipeline(StrangerTracker())
-    first = [private.process(frame(index, image), replace(ratio, unlit_allowed=False)) for index in range(25)]
-    assert max(difference(each.image, still) for each in first) < 2, "of a stranger nothing is shown relit"
-    assert private.troubles == []
-    other = replace(ratio, subject=replace(small_subject()))
-    made.process(frame(101, image), other)
-    assert made.troubles == []
-
-
 def test_stages_are_timed() -> None:
     made = pipeline()
     made.process(frame(), scene())
@@ -187,13 +172,6 @@ def test_reenact_stands_before_its_background_without_any_model() -> None:
     assert (red[:, 0] == [255, 0, 0]).all()
 
 
-def test_without_a_face_mode_ratio_shows_the_live_picture_where_that_is_allowed() -> None:
-    bright = np.tile(np.arange(0, 256, 2, dtype=np.uint8), (SIZE[1], 1))[..., None].repeat(3, axis=2)
-    assert bright.shape == (SIZE[1], SIZE[0], 3)
-    picture = pipeline(Blind()).process(frame(0, bright), scene(mode=Mode.RATIO)).image
-    assert np.abs(picture.astype(int) - bright).max() <= 2  # highlights are not dimmed
-
-
 class Blind(SteadyTracker):
     """Sees no face."""
 
@@ -201,42 +179,22 @@ class Blind(SteadyTracker):
         return LOST
 
 
-def test_without_a_face_mode_ratio_shows_what_reenact_does_unless_the_live_picture_is_allowed() -> None:
-    noise = np.random.default_rng(0).integers(60, 200, grey().shape, dtype=np.uint8)
-    light = {"exposure_ev": -1, "transition_s": 0}
-    ratio, reenact = (
-        pipeline(Blind()).process(frame(0, noise), scene(mode=mode, unlit_allowed=False, lighting=light))
-        for mode in Mode
-    )
-    assert not ratio.unlit
-    assert difference(ratio.image, reenact.image) < 2
+def noise() -> np.ndarray:
+    return np.random.default_rng(0).integers(60, 200, grey().shape, dtype=np.uint8)
 
 
-@pytest.mark.parametrize("blend", [1.0, 0.5])
-def test_the_subject_at_rest_is_placed_once_while_nothing_changes(
-    blend: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    placed: list[LinearImage] = []
-    whole = RestLayer.render
+@pytest.mark.parametrize("unlit_allowed", [True, False])
+def test_a_live_person_whose_face_was_never_seen_has_the_tint_of_the_place(unlit_allowed: bool) -> None:
+    def red(exposure_ev: float) -> Scene:
+        lamp = {"lamps": [{"color": [0.8, 0.2, 0.2]}], "environment": None, "transition_s": 0}
+        lighting = {**lamp, "exposure_ev": exposure_ev}
+        return scene(mode=Mode.RATIO, unlit_allowed=unlit_allowed, lighting=lighting)
 
-    def render(layer: RestLayer, relit: LinearImage) -> WarpedLayer:
-        placed.append(relit)
-        return whole(layer, relit)
-
-    monkeypatch.setattr(RestLayer, "render", render)
-    made = pipeline(Blind())
-    shown = [
-        scene(mode=Mode.RATIO, unlit_allowed=False, lighting={"blend": blend, "exposure_ev": ev}) for ev in (0, -2)
-    ]
-    for index in range(5):
-        made.process(frame(index), shown[0])
-    assert len(placed) == 1
-    pictures = [made.process(frame(index), shown[1]).image for index in range(5, 60)]
-    assert len(placed) > 2  # the light changes, step by step
-    assert difference(pictures[0], pictures[-1]) > 5
-    count = len(placed)
-    made.process(frame(60), shown[1])
-    assert len(placed) == count
+    first, darker = (pipeline(Blind()).process(frame(0, noise()), red(ev)) for ev in (0.0, -2.0))
+    assert (first.shown, first.unlit) == (Shown.PLACE_TINT, False)
+    means = first.image.reshape(-1, 3).mean(axis=0)
+    assert means[0] > 1.5 * means[1]
+    assert darker.image.mean() < 0.7 * first.image.mean()
 
 
 class SeenFrom(SteadyTracker):
@@ -261,31 +219,70 @@ def test_the_first_frame_with_a_face_is_relit_as_all_later_ones(unlit_allowed: b
     assert max(difference(each.image, rendered[-1].image) for each in rendered) < 1
 
 
-def test_a_face_that_comes_later_is_eased_from_the_picture_as_filmed_where_that_is_allowed() -> None:
-    shown = scene(mode=Mode.RATIO, lighting={"exposure_ev": -2, "transition_s": 0})
-    made, live = pipeline(SeenFrom(4, 60)), grey(220)
-    rendered = [made.process(frame(index, live), shown) for index in range(30)]
-    assert [each.unlit for each in rendered[:4]] == [True] * 4
-    assert not rendered[-1].unlit
-    steps = [difference(one.image, next_one.image) for one, next_one in pairwise(rendered)]
-    assert max(steps) < 0.35 * difference(rendered[0].image, rendered[-1].image)
-
-
-def test_a_face_that_comes_or_goes_is_eased_between_the_subject_at_rest_and_the_relit_picture() -> None:
+def test_a_face_that_goes_keeps_the_mean_of_its_light_and_comes_back_into_it() -> None:
     """No step is larger than easing makes it, and the live picture is in none of them."""
-
     shown = scene(mode=Mode.RATIO, unlit_allowed=False, lighting={"exposure_ev": -2, "transition_s": 0})
-    made = pipeline(SeenFrom(4, 34))
-    live = grey(220)
-    rendered = [made.process(frame(index, live), shown) for index in range(64)]
-    pictures = [each.image for each in rendered]
-    followed = difference(pictures[0], pictures[29])
-    assert followed > 20
-    steps = [difference(one, next_one) for one, next_one in pairwise(pictures)]
-    assert max(steps) < 0.35 * followed
-    assert difference(pictures[0], pictures[-1]) < 2
+    tracker, live = GoneFrom(20, 60), grey(220)
+    made = pipeline(tracker)
+    rendered = [made.process(frame(index, live), shown) for index in range(100)]
+    assert {each.shown for each in rendered[:20]} == {Shown.RELIT}
+    assert {each.shown for each in rendered[35:60]} == {Shown.LAST_LIGHT}
+    assert rendered[-1].shown is Shown.RELIT
     assert not any(each.unlit for each in rendered)
+    pictures = [each.image for each in rendered]
+    steps = [difference(one, next_one) for one, next_one in pairwise(pictures)]
+    assert max(steps) < 4
+    assert difference(pictures[19], pictures[-1]) < 2
     assert min(difference(picture, live) for picture in pictures) > 20
+    lost = pictures[50].reshape(-1, 3).astype(float)
+    assert abs(np.log(lost.mean() / pictures[19].mean())) < 0.4
+    assert np.ptp(lost, axis=0).max() <= 3  # of a grey picture, one factor makes one grey
+
+
+def test_the_light_goes_on_changing_while_the_face_is_lost() -> None:
+    made, live = pipeline(GoneFrom(10, 1000)), grey(220)
+    bright, dark = (scene(mode=Mode.RATIO, lighting={"exposure_ev": ev, "transition_s": 0}) for ev in (0, -3))
+    before = [made.process(frame(index, live), bright).image for index in range(40)][-1]
+    after = [made.process(frame(index, live), dark).image for index in range(40, 90)][-1]
+    assert after.mean() < 0.6 * before.mean()
+
+
+def test_a_head_turned_from_the_source_image_is_lit_as_it_is_turned(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not as it is turned from where the live person began: the subject may have been captured turned aside."""
+    seen: list[Rotation] = []
+    whole = SceneRelighting.compare
+
+    def compare(self: SceneRelighting, scene: Scene, rotation: Rotation, *rest: Any) -> Any:
+        seen.append(rotation)
+        return whole(self, scene, rotation, *rest)
+
+    monkeypatch.setattr(SceneRelighting, "compare", compare)
+    subject = small_subject()
+    face = find_source_face(subject, NotInStills())
+    turned = replace(face.pose, rotation=rotation_from_angles(20, 0) * face.pose.rotation)
+    landmarks = project(face.head_points, turned, subject.size).astype(np.float32)
+    aside = replace(subject, landmarks={face.scheme.name: landmarks})
+    for who in (subject, aside):
+        pipeline(NotInStills()).process(frame(), replace(scene(mode=Mode.RATIO), subject=who))
+    assert angles_from_rotation(seen[1] * seen[0].inv()).yaw == pytest.approx(-20, abs=1.5)
+
+
+class NotInStills(SteadyTracker):
+    """Leaves the source image to the landmarks that are stored with it."""
+
+    def track(self, frame: Frame) -> FaceState:
+        return LOST if frame.size == small_subject().size else super().track(frame)
+
+
+class GoneFrom(SteadyTracker):
+    """Sees no face from one frame on until before another."""
+
+    def __init__(self, first: int, end: int) -> None:
+        super().__init__()
+        self._gone = range(first, end)
+
+    def track(self, frame: Frame) -> FaceState:
+        return LOST if frame.index in self._gone else super().track(frame)
 
 
 @pytest.mark.parametrize(
@@ -297,16 +294,12 @@ def test_a_picture_says_whether_a_part_of_it_is_as_filmed(changes: dict[str, flo
 
 
 class OneGrey:
-    """A third mode: the whole picture in the grey of the subject's relit mean. It refuses a face that is not found."""
+    """A third mode: the whole picture in the grey of the subject's relit mean."""
 
     def __init__(self, context: ModeContext) -> None:
         self.context = context
 
-    def begin(
-        self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
-    ) -> RenderTask | FaceMismatch:
-        if motion.status is FaceStatus.LOST:
-            return FaceMismatch("nobody is there", "come back")
+    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
         relit = self.context.scene_relighting.relight(scene, motion.rotation, frame.time_s, quality.relight_every)
         width, height = self.context.size
         value = np.uint8(np.clip(255 * relit.mean(), 1, 255))
@@ -314,7 +307,7 @@ class OneGrey:
 
 
 def with_third_mode(tracker: Tracker) -> Pipeline:
-    """A pipeline whose mode ratio is another: its logic knows no mode by name but the fallback."""
+    """A pipeline whose mode ratio is another: its logic knows no mode by name."""
     modes = {**mode_factories(CPU), Mode.RATIO: OneGrey}
     follower = make_follower(CPU.tracker, tracker)
     return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
@@ -331,69 +324,12 @@ def test_a_third_mode_needs_nothing_of_the_pipeline() -> None:
     assert made.troubles == []
 
 
-def test_any_mode_may_find_a_mismatch_and_the_fallback_takes_over_until_the_subject_changes() -> None:
-    made, wanted = with_third_mode(Vanishing()), scene(mode=Mode.RATIO)
-    pictures = [made.process(frame(index), wanted).image for index in range(30)]
-    assert len(np.unique(pictures[24])) == 1
-    assert len(np.unique(pictures[25])) > 1
-    assert [(t.what, t.why, t.cure) for t in made.troubles] == [
-        ("mode reenact is shown in place of mode ratio", "nobody is there", "come back")
-    ]
-    made.process(frame(30), replace(wanted, subject=None))
-    assert made.troubles == []
-
-
-class Reappearing(SteadyTracker):
-    """Shows no face in frames 5 to 29."""
-
-    def track(self, frame: Frame) -> FaceState:
-        return LOST if 5 <= frame.index < 30 else super().track(frame)
-
-
-class OneGreyUntilSeen(OneGrey):
-    """The third mode, which takes a face that is found again."""
-
-    def begin(
-        self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
-    ) -> RenderTask | FaceMismatch:
-        task = super().begin(frame, motion, scene, quality)
-        return replace(task, is_over=_is_found) if isinstance(task, FaceMismatch) else task
-
-
-def _is_found(motion: FaceMotion) -> bool:
-    return motion.status is FaceStatus.FOUND
-
-
-def test_the_mode_comes_back_when_the_mismatch_is_over() -> None:
-    modes = {**mode_factories(CPU), Mode.RATIO: OneGreyUntilSeen}
-    tracker = Reappearing()
-    follower = make_follower(CPU.tracker, tracker)
-    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
-    shown = []
-    for index in range(70):
-        picture = made.process(frame(index), scene(mode=Mode.RATIO)).image
-        shown.append((len(np.unique(picture)) == 1, [trouble.code for trouble in made.troubles]))
-    assert (False, [DegradationCode.FACE_MISMATCH]) in shown
-    assert shown[0] == shown[-1] == (True, [])
-
-
 def test_a_frame_in_which_a_subject_is_chosen_is_not_shown_unlit() -> None:
     wanted = scene()
     scenes = iter([replace(wanted, subject=None), wanted])
     rendered = pipeline().begin(frame(), lambda: next(scenes))()
     assert rendered.motion is not None
     assert difference(rendered.image, pipeline().process(frame(), wanted).image) == 0
-
-
-def test_a_fallback_that_takes_no_face_either_is_an_error() -> None:
-    modes = {Mode.REENACT: OneGrey, Mode.RATIO: OneGrey}
-    tracker = Vanishing()
-    made = Pipeline(
-        tracker, make_follower(CPU.tracker, tracker), SIZE, modes, partial(open_relighter, "basis"), pytest.fail
-    )
-    made.process(frame(24), scene(mode=Mode.RATIO))
-    with pytest.raises(SubjectError, match="nobody is there; come back"):
-        made.process(frame(25), scene(mode=Mode.RATIO))
 
 
 def test_the_relighter_at_work_is_named_for_the_status() -> None:
@@ -423,7 +359,7 @@ def test_it_says_when_models_are_opened() -> None:
         said.append("picture")
     made.close()
     opened = ["opening", "picture"]
-    assert said == [*opened, "picture", *opened, *opened, "picture", *opened, *opened]
+    assert said == [*opened, "picture", "opening", *opened, "picture", "picture", *opened, *opened]
 
 
 def test_it_starts_no_thread() -> None:
@@ -449,9 +385,7 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
     asked: list[RenderQuality] = []
 
     class Noting(OneGrey):
-        def begin(
-            self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
-        ) -> RenderTask | FaceMismatch:
+        def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
             asked.append(quality)
             return super().begin(frame, motion, scene, quality)
 

@@ -14,6 +14,7 @@ from relit_camera.base.images.image_files import read_display
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
+from relit_camera.live.publishing.what_is_shown import Shown
 from tests.replay.case import CASES, Case, CaseError, read_case
 from tests.replay.expectations import differences, read_pose, record
 from tests.replay.failures import keep
@@ -38,7 +39,7 @@ def played(count: int = 4, shade: int = 100) -> Played:
         picture = np.full((48, 64, 3), shade, np.uint8)
         picture[8:24, 8 + 4 * index : 24 + 4 * index] = 230
         pictures.append(picture)
-    frames = [ReplayedFrame(index, index / 24, None, {}) for index in range(count)]
+    frames = [ReplayedFrame(index, index / 24, None, Shown.RELIT, {}) for index in range(count)]
     return Played(frames, pictures, pictures, [])
 
 
@@ -199,7 +200,7 @@ def followed(poses: np.ndarray) -> Played:
         )
         for pose in poses
     ]
-    return Played([ReplayedFrame(i, i / 24, motion, {}) for i, motion in enumerate(motions)], [], [], [])
+    return Played([ReplayedFrame(i, i / 24, motion, Shown.RELIT, {}) for i, motion in enumerate(motions)], [], [], [])
 
 
 def test_a_turned_pose_is_found_and_named(tmp_path: Path) -> None:

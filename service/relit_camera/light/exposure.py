@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from relit_camera.base.array_types import Float32Array
 from relit_camera.base.images.color import LUMINANCE
 from relit_camera.light.light_map import LightMap, irradiance, total
 
@@ -25,3 +28,10 @@ def auto_exposure_scale(light_map: LightMap) -> float:
     mean = float(total(light_map) @ LUMINANCE) / 4
     reference = max(facing, _MIN_FRONT_FRACTION * mean)
     return WHITE_BALL_LUMINANCE / reference if reference > 0 else 1.0
+
+
+def facing_light(light_map: LightMap) -> Float32Array:
+    """The light (3,) of a white diffuse ball at the point that faces the camera, with the least share of above."""
+    return np.maximum(irradiance(light_map, (0.0, 0.0, 1.0)), _MIN_FRONT_FRACTION / 4 * total(light_map)).astype(
+        np.float32
+    )

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.config.look import Mode
-from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import Frame
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.matting import Matting
@@ -17,8 +15,9 @@ from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
 from relit_camera.face.tracking.interval_tracker import IntervalTracker
 from relit_camera.live.compositing.compositor import Compositor
 from relit_camera.live.modes.frame_fitting import fit_frame
-from relit_camera.live.modes.mode import FaceMismatch, ModeContext, ModeFactory, RenderedFrame, RenderMode, RenderTask
+from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderedFrame, RenderMode, RenderTask
 from relit_camera.live.modes.scene_relighting import SceneRelighting
+from relit_camera.live.publishing.what_is_shown import Situation, what_is_shown
 from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
 from relit_camera.live.render_quality import FULL_QUALITY, RenderQuality
 from relit_camera.live.scene.light_transition import LightTransition
@@ -30,8 +29,6 @@ from relit_camera.subject.subject import Subject
 
 __all__ = ["Pipeline", "RenderTask", "RenderedFrame", "subject_troubles"]
 
-log = logging.getLogger(__name__)
-
 
 def subject_troubles(scene: Scene) -> list[Degradation]:
     """What works less well than asked because nobody is chosen; nothing where somebody is."""
@@ -42,10 +39,6 @@ def subject_troubles(scene: Scene) -> list[Degradation]:
     return [Degradation(code=DegradationCode.NO_SUBJECT, what=shown, why="no subject is chosen", cure=cure)]
 
 
-FALLBACK_MODE = Mode.REENACT
-"""Shown where the mode asked for cannot go on with the live face; it must take any face."""
-
-
 @dataclass(frozen=True)
 class _ActiveMode:
     """The mode at work, and the subject that it was made for."""
@@ -54,15 +47,6 @@ class _ActiveMode:
     name: Mode
     relighter: Relighter
     mode: RenderMode
-
-
-@dataclass(frozen=True)
-class _MismatchedSubject:
-    """A subject whose face is not the live one, the mode that found out, and what it said."""
-
-    subject: Subject
-    found_in: Mode
-    mismatch: FaceMismatch
 
 
 class Pipeline:
@@ -108,10 +92,9 @@ class Pipeline:
         self._open_relighter = open_relighter
         self._light = LightTransition()
         self._open_matte = open_matte
-        self._compositor = Compositor(size, self._opened_matte, self.timer)
-        self._active: _ActiveMode | None = None
-        self._mismatch: _MismatchedSubject | None = None
         self._troubles: dict[str, Degradation] = {}
+        self._compositor = Compositor(size, self._opened_matte, self.timer, self._troubles)
+        self._active: _ActiveMode | None = None
 
     @property
     def troubles(self) -> list[Degradation]:
@@ -161,24 +144,14 @@ class Pipeline:
         scene = scene_now()
         motion = self._track(frame, scene, quality) if scene.subject else None
         scene = scene_now()
-        self._forget_mismatch_of_other(scene.subject)
         if scene.subject is None:
             return lambda: self._render_unrelit(frame, scene)
         if motion is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
             motion = self._track(frame, scene, quality)
-        if self._mismatch is not None and self._mismatch.mismatch.is_over(motion):
-            self._forget_mismatch()
-        name = self._mode_for(scene.look.mode)
-        task = self._mode(scene.subject, name).begin(frame, motion, scene, quality)
-        if isinstance(task, FaceMismatch):
-            self._note_mismatch(scene.subject, name, task)
-            task = self._mode(scene.subject, FALLBACK_MODE).begin(frame, motion, scene, quality)
-            if isinstance(task, FaceMismatch):
-                raise SubjectError(task.why, task.cure)
-        return task
+        return self._mode(scene.subject, scene.look.mode).begin(frame, motion, scene, quality)
 
     def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> FaceMotion:
-        in_ratio = self._mode_for(scene.look.mode) is Mode.RATIO
+        in_ratio = scene.look.mode is Mode.RATIO
         with self.timer.stage("track"):
             every = quality.ratio_track_every if in_ratio else quality.track_every
             self._live_tracker.set_interval(every, follow_lips=not in_ratio)
@@ -187,30 +160,13 @@ class Pipeline:
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:
         live = fit_frame(frame, self._size)
         image = self._compositor.composite_live(live.image, live, scene)
-        return RenderedFrame(image, None, scene, unlit=True)  # the publisher shows it only where that is allowed
+        shown = what_is_shown(Situation(scene.look.mode, has_subject=False, filmed_allowed=True))
+        # The publisher shows it only where that is allowed.
+        return RenderedFrame(image, None, scene, shown, unlit=True)
 
     def _opened_matte(self) -> Matting:
         self.on_opening()
         return self._open_matte()
-
-    def _mode_for(self, asked: Mode) -> Mode:
-        """The mode asked for, or the fallback where that has found the live face not to be this subject's."""
-        return FALLBACK_MODE if self._mismatch is not None and asked is self._mismatch.found_in else asked
-
-    def _forget_mismatch_of_other(self, subject: Subject | None) -> None:
-        """Drop what was found about the live face and another subject; without a subject nothing holds."""
-        if self._mismatch is not None and self._mismatch.subject is not subject:
-            self._forget_mismatch()
-
-    def _forget_mismatch(self) -> None:
-        self._mismatch = None
-        self._troubles.pop("mode", None)
-
-    def _note_mismatch(self, subject: Subject, name: Mode, mismatch: FaceMismatch) -> None:
-        log.warning("mode %s falls back to %s: %s; %s", name, FALLBACK_MODE, mismatch.why, mismatch.cure)
-        self._mismatch = _MismatchedSubject(subject, name, mismatch)
-        what = f"mode {FALLBACK_MODE} is shown in place of mode {name}"
-        self._troubles["mode"] = Degradation(what, mismatch.why, mismatch.cure, code=DegradationCode.FACE_MISMATCH)
 
     def _open_scene_relighting(self, subject: Subject, face: SourceFace) -> SceneRelighting:
         return SceneRelighting(subject, face, self._open_relighter(subject), self._light, self.timer)

@@ -26,7 +26,6 @@ from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
     BackgroundRequest,
     apply_exposure,
-    needs_matte,
     neutral_background,
 )
 from relit_camera.live.compositing.matted_frame import MattedFrame
@@ -163,9 +162,6 @@ def test_gain_halves_or_raises_light_and_nothing_clips() -> None:
 
 
 def test_a_live_picture_stays_as_it_is_with_none(room: MattedFrame) -> None:
-    assert not needs_matte(NoBackground(), Lighting())
-    assert needs_matte(NoBackground(), Lighting(background_gain_ev=-1))
-    assert needs_matte(BlurBackground(), Lighting())
     live = BackgroundRenderer(SIZE).live_background(BackgroundRequest(NoBackground(), Lighting()), room, 0.0)
     np.testing.assert_array_equal(live, room.image)
     dimmed = BackgroundRenderer(SIZE).live_background(

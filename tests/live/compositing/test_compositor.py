@@ -7,13 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from relit_camera.base.config.look import ColorBackground, Lighting, Look, NoBackground
+from relit_camera.base.config.look import BlurBackground, ColorBackground, Lighting, Look, NoBackground
+from relit_camera.base.errors import ModelError
 from relit_camera.base.images.color import linear_from_uint8, uint8_from_linear
 from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame
 from relit_camera.face.matting import Matting
 from relit_camera.live.compositing.compositor import Compositor
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.scene.scene import Scene
+from relit_camera.live.status.camera_status import Degradation, DegradationCode
 from relit_camera.live.status.stage_timing import StageTimer
 
 SIZE = (64, 48)
@@ -36,7 +38,7 @@ class LeftHalf:
 
 
 def compositor(timer: StageTimer | None = None, open_matte: Callable[[], Matting] = LeftHalf) -> Compositor:
-    return Compositor(SIZE, open_matte, timer or StageTimer())
+    return Compositor(SIZE, open_matte, timer or StageTimer(), {})
 
 
 def scene(background: object = GREEN, **lighting: object) -> Scene:
@@ -87,10 +89,44 @@ def test_a_new_background_is_faded_in() -> None:
     assert (made.composite_source(square(0), scene(blue, transition_s=1.0), 1.1) == [0, 0, 255]).all()
 
 
-def test_the_live_room_passes_without_a_matte() -> None:
-    relit, timer = relit_picture(), StageTimer()
-    assert compositor(timer, pytest.fail).composite_live(relit, live_frame(), scene(NoBackground())) is relit
+def test_a_kept_room_is_that_of_the_frame_and_the_person_that_of_the_picture() -> None:
+    relit, live = relit_picture(), live_frame()
+    picture = compositor().composite_live(relit, live, scene(NoBackground()))
+    np.testing.assert_array_equal(picture[:, :32], relit[:, :32])
+    np.testing.assert_array_equal(picture[:, 32:], live.image[:, 32:])
+
+
+def test_a_blurred_room_is_that_of_the_frame() -> None:
+    relit, live = np.full_like(relit_picture(), 250), live_frame()
+    picture = compositor().composite_live(relit, live, scene(BlurBackground()))
+    assert np.abs(picture[:, 48:].astype(int) - live.image[:, 48:]).max() <= 1
+
+
+def test_what_surely_is_the_person_is_left_out_by_no_matte() -> None:
+    """Cells of eight pixels; the matte has the left half alone."""
+    relit, live, sure = relit_picture(), live_frame(), np.zeros((6, 8), np.float32)
+    sure[2:4, 5:8] = 1
+    picture = compositor().composite_live(relit, live, scene(NoBackground()), sure)
+    assert (picture[20:28, 48:60] == relit[0, 0]).all()
+    assert (picture[:8, 40:] == live.image[0, 0]).all()
+
+
+def test_the_picture_as_filmed_in_its_own_room_needs_no_matte() -> None:
+    live, timer = live_frame(), StageTimer()
+    assert compositor(timer, pytest.fail).composite_live(live.image, live, scene(NoBackground())) is live.image
     assert "matte" not in timer.lap_ms()
+
+
+def test_a_room_that_cannot_be_parted_is_relit_with_the_person_and_that_is_told() -> None:
+    def missing() -> Matting:
+        raise ModelError("model selfie_landscape is missing", "relit models pull")
+
+    troubles: dict[str, Degradation] = {}
+    relit, made = relit_picture(), Compositor(SIZE, missing, StageTimer(), troubles)
+    assert made.composite_live(relit, live_frame(), scene(NoBackground())) is relit
+    assert [each.code for each in troubles.values()] == [DegradationCode.ROOM_NOT_PARTED]
+    with pytest.raises(ModelError):
+        made.composite_live(relit, live_frame(), scene(GREEN))
 
 
 def test_a_live_person_stands_before_the_chosen_background() -> None:
@@ -109,7 +145,7 @@ def test_background_gain_dims_the_room_and_not_the_person() -> None:
     relit = relit_picture()
     dimmed = scene(NoBackground(), **Lighting(background_gain_ev=-1).model_dump(include={"background_gain_ev"}))
     picture = compositor().composite_live(relit, live_frame(), dimmed)
-    expected = uint8_from_linear(linear_from_uint8(relit) / np.float32(2)).astype(int)
+    expected = uint8_from_linear(linear_from_uint8(live_frame().image) / np.float32(2)).astype(int)
     assert np.abs(picture[:, 40:] - expected[:, 40:]).max() <= 1
     np.testing.assert_array_equal(picture[:, :24], relit[:, :24])
 

@@ -23,16 +23,15 @@ from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.frame_fitting import fit_motion
 from relit_camera.live.modes.ratio_relighting import (
     BOX_CELLS,
-    NEAR,
+    FaceLight,
     RatioPlan,
     RatioRelighting,
     _cells_within,
     extrapolate_roots,
     fit_similarity,
-    near_person,
-    ratio_confidence,
 )
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate, RoomLightEstimator
+from relit_camera.live.modes.source_masks import NEAR, near_person, ratio_confidence
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from tests.live.people import SCHEME, close_up, face_of
 from tests.live.rooms import (
@@ -45,6 +44,9 @@ from tests.live.rooms import (
     relighter,
     still_under,
 )
+
+REST = np.array([0.5, 0.4, 0.3], np.float32)
+"""A factor for somebody whose face does not tell their light."""
 
 
 class KnownRoom:
@@ -74,7 +76,8 @@ def relit_live(
     pictures = ours.raised_lights(relit, relighter().relight(room.in_head_frame(motion.rotation)[None])[0])
     positions = ours.positions(motion, motion.pose, frame.size)
     span = landmark_scheme("mesh478").eye_span(motion.landmarks)
-    return ours.apply(RatioPlan(frame, motion.presence, room.gain, pictures, positions, span), blend)
+    face = FaceLight(room.gain, pictures, positions, span)
+    return ours.apply(RatioPlan(frame, REST, motion.presence, face), blend).image
 
 
 def aligned_and_not(image: DisplayImage) -> list[DisplayImage]:
@@ -83,8 +86,8 @@ def aligned_and_not(image: DisplayImage) -> list[DisplayImage]:
     assert motion.pose is not None
     pictures = ours.raised_lights(still_under(EVENING), still_under(WINDOW))
     positions, span = ours.positions(motion, motion.pose, frame.size), SCHEME.eye_span(motion.landmarks)
-    plan = RatioPlan(frame, 1.0, np.ones(3, np.float32), pictures, positions, span)
-    return [ours.apply(plan), ours.apply(ours.aligned(plan))]
+    plan = RatioPlan(frame, REST, 1.0, FaceLight(np.ones(3, np.float32), pictures, positions, span))
+    return [ours.apply(plan).image, ours.apply(ours.aligned(plan)).image]
 
 
 def test_a_collar_that_sits_elsewhere_is_relit_as_a_collar() -> None:
@@ -129,10 +132,16 @@ def test_nothing_is_aligned_by_whom_nobody_is_sure_of() -> None:
     assert motion.pose is not None
     pictures = ours.raised_lights(still_under(EVENING), still_under(WINDOW))
     positions, span = ours.positions(motion, motion.pose, frame.size), SCHEME.eye_span(motion.landmarks)
-    plan = RatioPlan(frame, 0.2, np.ones(3, np.float32), pictures, positions, span)
-    np.testing.assert_array_equal(ours.aligned(plan).positions.positions, positions.positions)
-    sure = replace(plan, presence=1.0)
-    assert np.abs(ours.aligned(sure).positions.positions - positions.positions).max() > 0.1
+    plan = RatioPlan(frame, REST, 0.2, FaceLight(np.ones(3, np.float32), pictures, positions, span))
+    np.testing.assert_array_equal(corrected(ours, plan), positions.positions)
+    assert np.abs(corrected(ours, replace(plan, presence=1.0)) - positions.positions).max() > 0.1
+
+
+def corrected(ours: RatioRelighting, plan: RatioPlan) -> np.ndarray:
+    """The positions of a plan once it is aligned."""
+    face = ours.aligned(plan).face
+    assert face is not None
+    return face.positions.positions
 
 
 def inner(picture: np.ndarray) -> np.ndarray:
@@ -204,17 +213,46 @@ def test_blend_goes_in_light_from_the_live_frame_to_the_relit_one(share: float) 
     assert error[np.maximum(image, shown(1.0)) < 230].max() <= 2
 
 
-@pytest.mark.parametrize("color", [None, (253, 180, 150)])
-def test_presence_eases_to_the_live_frame_as_it_is_shown(color: tuple[int, int, int] | None) -> None:
+def test_presence_eases_to_the_factor_of_a_person_whose_face_is_not_seen() -> None:
     image = live_picture(WINDOW)
-    image = image if color is None else np.full_like(image, color)
 
     def shown(presence: float) -> np.ndarray:
         motion = before_the_camera(presence=presence)
         return relit_live(relighting(WINDOW), still_under(EVENING), motion, live_frame(image, 0)).astype(int)
 
-    np.testing.assert_allclose(shown(0.0), image, atol=1)
-    np.testing.assert_allclose(shown(0.5), (shown(1.0) + image) / 2, atol=2)  # skin does not redden on the way
+    at_rest = display_from_linear(linear_from_uint8(image) * REST)
+    np.testing.assert_allclose(shown(0.0), at_rest, atol=1)
+    between = shown(0.5)
+    low, high = np.minimum(at_rest, shown(1.0)), np.maximum(at_rest, shown(1.0))
+    assert np.mean((between >= low - 3) & (between <= high + 3)) > 0.98
+
+
+def test_nobody_followed_is_the_factor_everywhere_and_no_source_image() -> None:
+    image = live_picture(WINDOW)
+    relit = relighting(WINDOW).apply(RatioPlan(live_frame(image, 0), REST))
+    np.testing.assert_allclose(relit.image.astype(int), display_from_linear(linear_from_uint8(image) * REST), atol=1)
+    assert relit.person is None
+
+
+def test_cells_tell_where_the_person_surely_is() -> None:
+    ours, motion, frame = relighting(WINDOW), before_the_camera(), live_frame(live_picture(WINDOW), 0)
+    assert motion.pose is not None
+    pictures = ours.raised_lights(still_under(EVENING), still_under(WINDOW))
+    positions = ours.positions(motion, motion.pose, frame.size)
+    face = FaceLight(np.ones(3, np.float32), pictures, positions, SCHEME.eye_span(motion.landmarks))
+    person = ours.apply(RatioPlan(frame, REST, 1.0, face)).person
+    assert person is not None
+    rows, columns = person.shape
+    assert person[rows // 2, columns // 2] > 0.95
+    assert person[-1].max() < 0.2  # of what goes on beyond the source image it tells nothing
+
+
+def test_the_mean_factor_is_that_of_the_whole_person() -> None:
+    ours = relighting(WINDOW)
+    pictures = ours.raised_lights(still_under(WINDOW) * np.array([0.5, 1.0, 2.0], np.float32), still_under(WINDOW))
+    np.testing.assert_allclose(ours.mean_factor(pictures, np.ones(3, np.float32)), [0.5, 1.0, 2.0], rtol=0.04)
+    doubled = ours.mean_factor(pictures, np.full(3, 2, np.float32))
+    np.testing.assert_allclose(doubled, [0.25, 0.5, 1.0], rtol=0.04)  # the frame is exposed twice as long
 
 
 def test_what_is_made_for_the_person_s_cells_alone_is_what_all_cells_would_give() -> None:
@@ -293,7 +331,8 @@ def test_the_rim_is_trusted_less_than_the_middle() -> None:
     matte = np.zeros((200, 100), np.float32)
     matte[50:, 20:80] = 1
     weight = ratio_confidence(matte)
-    assert weight[100:, 40:60].min() == pytest.approx(1, abs=1e-3)
+    assert weight[100:180, 40:60].min() == pytest.approx(1, abs=1e-3)
+    assert weight[-1].max() < 0.05  # the body goes on below, and of that the picture tells nothing
     assert weight[100, 20] < 0.1
     assert weight[matte == 0].max() < 0.1
 

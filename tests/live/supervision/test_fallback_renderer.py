@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from relit_camera.base.config.look import Lamp, Lighting, Look
+from relit_camera.base.config.look import Lamp, Lighting, Look, Mode
 from relit_camera.base.config.settings import Fallback
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.live.publishing.placeholder_image import Placeholder
 from relit_camera.live.scene.scene import Scene
 from relit_camera.live.supervision import fallback_renderer
-from relit_camera.live.supervision.fallback_renderer import KEPT_S, FallbackRenderer
+from relit_camera.live.supervision.fallback_renderer import HOLD_S, KEPT_S, FallbackRenderer
 from tests.live.people import LIVE_SIZE, live_frame, motion, person
 
 FAILED = np.full((LIVE_SIZE[1], LIVE_SIZE[0], 3), 7, np.uint8)
@@ -44,13 +45,15 @@ def at_once(work: Callable[[], Any]) -> Future[Any]:
     return future
 
 
-def renderer(start: Callable[[Callable[[], Any]], Future[Any]] = at_once) -> FallbackRenderer:
-    return FallbackRenderer(LIVE_SIZE, Fallback.PLACEHOLDER, Placeholder(lambda: FAILED), start)
+def renderer(
+    start: Callable[[Callable[[], Any]], Future[Any]] = at_once, instead: Fallback = Fallback.PLACEHOLDER
+) -> FallbackRenderer:
+    return FallbackRenderer(LIVE_SIZE, instead, Placeholder(lambda: FAILED), start)
 
 
 def lit_from(azimuth_deg: float) -> Scene:
     lighting = Lighting(environment=None, lamps=[Lamp(azimuth_deg=azimuth_deg)], transition_s=0)
-    return Scene(Look(lighting=lighting), subject=person())
+    return Scene(Look(lighting=lighting, mode=Mode.REENACT), subject=person())
 
 
 def shown(fallback: FallbackRenderer, frame: Frame, scene: Scene) -> DisplayImage:
@@ -120,4 +123,33 @@ def test_where_it_cannot_be_opened_the_placeholder_is_shown(monkeypatch: pytest.
             future.set_exception(error)
         return future
 
-    np.testing.assert_array_equal(shown(renderer(start), live_frame(), lit_from(0)), FAILED)
+    fallback, scene = renderer(start), lit_from(0)
+    assert fallback.picture(at(0.0), scene) is None
+    np.testing.assert_array_equal(shown(fallback, at(HOLD_S + 0.1), scene), FAILED)
+
+
+def at(captured_at: float) -> Frame:
+    return replace(live_frame(), captured_at=captured_at)
+
+
+@pytest.mark.parametrize(
+    ("instead", "allowed", "filmed"),
+    [(Fallback.PLACEHOLDER, True, False), (Fallback.LIVE, False, False), (Fallback.LIVE, True, True)],
+)
+def test_a_live_picture_is_held_and_nothing_of_the_source_image_appears(
+    instead: Fallback, allowed: bool, filmed: bool
+) -> None:
+    def never(_: Callable[[], Any]) -> Future[Any]:
+        raise AssertionError("the source image is not to be relit")
+
+    fallback = renderer(never, instead)
+    scene = Scene(Look(mode=Mode.RATIO), subject=person(), unlit_allowed=allowed)
+    fallback.note_live(at(0.0), None)
+    assert fallback.picture(at(2.0), scene) is None
+    assert fallback.picture(at(2.0 + HOLD_S - 0.1), scene) is None
+    picture = fallback.picture(at(2.0 + HOLD_S), scene)
+    assert picture is not None
+    assert picture.unlit is filmed
+    np.testing.assert_array_equal(picture.image, live_frame().image if filmed else FAILED)
+    fallback.note_live(at(20.0), None)
+    assert fallback.picture(at(21.0), scene) is None, "it begins anew after a picture"

@@ -16,6 +16,7 @@ from relit_camera.base.video.video_writer import VideoWriter
 from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.pipeline import Pipeline
+from relit_camera.live.publishing.what_is_shown import Shown
 from relit_camera.live.scene.scene import Scene
 
 
@@ -27,12 +28,14 @@ class ReplayedFrame:
         index: from 0 in presentation order.
         time_s: presentation time.
         motion: what the face did.
+        shown: the kind of picture that was made.
         stage_ms: milliseconds of each stage that it went through.
     """
 
     index: int
     time_s: float
     motion: FaceMotion | None
+    shown: Shown
     stage_ms: dict[str, float]
 
     def as_json(self) -> dict[str, object]:
@@ -42,6 +45,7 @@ class ReplayedFrame:
             "index": self.index,
             "time_s": round(self.time_s, 6),
             "state": str(self.motion.status) if self.motion else "none",
+            "shown": str(self.shown),
             "pose": {name: round(value, 4) for name, value in angles._asdict().items()} if angles else None,
             "stage_ms": {name: round(value, 3) for name, value in self.stage_ms.items()},
         }
@@ -78,7 +82,9 @@ def replay(
         files.callback(pipeline.close)
         for frame in reader:
             rendered = pipeline.process(frame, scene_at(frame.time_s))
-            frames.append(ReplayedFrame(frame.index, frame.time_s, rendered.motion, pipeline.timer.lap_ms()))
+            frames.append(
+                ReplayedFrame(frame.index, frame.time_s, rendered.motion, rendered.shown, pipeline.timer.lap_ms())
+            )
             watch(frame.index, frame.image, rendered.image)
             if writer:
                 writer.write(np.ascontiguousarray(rendered.image), frame.time_s)

@@ -10,6 +10,9 @@ import typer
 from relit_camera.cli.model_offer import Pull
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from relit_camera.app.replay.video_replay import ReplayedFrame
     from relit_camera.base.config.settings import RelitSettings
     from relit_camera.subject.subject import Subject
 
@@ -72,7 +75,6 @@ def replay(
     )
     info = probe_video(video)
     scene_controller = SceneController(settings.storage)
-    scene_controller.set_unlit_allowed(True)  # the result is a file of the person's own
     if instant:
         scene_controller.show_subject("instant", _instant_subject(video, settings))
     else:
@@ -120,7 +122,22 @@ def replay(
     for trouble in pipelines[0].troubles:
         print(f"relit: {trouble.what}: {trouble.why}; {trouble.cure}", file=sys.stderr)
     found = sum(1 for frame in frames if frame.motion and frame.motion.status == "found")
-    typer.echo(f"{out}: {len(frames)} frames, face found in {found}")
+    typer.echo(f"{out}: {len(frames)} frames, face found in {found}{_otherwise_shown(frames)}")
+
+
+def _otherwise_shown(frames: Sequence[ReplayedFrame]) -> str:
+    """What was shown in the frames without a face that tells its light: a clause each."""
+    from collections import Counter
+
+    from relit_camera.live.publishing.what_is_shown import Shown
+
+    words = {
+        Shown.LAST_LIGHT: "the person in their mean light",
+        Shown.PLACE_TINT: "the person in the tint of the place",
+        Shown.AT_REST: "the subject at rest",
+    }
+    counts = Counter(frame.shown for frame in frames)
+    return "".join(f"; {what} in {counts[kind]}" for kind, what in words.items() if counts[kind])
 
 
 def _instant_subject(video: Path, settings: RelitSettings) -> Subject:

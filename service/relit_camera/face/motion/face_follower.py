@@ -10,14 +10,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import TrackError
 from relit_camera.base.images.image_types import Points
 from relit_camera.base.rotations import Angles, Rotation, angles_from_rotation
 from relit_camera.face.face_state import FaceState, FaceStatus
 from relit_camera.face.head_pose import HeadPose, project, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
-from relit_camera.face.motion.motion_blending import Crossfade, Inertialization, RelativeMotion, zero_motion
+from relit_camera.face.motion.motion_blending import (
+    Crossfade,
+    EasedPresence,
+    Inertialization,
+    RelativeMotion,
+    zero_motion,
+)
 from relit_camera.face.motion.neutral_face import NeutralFace, NeutralFaceFinder, is_frontal
 from relit_camera.face.motion.one_euro_filter import (
     FACE_SMOOTHING,
@@ -109,7 +114,7 @@ class FaceFollower:
         self._landmarks: Points = np.zeros((0, 2), np.float32)
         self._pose: HeadPose | None = None
         self._followed = False
-        self._presence = 0.0
+        self._presence = EasedPresence(self._settings.ease_s)
         self._time_s: float | None = None
         self._jumps_back = 0
 
@@ -127,6 +132,7 @@ class FaceFollower:
         """
         if self._time_s is not None and time_s < self._time_s:
             self._jumps_back += 1
+        self._time_s = time_s
         followed = False
         if state.visible:
             self._measure(state, size, time_s)
@@ -138,7 +144,7 @@ class FaceFollower:
         self._followed = followed
         return FaceMotion(
             status=state.status,
-            presence=self._ease_presence(time_s),
+            presence=self._presence.update(followed, time_s),
             rotation=motion.rotation,
             translation=motion.translation,
             expression=motion.expression,
@@ -181,14 +187,6 @@ class FaceFollower:
         share = 1.0 if self._followed else REENTRY_FRACTION
         yaw, pitch, _ = angles_from_rotation(self._target.rotation)
         return abs(yaw) <= share * self._settings.reach_yaw_deg and abs(pitch) <= share * self._settings.reach_pitch_deg
-
-    def _ease_presence(self, time_s: float) -> float:
-        first, passed = self._time_s is None, 0.0 if self._time_s is None else max(time_s - self._time_s, 0.0)
-        self._time_s = time_s
-        # Nothing was shown before the first frame that a face in it would have to be eased from.
-        step = 1.0 if first else passed / self._settings.ease_s
-        self._presence = min(max(self._presence + (step if self._followed else -step), 0.0), 1.0)
-        return float(smoothstep(self._presence)) if 0 < self._presence < 1 else self._presence
 
 
 class _FaceSmoother:

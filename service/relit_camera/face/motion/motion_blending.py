@@ -112,3 +112,19 @@ class Inertialization(MotionTransition):
     def _blend(self, kept: RelativeMotion, target: RelativeMotion, share: float) -> RelativeMotion:
         rest = zero_motion(len(target.expression))
         return kept.toward(rest, share).after(target)
+
+
+class EasedPresence:
+    """How far a face is there, 0..1, eased over `ease_s` as it comes and goes."""
+
+    def __init__(self, ease_s: float) -> None:
+        self._ease_s = ease_s
+        self._time_s: float | None = None
+        self._share = 0.0
+
+    def update(self, there: bool, time_s: float) -> float:
+        """The presence in the next frame; at once 1 in the first of all, before which nothing was shown."""
+        step = 1.0 if self._time_s is None else max(time_s - self._time_s, 0.0) / self._ease_s
+        self._time_s = time_s
+        self._share = min(max(self._share + (step if there else -step), 0.0), 1.0)
+        return float(smoothstep(self._share)) if 0 < self._share < 1 else self._share

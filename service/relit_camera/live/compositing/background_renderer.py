@@ -154,11 +154,6 @@ class _BlurredRoom:
     time_s: float
 
 
-def needs_matte(background: Background, lighting: Lighting) -> bool:
-    """Whether a live picture has to be parted into person and room: not while it is shown as it is."""
-    return not isinstance(background, NoBackground) or lighting.background_gain_ev != 0
-
-
 class BackgroundRenderer:
     """Makes backgrounds of one size. One without live pixels is kept till it changes, and faded in. Not thread-safe."""
 

@@ -4,28 +4,50 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from relit_camera.base.config.look import BlurBackground
-from relit_camera.base.images.image_types import DisplayImage, Frame
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.config.look import BlurBackground, NoBackground
+from relit_camera.base.errors import ModelError
+from relit_camera.base.images.image_types import Alpha, DisplayImage, Frame
 from relit_camera.face.matting import Matting
 from relit_camera.live.compositing.alpha_compositing import over, replace_room, split_alpha
 from relit_camera.live.compositing.background_renderer import (
     BackgroundRenderer,
     BackgroundRequest,
-    needs_matte,
 )
 from relit_camera.live.compositing.matted_frame import MattedFrame
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.scene.scene import Scene
+from relit_camera.live.status.camera_status import Degradation, DegradationCode
 from relit_camera.live.status.stage_timing import StageTimer
+
+SURELY_PERSON = 0.8
+"""Confidence of the source image above which a cell is the person's, whatever the matte says."""
 
 
 class Compositor:
     """Composes pictures of one size. `composite_*` are for one thread."""
 
-    def __init__(self, size: tuple[int, int], open_matte: Callable[[], Matting], timer: StageTimer) -> None:
-        """`size` is (width, height); `open_matte` is called when a live person must first be parted from the room."""
+    def __init__(
+        self,
+        size: tuple[int, int],
+        open_matte: Callable[[], Matting],
+        timer: StageTimer,
+        troubles: dict[str, Degradation],
+    ) -> None:
+        """Set up.
+
+        Args:
+            size: (width, height).
+            open_matte: called when a live person must first be parted from the room.
+            timer: counts the stages.
+            troubles: where what works less well than asked is noted, under `matte`.
+        """
         self._background_renderer = BackgroundRenderer(size)
         self._matte: Matting | None = None
+        self._troubles = troubles
         self._open_matte = open_matte
         self._timer = timer
 
@@ -36,21 +58,62 @@ class Compositor:
         """
         return composite_source_image(self._background_renderer, layer, scene, now)
 
-    def composite_live(self, picture: DisplayImage, frame: Frame, scene: Scene) -> DisplayImage:
-        """The relit live picture of the output's size before its background; the same where the room stays as it is.
+    def composite_live(
+        self, picture: DisplayImage, frame: Frame, scene: Scene, person: NDArray[np.float32] | None = None
+    ) -> DisplayImage:
+        """The person of the relit live picture before the scene's background; both are of the output's size.
+
+        A room that is kept or blurred is that of the frame, as filmed. Where the person cannot be parted from it, since
+        the matting model is missing, a kept room is relit as the picture is.
+
+        Args:
+            picture: the relit live picture.
+            frame: the live frame.
+            scene: what to show.
+            person: (rows, columns) float32, how surely cells of the frame show the person, 0..1: the matte leaves out
+                nothing that is sure.
 
         Raises:
-            ModelError: the background must be parted from the person and the matting model is missing.
+            ModelError: another background needs the matting model, and it is missing.
         """
-        if not needs_matte(scene.look.background, scene.look.lighting):
+        kept = isinstance(scene.look.background, NoBackground)
+        if kept and picture is frame.image and scene.look.lighting.background_gain_ev == 0:
             return picture
         with self._timer.stage("matte"):
-            if self._matte is None:
-                self._matte = self._open_matte()
-            matted = MattedFrame(picture, self._matte.matte(frame))
-        background = self._background_renderer.live_background(_background_request(scene), matted, frame.time_s)
+            matte = self._person_matte(frame, required=not kept)
+        if matte is None:
+            return picture
+        if person is not None:
+            matte = np.maximum(matte, _sure_alpha(person, frame.size))
+        request = _background_request(scene)
+        background = self._background_renderer.live_background(request, MattedFrame(frame.image, matte), frame.time_s)
+        if kept:
+            return over(picture, matte, background)
         # A blurred room is this frame's own.
-        return replace_room(matted, background, in_place=isinstance(scene.look.background, BlurBackground))
+        return replace_room(
+            MattedFrame(picture, matte), background, in_place=isinstance(scene.look.background, BlurBackground)
+        )
+
+    def _person_matte(self, frame: Frame, required: bool) -> Alpha | None:
+        """The matte of the person in a frame; None where its model is missing, unless it is required."""
+        if self._matte is None and (required or "matte" not in self._troubles):
+            try:
+                self._matte = self._open_matte()
+            except ModelError as error:
+                if required:
+                    raise
+                what = "the room is lit as the person is"
+                code = DegradationCode.ROOM_NOT_PARTED
+                self._troubles["matte"] = Degradation(what, error.what, error.cure, code=code)
+            else:
+                self._troubles.pop("matte", None)
+        return None if self._matte is None else self._matte.matte(frame)
+
+
+def _sure_alpha(person: NDArray[np.float32], size: tuple[int, int]) -> Alpha:
+    """Alpha of `size` (width, height) for what cells surely show of the person."""
+    sure = np.clip((person - SURELY_PERSON) / (1 - SURELY_PERSON), 0, 1)
+    return np.asarray(cv2.resize((255 * sure).astype(np.uint8), size, interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
 def composite_source_image(

@@ -10,6 +10,7 @@ from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.compositing.compositor import Compositor
 from relit_camera.live.modes.scene_relighting import SceneRelighting
+from relit_camera.live.publishing.what_is_shown import Shown
 from relit_camera.live.reenactment.source_image import SourceFace
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
@@ -25,33 +26,20 @@ class RenderedFrame:
         image: uint8 sRGB of the output's size.
         motion: what the face did; None while there is no tracker or no subject.
         scene: that it was made for.
-        unlit: whether it is as filmed, or a part of it.
+        shown: the kind of picture.
+        unlit: whether the person is as filmed, in a part of it or in all.
     """
 
     image: DisplayImage
     motion: FaceMotion | None
     scene: Scene
+    shown: Shown = Shown.RELIT
     unlit: bool = False
 
 
 RenderTask = Callable[[], RenderedFrame]
 """The second half of a frame's work. Called once, in the order of the frames, maybe in another thread while the next
 frame is begun: it shares nothing with `begin` that changes."""
-
-
-@dataclass(frozen=True)
-class FaceMismatch:
-    """A mode's result where it cannot go on because the live face is not the subject's.
-
-    Attributes:
-        why: one clause with what was measured.
-        cure: what the person can do.
-        is_over: whether a later live face is the subject's after all; called with each frame's motion.
-    """
-
-    why: str
-    cure: str
-    is_over: Callable[[FaceMotion], bool] = lambda _: False
 
 
 @dataclass(frozen=True)
@@ -80,9 +68,7 @@ class ModeContext:
 class RenderMode(Protocol):
     """Makes pictures of one subject in one mode. Keeps state between frames; `begin` is called by one thread."""
 
-    def begin(
-        self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
-    ) -> RenderTask | FaceMismatch:
+    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
         """Do the first half of a frame's work, and return the second.
 
         A mode divides its work so that both halves take about as long: two frames are then at work at once.

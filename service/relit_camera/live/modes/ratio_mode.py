@@ -2,31 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 
-from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
+import numpy as np
+from numpy.typing import NDArray
+
+from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.base.rotations import Rotation
+from relit_camera.face.face_state import FaceStatus
 from relit_camera.face.motion.face_follower import FaceMotion
-from relit_camera.live.compositing.background_renderer import crossfade
+from relit_camera.face.motion.motion_blending import EasedPresence
 from relit_camera.live.modes.frame_fitting import fit_frame, fit_motion
-from relit_camera.live.modes.identity_check import IdentityCheck
-from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
-from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
-from relit_camera.live.modes.reenact_mode import blend_with_source
+from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
+from relit_camera.live.modes.ratio_relighting import FaceLight, RatioPlan, RatioRelighting
+from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.modes.scene_relighting import SceneRelighting
-from relit_camera.live.reenactment.reenactor import WarpedLayer
-from relit_camera.live.reenactment.rest_layer import RestLayer
+from relit_camera.live.publishing.what_is_shown import FacePresence, Situation, what_is_shown
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
+
+MOST_TURN_DEG, RETURN_TURN_DEG = 60.0, 54.0
+"""Angle between nose and camera from which landmarks are a guess, and below which they are believed again."""
+EASE_S = 0.5
+"""Seconds over which the light of a face that comes or goes is eased to that of a person whose face is not seen."""
+REST_S = 0.3
+"""Time constant with which the factor of a person whose face is not seen follows what is known."""
 
 
 class RatioMode:
     """See `RenderMode`.
 
-    Where no face is followed, or not yet, the live picture would be shown as it is, and a stranger in the light of
-    another's face. Unless the scene allows that, the subject's relit picture at rest takes its place, as mode reenact
-    shows it while it searches, until the live face has passed for the subject's; between them it is eased.
+    Where the light of the face cannot be told, because it is lost, in profile or not yet seen, the person goes on in
+    the mean factor that they had, and before one is known in the mean tint of the place: they are never shown as
+    filmed.
     """
 
     def __init__(self, context: ModeContext, relighting: RatioRelighting, compared: SceneRelighting) -> None:
@@ -40,97 +48,85 @@ class RatioMode:
         self._context = context
         self._relighting = relighting
         self._compared = compared
-        self._identity = IdentityCheck(context.face)
-        self._at_rest = RestLayer(context.subject, context.size)
-        self._last_rest: tuple[LinearImage, float, WarpedLayer] | None = None
+        self._presence = EasedPresence(EASE_S)
+        self._followed = False
+        self._last: tuple[RoomLightEstimate, Rotation] | None = None
+        self._rest: NDArray[np.float32] | None = None
+        self._rest_s = 0.0
 
-    def begin(
-        self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality
-    ) -> RenderTask | FaceMismatch:
+    def begin(self, frame: Frame, motion: FaceMotion, scene: Scene, quality: RenderQuality) -> RenderTask:
         """See `RenderMode.begin`: relights the source image in both lights, and finds where it lies on the live face.
 
         The task multiplies and composes.
         """
         live = fit_frame(frame, self._context.size)
         fitted = fit_motion(motion, frame.size, self._context.size)  # what is given on is that of the frame
-        if scene.unlit_allowed:
-            plan = self._plan(fitted, live, scene, quality)
-            return plan if isinstance(plan, FaceMismatch) else partial(self._render, plan, live, motion, scene)
-        followed = None if motion.presence <= 0 else self._plan(fitted, live, scene, quality)
-        if isinstance(followed, FaceMismatch):
-            return followed
-        if followed is None:
-            self._identity.forget()
-        else:
-            followed = replace(followed, presence=min(followed.presence, self._identity.recognized(frame.time_s)))
-            if followed.presence >= 1:
-                self._last_rest = None  # megabytes that are shown no more
-                return partial(self._render, followed, live, motion, scene)
-        at_rest = self._context.scene_relighting.relight(
-            scene, Rotation.identity(), frame.time_s, quality.relight_every
-        )
-        return partial(self._render_eased, followed, at_rest, live, motion, scene)
+        plan = self._plan(fitted, live, scene, quality)
+        return partial(self._render, plan, live, motion, scene)
 
-    def _render(self, plan: RatioPlan | None, live: Frame, motion: FaceMotion, scene: Scene) -> RenderedFrame:
-        """The relit live picture; as far as no face is followed, and where `split` says so, the live one."""
-        lighting = scene.look.lighting
-        image = split_view(self._relit_live(plan, live, scene), live.image, lighting.split)
-        unlit = plan is None or plan.presence < 1 or scene.look.shows_filmed
-        return RenderedFrame(image, motion, scene, unlit)
-
-    def _render_eased(
-        self, plan: RatioPlan | None, at_rest: LinearImage, live: Frame, motion: FaceMotion, scene: Scene
-    ) -> RenderedFrame:
-        """The relit live picture as far as a face is followed; for the rest the subject at rest, relit."""
-        context = self._context
+    def _render(self, plan: RatioPlan, live: Frame, motion: FaceMotion, scene: Scene) -> RenderedFrame:
+        """The relit live picture, and where `split` says so the live one."""
+        context, lighting = self._context, scene.look.lighting
         with context.timer.stage("move"):
-            layer = self._rest_layer(at_rest, scene.look.lighting.blend)
+            relit = self._relighting.apply(plan, lighting.blend)
         with context.timer.stage("compose"):
-            image = context.compositor.composite_source(layer, scene, live.time_s)
-        if plan is not None and plan.presence > 0:
-            image = crossfade(image, self._relit_live(replace(plan, presence=1.0), live, scene), plan.presence)
-        return RenderedFrame(image, motion, scene, scene.look.shows_filmed)
+            sure = relit.person if plan.presence >= 1 else None  # a face that is lost is there no more
+            image = context.compositor.composite_live(relit.image, live, scene, sure)
+        if plan.presence > 0:
+            seen = FacePresence.FOLLOWED
+        else:
+            seen = FacePresence.NOT_YET if self._last is None else FacePresence.LOST
+        shown = what_is_shown(Situation(scene.look.mode, seen))
+        image = split_view(image, live.image, lighting.split)
+        return RenderedFrame(image, motion, scene, shown, unlit=scene.look.shows_filmed)
 
-    def _rest_layer(self, at_rest: LinearImage, blend: float) -> WarpedLayer:
-        """The subject at rest; the previous layer again while neither the relit picture nor the blend has changed."""
-        last = self._last_rest
-        if last is None or last[0] is not at_rest or last[1] != blend:
-            layer = self._at_rest.render(blend_with_source(self._context.subject, at_rest, blend))
-            last = self._last_rest = at_rest, blend, layer
-        return last[2]
-
-    def _relit_live(self, plan: RatioPlan | None, live: Frame, scene: Scene) -> DisplayImage:
-        with self._context.timer.stage("move"):
-            picture = live.image if plan is None else self._relighting.apply(plan, scene.look.lighting.blend)
-        with self._context.timer.stage("compose"):
-            return self._context.compositor.composite_live(picture, live, scene)
-
-    def _plan(
-        self, motion: FaceMotion, frame: Frame, scene: Scene, quality: RenderQuality
-    ) -> RatioPlan | FaceMismatch | None:
-        """What must be known to relight the frame; None without a face."""
-        context, relighting, pose = self._context, self._relighting, motion.pose
-        if pose is None:
-            return None
-        with context.timer.stage("room"):
-            room = relighting.room_light.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
-            mismatch = self._identity.check(motion, room.residual, frame.time_s)
-        if mismatch is not None:
-            return mismatch
+    def _plan(self, motion: FaceMotion, frame: Frame, scene: Scene, quality: RenderQuality) -> RatioPlan:
+        """What must be known to relight the frame."""
+        context, relighting = self._context, self._relighting
+        followed = self._is_followed(motion)
+        presence = self._presence.update(followed, frame.time_s)
+        if followed and motion.pose is not None:
+            rotation = motion.pose.rotation * context.face.pose.rotation.inv()
+            with context.timer.stage("room"):
+                self._last = (
+                    relighting.room_light.update(frame.image, motion.landmarks, rotation, frame.time_s),
+                    rotation,
+                )
+        if self._last is None:
+            return RatioPlan(frame, self._eased_rest(self._compared.place_tint(scene, frame.time_s), frame.time_s))
+        room, rotation = self._last
         pictures = self._compared.compare(
             scene,
-            motion.rotation,
+            rotation,
             frame.time_s,
             room.light_map,
             room.in_head_frame,
             relighting.raised_lights,
             quality.relight_every,
         )
+        rest = self._eased_rest(relighting.mean_factor(pictures, room.gain), frame.time_s)
+        if presence <= 0 or motion.pose is None:
+            return RatioPlan(frame, rest)
         with context.timer.stage("follow"):
-            positions = relighting.positions(motion, pose, frame.size)
+            positions = relighting.positions(motion, motion.pose, frame.size)
             eye_distance = context.face.scheme.eye_span(motion.landmarks)
-            plan = RatioPlan(frame, float(motion.presence), room.gain, pictures, positions, eye_distance)
-            return relighting.aligned(plan)
+            face = FaceLight(room.gain, pictures, positions, eye_distance)
+            return relighting.aligned(RatioPlan(frame, rest, presence, face))
+
+    def _is_followed(self, motion: FaceMotion) -> bool:
+        """Whether the face tells its light: it is seen, and not in profile."""
+        limit = MOST_TURN_DEG if self._followed else RETURN_TURN_DEG
+        seen = motion.status is not FaceStatus.LOST and motion.pose is not None
+        self._followed = seen and motion.pose is not None and motion.pose.turn_deg <= limit
+        return self._followed
+
+    def _eased_rest(self, factor: NDArray[np.float32], time_s: float) -> NDArray[np.float32]:
+        """The factor, eased toward it from that of the last frame."""
+        passed, self._rest_s = max(time_s - self._rest_s, 0.0), time_s
+        if self._rest is None:
+            self._rest = factor
+        self._rest = self._rest + (factor - self._rest) * np.float32(1 - np.exp(-passed / REST_S))
+        return self._rest
 
 
 def split_view(relit: DisplayImage, live: DisplayImage, share: float) -> DisplayImage:

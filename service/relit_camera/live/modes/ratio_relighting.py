@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Mask, Points
+from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage, Points
 from relit_camera.base.images.light_multiplication import POWER, light_of_root, multiply_light, root_of_light
 from relit_camera.base.images.temporal_noise import TemporalNoiseFilter
 from relit_camera.base.rotations import Rotation
@@ -29,7 +29,8 @@ from relit_camera.live.modes.live_detail import (
     smoothed,
 )
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
-from relit_camera.live.reenactment.control_points import control_points, feature_landmarks, head_and_shoulder_anchors
+from relit_camera.live.modes.source_masks import inside_face, limits, near_person, ratio_confidence, still_skin
+from relit_camera.live.reenactment.control_points import control_points, head_and_shoulder_anchors
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.first_order_reenactor import face_and_head_flow
 from relit_camera.live.reenactment.mesh.face_mesh import triangulate_face
@@ -42,14 +43,8 @@ RATIO_FLOOR = 0.03
 """Share of the room-lit face's mean that is added to both sides of the ratio: shadows stay bounded."""
 MIN_CHANNEL_MEAN = 1e-3
 """Linear: the least mean of a channel under the room's light that counts; three sRGB codes."""
-MOVING_REACH, SOFT_PX = 1.25, 1.5
-"""By how much the outlines of eyes and lips are enlarged, and how soft the borders are, in source pixels."""
-EDGE_MARGIN = 0.02
-"""Share of the source image's width at the matte's edge that is not trusted."""
 SURELY_THERE = 0.5
 """Presence up to which a frame does not tell where the person lies: the face may be lost, or not yet found."""
-NEAR = 0.6
-"""Eye distances beyond the outline up to which noise is kept from being shown."""
 RATIO_CELLS = 120
 """The ratio is made for cells of the frame, about so many on its shorter side: it is softer than the source image."""
 SMALL_FRAME_PX = 300
@@ -59,8 +54,8 @@ BOX_CELLS = 8
 EXTRAPOLATION_CELLS, WIDE_REDUCTION = 45, 4
 """The extrapolation beyond the person is computed for so many there, and its wide blurs for fewer by a factor."""
 
-_NO_LIMIT = 1e9
-"""Source pixels, more than any picture has."""
+FACTORS = (0.02, 12.0)
+"""Limits of the mean factor of light."""
 
 
 class RoomLight(Protocol):
@@ -72,24 +67,51 @@ class RoomLight(Protocol):
 
 
 @dataclass(frozen=True)
-class RatioPlan:
-    """What is known of one live frame before it is relit.
+class FaceLight:
+    """The light on a face that is followed in a live frame.
 
     Attributes:
-        frame: the live frame.
-        presence: how far it is relit, 0..1: 0 shows it as it is.
-        gain: (3,) float32 by which its exposure differs from that of the ratio, see `RoomLightEstimate`.
+        gain: (3,) float32 by which the frame's exposure differs from that of the ratio, see `RoomLightEstimate`.
         pictures: (2 · height, width, 3) float32, see `RatioRelighting.raised_lights`.
         positions: where cells of some pixels of the frame lie in the source image.
         eye_distance: in the frame, pixels.
     """
 
-    frame: Frame
-    presence: float
     gain: NDArray[np.float32]
     pictures: NDArray[np.float32]
     positions: PositionGrid
     eye_distance: float
+
+
+@dataclass(frozen=True)
+class RatioPlan:
+    """What is known of one live frame before it is relit.
+
+    Attributes:
+        frame: the live frame.
+        rest: (3,) float32 factor of light for a person whose face does not tell their light.
+        presence: how far the face tells it, 0..1.
+        face: what it tells; None where nobody is followed.
+    """
+
+    frame: Frame
+    rest: NDArray[np.float32]
+    presence: float = 0.0
+    face: FaceLight | None = None
+
+
+@dataclass(frozen=True)
+class RelitFrame:
+    """A live frame in another light.
+
+    Attributes:
+        image: uint8 sRGB.
+        person: (rows, columns) float32, how surely cells of the frame show the person, by what lies there in the source
+            image, 0..1; None where nobody is followed.
+    """
+
+    image: DisplayImage
+    person: NDArray[np.float32] | None
 
 
 class RatioRelighting:
@@ -120,7 +142,7 @@ class RatioRelighting:
         self._inside = (confidence > 0.5).astype(np.uint8)
         self._confidence = confidence
         near = near_person(confidence, face.scheme.eye_span(face.landmarks))
-        self._person, self._near = _limits(confidence), _limits(near)
+        self._person, self._near = limits(confidence), limits(near)
         self._parts = cv2.merge([confidence, still_skin(face), inside_face(face), near])
         self._alignment = LiveAlignment(face)
         self._noise = TemporalNoiseFilter()
@@ -141,6 +163,11 @@ class RatioRelighting:
             cv2.threshold(picture, 0, 0, cv2.THRESH_TOZERO, dst=half)
         return np.asarray(cv2.add(both, floor, dst=both), np.float32)
 
+    def mean_factor(self, pictures: NDArray[np.float32], gain: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The factor (3,) by which the light of the whole person is multiplied; arguments as in `FaceLight`."""
+        relit, under_room = (np.array(cv2.mean(half, self._inside)[:3]) for half in np.split(pictures, 2))
+        return np.clip(relit / np.maximum(under_room * gain, MIN_CHANNEL_MEAN), *FACTORS).astype(np.float32)
+
     def positions(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> PositionGrid:
         """Where a live frame of `size` (width, height) lies in the source image.
 
@@ -149,47 +176,70 @@ class RatioRelighting:
             pose: of the head in the frame.
             size: of the frame.
         """
-        step = 1 if min(size) < SMALL_FRAME_PX else round(min(size) / RATIO_CELLS)
-        return self._warp(motion, pose, size).grid((0, 0, *size), step)
+        return self._warp(motion, pose, size).grid((0, 0, *size), _cell_side(size))
 
     def aligned(self, plan: RatioPlan) -> RatioPlan:
         """The same plan, its positions corrected by what the frame shows; see `live_alignment`."""
+        if plan.face is None:
+            return plan
+        face, positions = plan.face, plan.face.positions
         if plan.presence > SURELY_THERE and self._alignment.is_due(plan.frame.time_s):
-            step = plan.positions.step
-            nodes = plan.positions.nodes() - np.float32(0.5)
+            nodes = positions.nodes() - np.float32(0.5)
             left, top, right, bottom = box = _cells_within(nodes, *self._person)
             looks = nodes[top:bottom, left:right]
             confidence = cv2.remap(self._confidence, looks, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-            live, brightest = live_cells(plan.frame.image, step, box)
+            live, brightest = live_cells(plan.frame.image, positions.step, box)
             confidence[overexposed(brightest)] = 0
-            cells = ComparedCells(live, _under_room(plan, looks), confidence, looks, plan.eye_distance / step)
+            unit = face.eye_distance / positions.step
+            cells = ComparedCells(live, _under_room(face, looks), confidence, looks, unit)
             self._alignment.update(cells, plan.frame.time_s)
-        return replace(plan, positions=self._alignment.corrected(plan.positions))
+        return replace(plan, face=replace(face, positions=self._alignment.corrected(positions)))
 
-    def apply(self, plan: RatioPlan, blend: float = 1.0) -> DisplayImage:
-        """The planned frame in the scene's light, uint8 sRGB.
+    def apply(self, plan: RatioPlan, blend: float = 1.0) -> RelitFrame:
+        """The planned frame in the scene's light.
 
         `blend` is how far, in light: 0 gives the frame itself. Its brightest codes are taken for no more light than
         sRGB says the further it is relit: more is a guess, which the ratio would show as red blotches where skin is red
-        first. Noise of the frame is removed over time in any case.
+        first. Noise of the frame is removed over time in any case, where a face is followed.
         """
-        step = plan.positions.step
+        image, step = plan.frame.image, _cell_side(plan.frame.size)
+        rows, columns = (-(-side // step) for side in image.shape[:2])
+        factor = np.empty((rows, columns, 3), np.float32)
+        factor[:] = root_of_light(plan.rest[None])[0]
+        added, person = np.zeros_like(factor), None
+        if plan.face is not None and plan.presence > 0:
+            image, told, more, person = self._face_cells(plan.frame, plan.face, whole=blend < 1)
+            factor = cv2.addWeighted(told, plan.presence, factor, 1 - plan.presence, 0)
+            added = more * np.float32(plan.presence)
+        if blend < 1:
+            live, _ = live_cells(image, step, (0, 0, columns, rows))
+            factor, added = blend_toward_live(np.asarray(factor, np.float32), added, live, blend)
+        return RelitFrame(multiply_light(image, factor, step, as_shown=1 - blend, added=added), person)
+
+    def _face_cells(
+        self, frame: Frame, face: FaceLight, whole: bool
+    ) -> tuple[DisplayImage, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+        """The frame with less noise; roots of the factor and what is added, (rows, columns, 3); the person, see above.
+
+        What is near the person is computed, or with `whole` all cells.
+        """
+        step = face.positions.step
         # cv2 counts pixel centers as integers: x_ours = x_cv + ½.
-        nodes = plan.positions.nodes() - np.float32(0.5)
-        box = _cells_within(nodes, *self._near) if blend >= 1 else (0, 0, nodes.shape[1], nodes.shape[0])
+        nodes = face.positions.nodes() - np.float32(0.5)
+        box = (0, 0, nodes.shape[1], nodes.shape[0]) if whole else _cells_within(nodes, *self._near)
         left, top, right, bottom = box
         inside = np.s_[top:bottom, left:right]
-        image = self._noise.filtered(plan.frame.image, _pixels_of(box, step, plan.frame.size))
+        image = self._noise.filtered(frame.image, _pixels_of(box, step, frame.size))
         relit, parts = (
             cv2.remap(each, nodes[inside], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-            for each in (np.split(plan.pictures, 2)[0], self._parts)
+            for each in (np.split(face.pictures, 2)[0], self._parts)
         )
         # Roots, because the step between two of them is about as visible anywhere.
-        relit, under_room = root_of_light(relit), _under_room(plan, nodes[inside])
+        relit, under_room = root_of_light(relit), _under_room(face, nodes[inside])
         live, brightest = live_cells(image, step, box)
-        confidence, skin, face, near = cv2.split(parts)
-        source = SourceCells(relit, under_room, confidence, skin, face, near)
-        unit = plan.eye_distance / step
+        confidence, skin, on_face, near = cv2.split(parts)
+        source = SourceCells(relit, under_room, confidence, skin, on_face, near)
+        unit = face.eye_distance / step
         smooth = smoothed(live, unit)
         cells = blend_cells(live, smooth, brightest, source, unit)
         beside = (top, nodes.shape[0] - bottom, left, nodes.shape[1] - right)
@@ -201,15 +251,8 @@ class RatioRelighting:
         calm = cv2.multiply(factor[inside], cv2.cvtColor(noise, cv2.COLOR_GRAY2RGB))
         factor[inside] -= calm
         added += cv2.multiply(calm, smooth)
-        if blend < 1:
-            factor, added = blend_toward_live(factor, added, live, blend)
-        added = cv2.copyMakeBorder(added, *beside, cv2.BORDER_CONSTANT)
-        shown = multiply_light(image, factor, step, as_shown=1 - blend, added=added)
-        if plan.presence < 1:
-            # Where nobody is tracked with confidence the picture eases back to the live one, as both are shown:
-            # in linear light that guess would be in the mixture.
-            shown = cv2.addWeighted(shown, plan.presence, plan.frame.image, 1 - plan.presence, 0)
-        return np.asarray(shown, np.uint8)
+        added, person = (cv2.copyMakeBorder(each, *beside, cv2.BORDER_CONSTANT) for each in (added, confidence))
+        return image, factor, np.asarray(added, np.float32), np.asarray(person, np.float32)
 
     def _warp(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> Warp:
         """The source image as it lies on the live face of a frame of `size`.
@@ -227,14 +270,19 @@ class RatioRelighting:
         return Warp(source_from_live, flow)
 
 
-def _under_room(plan: RatioPlan, looks: NDArray[np.float32]) -> NDArray[np.float32]:
+def _cell_side(size: tuple[int, int]) -> int:
+    """The side in pixels of a cell of frames of `size` (width, height)."""
+    return 1 if min(size) < SMALL_FRAME_PX else round(min(size) / RATIO_CELLS)
+
+
+def _under_room(face: FaceLight, looks: NDArray[np.float32]) -> NDArray[np.float32]:
     """Roots (rows, columns, 3) of what the source image has under the room's light, in the frame's exposure.
 
     With what `RatioRelighting.raised_lights` adds. `looks` (rows, columns, 2) are source pixels, as OpenCV counts.
     """
-    picture = np.split(plan.pictures, 2)[1]
+    picture = np.split(face.pictures, 2)[1]
     light = cv2.remap(picture, looks, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return root_of_light(np.asarray(cv2.multiply(light, (*map(float, plan.gain), 1.0)), np.float32))
+    return root_of_light(np.asarray(cv2.multiply(light, (*map(float, face.gain), 1.0)), np.float32))
 
 
 def _cells_within(nodes: NDArray[np.float32], low: tuple[float, ...], high: tuple[float, ...]) -> Box:
@@ -263,54 +311,6 @@ def as_large_as_needed(subject: Subject, face: SourceFace) -> tuple[Subject, Sou
     if min(subject.size) < 2 * RATIO_CELLS:
         return subject, face
     return half_size_subject(subject), half_size_face(face)
-
-
-def ratio_confidence(matte: Mask) -> Mask:
-    """How far the ratio counts, 0..1: in the matte, less toward its edge, whose rim light is not the live picture's."""
-    reach = max(round(EDGE_MARGIN * matte.shape[1]), 1)
-    inner = cv2.erode(matte, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1)))
-    return np.asarray(cv2.GaussianBlur(inner, (0, 0), reach / 2), dtype=np.float32)
-
-
-def near_person(confidence: Mask, eye_distance: float) -> Mask:
-    """Where the person is, or is as soon as they turn, since a turned head is wider, 0..1: up to NEAR from the outline.
-
-    Args:
-        confidence: where the source image shows them.
-        eye_distance: in its pixels.
-    """
-    blurred = cv2.GaussianBlur(confidence, (0, 0), NEAR / 1.28 * eye_distance, borderType=cv2.BORDER_REPLICATE)
-    # Beside a straight outline a blur has fallen to a tenth after 1.28 sigma.
-    return np.asarray(np.maximum(confidence, np.clip((blurred - 0.1) / 0.3, 0, 1)), np.float32)
-
-
-def still_skin(face: SourceFace) -> Mask:
-    """Where the source image shows what the live picture shows too, 0..1: not eyes and lips, which open and close."""
-    skin = np.ones(face.size[::-1], np.float32)
-    for feature in feature_landmarks(face.scheme):
-        outline = cv2.convexHull(face.landmarks[list(feature)])[:, 0]
-        grown = outline.mean(axis=0) + MOVING_REACH * (outline - outline.mean(axis=0))
-        cv2.fillConvexPoly(skin, np.round(grown).astype(np.int32), 0.0)
-    return np.asarray(cv2.GaussianBlur(skin, (0, 0), SOFT_PX), np.float32)
-
-
-def _limits(mask: Mask) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """The least and the largest x and y, as OpenCV counts, whose surroundings are in a mask of the source image.
-
-    Where that is at a border of the picture, which is repeated beyond, there is no limit.
-    """
-    left, top, width, height = cv2.boundingRect((mask > 0).astype(np.uint8))
-    low, high = np.array([left, top]) - 1.0, np.array([left + width, top + height], np.float64)
-    low[low < 0] = -_NO_LIMIT
-    high[high >= mask.shape[::-1]] = _NO_LIMIT
-    return tuple(low), tuple(high)
-
-
-def inside_face(face: SourceFace) -> Mask:
-    """Where the source image shows the face, 0..1."""
-    drawn = np.zeros(face.size[::-1], np.float32)
-    cv2.fillPoly(drawn, [np.round(face.landmarks[list(face.scheme.oval)]).astype(np.int32)], 1.0)
-    return np.asarray(cv2.GaussianBlur(drawn, (0, 0), SOFT_PX), np.float32)
 
 
 def fit_similarity(points: NDArray[np.float64], onto: NDArray[np.floating]) -> NDArray[np.float64]:

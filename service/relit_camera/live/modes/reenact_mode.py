@@ -8,6 +8,7 @@ from relit_camera.base.images.color import linear_from_uint8
 from relit_camera.base.images.image_types import Frame, LinearImage
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
+from relit_camera.live.publishing.what_is_shown import FacePresence, Situation, what_is_shown
 from relit_camera.live.reenactment.reenactor import Reenactor
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
@@ -33,7 +34,8 @@ class ReenactMode:
                 layer = warp(blend_with_source(context.subject, relit, scene.look.lighting.blend))
             with timer.stage("compose"):
                 image = context.compositor.composite_source(layer, scene, frame.time_s)
-            return RenderedFrame(image, motion, scene)
+            face = FacePresence.FOLLOWED if motion.presence > 0 else FacePresence.LOST
+            return RenderedFrame(image, motion, scene, what_is_shown(Situation(scene.look.mode, face)))
 
         return render
 

@@ -16,6 +16,7 @@ from relit_camera.base.easing import smoothstep
 from relit_camera.base.images.image_types import LinearImage, Mask
 from relit_camera.base.rotations import Rotation
 from relit_camera.face.head_pose import project
+from relit_camera.light.exposure import WHITE_BALL_LUMINANCE, facing_light
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
 from relit_camera.live.modes.turn_extrapolation import TurnExtrapolation
@@ -99,6 +100,12 @@ class SceneRelighting:
             return self._relit.picture(
                 rotation, light, None, every, lambda: self._head_and_body(self._scene_light(light, rotation))[0]
             )
+
+    def place_tint(self, scene: Scene, time_s: float) -> NDArray[np.float32]:
+        """The factor (3,) that a white ball facing the camera has in the scene's light, where 0.8 is 1."""
+        with self._timer.stage("light"):
+            light = self._light.update(scene, time_s)
+        return facing_light(light) / np.float32(WHITE_BALL_LUMINANCE)
 
     def compare(
         self,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart, return_freed_memory
+from relit_camera.base.config.look import Mode
 from relit_camera.base.config.settings import Fallback
 from relit_camera.base.errors import NotFoundError
 from relit_camera.base.images.image_types import DisplayImage, Frame, LinearImage
@@ -22,6 +23,7 @@ from relit_camera.light.light_map import LightMap
 from relit_camera.live.compositing.background_renderer import BackgroundRenderer
 from relit_camera.live.compositing.compositor import composite_source_image
 from relit_camera.live.publishing.placeholder_image import Placeholder
+from relit_camera.live.publishing.what_is_shown import Rendering, Shown, Situation, what_is_shown
 from relit_camera.live.reenactment.motion_transfer import split_body_motion
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.reenactment.source_image import Cutout, SourceFace
@@ -48,8 +50,8 @@ class FallbackPicture:
     unlit: bool = False
 
 
-OPENING_S = 10.0
-"""Seconds for which the last picture is shown while the relighter is opened."""
+HOLD_S = 10.0
+"""For so long the last picture is held while nothing better can be shown."""
 KEPT_S = 10.0
 """For so long the relit source image is kept after its last use: on a busy computer it is soon needed again."""
 
@@ -64,11 +66,10 @@ def in_a_thread(work: Callable[[], _RelitSource]) -> Future[_RelitSource]:
 
 
 class FallbackRenderer:
-    """Renders without tracker and reenactor: the subject's source image, relit as the scene says.
+    """Gives what `what_is_shown` says while no picture is rendered. Not thread-safe.
 
-    It moves aside and nearer with the head, where that was tracked before; else it is at rest. Where there is no
-    subject, or where that fails too, it gives the placeholder, or where both settings and scene allow it the live
-    picture. Not thread-safe.
+    In mode reenact it renders without tracker and reenactor: the subject's source image, relit as the scene says. It
+    moves aside and nearer with the head, where that was tracked before; else it is at rest.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class FallbackRenderer:
         fallback: Fallback,
         placeholder: Placeholder,
         start: Callable[[Callable[[], _RelitSource]], Future[_RelitSource]] = in_a_thread,
+        hold_s: float = HOLD_S,
     ) -> None:
         """Set up; nothing is rendered yet.
 
@@ -85,24 +87,28 @@ class FallbackRenderer:
             fallback: what is shown where the source image cannot be relit.
             placeholder: of the output's size.
             start: begins to open the relighter; whoever asks for pictures does not wait for it.
+            hold_s: for so long the last picture is held, where nothing better can be shown.
         """
         self._size, self._fallback, self._placeholder, self._start = size, fallback, placeholder, start
+        self._hold_s = hold_s
         self._background_renderer = BackgroundRenderer(size)
         self._light = LightTransition()
         self._head = HeadMovement()
         self._source: _RelitSource | None = None
         self._opening: tuple[Subject, Future[_RelitSource]] | None = None
-        self._opened_at = 0.0
+        self._failing_since: float | None = None
         self._used_at = 0.0
         self._failed_subject: Subject | None = None
 
     def note_live(self, frame: Frame, motion: FaceMotion | None) -> None:
         """A live picture of this frame was shown, in which the face moved so: a fallback goes on from there."""
+        self._failing_since = None
         self._head.begin_at(frame, motion)
 
     def forget(self) -> None:
         """Nobody is shown: keep neither a frame nor the relit source image nor the background."""
         self._head.forget()
+        self._failing_since = None
         self._drop()
 
     def release(self, now: float) -> None:
@@ -112,36 +118,52 @@ class FallbackRenderer:
             return_freed_memory()
 
     def picture(self, frame: Frame, scene: Scene) -> FallbackPicture | None:
-        """A picture in place of this live frame; None while the relighter is opened, if not for too long. Never raises.
+        """A picture in place of this live frame; None where the last one is held. Never raises."""
+        now = self._used_at = frame.captured_at
+        if self._failing_since is None:
+            self._failing_since = now
+        rest = self._at_rest(frame, scene) if scene.look.mode is Mode.REENACT else None
+        situation = Situation(
+            scene.look.mode,
+            has_subject=scene.subject is not None,
+            rendering=Rendering.FAILS if now - self._failing_since < self._hold_s else Rendering.HAS_FAILED,
+            can_rest=rest is not None,
+            filmed_allowed=scene.unlit_allowed,
+            filmed_when_failing=self._fallback is Fallback.LIVE,
+        )
+        match what_is_shown(situation):
+            case Shown.HELD:
+                return None
+            case Shown.FILMED:
+                return FallbackPicture(crop_to_fill(frame.image, self._size), unlit=True)
+            case Shown.PLACEHOLDER:
+                return FallbackPicture(self._placeholder.image)
+        assert rest is not None
+        return FallbackPicture(rest)
 
-        As filmed only where the scene allows that too.
-        """
+    def _at_rest(self, frame: Frame, scene: Scene) -> DisplayImage | None:
+        """The source image of the scene's subject before its background; None while that cannot be made."""
         subject = scene.subject
-        self._used_at = frame.captured_at
-        if subject is not None and subject is not self._failed_subject:
-            try:
-                source = self._opened(subject, frame.captured_at)
-                if source is not None:
-                    return FallbackPicture(self._relit(source, scene, frame))
-                if frame.captured_at - self._opened_at < OPENING_S:
-                    return None
-            except Exception:  # this is what is shown when all else fails
-                log.exception("the source image cannot be relit either")
-                self._failed_subject = subject
-        if self._fallback is Fallback.LIVE and scene.unlit_allowed:
-            return FallbackPicture(crop_to_fill(frame.image, self._size), unlit=True)
-        return FallbackPicture(self._placeholder.image)
+        if subject is None or subject is self._failed_subject:
+            return None
+        try:
+            source = self._opened(subject)
+            return None if source is None else self._relit(source, scene, frame)
+        except Exception:  # this is what is shown when all else fails
+            log.exception("the source image cannot be relit either")
+            self._failed_subject = subject
+            return None
 
     def _drop(self) -> None:
         self._source = self._opening = None
         self._background_renderer = BackgroundRenderer(self._size)
 
-    def _opened(self, subject: Subject, now: float) -> _RelitSource | None:
+    def _opened(self, subject: Subject) -> _RelitSource | None:
         if self._source is not None and self._source.subject is subject:
             return self._source
         if self._opening is None or self._opening[0] is not subject:
             self._source = None
-            self._opening, self._opened_at = (subject, self._start(lambda: _open(subject, self._size))), now
+            self._opening = subject, self._start(lambda: _open(subject, self._size))
         opening = self._opening[1]
         if opening.done():
             self._opening = None

@@ -32,7 +32,8 @@ from relit_camera.lab.evaluate.ladder.webcam_frames import RoomFrames, enlarged,
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.light.exposure import auto_exposure_scale
 from relit_camera.light.light_map import LightMap
-from relit_camera.live.modes.ratio_relighting import fit_similarity, ratio_confidence
+from relit_camera.live.modes.ratio_relighting import fit_similarity
+from relit_camera.live.modes.source_masks import ratio_confidence
 from relit_camera.live.reenactment.source_image import feather_edges
 from relit_camera.subject.relighting.basis_relighter import BasisRelighter
 from relit_camera.subject.subject import Subject
