@@ -14,7 +14,7 @@ import numpy as np
 from relit_camera.api.app import create_app
 from relit_camera.api.server.http_server import start_api_server
 from relit_camera.app.camera_service import DEFAULT_TIMINGS, CameraService, CameraTimings
-from relit_camera.base.config.look import Lighting, Look
+from relit_camera.base.config.look import Lighting, Look, Mode
 from relit_camera.base.config.settings import Fallback, OutputSettings, RelitSettings, ServerSettings, StorageSettings
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.devices.sinks.sink import NullSink
@@ -148,7 +148,7 @@ def running_camera(
     )
     scene_controller = SceneController(settings.storage)
     scene_controller.set_unlit_allowed(unlit_allowed)
-    scene_controller.set_look(look or Look(lighting=Lighting(transition_s=0)))
+    scene_controller.set_look(look or Look(mode=Mode.PORTRAIT, lighting=Lighting(transition_s=0)))
     scene_controller.show_subject("small", subject or small_subject())
     sink, tracker = sink or RememberingSink(), tracker or SteadyTracker()
     camera_service = CameraService(

@@ -296,28 +296,28 @@ def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("full_quality")
-def test_ratio_falls_back_and_says_so_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
+def test_live_falls_back_and_says_so_where_the_face_is_not_the_subjects(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     source = SteppedSource(noise.repeat(4, axis=0).repeat(4, axis=1))
-    with running_camera(tmp_path, source, StrangerTracker(), look=Look(mode=Mode.RATIO), timings=PATIENT) as camera:
+    with running_camera(tmp_path, source, StrangerTracker(), look=Look(mode=Mode.LIVE), timings=PATIENT) as camera:
         camera.sink.wait_for(1)  # the placeholder
         for _ in range(6):
             source.step(camera.sink, 0.5)
         wait_until(lambda: DegradationCode.FACE_MISMATCH in camera.degraded())
-        assert camera.status()["mode"] == "ratio"
+        assert camera.status()["mode"] == "live"
         degraded = camera.status()["degraded"]
         assert isinstance(degraded, list)
         (mismatch,) = [each for each in degraded if each["code"] == "face-mismatch"]
         assert "choose your own subject" in mismatch["cure"]
         source.step(camera.sink)
-        camera.put("mode", mode="reenact")
+        camera.put("mode", mode="portrait")
         source.step(camera.sink)
 
 
 @pytest.mark.slow
 def test_a_missing_matte_model_is_reported_and_pictures_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "no-models"))
-    with running_camera(tmp_path, look=Look(mode=Mode.RATIO), timings=IMPATIENT) as camera:
+    with running_camera(tmp_path, look=Look(mode=Mode.LIVE), timings=IMPATIENT) as camera:
         camera.sink.wait_for(3)
         camera.put("background", kind="blur")
         wait_until(lambda: "relit models pull" in camera.troubles())

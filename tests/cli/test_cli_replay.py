@@ -25,7 +25,7 @@ def done(answer: Answer) -> Answer:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["reenact", "ratio"])
+@pytest.mark.parametrize("mode", ["live", "portrait"])
 def test_replay_writes_video_report_and_sheet(mode: str, material: Material, tmp_path: Path) -> None:
     answer = done(
         call(

@@ -46,7 +46,7 @@ def pipeline(tracker: Tracker | None = None, size: tuple[int, int] = SIZE) -> Pi
     return make_pipeline(CPU, tracker or SteadyTracker(), size)
 
 
-def scene(subject: bool = True, mode: Mode = Mode.REENACT, unlit_allowed: bool = True, **look: object) -> Scene:
+def scene(subject: bool = True, mode: Mode = Mode.PORTRAIT, unlit_allowed: bool = True, **look: object) -> Scene:
     wanted = Look.model_validate({"mode": mode, **look})
     lit = STUDIO if wanted.lighting.environment == "studio" else None
     return Scene(wanted, lit, None, "small", small_subject() if subject else None, unlit_allowed=unlit_allowed)
@@ -58,13 +58,13 @@ def frame(index: int = 0, image: np.ndarray | None = None) -> Frame:
 
 def test_pictures_are_of_the_outputs_size_whatever_comes() -> None:
     for image in (grey(), grey(size=(90, 160)), grey(size=(300, 40))):
-        for shown in (scene(), scene(subject=False), scene(mode=Mode.RATIO)):
+        for shown in (scene(), scene(subject=False), scene(mode=Mode.LIVE)):
             picture = pipeline(size=(160, 90)).process(frame(0, image), shown).image
             assert picture.shape == (90, 160, 3)
             assert picture.dtype == np.uint8
 
 
-def test_reenact_lets_no_live_pixel_through() -> None:
+def test_portrait_lets_no_live_pixel_through() -> None:
     noise = np.random.default_rng(0).integers(0, 255, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
     quiet, loud = (pipeline().process(frame(0, image), scene()).image for image in (grey(), noise))
     np.testing.assert_array_equal(quiet, loud)
@@ -84,9 +84,9 @@ def test_nobody_is_a_trouble(allowed: bool, shown: str) -> None:
     assert subject_troubles(scene()) == []
 
 
-def test_ratio_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
+def test_live_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
     """The face is tracked in the frame as it comes, the light is exchanged in the frame as it goes out."""
-    size, shown = (160, 90), scene(mode=Mode.RATIO, lighting={"exposure_ev": -2})
+    size, shown = (160, 90), scene(mode=Mode.LIVE, lighting={"exposure_ev": -2})
     textured = cv2.resize(np.random.default_rng(0).integers(60, 200, (9, 16, 3), dtype=np.uint8), (320, 240))
     live = frame(0, textured)
     scaled, cut = pipeline(SyntheticTracker(), size), pipeline(SyntheticTracker(), size)
@@ -95,7 +95,7 @@ def test_ratio_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
     assert motion is not None
     assert motion.pose is not None
     middle = motion.landmarks.mean(axis=0)
-    assert np.abs(middle - np.array(live.size) / 2).max() < 0.2 * live.size[1]  # told as in mode reenact
+    assert np.abs(middle - np.array(live.size) / 2).max() < 0.2 * live.size[1]  # told as in mode portrait
     two = cut.process(fit_frame(live, size), shown).image
     assert difference(one, two) < 2
 
@@ -139,7 +139,7 @@ def test_blend_goes_from_the_live_picture_to_the_relit_one() -> None:
     image = grey(150)
 
     def last(blend: float) -> np.ndarray:
-        made, shown = pipeline(), scene(mode=Mode.RATIO, lighting={"blend": blend, "exposure_ev": -2})
+        made, shown = pipeline(), scene(mode=Mode.LIVE, lighting={"blend": blend, "exposure_ev": -2})
         # A face that just came is eased in.
         return [made.process(frame(index, image), shown).image for index in range(25)][-1]
 
@@ -149,20 +149,20 @@ def test_blend_goes_from_the_live_picture_to_the_relit_one() -> None:
 
 
 @pytest.mark.slow
-def test_a_stranger_turns_ratio_into_reenact_until_the_subject_changes() -> None:
+def test_a_stranger_turns_live_into_portrait_until_the_subject_changes() -> None:
     noise = np.random.default_rng(1).choice(np.array([5, 245], np.uint8), (SIZE[1] // 4, SIZE[0] // 4, 3))
     image = np.ascontiguousarray(noise.repeat(4, axis=0).repeat(4, axis=1))
-    made, ratio = pipeline(StrangerTracker()), scene(mode=Mode.RATIO)
+    made, live = pipeline(StrangerTracker()), scene(mode=Mode.LIVE)
     for index in range(100):
-        last = made.process(frame(index, image), ratio).image
-    assert [trouble.what for trouble in made.troubles] == ["mode reenact is shown in place of mode ratio"]
+        last = made.process(frame(index, image), live).image
+    assert [trouble.what for trouble in made.troubles] == ["mode portrait is shown in place of mode live"]
     still = made.process(frame(100, image), scene()).image
     assert difference(last, still) < 2
     private = pipeline(StrangerTracker())
-    first = [private.process(frame(index, image), replace(ratio, unlit_allowed=False)) for index in range(25)]
+    first = [private.process(frame(index, image), replace(live, unlit_allowed=False)) for index in range(25)]
     assert max(difference(each.image, still) for each in first) < 2, "of a stranger nothing is shown relit"
     assert private.troubles == []
-    other = replace(ratio, subject=replace(small_subject()))
+    other = replace(live, subject=replace(small_subject()))
     made.process(frame(101, image), other)
     assert made.troubles == []
 
@@ -177,20 +177,20 @@ def test_stages_are_timed() -> None:
 
 def test_a_matte_that_needs_a_missing_model_says_which(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
-    coloured = scene(mode=Mode.RATIO, background=ColorBackground())
+    coloured = scene(mode=Mode.LIVE, background=ColorBackground())
     with pytest.raises(ModelError, match="relit models pull"):
         pipeline().process(frame(), coloured)
 
 
-def test_reenact_stands_before_its_background_without_any_model() -> None:
+def test_portrait_stands_before_its_background_without_any_model() -> None:
     red = pipeline().process(frame(), scene(background=ColorBackground(color="#ff0000"))).image
     assert (red[:, 0] == [255, 0, 0]).all()
 
 
-def test_without_a_face_mode_ratio_shows_the_live_picture_where_that_is_allowed() -> None:
+def test_without_a_face_mode_live_shows_the_live_picture_where_that_is_allowed() -> None:
     bright = np.tile(np.arange(0, 256, 2, dtype=np.uint8), (SIZE[1], 1))[..., None].repeat(3, axis=2)
     assert bright.shape == (SIZE[1], SIZE[0], 3)
-    picture = pipeline(Blind()).process(frame(0, bright), scene(mode=Mode.RATIO)).image
+    picture = pipeline(Blind()).process(frame(0, bright), scene(mode=Mode.LIVE)).image
     assert np.abs(picture.astype(int) - bright).max() <= 2  # highlights are not dimmed
 
 
@@ -201,15 +201,15 @@ class Blind(SteadyTracker):
         return LOST
 
 
-def test_without_a_face_mode_ratio_shows_what_reenact_does_unless_the_live_picture_is_allowed() -> None:
+def test_without_a_face_mode_live_shows_what_portrait_does_unless_the_live_picture_is_allowed() -> None:
     noise = np.random.default_rng(0).integers(60, 200, grey().shape, dtype=np.uint8)
     light = {"exposure_ev": -1, "transition_s": 0}
-    ratio, reenact = (
+    live, portrait = (
         pipeline(Blind()).process(frame(0, noise), scene(mode=mode, unlit_allowed=False, lighting=light))
         for mode in Mode
     )
-    assert not ratio.unlit
-    assert difference(ratio.image, reenact.image) < 2
+    assert not live.unlit
+    assert difference(live.image, portrait.image) < 2
 
 
 @pytest.mark.parametrize("blend", [1.0, 0.5])
@@ -225,9 +225,7 @@ def test_the_subject_at_rest_is_placed_once_while_nothing_changes(
 
     monkeypatch.setattr(RestLayer, "render", render)
     made = pipeline(Blind())
-    shown = [
-        scene(mode=Mode.RATIO, unlit_allowed=False, lighting={"blend": blend, "exposure_ev": ev}) for ev in (0, -2)
-    ]
+    shown = [scene(mode=Mode.LIVE, unlit_allowed=False, lighting={"blend": blend, "exposure_ev": ev}) for ev in (0, -2)]
     for index in range(5):
         made.process(frame(index), shown[0])
     assert len(placed) == 1
@@ -253,7 +251,7 @@ class SeenFrom(SteadyTracker):
 @pytest.mark.parametrize("unlit_allowed", [True, False])
 def test_the_first_frame_with_a_face_is_relit_as_all_later_ones(unlit_allowed: bool) -> None:
     """One fit tells the room; before the first frame nothing was shown that it would have to be eased from."""
-    shown = scene(mode=Mode.RATIO, unlit_allowed=unlit_allowed, lighting={"exposure_ev": -2, "transition_s": 0})
+    shown = scene(mode=Mode.LIVE, unlit_allowed=unlit_allowed, lighting={"exposure_ev": -2, "transition_s": 0})
     made, live = pipeline(), grey(220)
     rendered = [made.process(frame(index, live), shown) for index in range(20)]
     assert not any(each.unlit for each in rendered)
@@ -262,7 +260,7 @@ def test_the_first_frame_with_a_face_is_relit_as_all_later_ones(unlit_allowed: b
 
 
 def test_a_face_that_comes_later_is_eased_from_the_picture_as_filmed_where_that_is_allowed() -> None:
-    shown = scene(mode=Mode.RATIO, lighting={"exposure_ev": -2, "transition_s": 0})
+    shown = scene(mode=Mode.LIVE, lighting={"exposure_ev": -2, "transition_s": 0})
     made, live = pipeline(SeenFrom(4, 60)), grey(220)
     rendered = [made.process(frame(index, live), shown) for index in range(30)]
     assert [each.unlit for each in rendered[:4]] == [True] * 4
@@ -274,7 +272,7 @@ def test_a_face_that_comes_later_is_eased_from_the_picture_as_filmed_where_that_
 def test_a_face_that_comes_or_goes_is_eased_between_the_subject_at_rest_and_the_relit_picture() -> None:
     """No step is larger than easing makes it, and the live picture is in none of them."""
 
-    shown = scene(mode=Mode.RATIO, unlit_allowed=False, lighting={"exposure_ev": -2, "transition_s": 0})
+    shown = scene(mode=Mode.LIVE, unlit_allowed=False, lighting={"exposure_ev": -2, "transition_s": 0})
     made = pipeline(SeenFrom(4, 34))
     live = grey(220)
     rendered = [made.process(frame(index, live), shown) for index in range(64)]
@@ -292,7 +290,7 @@ def test_a_face_that_comes_or_goes_is_eased_between_the_subject_at_rest_and_the_
     ("changes", "unlit"), [({}, False), ({"split": 0.5}, True), ({"blend": 0.0}, True), ({"blend": 0.5}, False)]
 )
 def test_a_picture_says_whether_a_part_of_it_is_as_filmed(changes: dict[str, float], unlit: bool) -> None:
-    made, shown = pipeline(), scene(mode=Mode.RATIO, lighting=changes)
+    made, shown = pipeline(), scene(mode=Mode.LIVE, lighting=changes)
     assert [made.process(frame(index), shown).unlit for index in range(3)] == [unlit] * 3
 
 
@@ -314,8 +312,8 @@ class OneGrey:
 
 
 def with_third_mode(tracker: Tracker) -> Pipeline:
-    """A pipeline whose mode ratio is another: its logic knows no mode by name but the fallback."""
-    modes = {**mode_factories(CPU), Mode.RATIO: OneGrey}
+    """A pipeline whose mode live is another: its logic knows no mode by name but the fallback."""
+    modes = {**mode_factories(CPU), Mode.LIVE: OneGrey}
     follower = make_follower(CPU.tracker, tracker)
     return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
 
@@ -323,7 +321,7 @@ def with_third_mode(tracker: Tracker) -> Pipeline:
 def test_a_third_mode_needs_nothing_of_the_pipeline() -> None:
     made = with_third_mode(SteadyTracker())
     one, two = (
-        made.process(frame(index), scene(mode=Mode.RATIO, lighting={"exposure_ev": ev, "transition_s": 0})).image
+        made.process(frame(index), scene(mode=Mode.LIVE, lighting={"exposure_ev": ev, "transition_s": 0})).image
         for index, ev in enumerate((-1, 1))
     )
     assert len(np.unique(one)) == len(np.unique(two)) == 1
@@ -332,12 +330,12 @@ def test_a_third_mode_needs_nothing_of_the_pipeline() -> None:
 
 
 def test_any_mode_may_find_a_mismatch_and_the_fallback_takes_over_until_the_subject_changes() -> None:
-    made, wanted = with_third_mode(Vanishing()), scene(mode=Mode.RATIO)
+    made, wanted = with_third_mode(Vanishing()), scene(mode=Mode.LIVE)
     pictures = [made.process(frame(index), wanted).image for index in range(30)]
     assert len(np.unique(pictures[24])) == 1
     assert len(np.unique(pictures[25])) > 1
     assert [(t.what, t.why, t.cure) for t in made.troubles] == [
-        ("mode reenact is shown in place of mode ratio", "nobody is there", "come back")
+        ("mode portrait is shown in place of mode live", "nobody is there", "come back")
     ]
     made.process(frame(30), replace(wanted, subject=None))
     assert made.troubles == []
@@ -365,13 +363,13 @@ def _is_found(motion: FaceMotion) -> bool:
 
 
 def test_the_mode_comes_back_when_the_mismatch_is_over() -> None:
-    modes = {**mode_factories(CPU), Mode.RATIO: OneGreyUntilSeen}
+    modes = {**mode_factories(CPU), Mode.LIVE: OneGreyUntilSeen}
     tracker = Reappearing()
     follower = make_follower(CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
     shown = []
     for index in range(70):
-        picture = made.process(frame(index), scene(mode=Mode.RATIO)).image
+        picture = made.process(frame(index), scene(mode=Mode.LIVE)).image
         shown.append((len(np.unique(picture)) == 1, [trouble.code for trouble in made.troubles]))
     assert (False, [DegradationCode.FACE_MISMATCH]) in shown
     assert shown[0] == shown[-1] == (True, [])
@@ -386,14 +384,14 @@ def test_a_frame_in_which_a_subject_is_chosen_is_not_shown_unlit() -> None:
 
 
 def test_a_fallback_that_takes_no_face_either_is_an_error() -> None:
-    modes = {Mode.REENACT: OneGrey, Mode.RATIO: OneGrey}
+    modes = {Mode.PORTRAIT: OneGrey, Mode.LIVE: OneGrey}
     tracker = Vanishing()
     made = Pipeline(
         tracker, make_follower(CPU.tracker, tracker), SIZE, modes, partial(open_relighter, "basis"), pytest.fail
     )
-    made.process(frame(24), scene(mode=Mode.RATIO))
+    made.process(frame(24), scene(mode=Mode.LIVE))
     with pytest.raises(SubjectError, match="nobody is there; come back"):
-        made.process(frame(25), scene(mode=Mode.RATIO))
+        made.process(frame(25), scene(mode=Mode.LIVE))
 
 
 def test_the_relighter_at_work_is_named_for_the_status() -> None:
@@ -416,9 +414,9 @@ def test_it_says_when_models_are_opened() -> None:
     follower = make_follower(CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere)
     made.on_opening = lambda: said.append("opening")
-    blurred, other = scene(mode=Mode.RATIO, background={"kind": "blur"}), replace(small_subject())
-    ratio = scene(mode=Mode.RATIO)
-    for wanted in (scene(), scene(), ratio, blurred, blurred, scene(), replace(scene(), subject=other)):
+    blurred, other = scene(mode=Mode.LIVE, background={"kind": "blur"}), replace(small_subject())
+    live = scene(mode=Mode.LIVE)
+    for wanted in (scene(), scene(), live, blurred, blurred, scene(), replace(scene(), subject=other)):
         made.process(frame(), wanted)
         said.append("picture")
     made.close()
@@ -430,7 +428,7 @@ def test_it_starts_no_thread() -> None:
     before = set(threading.enumerate())
     made = pipeline()
     made.process(frame(), scene())
-    made.process(frame(), scene(mode=Mode.RATIO))
+    made.process(frame(), scene(mode=Mode.LIVE))
     assert set(threading.enumerate()) <= before  # those of other tests may have ended meanwhile
     made.close()
 
@@ -456,7 +454,7 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
             return super().begin(frame, motion, scene, quality)
 
     tracker = CountingTracker()
-    modes = {Mode.REENACT: Noting, Mode.RATIO: Noting}
+    modes = {Mode.PORTRAIT: Noting, Mode.LIVE: Noting}
     follower = make_follower(CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)  # flow needs something to follow
@@ -469,10 +467,10 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
     assert tracker.measured - before == 4
 
 
-@pytest.mark.parametrize(("mode", "measured"), [(Mode.REENACT, 8), (Mode.RATIO, 4)])
-def test_the_running_camera_measures_every_second_face_in_mode_ratio(mode: Mode, measured: int) -> None:
+@pytest.mark.parametrize(("mode", "measured"), [(Mode.PORTRAIT, 8), (Mode.LIVE, 4)])
+def test_the_running_camera_measures_every_second_face_in_mode_live(mode: Mode, measured: int) -> None:
     tracker = CountingTracker()
-    modes = {Mode.REENACT: OneGrey, Mode.RATIO: OneGrey}
+    modes = {Mode.PORTRAIT: OneGrey, Mode.LIVE: OneGrey}
     follower = make_follower(CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)

@@ -42,7 +42,7 @@ def subject_troubles(scene: Scene) -> list[Degradation]:
     return [Degradation(code=DegradationCode.NO_SUBJECT, what=shown, why="no subject is chosen", cure=cure)]
 
 
-FALLBACK_MODE = Mode.REENACT
+FALLBACK_MODE = Mode.PORTRAIT
 """Shown where the mode asked for cannot go on with the live face; it must take any face."""
 
 
@@ -178,10 +178,10 @@ class Pipeline:
         return task
 
     def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> FaceMotion:
-        in_ratio = self._mode_for(scene.look.mode) is Mode.RATIO
+        is_live = self._mode_for(scene.look.mode) is Mode.LIVE
         with self.timer.stage("track"):
-            every = quality.ratio_track_every if in_ratio else quality.track_every
-            self._live_tracker.set_interval(every, follow_lips=not in_ratio)
+            every = quality.live_track_every if is_live else quality.track_every
+            self._live_tracker.set_interval(every, follow_lips=not is_live)
             return self._follower.follow(self._live_tracker.track(frame), frame.size, frame.time_s)
 
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:

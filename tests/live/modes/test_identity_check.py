@@ -33,7 +33,7 @@ def test_a_stranger_is_found_out_after_a_while_and_not_before() -> None:
     assert isinstance(found, FaceMismatch)
     assert "the live face is not the subject's" in found.why
     assert "deviation 0.75" in found.why
-    assert "mode reenact" in found.cure
+    assert "mode portrait" in found.cure
 
 
 def test_the_subject_is_not_taken_for_a_stranger_even_in_odd_light() -> None:

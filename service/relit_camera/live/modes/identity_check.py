@@ -1,4 +1,4 @@
-"""Whether the live face is the subject's: mode ratio would paint the light of one face on another."""
+"""Whether the live face is the subject's: mode live would paint the light of one face on another."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class IdentityCheck:
         self._passed_s = None
         return FaceMismatch(
             f"the live face is not the subject's: {_differences(self._shape_cm, residual)}",
-            "choose your own subject, or mode reenact",
+            "choose your own subject, or mode portrait",
             partial(self._has_changed_into_the_subjects, self._shape_cm),
         )
 

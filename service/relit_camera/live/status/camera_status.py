@@ -53,7 +53,7 @@ class DegradationCode(StrEnum):
     NO_SUBJECT = "no-subject"
     """No subject is chosen: a placeholder is shown, or the picture as filmed where that is allowed."""
     FACE_MISMATCH = "face-mismatch"
-    """Mode ratio: the live face is not the subject's, so mode reenact takes over."""
+    """Mode live: the live face is not the subject's, so mode portrait takes over."""
     PROVIDER_FALLBACK = "provider-fallback"
     """A model runs on a slower execution provider than asked."""
     REDUCED_QUALITY = "reduced-quality"

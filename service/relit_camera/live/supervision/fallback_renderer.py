@@ -128,7 +128,7 @@ class FallbackRenderer:
             except Exception:  # this is what is shown when all else fails
                 log.exception("the source image cannot be relit either")
                 self._failed_subject = subject
-        if self._fallback is Fallback.LIVE and scene.unlit_allowed:
+        if self._fallback is Fallback.FILMED and scene.unlit_allowed:
             return FallbackPicture(crop_to_fill(frame.image, self._size), unlit=True)
         return FallbackPicture(self._placeholder.image)
 

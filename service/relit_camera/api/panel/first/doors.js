@@ -113,7 +113,7 @@ async function pass(work, words) {
 
 async function showDemo() {
   const { name } = await call("POST", "demo-subject");
-  await call("PATCH", "scene", { subject: name, mode: "reenact", unlit_allowed: false });
+  await call("PATCH", "scene", { subject: name, mode: "portrait", unlit_allowed: false });
 }
 
 async function openFile(file) {

@@ -1,4 +1,4 @@
-"""Mode ratio: the live picture itself, with its light exchanged, before its own or another background."""
+"""Mode live: the live picture itself, with its light exchanged, before its own or another background."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from relit_camera.live.compositing.background_renderer import crossfade
 from relit_camera.live.modes.frame_fitting import fit_frame, fit_motion
 from relit_camera.live.modes.identity_check import IdentityCheck
 from relit_camera.live.modes.mode import FaceMismatch, ModeContext, RenderedFrame, RenderTask
+from relit_camera.live.modes.portrait_mode import blend_with_source
 from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting
-from relit_camera.live.modes.reenact_mode import blend_with_source
 from relit_camera.live.modes.scene_relighting import SceneRelighting
 from relit_camera.live.reenactment.reenactor import WarpedLayer
 from relit_camera.live.reenactment.rest_layer import RestLayer
@@ -21,11 +21,11 @@ from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
 
 
-class RatioMode:
+class LiveMode:
     """See `RenderMode`.
 
     Where no face is followed, or not yet, the live picture would be shown as it is, and a stranger in the light of
-    another's face. Unless the scene allows that, the subject's relit picture at rest takes its place, as mode reenact
+    another's face. Unless the scene allows that, the subject's relit picture at rest takes its place, as mode portrait
     shows it while it searches, until the live face has passed for the subject's; between them it is eased.
     """
 
