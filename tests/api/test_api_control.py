@@ -15,6 +15,14 @@ def test_mode_is_changed_and_told(client: Client, camera: FakeCamera) -> None:
     assert camera.scene_controller.scene.look.mode == "portrait"
 
 
+@pytest.mark.parametrize(("former", "mode"), [("ratio", "live"), ("reenact", "portrait")])
+def test_former_names_of_modes_are_taken(client: Client, former: str, mode: str) -> None:
+    assert client.put("/api/v1/mode", {"mode": former}).json() == {"mode": mode}
+    assert client.patch("/api/v1/scene", {"mode": former}).json()["mode"] == mode
+    assert client.put("/api/v1/presets/before", {"mode": former}).status_code == 201
+    assert client.get("/api/v1/presets/before").json()["mode"] == mode
+
+
 def test_freeze_is_changed_and_told(client: Client, camera: FakeCamera) -> None:
     assert client.get("/api/v1/freeze").json() == {"frozen": False}
     assert client.put("/api/v1/freeze", {"frozen": True}).json() == {"frozen": True}

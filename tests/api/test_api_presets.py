@@ -170,5 +170,5 @@ def test_names_are_checked_where_no_api_has_done_so(tmp_path: Path) -> None:
 
 
 def test_a_preset_of_before_reads_as_one_of_whoever_is_shown(tmp_path: Path) -> None:
-    (tmp_path / "old.yaml").write_text("mode: portrait\n")
+    (tmp_path / "old.yaml").write_text("mode: reenact\n")
     assert PresetStore(tmp_path).load("old") == Preset(mode=Mode.PORTRAIT)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from relit_camera.app.replay.video_replay import ReplayedFrame
+from relit_camera.base.config.look import Mode
 from relit_camera.base.images.image_files import read_display
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.face_state import FaceStatus
@@ -64,6 +65,10 @@ def test_wrong_case_names_file_and_field(text: str, said: str, tmp_path: Path) -
         read_case(tmp_path)
     assert str(tmp_path / "case.yaml") in str(error.value)
     assert said in str(error.value)
+
+
+def test_former_names_of_modes_are_read() -> None:
+    assert [case_of(mode=former).mode for former in ("ratio", "reenact")] == [Mode.LIVE, Mode.PORTRAIT]
 
 
 def test_folder_without_case(tmp_path: Path) -> None:

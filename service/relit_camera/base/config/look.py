@@ -27,7 +27,10 @@ class SettingsModel(BaseModel):
 
 
 class Mode(StrEnum):
-    """How the relit face reaches the picture. Their former names, `ratio` and `reenact`, are still accepted."""
+    """How the relit face reaches the picture.
+
+    The former names `ratio` (live) and `reenact` (portrait) are still accepted.
+    """
 
     LIVE = "live"
     """The live frame itself, multiplied by the ratio of target light to room light."""
