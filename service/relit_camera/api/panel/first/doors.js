@@ -113,6 +113,7 @@ async function pass(work, words) {
 
 async function showDemo() {
   const { name } = await call("POST", "demo-subject");
+  // Another's face than the webcam's: only portrait shows it.
   await call("PATCH", "scene", { subject: name, mode: "portrait", unlit_allowed: false });
 }
 
