@@ -50,7 +50,7 @@ def relit(environment: str) -> tuple[list[DisplayImage], list[DisplayImage]]:
     scene_controller = SceneController(settings.storage)
     scene_controller.load_configured_subject(settings.subject)
     light = Lighting(environment=environment)
-    scene_controller.set_look(Look(mode=Mode.RATIO, lighting=light, background=EnvironmentBackground()))
+    scene_controller.set_look(Look(mode=Mode.LIVE, lighting=light, background=EnvironmentBackground()))
     tracker = make_tracker(settings)
     before, after = [], []
 

@@ -77,7 +77,7 @@ def main() -> None:
     options = parser.parse_args()
     here = Path(__file__).resolve().parents[1]
     with tempfile.TemporaryDirectory(prefix="relit-cost.") as folder:
-        for mode in ("reenact", "ratio"):
+        for mode in ("reenact", "ratio"):  # the former names: another checkout may know no others
             for name, tree in (("before", options.old_tree), ("after", here)):
                 variables = {**environment(Path(folder)), "PYTHONPATH": str(tree.resolve() / "service")}
                 if name == "before" and options.old_models:

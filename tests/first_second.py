@@ -1,4 +1,4 @@
-"""Measures mode ratio from the first frame on, against truth: `python -m tests.first_second SUBJECT CLIP TRUTH MATTE
+"""Measures mode live from the first frame on, against truth: `python -m tests.first_second SUBJECT CLIP TRUTH MATTE
 --environment NAME [--tracker recorded:TRACK.json] [--every N]`.
 
 CLIP is the live video, TRUTH a video of the same performance in the light of the environment, MATTE one that is bright
@@ -36,13 +36,13 @@ def read_frames(video: Path, seconds: float) -> list[Frame]:
 def relit(
     frames: list[Frame], subject: Path, environment: str, tracker: str, unlit_allowed: bool
 ) -> list[DisplayImage]:
-    """What mode ratio shows of them, the room left as it is."""
+    """What mode live shows of them, the room left as it is."""
     settings = RelitSettings().model_copy(update={"tracker": TrackerSettings(name=tracker)})
     controller = SceneController(settings.storage)
     controller.set_unlit_allowed(unlit_allowed)
     controller.load_configured_subject(str(subject))
     lighting = parse_lighting(controller.register_temporary_environment(environment), "0,0,0", 0.0)
-    controller.set_look(Look(lighting=lighting, background=parse_background("none"), mode=Mode.RATIO))
+    controller.set_look(Look(lighting=lighting, background=parse_background("none"), mode=Mode.LIVE))
     pipeline = make_pipeline(settings, make_tracker(settings), frames[0].size)
     try:
         return [pipeline.process(frame, controller.scene).image for frame in frames]

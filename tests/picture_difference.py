@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 Frames = NDArray[np.uint8]
 """(count, height, width, 3) sRGB."""
 
+# The modes by their former names: the other checkout may know no others.
 SCENES: dict[str, dict[str, object]] = {
     "reenact sunset": {"mode": "reenact", "environment": "sunset", "background": {"kind": "none"}},
     "reenact night-street": {"mode": "reenact", "environment": "night-street", "background": {"kind": "environment"}},

@@ -38,7 +38,7 @@ def measure_short(data: Path) -> list[CameraCost]:
         measure_cameras(
             settings.model_copy(update=recorded),
             [SHORT_SIZE],
-            [Mode.REENACT, Mode.RATIO],
+            [Mode.PORTRAIT, Mode.LIVE],
             [NoBackground()],
             SHORT_FPS,
             SHORT_SECONDS,
@@ -55,7 +55,7 @@ def recorded() -> dict[str, Any]:
 def main() -> None:
     """Measure, and write the record."""
     settings = bundled_settings(RelitSettings())
-    machine, modes = machine_info(), [Mode.REENACT, Mode.RATIO]
+    machine, modes = machine_info(), [Mode.PORTRAIT, Mode.LIVE]
     del machine["system"]  # the kernel's build says whose machine it is, and nothing about cost
     cameras = [
         *measure_cameras(settings, [MAIN_SIZE], modes, [NoBackground(), BlurBackground()], SOURCE_FPS, SECONDS),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import httpx
@@ -14,7 +14,7 @@ import numpy as np
 from relit_camera.api.app import create_app
 from relit_camera.api.server.http_server import start_api_server
 from relit_camera.app.camera_service import DEFAULT_TIMINGS, CameraService, CameraTimings
-from relit_camera.base.config.look import Lighting, Look
+from relit_camera.base.config.look import Lighting, Look, Mode
 from relit_camera.base.config.settings import Fallback, OutputSettings, RelitSettings, ServerSettings, StorageSettings
 from relit_camera.base.images.image_types import DisplayImage, Frame
 from relit_camera.devices.sinks.sink import NullSink
@@ -41,17 +41,6 @@ class SteadyTracker(SyntheticTracker):
 
     def track(self, frame: Frame) -> FaceState:
         return super().track(Frame(frame.image, frame.index, frame.captured_at, 0.0))
-
-
-class StrangerTracker(SteadyTracker):
-    """Sees another person: a face longer than the subject's, with a narrow chin."""
-
-    def track(self, frame: Frame) -> FaceState:
-        state = super().track(frame)
-        middle = state.landmarks.mean(axis=0)
-        x, y = (state.landmarks - middle).T
-        changed = np.stack([np.where(y > 0, 0.75, 1.1) * x, 1.2 * y], axis=1)
-        return replace(state, landmarks=middle + changed.astype(np.float32))
 
 
 def grey(value: int = 120, size: tuple[int, int] = SIZE) -> DisplayImage:
@@ -152,7 +141,7 @@ def running_camera(
     )
     scene_controller = SceneController(settings.storage)
     scene_controller.set_unlit_allowed(unlit_allowed)
-    scene_controller.set_look(look or Look(lighting=Lighting(transition_s=0)))
+    scene_controller.set_look(look or Look(mode=Mode.PORTRAIT, lighting=Lighting(transition_s=0)))
     scene_controller.show_subject("small", subject or small_subject())
     sink, tracker = sink or RememberingSink(), tracker or SteadyTracker()
     camera_service = CameraService(

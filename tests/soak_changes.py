@@ -155,7 +155,7 @@ class RandomChanges:
         self._send("PUT", "background", json=self._random.choice(kinds))
 
     def _mode(self) -> None:
-        self._send("PUT", "mode", json={"mode": self._random.choice(("reenact", "ratio"))})
+        self._send("PUT", "mode", json={"mode": self._random.choice(("live", "portrait"))})
 
     def _face(self) -> None:
         self._send("PUT", "subject", json={"name": self._random.choice((self._reference["subject"], *STORED, None))})

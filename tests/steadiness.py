@@ -97,7 +97,7 @@ def watch(frames: Iterator[Frame], subject: Path, environment: str, mode: Mode) 
             continue
         oval = rendered.motion.landmarks[list(scheme.oval)]
         live.add(frame.image, oval)
-        relit.add(rendered.image, oval if mode is Mode.RATIO else at_rest)
+        relit.add(rendered.image, oval if mode is Mode.LIVE else at_rest)
     if pipeline is not None:
         pipeline.close()
     return live, relit, float(np.max(np.array(relit.coarse) - live.coarse))

@@ -1,4 +1,4 @@
-"""Measures mode reenact with a subject's expression stills and without, and mode ratio beside it, against the same
+"""Measures mode portrait with a subject's expression stills and without, and mode live beside it, against the same
 performance rendered in that light: `python -m tests.still_accuracy SUBJECT DRIVER TRUTH --environment NAME [--sheet
 FILE.png]`.
 
@@ -49,8 +49,8 @@ SIDE_PX = 200
 PERSON = 200
 """Code of the truth's matte, of 255, from which a pixel counts: behind the far cheek a turned face's regions take in
 some of the background, which in TRUTH is the environment."""
-WAYS = ("plain", "stills", "ratio")
-"""Mode reenact without stills and with them, and mode ratio."""
+WAYS = ("plain", "stills", "live")
+"""Mode portrait without stills and with them, and mode live."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def main() -> None:
     try:
         truth, driver = (clip_pictures(clip) for clip in (args.truth, args.driver))
         mattes = clip_pictures(args.truth.with_name("matte.mp4"))
-        subjects, modes = (plain, args.subject, args.subject), (Mode.REENACT, Mode.REENACT, Mode.RATIO)
+        subjects, modes = (plain, args.subject, args.subject), (Mode.PORTRAIT, Mode.PORTRAIT, Mode.LIVE)
         shown = {
             way: relit(subject, args.driver, args.environment, mode)
             for way, subject, mode in zip(WAYS, subjects, modes, strict=True)

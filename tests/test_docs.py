@@ -54,7 +54,7 @@ MIB = 1 << 20
 OLD_WORDS = re.compile(
     r"\b(the|a|subject's|relit|captured) still\b(?! picture)|\bstand-ins?\b|\bstand(s|ing)? in for\b"
     r"|\bpicture path\b|\blive chain\b|\bLineKeeper\b|\bDaemon\b|\bDirector\b|\bComposer\b"
-    r"|\bbackdrop\b|\bfloors\b",
+    r"|\bbackdrop\b|\bfloors\b|\b[Mm]ode (ratio|reenact)\b",
 )
 """What parts and pictures were called before; CHANGELOG.md and the words of the glossary's third column aside."""
 

@@ -262,7 +262,7 @@ def test_other_names_are_refused_whoever_asks(guarded: Client, host: str, path: 
 )
 def test_our_panel_may_change_things(guarded: Client, origin: str) -> None:
     headers = {**session(guarded), "origin": origin, "sec-fetch-site": "same-origin"}
-    assert guarded.put("/api/v1/mode", {"mode": "ratio"}, headers=headers).status_code == 200
+    assert guarded.put("/api/v1/mode", {"mode": "portrait"}, headers=headers).status_code == 200
 
 
 @pytest.mark.parametrize(
@@ -279,7 +279,7 @@ def test_our_panel_may_change_things(guarded: Client, origin: str) -> None:
 def test_other_pages_may_not_change_things(guarded: Client, camera: FakeCamera, origin: str) -> None:
     before = camera.scene_controller.scene
     headers = {**session(guarded), "origin": origin}
-    check_problem(guarded.put("/api/v1/mode", {"mode": "ratio"}, headers=headers), 403)
+    check_problem(guarded.put("/api/v1/mode", {"mode": "portrait"}, headers=headers), 403)
     check_problem(login(guarded, origin=origin), 403)
     assert camera.scene_controller.scene is before
 

@@ -220,7 +220,7 @@ def test_a_link_is_deleted_and_not_what_it_leads_to(
     (folder / f"linked{suffix}").symlink_to(outside)
     assert "linked" in [item["name"] for item in client.get(f"/api/v1/{collection}").json()]
     if collection == "presets":
-        assert client.put("/api/v1/presets/linked", {"mode": "ratio"}).status_code == 200
+        assert client.put("/api/v1/presets/linked", {"mode": "portrait"}).status_code == 200
         assert not (folder / "linked.yaml").is_symlink()
     assert client.delete(f"/api/v1/{collection}/linked").status_code == 204
     assert list(folder.iterdir()) == []

@@ -9,10 +9,18 @@ from tests.api.fake_camera import FakeCamera
 
 
 def test_mode_is_changed_and_told(client: Client, camera: FakeCamera) -> None:
-    assert client.get("/api/v1/mode").json() == {"mode": "reenact"}
-    assert client.put("/api/v1/mode", {"mode": "ratio"}).json() == {"mode": "ratio"}
-    assert client.get("/api/v1/mode").json() == {"mode": "ratio"}
-    assert camera.scene_controller.scene.look.mode == "ratio"
+    assert client.get("/api/v1/mode").json() == {"mode": "live"}
+    assert client.put("/api/v1/mode", {"mode": "portrait"}).json() == {"mode": "portrait"}
+    assert client.get("/api/v1/mode").json() == {"mode": "portrait"}
+    assert camera.scene_controller.scene.look.mode == "portrait"
+
+
+@pytest.mark.parametrize(("former", "mode"), [("ratio", "live"), ("reenact", "portrait")])
+def test_former_names_of_modes_are_taken(client: Client, former: str, mode: str) -> None:
+    assert client.put("/api/v1/mode", {"mode": former}).json() == {"mode": mode}
+    assert client.patch("/api/v1/scene", {"mode": former}).json()["mode"] == mode
+    assert client.put("/api/v1/presets/before", {"mode": former}).status_code == 201
+    assert client.get("/api/v1/presets/before").json()["mode"] == mode
 
 
 def test_freeze_is_changed_and_told(client: Client, camera: FakeCamera) -> None:
@@ -34,7 +42,7 @@ def test_neutral_pose_is_asked_for(client: Client, camera: FakeCamera) -> None:
     [
         ("mode", {"mode": "disco"}, "mode"),
         ("mode", {}, "mode"),
-        ("mode", {"mode": "ratio", "speed": 1}, "speed"),
+        ("mode", {"mode": "portrait", "speed": 1}, "speed"),
         ("freeze", {"frozen": "perhaps"}, "frozen"),
         ("freeze", None, ""),
     ],

@@ -71,7 +71,7 @@ def test_a_listener_first_gets_what_stands(listener: Listener, camera: FakeCamer
         "revision": camera.scene_controller.scene.revision,
         "lighting": Lighting().model_dump(mode="json"),
         "background": {"kind": "none"},
-        "mode": "reenact",
+        "mode": "live",
         "subject": None,
         "rung": None,
         "unlit_allowed": False,

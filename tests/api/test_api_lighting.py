@@ -111,7 +111,7 @@ def test_concurrent_changes_lose_nothing_and_mix_nothing(client: Client, camera:
 
     def change(number: int) -> None:
         if number % 4 == 0:
-            client.put("/api/v1/mode", {"mode": "ratio"})
+            client.put("/api/v1/mode", {"mode": "portrait"})
         elif number % 4 == 1:
             client.put("/api/v1/background", {"kind": "blur", "strength": 0.25})
         else:
@@ -124,5 +124,5 @@ def test_concurrent_changes_lose_nothing_and_mix_nothing(client: Client, camera:
         list(pool.map(change, range(40)))
     look = camera.scene_controller.scene.look
     assert camera.scene_controller.scene.revision == first + 40
-    assert look.mode == "ratio"
+    assert look.mode == "portrait"
     assert look.background.kind == "blur"

@@ -19,7 +19,7 @@ PRESETS = "/api/v1/presets"
 LOOK = Preset(
     lighting=Lighting(environment="sunset", yaw_deg=-40, lamps=(Lamp(color=(1, 0.5, 0.25)),)),
     background=ColorBackground(color="#112233"),
-    mode=Mode.RATIO,
+    mode=Mode.PORTRAIT,
 )
 
 
@@ -109,7 +109,7 @@ def test_a_preset_shows_its_subject_again(client: Client, camera: FakeCamera) ->
         write_subject(camera.scene_controller.subjects.new_path(name), small_subject())
     camera.scene_controller.choose_stored_subject("ada")
     assert client.request("PUT", f"{PRESETS}/mine").json()["subject"] == "ada"
-    client.put(f"{PRESETS}/anybody", {"mode": "ratio"})
+    client.put(f"{PRESETS}/anybody", {"mode": "portrait"})
     camera.scene_controller.choose_stored_subject("bea")
     before = camera.scene_controller.scene.revision
     client.post(f"{PRESETS}/mine/apply")
@@ -141,7 +141,7 @@ def test_one_at_most_is_shown_at_the_start(client: Client) -> None:
 
 
 def test_a_preset_is_renamed(client: Client) -> None:
-    client.put(f"{PRESETS}/day", {"mode": "ratio"})
+    client.put(f"{PRESETS}/day", {"mode": "portrait"})
     client.request("PUT", f"{PRESETS}/night")
     check_problem(client.patch(f"{PRESETS}/day", {"name": "night"}), 409)
     check_problem(client.patch(f"{PRESETS}/day", {"name": "../day"}), 422)
@@ -149,7 +149,7 @@ def test_a_preset_is_renamed(client: Client) -> None:
     assert client.patch(f"{PRESETS}/day", {"name": "day"}).status_code == 200
     client.patch(f"{PRESETS}/day", {"name": "noon"})
     assert [item["name"] for item in client.get(PRESETS).json()] == ["night", "noon"]
-    assert client.get(f"{PRESETS}/noon").json()["mode"] == "ratio"
+    assert client.get(f"{PRESETS}/noon").json()["mode"] == "portrait"
 
 
 def test_names_are_checked_where_no_api_has_done_so(tmp_path: Path) -> None:
@@ -170,5 +170,5 @@ def test_names_are_checked_where_no_api_has_done_so(tmp_path: Path) -> None:
 
 
 def test_a_preset_of_before_reads_as_one_of_whoever_is_shown(tmp_path: Path) -> None:
-    (tmp_path / "old.yaml").write_text("mode: ratio\n")
-    assert PresetStore(tmp_path).load("old") == Preset(mode=Mode.RATIO)
+    (tmp_path / "old.yaml").write_text("mode: reenact\n")
+    assert PresetStore(tmp_path).load("old") == Preset(mode=Mode.PORTRAIT)

@@ -100,14 +100,14 @@ def test_a_form_may_be_longer_than_json(client: Client) -> None:
 
 def test_json_that_does_not_say_so_is_refused(app: FastAPI, client: Client) -> None:
     """A form of another site can send text/plain without asking; it must not pass as JSON."""
-    answer = client.request("PUT", "/api/v1/mode", content='{"mode": "ratio"}', headers={"content-type": "text/plain"})
+    answer = client.request("PUT", "/api/v1/mode", content='{"mode": "live"}', headers={"content-type": "text/plain"})
     assert "application/json" in check_problem(answer, 415)["cure"]
 
 
 @pytest.mark.parametrize("path", ["mode", "scene", "presets/look"])
 def test_a_body_without_a_content_type_is_refused(client: Client, path: str) -> None:
     method = "PATCH" if path == "scene" else "PUT"
-    check_problem(client.request(method, f"/api/v1/{path}", content='{"mode": "ratio"}'), 415)
+    check_problem(client.request(method, f"/api/v1/{path}", content='{"mode": "live"}'), 415)
 
 
 def test_a_body_may_be_left_out_without_a_content_type(client: Client) -> None:

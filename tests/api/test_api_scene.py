@@ -35,7 +35,7 @@ def test_it_is_read_with_its_revision(client: Client, camera: FakeCamera) -> Non
     answer = client.get(SCENE)
     body = answer.json()
     assert answer.headers["etag"] == f'"{camera.scene_controller.scene.revision}"' == f'"{body["revision"]}"'
-    assert (body["mode"], body["subject"], body["can_undo"]) == ("reenact", None, False)
+    assert (body["mode"], body["subject"], body["can_undo"]) == ("live", None, False)
 
 
 def test_everything_changes_in_one_revision(client: Client, camera: FakeCamera, ada: str) -> None:
@@ -43,13 +43,13 @@ def test_everything_changes_in_one_revision(client: Client, camera: FakeCamera, 
     changes: dict[str, Any] = {
         "lighting": {"yaw_deg": 20, "lamps": [{"kelvin": 3000, "name": "key", "muted": True}]},
         "background": {"kind": "color", "color": "#112233"},
-        "mode": "ratio",
+        "mode": "portrait",
         "subject": ada,
         "frozen": True,
     }
     body = patch(client, **changes)
     assert body["revision"] == before + 1
-    assert (body["mode"], body["subject"], body["frozen"]) == ("ratio", "ada", True)
+    assert (body["mode"], body["subject"], body["frozen"]) == ("portrait", "ada", True)
     assert body["background"] == changes["background"]
     assert (body["lighting"]["yaw_deg"], body["lighting"]["environment"]) == (20, "studio")
     assert body["lighting"]["lamps"][0]["name"] == "key"
@@ -71,13 +71,13 @@ def test_what_is_wrong_in_part_changes_nothing(
     client: Client, camera: FakeCamera, changes: dict[str, Any], status: int
 ) -> None:
     scene = camera.scene_controller.scene
-    check_problem(client.patch(SCENE, {"mode": "ratio", "frozen": True, **changes}), status)
+    check_problem(client.patch(SCENE, {"mode": "portrait", "frozen": True, **changes}), status)
     assert camera.scene_controller.scene is scene
 
 
 def test_a_change_of_another_scene_is_refused(client: Client, camera: FakeCamera) -> None:
     tag = client.get(SCENE).headers["etag"]
-    patch(client, tag, mode="ratio")
+    patch(client, tag, mode="portrait")
     answer = client.request("PATCH", SCENE, json={"frozen": True}, headers={"If-Match": tag})
     problem = check_problem(answer, 412)
     assert problem["type"].endswith(":precondition-failed")
@@ -97,9 +97,9 @@ def test_steps_are_undone_and_done_again(client: Client, ada: str) -> None:
     problem = check_problem(client.post(f"{SCENE}/undo"), 409)
     assert "nothing to undo" in problem["what"]
     patch(client, subject=ada)
-    patch(client, lighting={"environment": "sunset"}, mode="ratio")
+    patch(client, lighting={"environment": "sunset"}, mode="portrait")
     undone = client.post(f"{SCENE}/undo").json()
-    assert (undone["lighting"]["environment"], undone["mode"], undone["subject"]) == ("studio", "reenact", "ada")
+    assert (undone["lighting"]["environment"], undone["mode"], undone["subject"]) == ("studio", "live", "ada")
     assert (undone["can_undo"], undone["can_redo"]) == (True, True)
     assert client.post(f"{SCENE}/undo").json()["subject"] is None
     assert client.post(f"{SCENE}/redo").json()["subject"] == "ada"
@@ -119,22 +119,22 @@ def test_changes_of_the_same_fields_at_once_are_one_step(client: Client) -> None
 
 def test_reset_shows_what_the_settings_say_and_can_be_undone(client: Client, camera: FakeCamera, ada: str) -> None:
     camera.scene_controller.mark_start()
-    patch(client, subject=ada, mode="ratio", frozen=True, lighting={"yaw_deg": 30})
+    patch(client, subject=ada, mode="portrait", frozen=True, lighting={"yaw_deg": 30})
     body = client.post(f"{SCENE}/reset").json()
-    assert (body["lighting"]["yaw_deg"], body["mode"], body["frozen"]) == (0, "reenact", False)
+    assert (body["lighting"]["yaw_deg"], body["mode"], body["frozen"]) == (0, "live", False)
     assert body["subject"] == "ada"  # the settings name nobody: whoever is shown stays
-    assert client.post(f"{SCENE}/undo").json()["mode"] == "ratio"
+    assert client.post(f"{SCENE}/undo").json()["mode"] == "portrait"
 
 
 def test_what_is_gone_is_said_and_does_not_bar_the_way(client: Client, camera: FakeCamera, ada: str) -> None:
-    patch(client, mode="ratio")
+    patch(client, mode="portrait")
     patch(client, subject=ada)
-    patch(client, frozen=True, mode="reenact")
+    patch(client, frozen=True, mode="live")
     patch(client, subject=None)
     camera.scene_controller.subjects.remove(ada)
     check_problem(client.post(f"{SCENE}/undo"), 404)
     check_problem(client.post(f"{SCENE}/undo"), 404)
-    assert client.post(f"{SCENE}/undo").json()["mode"] == "ratio"
+    assert client.post(f"{SCENE}/undo").json()["mode"] == "portrait"
 
 
 # Nothing as filmed unasked
@@ -145,10 +145,10 @@ def test_what_is_gone_is_said_and_does_not_bar_the_way(client: Client, camera: F
 def test_nothing_as_filmed_without_a_confirmed_choice(
     client: Client, camera: FakeCamera, change: dict[str, float], way: str
 ) -> None:
-    patch(client, mode="ratio")
+    patch(client, mode="live")
     scene = camera.scene_controller.scene
     if way == "preset":
-        client.put("/api/v1/presets/before", {"mode": "ratio", "lighting": change})
+        client.put("/api/v1/presets/before", {"mode": "live", "lighting": change})
         answer = client.post("/api/v1/presets/before/apply")
     else:
         body = {"lighting": change} if way == "scene" else change
@@ -161,21 +161,21 @@ def test_nothing_as_filmed_without_a_confirmed_choice(
 
 
 def test_neither_the_mode_nor_nobody_brings_it_about(client: Client, camera: FakeCamera) -> None:
-    patch(client, lighting={"blend": 0})  # in mode reenact: the source image as captured
-    check_problem(client.put("/api/v1/mode", {"mode": "ratio"}), 409)
+    patch(client, mode="portrait", lighting={"blend": 0})  # the source image as captured
+    check_problem(client.put("/api/v1/mode", {"mode": "live"}), 409)
     client.put("/api/v1/subject", {"name": None})
     assert not camera.scene_controller.scene.unlit_allowed
 
 
 def test_when_the_choice_is_withdrawn_nothing_as_filmed_stays(client: Client) -> None:
-    patch(client, mode="ratio", lighting={"split": 0.5, "yaw_deg": 5}, unlit_allowed=True)
+    patch(client, mode="live", lighting={"split": 0.5, "yaw_deg": 5}, unlit_allowed=True)
     body = patch(client, unlit_allowed=False)
     assert (body["lighting"]["split"], body["lighting"]["yaw_deg"], body["unlit_allowed"]) == (0, 5, False)
     check_problem(client.patch(SCENE, {"unlit_allowed": False, "lighting": {"split": 1}}), 409)
 
 
 def test_undo_redo_and_reset_never_allow_it(client: Client) -> None:
-    patch(client, mode="ratio", lighting={"split": 0.5}, unlit_allowed=True)
+    patch(client, mode="live", lighting={"split": 0.5}, unlit_allowed=True)
     patch(client, lighting={"yaw_deg": 5})
     patch(client, unlit_allowed=False)
     for way in ("undo", "undo", "redo", "redo", "reset"):

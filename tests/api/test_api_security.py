@@ -55,7 +55,7 @@ def test_port_80_need_not_be_named() -> None:
 @pytest.mark.parametrize("origin", [BASE_URL, "http://localhost:8470", "http://[::1]:8470"])
 def test_our_panel_may_change_things(client: Client, origin: str) -> None:
     headers = {"origin": origin, "sec-fetch-site": "same-origin"}
-    assert client.put("/api/v1/mode", {"mode": "ratio"}, headers=headers).status_code == 200
+    assert client.put("/api/v1/mode", {"mode": "portrait"}, headers=headers).status_code == 200
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_our_panel_may_change_things(client: Client, origin: str) -> None:
 @pytest.mark.parametrize(("method", "path"), [("PUT", "mode"), ("POST", "neutral-pose"), ("DELETE", "presets/x")])
 def test_other_origins_may_not(client: Client, camera: FakeCamera, origin: str, method: str, path: str) -> None:
     before = camera.scene_controller.scene
-    options = {"json": {"mode": "ratio"}} if method == "PUT" else {}
+    options = {"json": {"mode": "portrait"}} if method == "PUT" else {}
     check_problem(client.request(method, f"/api/v1/{path}", headers={"origin": origin}, **options), 403)
     assert camera.scene_controller.scene is before
     assert camera.neutral_resets == 0

@@ -111,7 +111,7 @@ def test_the_camera_keeps_its_rate(
             got, made, times = ask(viewers) - before, len(encoded) - made, sink.times[frames:]
             most_made = preview_stream.MAX_FRAMES_SENT_PER_S / VIEWERS * (time.monotonic() - began) + 2
             most_threads = process.num_threads()
-            camera.put("mode", mode="reenact")
+            camera.put("mode", mode="portrait")
         wait_until(lambda: process.num_fds() <= files)
         wait_until(lambda: camera.status()["state"] == "live")
         gap_s = longest_gap_s(times)

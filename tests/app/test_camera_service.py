@@ -296,7 +296,7 @@ def test_ready_while_the_picture_is_held(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_missing_matte_model_is_reported_and_pictures_go_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "no-models"))
-    with running_camera(tmp_path, look=Look(mode=Mode.RATIO), timings=IMPATIENT) as camera:
+    with running_camera(tmp_path, look=Look(mode=Mode.LIVE), timings=IMPATIENT) as camera:
         camera.sink.wait_for(3)
         camera.put("background", kind="blur")
         wait_until(lambda: "relit models pull" in camera.troubles())

@@ -38,7 +38,7 @@ def test_it_begins_as_filmed_and_relights_in_many_places() -> None:
 def test_every_look_can_be_shown(scene_controller: SceneController) -> None:
     for time_s in np.arange(0, TOUR_S, 0.25):
         _, look = tour_at(float(time_s))
-        assert scene_controller.set_look(look).look.mode is Mode.RATIO
+        assert scene_controller.set_look(look).look.mode is Mode.LIVE
 
 
 def test_the_tour_begins_again() -> None:

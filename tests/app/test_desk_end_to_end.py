@@ -93,7 +93,7 @@ def person_at_the_desk() -> SimulatedFrames:
 def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: Path) -> None:
     desk, stop = Desk(person_at_the_desk()), threading.Event()
     scenes = SceneController(StorageSettings(data_dir=tmp_path))
-    scenes.set_look(Look())
+    scenes.set_look(Look(mode=Mode.PORTRAIT))
     recorder = FrameRecorder()
     before = dict(desk.webcam.values)
     filming = DeskFilming(
@@ -138,7 +138,7 @@ def test_a_person_before_their_screen_becomes_a_subject(tmp_path: Path, models: 
     assert status.stage is DeskStage.DONE, status
     assert desk.webcam.values == before
     assert scenes.scene.subject_name == "me"
-    assert scenes.scene.look.mode is Mode.RATIO
+    assert scenes.scene.look.mode is Mode.LIVE
     found = read_subject(scenes.subject_path("me"))
     assert (found.metadata.rung, found.metadata.lights) == ("desk", MONITOR.patches.count)
     assert (found.metadata.width, found.metadata.height) == (SMALL_PX, SMALL_PX)

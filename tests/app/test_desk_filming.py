@@ -44,7 +44,7 @@ class Desk:
 
     def __init__(self, folder: Path, build: DeskBuilder) -> None:
         self.scenes = SceneController(StorageSettings(data_dir=folder))
-        self.scenes.set_look(Look())
+        self.scenes.set_look(Look(mode=Mode.PORTRAIT))
         self.webcam = FakeWebcam()
         self.before = dict(self.webcam.values)
         self.recorder = FrameRecorder()
@@ -128,7 +128,7 @@ def test_a_capture_ends_with_a_stored_subject_and_the_webcam_as_it_was(desk: Cal
     assert there.end() is DeskStage.DONE, there.filming.status()
     assert there.filming.status().what == "it was bright"
     assert there.scenes.scene.subject_name == "desk"
-    assert there.scenes.scene.look.mode is Mode.RATIO
+    assert there.scenes.scene.look.mode is Mode.LIVE
     assert there.webcam.values == there.before
 
 

@@ -58,13 +58,13 @@ class ShortFilming(GuidedFilming):
 
 
 class Studio:
-    """A stored subject `me`, which is shown in mode reenact, and the capture under test."""
+    """A stored subject `me`, which is shown in mode portrait, and the capture under test."""
 
     def __init__(self, folder: Path, build: FilmedBuilder, build_of_video: VideoBuilder = add_of_video) -> None:
         self.data = folder
         self.storage = StorageSettings(data_dir=folder)
         self.scenes = SceneController(self.storage)
-        self.scenes.set_look(Look())
+        self.scenes.set_look(Look(mode=Mode.PORTRAIT))
         self.file = self.scenes.subjects.new_path("me")
         if not self.file.exists():
             write_subject(self.file, captured("desk"))
@@ -152,7 +152,7 @@ def test_the_subject_that_is_shown_has_its_stills_at_once_in_the_same_mode(studi
     now = there.scenes.scene
     assert now.subject is not None
     assert len(now.subject.stills) == 1
-    assert (now.subject_name, now.look.mode) == ("me", Mode.REENACT)
+    assert (now.subject_name, now.look.mode) == ("me", Mode.PORTRAIT)
     assert now.can_undo == before.can_undo, "more stills are no step to undo"
 
 

@@ -57,7 +57,7 @@ def test_a_film_is_sent_read_reported_and_shown(tmp_path: Path, monkeypatch: pyt
         assert report["used"] > 30
         assert "part of the exposure" in report["dropped"][0]["why"]
         assert camera.status()["subject"] == "me"
-        assert camera.status()["mode"] == "ratio"
+        assert camera.status()["mode"] == "live"
         details = camera.http.get("subjects/me").json()["metadata"]
         assert (details["rung"], details["width"], details["source"]) == ("film", 64, "evening.mp4")
         pictures = {

@@ -38,7 +38,7 @@ class Studio:
         storage = StorageSettings(data_dir=folder)
         self.folder = storage.film_capture
         self.scenes = SceneController(storage)
-        self.scenes.set_look(Look())
+        self.scenes.set_look(Look(mode=Mode.PORTRAIT))
         events = EventHub()
         self._listening = events.listen()
         self.events = self._listening.__enter__()
@@ -107,7 +107,7 @@ def test_a_film_becomes_a_subject_that_is_shown_and_the_film_is_deleted(studio: 
     assert done.report.pictures == ("/api/v1/captures/film/pictures/studio.jpg",)
     assert there.capture.picture("studio") == b"a picture"
     assert there.told() == ["receiving", "reading", "building", "done"]
-    assert (there.scenes.scene.subject_name, there.scenes.scene.look.mode) == ("me", Mode.RATIO)
+    assert (there.scenes.scene.subject_name, there.scenes.scene.look.mode) == ("me", Mode.LIVE)
     assert there.files() == {RECORD_NAME, "pictures"}
     assert stat.S_IMODE(there.folder.stat().st_mode) == 0o700
 
@@ -423,10 +423,10 @@ def test_a_mode_that_was_chosen_meanwhile_stays_though_it_is_the_same_again(stud
     wait_until(lambda: there.capture.status().stage is FilmStage.BUILDING)
     there.capture.cancel()
     there.capture.resume()
-    there.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.RATIO}))
-    there.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.REENACT}))
+    there.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.LIVE}))
+    there.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.PORTRAIT}))
     assert there.end().stage is FilmStage.DONE
-    assert (there.scenes.scene.subject_name, there.scenes.scene.look.mode) == ("me", Mode.REENACT)
+    assert (there.scenes.scene.subject_name, there.scenes.scene.look.mode) == ("me", Mode.PORTRAIT)
 
 
 def test_the_steps_are_those_that_the_work_tells() -> None:

@@ -33,7 +33,7 @@ class Studio:
 
     def __init__(self, folder: Path, build: SubjectBuilder, timings: LiveCaptureTimings | None = None) -> None:
         self.scenes = SceneController(StorageSettings(data_dir=folder))
-        self.scenes.set_look(Look())
+        self.scenes.set_look(Look(mode=Mode.PORTRAIT))
         self.recorder = FrameRecorder()
         self.on = True
         self.woken = 0
@@ -103,7 +103,7 @@ def test_a_captured_subject_is_stored_and_shown(studio: Callable[[SubjectBuilder
     assert "turn toward the window" in status.what
     assert camera.stages_until("done") == ["filming", "building", "done"]
     assert camera.scenes.scene.subject_name == "me"
-    assert camera.scenes.scene.look.mode is Mode.RATIO
+    assert camera.scenes.scene.look.mode is Mode.LIVE
     assert camera.scenes.subjects.names() == ["me"]
     assert camera.woken > 0
 
@@ -117,20 +117,20 @@ def test_a_subject_that_somebody_chose_meanwhile_stays(studio: Callable[[Subject
     camera.on = True
     wait_until(camera.ended)
     assert camera.scenes.scene.subject_name == "other"
-    assert camera.scenes.scene.look.mode is Mode.REENACT
+    assert camera.scenes.scene.look.mode is Mode.PORTRAIT
     assert camera.scenes.subjects.names() == ["me"]
 
 
 def test_a_mode_that_somebody_chose_meanwhile_stays(studio: Callable[[SubjectBuilder], Studio]) -> None:
     camera = studio(build)
-    camera.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.RATIO}))
+    camera.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.LIVE}))
     camera.on = False
     camera.capture.start("me")
-    camera.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.REENACT}))
+    camera.scenes.update_look(lambda look: look.model_copy(update={"mode": Mode.PORTRAIT}))
     camera.on = True
     wait_until(camera.ended)
     assert camera.scenes.scene.subject_name == "me"
-    assert camera.scenes.scene.look.mode is Mode.REENACT
+    assert camera.scenes.scene.look.mode is Mode.PORTRAIT
 
 
 def test_a_better_subject_that_was_stored_meanwhile_stays(studio: Callable[[SubjectBuilder], Studio]) -> None:

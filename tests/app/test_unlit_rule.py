@@ -30,7 +30,7 @@ from tests.small_camera import (
 )
 
 FILMED: DisplayImage = np.random.default_rng(3).integers(60, 200, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
-RATIO = Look(mode=Mode.RATIO, lighting=Lighting(exposure_ev=-2, transition_s=0))
+LIVE = Look(mode=Mode.LIVE, lighting=Lighting(exposure_ev=-2, transition_s=0))
 ONE_S = int(FPS)
 SETTLED = 2 * ONE_S
 """New pictures, after which a face that came or went has been eased in or out."""
@@ -75,7 +75,7 @@ def test_the_pattern_is_told_from_others() -> None:
 
 @pytest.mark.parametrize("mode", list(Mode))
 def test_no_subject(tmp_path: Path, mode: Mode) -> None:
-    with running_camera(tmp_path, memory_source(FILMED), look=RATIO.model_copy(update={"mode": mode})) as camera:
+    with running_camera(tmp_path, memory_source(FILMED), look=LIVE.model_copy(update={"mode": mode})) as camera:
         camera.put("subject", name=None)
         wait_until(lambda: camera.status()["state"] == "no-subject")
         check_nothing_as_filmed(camera)
@@ -83,7 +83,7 @@ def test_no_subject(tmp_path: Path, mode: Mode) -> None:
 
 
 def test_it_is_published_once_that_is_confirmed_and_no_longer_when_it_is_withdrawn(tmp_path: Path) -> None:
-    with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
+    with running_camera(tmp_path, memory_source(FILMED), look=LIVE) as camera:
         camera.http.patch("scene", json={"subject": None, "unlit_allowed": True}).raise_for_status()
         wait_until(lambda: bool(camera.status()["unlit"]))
         wait_until(lambda: share_as_filmed(camera.sink.new[-1]) == 1)
@@ -100,14 +100,14 @@ def test_it_is_published_once_that_is_confirmed_and_no_longer_when_it_is_withdra
     ids=["never there", "lost", "coming and going"],
 )
 def test_a_face_that_is_lost(tmp_path: Path, sees: Callable[[int], bool]) -> None:
-    with running_camera(tmp_path, memory_source(FILMED), Tracker(sees), look=RATIO) as camera:
+    with running_camera(tmp_path, memory_source(FILMED), Tracker(sees), look=LIVE) as camera:
         camera.sink.wait_for(SETTLED)
         check_nothing_as_filmed(camera)
 
 
 @pytest.mark.slow
 def test_a_head_that_is_bowed_at_the_start(tmp_path: Path) -> None:
-    with running_camera(tmp_path, memory_source(FILMED), Tracker(tilted_deg=30), look=RATIO) as camera:
+    with running_camera(tmp_path, memory_source(FILMED), Tracker(tilted_deg=30), look=LIVE) as camera:
         camera.sink.wait_for(SETTLED)
         check_nothing_as_filmed(camera)
 
@@ -115,7 +115,7 @@ def test_a_head_that_is_bowed_at_the_start(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("change", [{"split": 0.5}, {"split": 1.0}, {"blend": 0.0}])
 def test_as_filmed(tmp_path: Path, change: dict[str, float]) -> None:
-    with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
+    with running_camera(tmp_path, memory_source(FILMED), look=LIVE) as camera:
         assert camera.http.patch("lighting", json=change).status_code == 409
         camera.sink.wait_for(SETTLED)
         check_nothing_as_filmed(camera)
@@ -143,8 +143,8 @@ def test_the_fallback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, allowed: 
         tmp_path,
         memory_source(FILMED),
         BrokenTracker(),
-        look=RATIO,
-        fallback=Fallback.LIVE,
+        look=LIVE,
+        fallback=Fallback.FILMED,
         timings=IMPATIENT,
         unlit_allowed=allowed,
     ) as camera:
@@ -158,7 +158,7 @@ def test_the_fallback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, allowed: 
 
 @pytest.mark.slow
 def test_before_is_for_the_preview_alone_and_taken_from_nobody(tmp_path: Path) -> None:
-    with running_camera(tmp_path, memory_source(FILMED), look=RATIO) as camera:
+    with running_camera(tmp_path, memory_source(FILMED), look=LIVE) as camera:
         camera.sink.wait_for(ONE_S // 4)
         with camera.http.stream("GET", "preview.mjpg", params={"before": "true"}) as body:
             picture = first_picture(body)

@@ -94,10 +94,11 @@ def test_enter_saves_a_preset(fake: FakeServer, open_page: OpenPage) -> None:
 
 
 def test_nothing_is_called_private_while_the_raw_picture_is_published(fake: FakeServer, open_page: OpenPage) -> None:
+    fake.patch("scene", mode="portrait")
     fake.show_raw_picture()
     panel = open_panel(open_page, fake.url)
     expect(panel.unlit).to_be_visible()
-    expect(panel.page.get_by_text(re.compile("stays private"))).to_have_count(0)
+    expect(panel.page.get_by_text(re.compile("nothing of your room"))).to_have_count(0)
 
 
 def test_a_subject_from_a_file_can_be_chosen_again_after_nobody(

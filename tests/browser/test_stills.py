@@ -174,15 +174,15 @@ def test_a_video_is_sent_instead(fake: FakeServer, open_page: OpenPage) -> None:
     expect(dialog).to_have_attribute("data-step", "done")
 
 
-def test_in_mode_ratio_it_says_where_they_show(fake: FakeServer, open_page: OpenPage) -> None:
-    fake.patch("scene", mode="ratio")
+def test_in_mode_live_it_says_where_they_show(fake: FakeServer, open_page: OpenPage) -> None:
+    fake.patch("scene", mode="live")
     panel, dialog = open_card(fake, open_page)
     panel.page.keyboard.press("Enter")
     wait_until(lambda: stage(fake) is ExpressionStage.FILMING)
     tell(fake, stage=ExpressionStage.DONE, report=REPORT)
-    expect(dialog.locator("#stills-words")).to_contain_text("They show with “Captured face, moved”")
+    expect(dialog.locator("#stills-words")).to_contain_text("They show with “Portrait: your captured picture, moved”")
     dialog.locator("#stills-moved").click()
-    fake.wait_for("scene", mode="reenact")
+    fake.wait_for("scene", mode="portrait")
 
 
 @pytest.mark.parametrize("theme", THEMES)
@@ -208,7 +208,7 @@ def test_one_s_own_stills_from_a_recorded_webcam(
     with camera_process(tmp_path, "run", "--source", demo_files.CLIP, models=models) as camera:
         file = ("me.relit", demo_files.SUBJECT.read_bytes())
         camera.http.post("subjects", data={"name": "me"}, files={"file": file}).raise_for_status()
-        camera.patch("scene", subject="me", mode="reenact")
+        camera.patch("scene", subject="me", mode="portrait")
         panel = open_panel(open_page, camera.url)
         dialog = panel.page.locator("#stills-dialog")
         with timed("open the card"):
@@ -225,6 +225,6 @@ def test_one_s_own_stills_from_a_recorded_webcam(
         assert {"neutral", "lips apart"} <= set(report["covered"])
         stored = next(tmp_path.rglob("me.relit"))
         assert count_stills(stored) == report["stills"]
-        assert camera.get("scene")["mode"] == "reenact"
+        assert camera.get("scene")["mode"] == "portrait"
         panel.page.locator("#stills-keep").click()
         expect(panel.page.locator("#ladder-trust")).to_contain_text(f"{report['stills']} pictures of your own mouth")

@@ -82,10 +82,10 @@ def is_live_without_troubles(http: httpx.Client) -> bool:
     return now["state"] == "live" and {each["code"] for each in now["degraded"]} <= {"reduced-quality"}
 
 
-def test_the_bundled_person_is_live_and_in_ratio(demo: tuple[list[str], httpx.Client]) -> None:
+def test_the_bundled_person_is_live_and_in_mode_live(demo: tuple[list[str], httpx.Client]) -> None:
     wait_until(lambda: is_live_without_troubles(demo[1]))
     now = status(demo[1])
-    assert (now["subject"], now["mode"]) == ("adam", "ratio")
+    assert (now["subject"], now["mode"]) == ("adam", "live")
     assert demo[1].get("scene").json()["rung"] == "pictures"
 
 
@@ -102,7 +102,7 @@ def test_the_light_changes_by_itself_until_somebody_takes_over(demo: tuple[list[
     http.patch("lighting", json={"environment": "party", "split": 0, "transition_s": 0}).raise_for_status()
     let_run(http, 3)  # longer than a stranger is on trial, too
     assert http.get("lighting").json()["environment"] == "party"
-    assert status(http)["mode"] == "ratio"
+    assert status(http)["mode"] == "live"
     wait_until(lambda: is_live_without_troubles(http))
     party = snapshot(http)
     http.patch("lighting", json={"environment": "overcast"}).raise_for_status()

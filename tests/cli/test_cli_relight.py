@@ -145,7 +145,7 @@ def test_replay_shows_the_window_at_the_left_behind_the_person(material: Materia
     done(
         call(
             "replay", material.clip, "--subject", material.subject, "--environment", panorama,
-            "--background", "environment", "--tracker", material.tracker, "--out", out,
+            "--background", "environment", "--mode", "portrait", "--tracker", material.tracker, "--out", out,
         )
     )  # fmt: skip
     with VideoReader(out) as video:

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from relit_camera.base.config.look import Mode
 from relit_camera.base.images.image_files import read_display
 from relit_camera.base.video.video_readers import VideoReader
+from relit_camera.cli.arguments import parse_mode
 from relit_camera.cli.main import COMMANDS
 from tests.cli.relit_command import CLIP_FPS, CLIP_SIZE, Answer, Material, call, files, finish
 from tests.synthetic import sphere_samples, write_lights
@@ -25,11 +27,11 @@ def done(answer: Answer) -> Answer:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mode", ["reenact", "ratio"])
-def test_replay_writes_video_report_and_sheet(mode: str, material: Material, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("given", "mode"), [("live", "live"), ("reenact", "portrait")], ids=["live", "former name"])
+def test_replay_writes_video_report_and_sheet(given: str, mode: str, material: Material, tmp_path: Path) -> None:
     answer = done(
         call(
-            "replay", material.clip, "--subject", material.subject, "--environment", "window", "--mode", mode,
+            "replay", material.clip, "--subject", material.subject, "--environment", "window", "--mode", given,
             "--tracker", material.tracker, "--out", tmp_path / "out.mp4", "--report", tmp_path / "report.json",
             "--contact-sheet", tmp_path / "sheet.png", "--rotate=40,0,0",
         )
@@ -118,6 +120,10 @@ def test_the_log_follows_the_option_then_the_settings(
     done(call("--config", config, "--log-level", "error", "subject", "info", material.subject))
     assert ours.level == logging.ERROR
     assert call("--log-level", "loud", "devices").code == 2
+
+
+def test_former_names_of_modes_are_taken() -> None:
+    assert [parse_mode(former) for former in ("ratio", "reenact")] == [Mode.LIVE, Mode.PORTRAIT]
 
 
 def test_usage_errors_exit_with_two(material: Material) -> None:

@@ -113,9 +113,9 @@ def check_end(process: subprocess.Popen[str], http: httpx.Client, number: signal
 
 @pytest.mark.slow
 def test_light_changes_while_it_runs_the_clip_loops_and_sigterm_ends_it(material: Material, tmp_path: Path) -> None:
-    with running(material, tmp_path, "--environment", "sunset", "--mode", "ratio") as (process, http):
+    with running(material, tmp_path, "--environment", "sunset", "--mode", "live") as (process, http):
         assert http.get("lighting").json()["environment"] == "sunset"
-        assert http.get("mode").json() == {"mode": "ratio"}
+        assert http.get("mode").json() == {"mode": "live"}
         first = http.get("snapshot.jpg").raise_for_status().content
         assert first.startswith(b"\xff\xd8")
         body = {"environment": None, "lamps": [{"azimuth_deg": 90}], "transition_s": 0}

@@ -139,7 +139,7 @@ def test_the_person_is_relit_before_another_background(
     out, report = tmp_path / "relit.mkv", tmp_path / "report.json"
     color = "#{:02x}{:02x}{:02x}".format(*BACKGROUND)
     answer = pulled[0].relit(
-        "replay", clip, "--subject", demo_files.SUBJECT, "--environment", "sunset", "--mode", "ratio",
+        "replay", clip, "--subject", demo_files.SUBJECT, "--environment", "sunset", "--mode", "live",
         "--background", color, "--out", out, "--report", report,
     )  # fmt: skip
     assert answer.code == 0, answer

@@ -210,12 +210,12 @@ def test_what_is_late_does_not_break_a_held_picture(tracker: FaultyTracker, tmp_
 
 
 def test_what_is_late_does_not_show_the_room(tracker: FaultyTracker, tmp_path: Path) -> None:
-    """A frame of mode ratio hangs; when it comes at last the live picture is private."""
+    """A frame of mode live hangs; when it comes at last the live picture is private."""
     room = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
     room[..., 1] = 255
-    with watched_camera(tmp_path, tracker=tracker, source=memory_source(room), look=Look(mode=Mode.RATIO)) as watched:
+    with watched_camera(tmp_path, tracker=tracker, source=memory_source(room), look=Look(mode=Mode.LIVE)) as watched:
         hang(tracker, watched)
-        watched.camera.put("mode", mode="reenact")
+        watched.camera.put("mode", mode="portrait")
         watched.goes_on()  # what was on its way before
         count = len(watched.sink.new)
         tracker.release.set()
@@ -279,7 +279,7 @@ def test_a_reenactor(half: str, how: str, tmp_path: Path, survived: Survived, mo
 def test_not_even_the_source_image_can_be_relit(
     fallback: Fallback, tmp_path: Path, survived: Survived, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with watched_camera(tmp_path, fallback=fallback, unlit_allowed=fallback is Fallback.LIVE) as watched:
+    with watched_camera(tmp_path, fallback=fallback, unlit_allowed=fallback is Fallback.FILMED) as watched:
 
         def fail(self: BasisRelighter, lights: object) -> LinearImage:
             raise MemoryError("no memory for a picture")
@@ -288,7 +288,8 @@ def test_not_even_the_source_image_can_be_relit(
             broken.setattr(BasisRelighter, "relight", fail)
             watched.camera.put("lighting", environment="sunset", transition_s=0)
             watched.reports("no memory for a picture")
-            shown = grey() if fallback is Fallback.LIVE else placeholder(SIZE, "the picture has failed: see the panel")
+            failed = placeholder(SIZE, "the picture has failed: see the panel")
+            shown = grey() if fallback is Fallback.FILMED else failed
             wait_until(lambda: difference(watched.sink.new[-1], shown) == 0)
             watched.goes_on(MORE)
         watched.recovers()

@@ -104,7 +104,7 @@ NOBODY = FaceMotion(
 
 
 def moved_by(reenactor: Reenactor, relit: LinearImage, motion: FaceMotion, frame: Frame) -> WarpedLayer:
-    """A frame as mode reenact does it: plan the warp, then warp the relit picture."""
+    """A frame as mode portrait does it: plan the warp, then warp the relit picture."""
     return reenactor.plan_warp(motion, frame, FULL_QUALITY)(relit)
 
 

@@ -50,7 +50,7 @@ def pipeline(tracker: Tracker | None = None, size: tuple[int, int] = SIZE) -> Pi
     return make_pipeline(CPU, tracker or SteadyTracker(), size)
 
 
-def scene(subject: bool = True, mode: Mode = Mode.REENACT, unlit_allowed: bool = True, **look: object) -> Scene:
+def scene(subject: bool = True, mode: Mode = Mode.PORTRAIT, unlit_allowed: bool = True, **look: object) -> Scene:
     wanted = Look.model_validate({"mode": mode, **look})
     lit = STUDIO if wanted.lighting.environment == "studio" else None
     return Scene(wanted, lit, None, "small", small_subject() if subject else None, unlit_allowed=unlit_allowed)
@@ -62,13 +62,13 @@ def frame(index: int = 0, image: np.ndarray | None = None) -> Frame:
 
 def test_pictures_are_of_the_outputs_size_whatever_comes() -> None:
     for image in (grey(), grey(size=(90, 160)), grey(size=(300, 40))):
-        for shown in (scene(), scene(subject=False), scene(mode=Mode.RATIO)):
+        for shown in (scene(), scene(subject=False), scene(mode=Mode.LIVE)):
             picture = pipeline(size=(160, 90)).process(frame(0, image), shown).image
             assert picture.shape == (90, 160, 3)
             assert picture.dtype == np.uint8
 
 
-def test_reenact_lets_no_live_pixel_through() -> None:
+def test_portrait_lets_no_live_pixel_through() -> None:
     noise = np.random.default_rng(0).integers(0, 255, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
     quiet, loud = (pipeline().process(frame(0, image), scene()).image for image in (grey(), noise))
     np.testing.assert_array_equal(quiet, loud)
@@ -88,9 +88,9 @@ def test_nobody_is_a_trouble(allowed: bool, shown: str) -> None:
     assert subject_troubles(scene()) == []
 
 
-def test_ratio_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
+def test_live_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
     """The face is tracked in the frame as it comes, the light is exchanged in the frame as it goes out."""
-    size, shown = (160, 90), scene(mode=Mode.RATIO, lighting={"exposure_ev": -2})
+    size, shown = (160, 90), scene(mode=Mode.LIVE, lighting={"exposure_ev": -2})
     textured = cv2.resize(np.random.default_rng(0).integers(60, 200, (9, 16, 3), dtype=np.uint8), (320, 240))
     live = frame(0, textured)
     scaled, cut = pipeline(SyntheticTracker(), size), pipeline(SyntheticTracker(), size)
@@ -99,7 +99,7 @@ def test_ratio_of_a_frame_of_another_size_is_that_of_the_fitted_frame() -> None:
     assert motion is not None
     assert motion.pose is not None
     middle = motion.landmarks.mean(axis=0)
-    assert np.abs(middle - np.array(live.size) / 2).max() < 0.2 * live.size[1]  # told as in mode reenact
+    assert np.abs(middle - np.array(live.size) / 2).max() < 0.2 * live.size[1]  # told as in mode portrait
     two = cut.process(fit_frame(live, size), shown).image
     assert difference(one, two) < 2
 
@@ -143,7 +143,7 @@ def test_blend_goes_from_the_live_picture_to_the_relit_one() -> None:
     image = grey(150)
 
     def last(blend: float) -> np.ndarray:
-        made, shown = pipeline(), scene(mode=Mode.RATIO, lighting={"blend": blend, "exposure_ev": -2})
+        made, shown = pipeline(), scene(mode=Mode.LIVE, lighting={"blend": blend, "exposure_ev": -2})
         # A face that just came is eased in.
         return [made.process(frame(index, image), shown).image for index in range(25)][-1]
 
@@ -162,12 +162,12 @@ def test_stages_are_timed() -> None:
 
 def test_a_matte_that_needs_a_missing_model_says_which(tmp_path: object, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
-    coloured = scene(mode=Mode.RATIO, background=ColorBackground())
+    coloured = scene(mode=Mode.LIVE, background=ColorBackground())
     with pytest.raises(ModelError, match="relit models pull"):
         pipeline().process(frame(), coloured)
 
 
-def test_reenact_stands_before_its_background_without_any_model() -> None:
+def test_portrait_stands_before_its_background_without_any_model() -> None:
     red = pipeline().process(frame(), scene(background=ColorBackground(color="#ff0000"))).image
     assert (red[:, 0] == [255, 0, 0]).all()
 
@@ -188,7 +188,7 @@ def test_a_live_person_whose_face_was_never_seen_has_the_tint_of_the_place(unlit
     def red(exposure_ev: float) -> Scene:
         lamp = {"lamps": [{"color": [0.8, 0.2, 0.2]}], "environment": None, "transition_s": 0}
         lighting = {**lamp, "exposure_ev": exposure_ev}
-        return scene(mode=Mode.RATIO, unlit_allowed=unlit_allowed, lighting=lighting)
+        return scene(mode=Mode.LIVE, unlit_allowed=unlit_allowed, lighting=lighting)
 
     first, darker = (pipeline(Blind()).process(frame(0, noise()), red(ev)) for ev in (0.0, -2.0))
     assert (first.shown, first.unlit) == (Shown.PLACE_TINT, False)
@@ -211,7 +211,7 @@ class SeenFrom(SteadyTracker):
 @pytest.mark.parametrize("unlit_allowed", [True, False])
 def test_the_first_frame_with_a_face_is_relit_as_all_later_ones(unlit_allowed: bool) -> None:
     """One fit tells the room; before the first frame nothing was shown that it would have to be eased from."""
-    shown = scene(mode=Mode.RATIO, unlit_allowed=unlit_allowed, lighting={"exposure_ev": -2, "transition_s": 0})
+    shown = scene(mode=Mode.LIVE, unlit_allowed=unlit_allowed, lighting={"exposure_ev": -2, "transition_s": 0})
     made, live = pipeline(), grey(220)
     rendered = [made.process(frame(index, live), shown) for index in range(20)]
     assert not any(each.unlit for each in rendered)
@@ -221,7 +221,7 @@ def test_the_first_frame_with_a_face_is_relit_as_all_later_ones(unlit_allowed: b
 
 def test_a_face_that_goes_keeps_the_mean_of_its_light_and_comes_back_into_it() -> None:
     """No step is larger than easing makes it, and the live picture is in none of them."""
-    shown = scene(mode=Mode.RATIO, unlit_allowed=False, lighting={"exposure_ev": -2, "transition_s": 0})
+    shown = scene(mode=Mode.LIVE, unlit_allowed=False, lighting={"exposure_ev": -2, "transition_s": 0})
     tracker, live = GoneFrom(20, 60), grey(220)
     made = pipeline(tracker)
     rendered = [made.process(frame(index, live), shown) for index in range(100)]
@@ -241,7 +241,7 @@ def test_a_face_that_goes_keeps_the_mean_of_its_light_and_comes_back_into_it() -
 
 def test_the_light_goes_on_changing_while_the_face_is_lost() -> None:
     made, live = pipeline(GoneFrom(10, 1000)), grey(220)
-    bright, dark = (scene(mode=Mode.RATIO, lighting={"exposure_ev": ev, "transition_s": 0}) for ev in (0, -3))
+    bright, dark = (scene(mode=Mode.LIVE, lighting={"exposure_ev": ev, "transition_s": 0}) for ev in (0, -3))
     before = [made.process(frame(index, live), bright).image for index in range(40)][-1]
     after = [made.process(frame(index, live), dark).image for index in range(40, 90)][-1]
     assert after.mean() < 0.6 * before.mean()
@@ -263,7 +263,7 @@ def test_a_head_turned_from_the_source_image_is_lit_as_it_is_turned(monkeypatch:
     landmarks = project(face.head_points, turned, subject.size).astype(np.float32)
     aside = replace(subject, landmarks={face.scheme.name: landmarks})
     for who in (subject, aside):
-        pipeline(NotInStills()).process(frame(), replace(scene(mode=Mode.RATIO), subject=who))
+        pipeline(NotInStills()).process(frame(), replace(scene(mode=Mode.LIVE), subject=who))
     assert angles_from_rotation(seen[1] * seen[0].inv()).yaw == pytest.approx(-20, abs=1.5)
 
 
@@ -289,7 +289,7 @@ class GoneFrom(SteadyTracker):
     ("changes", "unlit"), [({}, False), ({"split": 0.5}, True), ({"blend": 0.0}, True), ({"blend": 0.5}, False)]
 )
 def test_a_picture_says_whether_a_part_of_it_is_as_filmed(changes: dict[str, float], unlit: bool) -> None:
-    made, shown = pipeline(), scene(mode=Mode.RATIO, lighting=changes)
+    made, shown = pipeline(), scene(mode=Mode.LIVE, lighting=changes)
     assert [made.process(frame(index), shown).unlit for index in range(3)] == [unlit] * 3
 
 
@@ -307,8 +307,8 @@ class OneGrey:
 
 
 def with_third_mode(tracker: Tracker) -> Pipeline:
-    """A pipeline whose mode ratio is another: its logic knows no mode by name."""
-    modes = {**mode_factories(CPU), Mode.RATIO: OneGrey}
+    """A pipeline whose mode live is another: its logic knows no mode by name."""
+    modes = {**mode_factories(CPU), Mode.LIVE: OneGrey}
     follower = make_follower(CPU.tracker, tracker)
     return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
 
@@ -316,7 +316,7 @@ def with_third_mode(tracker: Tracker) -> Pipeline:
 def test_a_third_mode_needs_nothing_of_the_pipeline() -> None:
     made = with_third_mode(SteadyTracker())
     one, two = (
-        made.process(frame(index), scene(mode=Mode.RATIO, lighting={"exposure_ev": ev, "transition_s": 0})).image
+        made.process(frame(index), scene(mode=Mode.LIVE, lighting={"exposure_ev": ev, "transition_s": 0})).image
         for index, ev in enumerate((-1, 1))
     )
     assert len(np.unique(one)) == len(np.unique(two)) == 1
@@ -352,9 +352,9 @@ def test_it_says_when_models_are_opened() -> None:
     follower = make_follower(CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere)
     made.on_opening = lambda: said.append("opening")
-    blurred, other = scene(mode=Mode.RATIO, background={"kind": "blur"}), replace(small_subject())
-    ratio = scene(mode=Mode.RATIO)
-    for wanted in (scene(), scene(), ratio, blurred, blurred, scene(), replace(scene(), subject=other)):
+    blurred, other = scene(mode=Mode.LIVE, background={"kind": "blur"}), replace(small_subject())
+    live = scene(mode=Mode.LIVE)
+    for wanted in (scene(), scene(), live, blurred, blurred, scene(), replace(scene(), subject=other)):
         made.process(frame(), wanted)
         said.append("picture")
     made.close()
@@ -366,7 +366,7 @@ def test_it_starts_no_thread() -> None:
     before = set(threading.enumerate())
     made = pipeline()
     made.process(frame(), scene())
-    made.process(frame(), scene(mode=Mode.RATIO))
+    made.process(frame(), scene(mode=Mode.LIVE))
     assert set(threading.enumerate()) <= before  # those of other tests may have ended meanwhile
     made.close()
 
@@ -390,7 +390,7 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
             return super().begin(frame, motion, scene, quality)
 
     tracker = CountingTracker()
-    modes = {Mode.REENACT: Noting, Mode.RATIO: Noting}
+    modes = {Mode.PORTRAIT: Noting, Mode.LIVE: Noting}
     follower = make_follower(CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)  # flow needs something to follow
@@ -403,10 +403,10 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
     assert tracker.measured - before == 4
 
 
-@pytest.mark.parametrize(("mode", "measured"), [(Mode.REENACT, 8), (Mode.RATIO, 4)])
-def test_the_running_camera_measures_every_second_face_in_mode_ratio(mode: Mode, measured: int) -> None:
+@pytest.mark.parametrize(("mode", "measured"), [(Mode.PORTRAIT, 8), (Mode.LIVE, 4)])
+def test_the_running_camera_measures_every_second_face_in_mode_live(mode: Mode, measured: int) -> None:
     tracker = CountingTracker()
-    modes = {Mode.REENACT: OneGrey, Mode.RATIO: OneGrey}
+    modes = {Mode.PORTRAIT: OneGrey, Mode.LIVE: OneGrey}
     follower = make_follower(CPU.tracker, tracker)
     made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)

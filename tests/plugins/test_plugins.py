@@ -45,7 +45,7 @@ output: {sink: "example:shelf", width: 160, height: 90}
 tracker: {name: "example:120"}
 relight: {name: "example:2"}
 reenact: {name: example}
-look: {lighting: {environment: null, lamps: [{azimuth_deg: 0, elevation_deg: 0}]}}
+look: {mode: portrait, lighting: {environment: null, lamps: [{azimuth_deg: 0, elevation_deg: 0}]}}
 """
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from relit_camera.app.replay.video_replay import ReplayedFrame
+from relit_camera.base.config.look import Mode
 from relit_camera.base.images.image_files import read_display
 from relit_camera.base.rotations import rotation_from_angles
 from relit_camera.face.face_state import FaceStatus
@@ -22,7 +23,7 @@ from tests.replay.materials import UnavailableError, find, shared_folder
 from tests.replay.play import Played
 
 LEAST = {
-    "description": "d", "clip": "c.mp4", "subject": "s.relit", "environment": "studio", "mode": "reenact",
+    "description": "d", "clip": "c.mp4", "subject": "s.relit", "environment": "studio", "mode": "portrait",
     "tracker": "mesh", "expect": {},
 }  # fmt: skip
 EXPECTED_PICTURES = {"expect": {"pictures": {"frames": [1, 3], "min_psnr_db": 40}}}
@@ -48,9 +49,9 @@ def played(count: int = 4, shade: int = 100) -> Played:
     [
         ("clip: [", "is no YAML"),
         ("just words", "the file"),
-        ("mode: reenact", "clip: Field required"),
-        ("modus: reenact", "modus: Extra inputs are not permitted"),
-        ("mode: dance", "mode: Input should be 'reenact' or 'ratio'"),
+        ("mode: portrait", "clip: Field required"),
+        ("modus: portrait", "modus: Extra inputs are not permitted"),
+        ("mode: dance", "mode: Input should be 'live' or 'portrait'"),
         ("expect: {pose: {bounds: {yaw: [30, -30]}}}", "yaw: the lower bound comes first"),
         ("expect: {pictures: {frames: []}}", "expect.pictures.frames"),
         ("expect: {pictures: {frames: [3], min_psnr_db: .nan}}", "expect.pictures.min_psnr_db"),
@@ -67,15 +68,19 @@ def test_wrong_case_names_file_and_field(text: str, said: str, tmp_path: Path) -
     assert said in str(error.value)
 
 
+def test_former_names_of_modes_are_read() -> None:
+    assert [case_of(mode=former).mode for former in ("ratio", "reenact")] == [Mode.LIVE, Mode.PORTRAIT]
+
+
 def test_folder_without_case(tmp_path: Path) -> None:
     with pytest.raises(CaseError, match="cannot read"):
         read_case(tmp_path)
 
 
 def test_shipped_cases_need_nothing_or_say_so() -> None:
-    assert not read_case(CASES / "mannequin-reenact").uses_shared
-    assert not read_case(CASES / "mannequin-ratio").uses_shared
-    assert read_case(CASES / "adam-ratio").uses_shared
+    assert not read_case(CASES / "mannequin-portrait").uses_shared
+    assert not read_case(CASES / "mannequin-live").uses_shared
+    assert read_case(CASES / "adam-live").uses_shared
 
 
 def test_places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -165,10 +170,10 @@ def test_missing_expectations_say_how_to_make_them(tmp_path: Path) -> None:
 
 
 def test_no_face_and_no_word(tmp_path: Path) -> None:
-    wrong = differences(case_of(expect={"degraded": "ratio"}), tmp_path, played())
+    wrong = differences(case_of(expect={"degraded": "live"}), tmp_path, played())
     assert wrong == [
         "the face is found in 0% of the frames, expected are 100%",
-        "expected a word about 'ratio', reported was: nothing",
+        "expected a word about 'live', reported was: nothing",
     ]
 
 
@@ -182,7 +187,7 @@ def test_no_face_and_no_word(tmp_path: Path) -> None:
 )
 def test_damaged_pose_track(changed: object, said: str, tmp_path: Path) -> None:
     assert callable(changed)
-    shutil.copy(CASES / "mannequin-reenact" / "pose.csv", tmp_path)
+    shutil.copy(CASES / "mannequin-portrait" / "pose.csv", tmp_path)
     path = tmp_path / "pose.csv"
     assert read_pose(path).shape == (48, 3)
     path.write_text(changed(path.read_text()))
@@ -204,7 +209,7 @@ def followed(poses: np.ndarray) -> Played:
 
 
 def test_a_turned_pose_is_found_and_named(tmp_path: Path) -> None:
-    seen = followed(read_pose(CASES / "mannequin-reenact" / "pose.csv"))
+    seen = followed(read_pose(CASES / "mannequin-portrait" / "pose.csv"))
     case = case_of(expect={"pose": {"track": "pose.csv", "tolerance_deg": 0.5}})
     record(case, tmp_path, seen)
     assert differences(case, tmp_path, seen) == []
@@ -216,7 +221,7 @@ def test_a_turned_pose_is_found_and_named(tmp_path: Path) -> None:
 
 
 def test_bounds_and_jitter(tmp_path: Path) -> None:
-    seen = followed(read_pose(CASES / "mannequin-reenact" / "pose.csv"))
+    seen = followed(read_pose(CASES / "mannequin-portrait" / "pose.csv"))
     bounded = case_of(expect={"pose": {"bounds": {"yaw": [-5, 5]}, "jitter_deg": 0.01}})
     wrong = differences(bounded, tmp_path, seen)
     assert any(line.startswith("yaw is ") for line in wrong)

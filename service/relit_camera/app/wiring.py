@@ -14,10 +14,10 @@ from relit_camera.face.matting import matting_factory
 from relit_camera.face.motion.face_follower import FaceFollower, FaceFollowerSettings
 from relit_camera.face.motion.one_euro_filter import FACE_SMOOTHING
 from relit_camera.face.tracking.trackers import TRACKERS, TrackerOptions, open_tracker
+from relit_camera.live.modes.live_mode import LiveMode
 from relit_camera.live.modes.mode import ModeContext, ModeFactory, RenderMode
-from relit_camera.live.modes.ratio_mode import RatioMode
+from relit_camera.live.modes.portrait_mode import PortraitMode
 from relit_camera.live.modes.ratio_relighting import RatioRelighting, as_large_as_needed
-from relit_camera.live.modes.reenact_mode import ReenactMode
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.reenactment.dense_motion import DenseMotion
@@ -97,14 +97,14 @@ def mode_factories(settings: RelitSettings) -> Mapping[Mode, ModeFactory]:
     """How each mode is made for a subject. A new mode is one more entry here."""
     session = session_options(settings.inference)
 
-    def reenact(context: ModeContext) -> RenderMode:
+    def portrait(context: ModeContext) -> RenderMode:
         reenactor = ReenactorContext(context.subject, context.face, context.size, session)
-        return ReenactMode(context, open_reenactor(settings.reenact.reenactor, reenactor))
+        return PortraitMode(context, open_reenactor(settings.reenact.reenactor, reenactor))
 
-    def ratio(context: ModeContext) -> RenderMode:
+    def live(context: ModeContext) -> RenderMode:
         room_light = RoomLightEstimator(context.subject, context.face)
         subject, face = as_large_as_needed(context.subject, context.face)
         relighting = RatioRelighting(subject, face, room_light, DenseMotion(session))
-        return RatioMode(context, relighting, context.open_scene_relighting(subject, face))
+        return LiveMode(context, relighting, context.open_scene_relighting(subject, face))
 
-    return {Mode.REENACT: reenact, Mode.RATIO: ratio}
+    return {Mode.LIVE: live, Mode.PORTRAIT: portrait}

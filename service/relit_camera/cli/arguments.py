@@ -88,7 +88,7 @@ def parse_lighting(environment: str, rotate: str, exposure_ev: float) -> Lightin
 
 
 def parse_mode(text: str) -> Mode:
-    """Parse a mode: `reenact` or `ratio`.
+    """Parse a mode: `live` or `portrait`, or by its former name.
 
     Raises:
         typer.BadParameter: neither (exit 2: usage).
@@ -96,7 +96,7 @@ def parse_mode(text: str) -> Mode:
     try:
         return Mode(text)
     except ValueError as error:
-        raise typer.BadParameter(f"'{text}' is not reenact or ratio", param_hint="--mode") from error
+        raise typer.BadParameter(f"'{text}' is not live or portrait", param_hint="--mode") from error
 
 
 def parse_size(text: str) -> tuple[int, int]:

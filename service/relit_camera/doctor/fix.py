@@ -35,7 +35,7 @@ source:
   on_demand: false          # true: the webcam is released while nobody reads the virtual camera or watches a preview
 
 look:
-  mode: reenact             # reenact: the subject's picture, moved as you move. ratio: the live picture itself, relit
+  mode: live                # live: the live picture itself, relit. portrait: the subject's picture, moved as you move
   lighting:
     environment: studio     # studio, window, sunset, night-street, party, overcast, or one of your own
 """

@@ -151,10 +151,10 @@ class Pipeline:
         return self._mode(scene.subject, scene.look.mode).begin(frame, motion, scene, quality)
 
     def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> FaceMotion:
-        in_ratio = scene.look.mode is Mode.RATIO
+        is_live = scene.look.mode is Mode.LIVE
         with self.timer.stage("track"):
-            every = quality.ratio_track_every if in_ratio else quality.track_every
-            self._live_tracker.set_interval(every, follow_lips=not in_ratio)
+            every = quality.live_track_every if is_live else quality.track_every
+            self._live_tracker.set_interval(every, follow_lips=not is_live)
             return self._follower.follow(self._live_tracker.track(frame), frame.size, frame.time_s)
 
     def _render_unrelit(self, frame: Frame, scene: Scene) -> RenderedFrame:

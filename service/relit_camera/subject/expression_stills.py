@@ -1,7 +1,7 @@
 """Expression stills: pictures of the person in an expression or a turn, which the source image does not show.
 
 A still is an ordinary frame in the light of a room, cropped to the face, with what the face does in it and the light
-that it was taken in. Mode reenact takes the inside of the mouth, shut lids and turned cheeks from them.
+that it was taken in. Mode portrait takes the inside of the mouth, shut lids and turned cheeks from them.
 """
 
 from __future__ import annotations

@@ -17,11 +17,11 @@ from relit_camera.subject.subject import Subject
 from relit_camera.subject.subject_file import read_subject
 from relit_studio.commands.options import Out, load_person, load_room, shown_progress
 from relit_studio.drive.moving.moving_table import (
+    FILMED,
     INSTANT,
-    LIVE,
     capture_from_clip,
     error_sheet,
-    evaluate_live,
+    evaluate_filmed,
     evaluate_mode,
     read_truth,
 )
@@ -43,7 +43,7 @@ def moving(
         str, typer.Option(help=f"Where they are filmed; '{SWITCHED}' is '{LAMP_ROOMS[0]}' with a lamp switched on.")
     ] = f"soft,side-window,ceiling,screen,party,{SWITCHED}",
     lights: Annotated[str, typer.Option(help="What they are taken into: environments.")] = "sunset,studio",
-    modes: Annotated[str, typer.Option(help="Of the camera.")] = "ratio,reenact",
+    modes: Annotated[str, typer.Option(help="Of the camera.")] = "live,portrait",
     tracker: Annotated[str, typer.Option(help="Name of the tracker.")] = "mesh",
     samples: Annotated[int, typer.Option(min=1, max=65536, help="A pixel.")] = 10,
     every: Annotated[int, typer.Option(min=1, max=24, help="Render only every N-th frame.")] = 6,
@@ -51,7 +51,7 @@ def moving(
     field_lights: Annotated[int, typer.Option(min=4, max=9999, help="That the subject is made of.")] = 96,
     instant: Annotated[
         bool,
-        typer.Option("--instant/--no-instant", help="Also ratio with an instant subject of each clip."),
+        typer.Option("--instant/--no-instant", help="Also live with an instant subject of each clip."),
     ] = True,
 ) -> None:
     """Render people who talk and turn before webcams and in the light that is wanted, and compare; it can be resumed.
@@ -69,11 +69,11 @@ def moving(
             truth, environment = read_truth(files.truth(light)), load_room(light, 0.0).environment
             for room in rooms.split(","):
                 title = f"{name} {room} to {light}"
-                rows = {LIVE: evaluate_live(files.clip(room), truth)}
+                rows = {FILMED: evaluate_filmed(files.clip(room), truth)}
                 for mode in map(Mode, modes.split(",")):
                     rows[mode] = evaluate_mode(files.clip(room), truth, subject, environment, mode, tracker)
                 if own := captured.get(room):
-                    rows[INSTANT] = evaluate_mode(files.clip(room), truth, own, environment, Mode.RATIO, tracker)
+                    rows[INSTANT] = evaluate_mode(files.clip(room), truth, own, environment, Mode.LIVE, tracker)
                 figures += [(f"{title}, {row}", found) for row, (found, _) in rows.items()]
                 sheet = error_sheet(truth, {row: shown for row, (_, shown) in rows.items()})
                 write_display(files.folder / f"{room}-{light}.png", sheet)

@@ -186,7 +186,7 @@ def test_whoever_allowed_one_webcam_s_picture_as_filmed_has_not_allowed_another_
     scene_controller = machine.camera.scene_controller
     with machine.running():
         wait_until(lambda: str(machine.camera.status().state) == "live")
-        as_filmed = Look(mode=Mode.RATIO, lighting=Lighting(split=1, transition_s=0))
+        as_filmed = Look(mode=Mode.LIVE, lighting=Lighting(split=1, transition_s=0))
         scene_controller.change(lambda _: as_filmed, unlit_allowed=True)
         wait_until(lambda: machine.camera.status().unlit)
         machine.camera.setup.change_source(width=SIZE[0] // 2, height=SIZE[1] // 2)

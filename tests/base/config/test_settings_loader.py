@@ -222,3 +222,23 @@ def test_the_file_in_the_repository_is_right_and_says_the_defaults() -> None:
     given = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
     assert values(load_settings(path)) == values(RelitSettings())
     assert set(given) <= set(RelitSettings.model_fields)
+
+
+@pytest.mark.parametrize(("former", "mode"), [("ratio", "live"), ("reenact", "portrait")])
+def test_former_names_of_modes_are_read(
+    former: str, mode: str, write: WriteConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert load_settings(write(f"look: {{mode: {former}}}")).model_dump(mode="json")["look"]["mode"] == mode
+    monkeypatch.setenv("RELIT_LOOK__MODE", former)
+    assert str(load_settings().look.mode) == mode
+
+
+def test_the_former_name_of_a_fallback_is_read(write: WriteConfig) -> None:
+    settings = load_settings(write("output: {fallback: live}"))
+    assert settings.model_dump(mode="json")["output"]["fallback"] == "filmed"
+
+
+def test_the_schema_has_the_names_of_today_alone() -> None:
+    kinds = RelitSettings.model_json_schema()["$defs"]
+    assert (kinds["Mode"]["enum"], kinds["Fallback"]["enum"]) == (["live", "portrait"], ["placeholder", "filmed"])
+    assert "`reenact`" in kinds["Mode"]["description"]

@@ -51,7 +51,7 @@ def cost(material: Material, tmp_path_factory: pytest.TempPathFactory) -> Camera
     settings = settings_of(material, tmp_path_factory.mktemp("data"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(WARM_UP_S, 0.5)
-        (only,) = measure_cameras(settings, [CLIP_SIZE], [Mode.REENACT], [NoBackground()], None, SECONDS)
+        (only,) = measure_cameras(settings, [CLIP_SIZE], [Mode.PORTRAIT], [NoBackground()], None, SECONDS)
     return only
 
 
@@ -100,7 +100,7 @@ class CountingCamera:
     def status(self) -> dict[str, Any]:
         made = self._made()
         return {
-            "mode": "ratio",
+            "mode": "live",
             "frames": {"composed": made, "dropped": 2 * made},
             "stage_processor_s": {"track": 0.010 * made},
             "stage_ms": {"track": {"p50": 1.0, "p95": 2.0}},
@@ -136,7 +136,7 @@ def test_a_camera_that_cannot_run_says_why(material: Material, tmp_path: Path) -
 
 
 COST = CameraCost(
-    mode="ratio",
+    mode="live",
     background="blur",
     tracker="mesh",
     size=(1280, 720),
@@ -161,7 +161,7 @@ COST = CameraCost(
 def test_the_text_says_the_figures() -> None:
     lines = cost_text(COST).splitlines()
     cells = {line[2:22].strip(): line[22:].split() for line in lines}
-    assert lines[0] == "ratio, background blur, 1280x720, tracker mesh"
+    assert lines[0] == "live, background blur, 1280x720, tracker mesh"
     assert cells["track"] == ["7.50", "1.50", "8.0", "9.5"]
     assert cells["outside the stages"] == ["12.50", "2.50"]
     assert cells["whole process"] == ["20.00", "4.00"]
@@ -226,4 +226,4 @@ def test_bench_measures_each_combination(monkeypatch: pytest.MonkeyPatch, materi
     assert json.loads(answer.out)["camera"] == [COST.as_json()] * 4
     none, blur = NoBackground(), BlurBackground()
     assert asked == [(128, mode, background, 12.0, 3.0) for mode in Mode for background in (none, blur)]
-    assert "4.00" in call("bench", "--no-relighting", "--mode", "ratio", "--background", "none").out
+    assert "4.00" in call("bench", "--no-relighting", "--mode", "live", "--background", "none").out

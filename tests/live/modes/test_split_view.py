@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.live.modes.ratio_mode import split_view
+from relit_camera.live.modes.live_mode import split_view
 
 BEFORE, AFTER = (np.full((4, 40, 3), value, np.uint8) for value in (10, 200))
 

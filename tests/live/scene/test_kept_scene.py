@@ -59,17 +59,17 @@ def run(
     return first
 
 
-def sunset_ratio(controller: SceneController) -> None:
-    look = Look(lighting=Lighting(environment="sunset", yaw_deg=30), background=ColorBackground(), mode=Mode.RATIO)
+def sunset_portrait(controller: SceneController) -> None:
+    look = Look(lighting=Lighting(environment="sunset", yaw_deg=30), background=ColorBackground(), mode=Mode.PORTRAIT)
     controller.set_look(look)
     controller.choose_stored_subject("ada")
 
 
 def test_look_and_subject_are_those_of_the_last_run(folder: Path) -> None:
-    first = run(settings(folder), sunset_ratio)
+    first = run(settings(folder), sunset_portrait)
     assert (first.subject_name, first.look) == (None, Look())
     again = run(settings(folder))
-    assert (again.subject_name, again.look.lighting.environment, again.look.mode) == ("ada", "sunset", Mode.RATIO)
+    assert (again.subject_name, again.look.lighting.environment, again.look.mode) == ("ada", "sunset", Mode.PORTRAIT)
     assert again.environment is not None
     assert again.environment.name == "sunset"
     assert (again.can_undo, again.can_redo) == (False, False)
@@ -78,7 +78,7 @@ def test_look_and_subject_are_those_of_the_last_run(folder: Path) -> None:
 
 
 def test_reset_shows_what_the_settings_say(folder: Path) -> None:
-    run(settings(folder), sunset_ratio)
+    run(settings(folder), sunset_portrait)
     controller = SceneController(StorageSettings(data_dir=folder))
     show_first_scene(controller, settings(folder, subject="bea"), given=NOTHING_GIVEN)
     assert controller.reset().look == Look()
@@ -86,13 +86,13 @@ def test_reset_shows_what_the_settings_say(folder: Path) -> None:
 
 
 def test_nothing_is_kept_where_that_is_not_asked_for(folder: Path) -> None:
-    run(settings(folder), sunset_ratio)
+    run(settings(folder), sunset_portrait)
     assert run(settings(folder), given=None).look == Look()
 
 
 def test_what_was_edited_in_the_configuration_since_wins(folder: Path) -> None:
     before = settings(folder, subject="bea", look={"lighting": {"saturation": 0.5}})
-    run(before, sunset_ratio)
+    run(before, sunset_portrait)
     edited = settings(folder, subject="bea", look={"lighting": {"saturation": 0.5, "yaw_deg": -10}})
     again = run(edited)
     assert (again.look.lighting.yaw_deg, again.look.lighting.environment, again.subject_name) == (-10, "sunset", "ada")
@@ -101,7 +101,7 @@ def test_what_was_edited_in_the_configuration_since_wins(folder: Path) -> None:
 
 
 def test_a_preset_at_start_wins_over_the_last_run(folder: Path) -> None:
-    run(settings(folder), sunset_ratio)
+    run(settings(folder), sunset_portrait)
     presets = PresetStore(settings(folder).storage.presets)
     presets.save("calm", Preset(lighting=Lighting(environment="overcast")))
     presets.save("bea", Preset(subject="bea"))
@@ -113,37 +113,45 @@ def test_a_preset_at_start_wins_over_the_last_run(folder: Path) -> None:
 
 
 def test_the_command_line_wins_over_both(folder: Path) -> None:
-    run(settings(folder), sunset_ratio)
-    PresetStore(settings(folder).storage.presets).save("bea", Preset(subject="bea", mode=Mode.RATIO))
+    run(settings(folder), sunset_portrait)
+    PresetStore(settings(folder).storage.presets).save("bea", Preset(subject="bea", mode=Mode.LIVE))
     PresetStore(settings(folder).storage.presets).set_at_start("bea")
-    wanted = settings(folder, subject="ada", look={"mode": "reenact"})
+    wanted = settings(folder, subject="ada", look={"mode": "portrait"})
     first = run(wanted, given=GivenOptions(subject=True, mode=True), environment="party")
-    assert (first.subject_name, first.look.mode, first.look.lighting.environment) == ("ada", Mode.REENACT, "party")
+    assert (first.subject_name, first.look.mode, first.look.lighting.environment) == ("ada", Mode.PORTRAIT, "party")
     assert run(settings(folder), instant=True).subject_name is None
 
 
 def test_what_the_command_line_said_is_kept_as_what_was_shown(folder: Path) -> None:
-    wanted = settings(folder, subject="ada", look={"mode": "ratio"})
+    wanted = settings(folder, subject="ada", look={"mode": "portrait"})
     run(wanted, lambda controller: controller.set_frozen(True), GivenOptions(subject=True, mode=True))
-    run(wanted, lambda controller: controller.set_look(Look(mode=Mode.RATIO, lighting=Lighting(yaw_deg=9))),
+    run(wanted, lambda controller: controller.set_look(Look(mode=Mode.PORTRAIT, lighting=Lighting(yaw_deg=9))),
         GivenOptions(subject=True, mode=True))  # fmt: skip
     again = run(settings(folder))
-    assert (again.subject_name, again.look.mode, again.look.lighting.yaw_deg) == ("ada", Mode.RATIO, 9)
+    assert (again.subject_name, again.look.mode, again.look.lighting.yaw_deg) == ("ada", Mode.PORTRAIT, 9)
+
+
+def test_a_scene_of_before_is_shown_though_the_default_was_another(folder: Path) -> None:
+    old = "{look: {mode: reenact, lighting: {yaw_deg: 9}}, configured_look: {mode: reenact}}"
+    kept_scene_path(StorageSettings(data_dir=folder)).write_text(old)
+    again = run(settings(folder), lambda controller: controller.choose_stored_subject("ada"))
+    assert (again.look.mode, again.look.lighting.yaw_deg) == (Mode.PORTRAIT, 9)
+    assert "mode: portrait" in kept_scene_path(StorageSettings(data_dir=folder)).read_text()
 
 
 def test_a_subject_that_is_not_stored_is_left_to_the_settings(folder: Path, tmp_path: Path) -> None:
     file = tmp_path / "elsewhere" / "me.relit"
     file.parent.mkdir()
     write_subject(file, small_subject())
-    run(settings(folder, subject=str(file)), lambda controller: controller.set_look(Look(mode=Mode.RATIO)))
+    run(settings(folder, subject=str(file)), lambda controller: controller.set_look(Look(mode=Mode.PORTRAIT)))
     again = run(settings(folder, subject=str(file)))
-    assert (again.subject_name, again.look.mode) == ("me", Mode.RATIO)
+    assert (again.subject_name, again.look.mode) == ("me", Mode.PORTRAIT)
     assert run(settings(folder)).subject_name is None
 
 
 def test_what_is_gone_is_left_out_and_said(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
     def change(controller: SceneController) -> None:
-        sunset_ratio(controller)
+        sunset_portrait(controller)
         controller.environments.add_upload("room", io.BytesIO(hdr()), ".hdr")
         controller.update_look(
             lambda look: look.model_copy(update={"lighting": look.lighting.model_copy(update={"environment": "room"})})
@@ -162,7 +170,7 @@ def test_what_is_gone_is_left_out_and_said(folder: Path, caplog: pytest.LogCaptu
 @pytest.mark.parametrize("text", ["", "look: [", "look: {mode: disco}", "\x00", "[" * 100_000, "#" * (2 << 20)])
 def test_a_damaged_file_is_said_and_left_out(folder: Path, text: str, caplog: pytest.LogCaptureFixture) -> None:
     kept_scene_path(StorageSettings(data_dir=folder)).write_text(text)
-    assert run(settings(folder), sunset_ratio).look == Look()
+    assert run(settings(folder), sunset_portrait).look == Look()
     assert "last-scene.yaml" in caplog.text
     assert run(settings(folder)).subject_name == "ada"
 
@@ -174,18 +182,18 @@ def test_permission_for_the_picture_as_filmed_is_not_kept(folder: Path) -> None:
     def change(controller: SceneController) -> None:
         controller.change(
             lambda look: look.model_copy(
-                update={"mode": Mode.RATIO, "lighting": look.lighting.model_copy(update={"split": 0.5})}
+                update={"mode": Mode.LIVE, "lighting": look.lighting.model_copy(update={"split": 0.5})}
             ),
             unlit_allowed=True,
         )
 
     run(settings(folder), change)
     again = run(settings(folder))
-    assert (again.unlit_allowed, again.look.lighting.split, again.look.mode) == (False, 0, Mode.RATIO)
+    assert (again.unlit_allowed, again.look.lighting.split, again.look.mode) == (False, 0, Mode.LIVE)
 
 
 def test_settings_that_show_it_count_where_they_allow_it_too(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
-    look = {"mode": "ratio", "lighting": {"split": 0.5}}
+    look = {"mode": "live", "lighting": {"split": 0.5}}
     assert run(settings(folder, look=look)).look.lighting.split == 0
     assert "output.unlit_allowed" in caplog.text
     allowed = settings(folder, look=look, output=OutputSettings(unlit_allowed=True))
@@ -204,7 +212,7 @@ def test_an_unchanged_scene_is_not_written_again(folder: Path) -> None:
     path = kept_scene_path(StorageSettings(data_dir=folder))
     keeper.check()
     assert not path.exists()
-    controller.set_look(Look(mode=Mode.RATIO))
+    controller.set_look(Look(mode=Mode.PORTRAIT))
     keeper.check()
     written = path.stat().st_mtime_ns
     controller.set_frozen(True)
@@ -226,7 +234,7 @@ def test_an_unchanged_scene_costs_nothing(folder: Path, monkeypatch: pytest.Monk
     for _ in range(5):
         keeper.check()
     assert dumped == []
-    controller.set_look(Look(mode=Mode.RATIO))
+    controller.set_look(Look(mode=Mode.PORTRAIT))
     for _ in range(5):
         keeper.check()
     assert len(dumped) == 1
@@ -255,11 +263,11 @@ def test_a_folder_that_cannot_be_read_ends_nothing_and_is_said_once(
         keeper.check()
         keeper.check()
     assert caplog.text.count("Permission denied") == 1
-    controller.set_look(Look(mode=Mode.RATIO))
+    controller.set_look(Look(mode=Mode.PORTRAIT))
     keeper.check()
     kept = read_kept_scene(kept_scene_path(StorageSettings(data_dir=folder)))
     assert kept is not None
-    assert (kept.look.mode, kept.subject) == (Mode.RATIO, "ada")
+    assert (kept.look.mode, kept.subject) == (Mode.PORTRAIT, "ada")
 
 
 def test_a_disk_that_takes_nothing_is_said_once(
@@ -271,7 +279,7 @@ def test_a_disk_that_takes_nothing_is_said_once(
     controller = SceneController(StorageSettings(data_dir=folder))
     show_first_scene(controller, settings(folder))
     keeper = SceneKeeper(controller, settings(folder), NOTHING_GIVEN)
-    controller.set_look(Look(mode=Mode.RATIO))
+    controller.set_look(Look(mode=Mode.PORTRAIT))
     with monkeypatch.context() as broken:
         broken.setattr("relit_camera.live.scene.kept_scene.write_atomic", fail)
         keeper.check()

@@ -149,12 +149,12 @@ def test_what_a_change_leaves_alone_is_kept(scene_controller: SceneController, m
     monkeypatch.setattr(scene_controller.backgrounds, "load", pytest.fail)
     monkeypatch.setattr(scene_controller.environments, "load", pytest.fail)
     change: Callable[[Look], Look] = lambda look: look.model_copy(  # noqa: E731
-        update={"lighting": look.lighting.model_copy(update={"exposure_ev": 1.0}), "mode": Mode.RATIO}
+        update={"lighting": look.lighting.model_copy(update={"exposure_ev": 1.0}), "mode": Mode.LIVE}
     )
     after = scene_controller.update_look(change)
     assert after.background_image is before.background_image
     assert after.environment is before.environment
-    assert after.look.mode is Mode.RATIO
+    assert after.look.mode is Mode.LIVE
 
 
 @pytest.mark.parametrize("stem", [BACKGROUND_ENVIRONMENT, "studio", "background!", "s" * 80])

@@ -10,7 +10,7 @@ from relit_camera.live.scene.scene_history import MAX_STEPS, SAME_STEP_S, SceneH
 from tests.virtual_clock import VirtualClock
 
 
-def point(mode: Mode = Mode.REENACT, subject: str | None = None, **lighting: float) -> ScenePoint:
+def point(mode: Mode = Mode.PORTRAIT, subject: str | None = None, **lighting: float) -> ScenePoint:
     return ScenePoint(Look(lighting=Lighting.model_validate(lighting), mode=mode), subject, False)
 
 
@@ -38,8 +38,8 @@ def test_a_slider_is_one_step_until_it_rests() -> None:
 def test_other_fields_are_another_step() -> None:
     history = SceneHistory(VirtualClock())
     history.note(point(), point(yaw_deg=1))
-    history.note(point(yaw_deg=1), point(mode=Mode.RATIO, yaw_deg=1))
-    assert steps(history, point(mode=Mode.RATIO, yaw_deg=1)) == [point(yaw_deg=1), point()]
+    history.note(point(yaw_deg=1), point(mode=Mode.LIVE, yaw_deg=1))
+    assert steps(history, point(mode=Mode.LIVE, yaw_deg=1)) == [point(yaw_deg=1), point()]
 
 
 def test_what_changes_nothing_is_no_step_and_keeps_what_was_undone() -> None:
@@ -82,4 +82,4 @@ def test_old_steps_are_forgotten() -> None:
 
 
 def test_changed_fields_are_named() -> None:
-    assert changed_fields(point(), point(Mode.RATIO, "ada", yaw_deg=1)) == {"mode", "subject", "lighting.yaw_deg"}
+    assert changed_fields(point(), point(Mode.LIVE, "ada", yaw_deg=1)) == {"mode", "subject", "lighting.yaw_deg"}

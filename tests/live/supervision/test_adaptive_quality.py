@@ -42,7 +42,7 @@ def test_there_is_no_cheaper_level_than_the_last_and_each_is_cheaper() -> None:
         assert cheaper.relight_every >= dearer.relight_every
         assert cheaper.half_size >= dearer.half_size
         assert cheaper.track_every >= dearer.track_every
-        assert cheaper.ratio_track_every >= dearer.ratio_track_every
+        assert cheaper.live_track_every >= dearer.live_track_every
         assert cheaper.render_every >= dearer.render_every
         assert cheaper != dearer
 

@@ -357,7 +357,7 @@ def test_nothing_follows_stopping(camera: LoopUnderTest) -> None:
 
 
 @pytest.mark.parametrize(
-    "changed", [{"frozen": True}, {"subject": object()}, {"look": Look(mode=Mode.RATIO)}, {"revision": 9}]
+    "changed", [{"frozen": True}, {"subject": object()}, {"look": Look(mode=Mode.PORTRAIT)}, {"revision": 9}]
 )
 def test_a_late_picture_of_another_subject_or_mode_is_not_published(
     camera: LoopUnderTest, changed: dict[str, object]

@@ -19,7 +19,7 @@ from relit_studio.drive.moving.moving_table import (
     FIRST_FRAME,
     capture_from_clip,
     error_sheet,
-    evaluate_live,
+    evaluate_filmed,
     evaluate_mode,
     read_truth,
 )
@@ -51,7 +51,7 @@ def test_the_live_clip_is_its_own_truth(clip: Path) -> None:
     truth = read_truth(clip)
     assert len(truth) == FRAMES
     assert {"person", "face", "hair", "body"} <= set(truth[0].parts)
-    figures, shown = evaluate_live(clip, truth)
+    figures, shown = evaluate_filmed(clip, truth)
     assert figures.mean("person") > 50
     assert len(shown) == FRAMES - FIRST_FRAME
 
@@ -60,9 +60,9 @@ def test_the_live_clip_is_its_own_truth(clip: Path) -> None:
 def test_a_mode_is_compared_frame_by_frame(clip: Path) -> None:
     truth, studio = read_truth(clip), EnvironmentStore().resolve("studio")
     subject = read_subject(DEMO / "adam.relit")
-    figures, shown = evaluate_mode(clip, truth, subject, studio, Mode.RATIO, f"recorded:{clip / 'track.json'}")
+    figures, shown = evaluate_mode(clip, truth, subject, studio, Mode.LIVE, f"recorded:{clip / 'track.json'}")
     assert 8 < figures.mean("face") < 40  # another light than the clip's
-    sheet = error_sheet(truth, {"ratio": shown})
+    sheet = error_sheet(truth, {"live": shown})
     assert sheet.shape[1] > 4 * 100
 
 

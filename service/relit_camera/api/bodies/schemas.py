@@ -168,7 +168,7 @@ class SceneChanges(ApiModel):
     """Only the given fields change; `lamps` is replaced as a whole."""
     background: Background = NoBackground()
     """Replaced as a whole."""
-    mode: Mode = Mode.REENACT
+    mode: Mode = Mode.LIVE
     subject: SubjectName | None = None
     """A stored subject, or null for nobody."""
     frozen: bool = False

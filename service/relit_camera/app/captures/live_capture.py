@@ -112,7 +112,7 @@ class LiveCapture:
     def start(self, name: str, until_done: bool = False) -> CaptureStatus:
         """Begin to capture a subject, which replaces a stored instant one of that name.
 
-        It is shown, in mode ratio, once it is stored, unless somebody has chosen another one or mode meanwhile. It ends
+        It is shown, in mode live, once it is stored, unless somebody has chosen another one or mode meanwhile. It ends
         a capture that pauses before its next attempt.
 
         Args:

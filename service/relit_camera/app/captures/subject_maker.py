@@ -70,7 +70,7 @@ class SubjectMaker:
     ) -> tuple[T, str]:
         """Store what `build` makes, and show it unless somebody has chosen another one meanwhile.
 
-        It is shown in mode ratio, unless somebody has chosen another mode meanwhile. Nothing is stored, and nothing
+        It is shown in mode live, unless somebody has chosen another mode meanwhile. Nothing is stored, and nothing
         unfinished is left, unless this returns.
 
         Args:
@@ -99,7 +99,7 @@ class SubjectMaker:
         self._events.publish("collection", name="subjects")
         now = self.shown()
         if now.subject is before.subject:
-            mode = Mode.RATIO if now.mode_revision == before.mode_revision else None
+            mode = Mode.LIVE if now.mode_revision == before.mode_revision else None
             try:
                 self._scene_controller.choose_stored_subject(name, mode)
             except RelitError as error:

@@ -118,11 +118,11 @@ def _without_split(look: Look, left_split: float) -> Look:
 def _in_environment(environment: str, yaw_deg: float = 0.0, split: float = 0.0) -> Look:
     """The person in an environment, before that same place."""
     light = Lighting(environment=environment, yaw_deg=yaw_deg, split=split)
-    return Look(mode=Mode.RATIO, lighting=light, background=EnvironmentBackground())
+    return Look(mode=Mode.LIVE, lighting=light, background=EnvironmentBackground())
 
 
 def _as_filmed(_: float) -> Look:
-    return Look(mode=Mode.RATIO, lighting=Lighting(environment="sunset", split=1.0), background=NoBackground())
+    return Look(mode=Mode.LIVE, lighting=Lighting(environment="sunset", split=1.0), background=NoBackground())
 
 
 def _split_wipe(share: float) -> Look:
@@ -146,7 +146,7 @@ def _moving_lamps(share: float) -> Look:
         Lamp(azimuth_deg=150, elevation_deg=20, size_deg=30, kelvin=12000, intensity=2.0),
     )
     return Look(
-        mode=Mode.RATIO,
+        mode=Mode.LIVE,
         lighting=Lighting(environment=None, lamps=lamps, transition_s=0.2),
         background=ColorBackground(color="#101216"),
     )

@@ -27,12 +27,25 @@ class SettingsModel(BaseModel):
 
 
 class Mode(StrEnum):
-    """How the relit face reaches the picture."""
+    """How the relit face reaches the picture.
 
-    REENACT = "reenact"
-    """The subject's source image, relit and moved as the live face moves. The webcam's picture stays private."""
-    RATIO = "ratio"
+    The former names `ratio` (live) and `reenact` (portrait) are still accepted.
+    """
+
+    LIVE = "live"
     """The live frame itself, multiplied by the ratio of target light to room light."""
+    PORTRAIT = "portrait"
+    """The subject's source image, relit and moved as the live face moves. The webcam's picture stays private: nothing
+    of the room, or of today's hair and clothes, is sent."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> Mode | None:
+        match value:
+            case "ratio":
+                return cls.LIVE
+            case "reenact":
+                return cls.PORTRAIT
+        return None
 
 
 class Lamp(SettingsModel):
@@ -87,10 +100,10 @@ class Lighting(SettingsModel):
     face_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
     background_gain_ev: Annotated[float, Field(ge=-10, le=10)] = 0.0
     blend: Annotated[float, Field(ge=0, le=1)] = 1.0
-    """0 the live picture (in reenact, where that stays private, the source image as captured), 1 fully relit. In ratio
+    """0 the live picture (in portrait, where that stays private, the source image as captured), 1 fully relit. In live
     below 0.05 only where the picture as filmed may be published."""
     split: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Before and after, in mode ratio: this share of the picture, from its left, is as filmed, room and all. Above 0
+    """Before and after, in mode live: this share of the picture, from its left, is as filmed, room and all. Above 0
     only where the picture as filmed may be published."""
     transition_s: Annotated[float, Field(ge=0, le=60)] = 0.4
     """Seconds over which a change is eased."""
@@ -108,7 +121,7 @@ class KindOfBackground(SettingsModel):
 
 
 class NoBackground(KindOfBackground):
-    """Reenact: a dark neutral. Ratio: the live room."""
+    """Portrait: a dark neutral. Live: the live room."""
 
     kind: Literal["none"] = "none"
 
@@ -157,25 +170,25 @@ class Look(SettingsModel):
 
     lighting: Lighting = Lighting()
     background: Background = NoBackground()
-    mode: Mode = Mode.REENACT
+    mode: Mode = Mode.LIVE
 
     @property
     def shows_filmed(self) -> bool:
         """Whether a part of the picture would be as it was filmed, or all of it but for a trace."""
         light = self.lighting
-        return light.split > 0 or (self.mode is Mode.RATIO and light.blend < LEAST_RELIT_BLEND)
+        return light.split > 0 or (self.mode is Mode.LIVE and light.blend < LEAST_RELIT_BLEND)
 
     def relit(self) -> Look:
         """The same look where it shows nothing as filmed; else with all of the picture relit."""
         if not self.shows_filmed:
             return self
-        faint = self.mode is Mode.RATIO and self.lighting.blend < LEAST_RELIT_BLEND
+        faint = self.mode is Mode.LIVE and self.lighting.blend < LEAST_RELIT_BLEND
         changes = {"split": 0.0, "blend": 1.0 if faint else self.lighting.blend}
         return self.model_copy(update={"lighting": self.lighting.model_copy(update=changes)})
 
 
 LEAST_RELIT_BLEND = 0.05
-"""Below this `blend` the picture of mode ratio is as filmed for the eye: it differs by a few codes."""
+"""Below this `blend` the picture of mode live is as filmed for the eye: it differs by a few codes."""
 
 
 class Preset(Look):

@@ -37,8 +37,12 @@ class Fallback(StrEnum):
     """What is shown where not even the source image can be relit."""
 
     PLACEHOLDER = "placeholder"
-    LIVE = "live"
-    """The webcam's picture as it is: yourself and your room."""
+    FILMED = "filmed"
+    """The webcam's picture as it is: yourself and your room. Its former name, `live`, is still accepted."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> Fallback | None:
+        return cls.FILMED if value == "live" else None
 
 
 class OutputSettings(SettingsModel):
@@ -60,9 +64,9 @@ class OutputSettings(SettingsModel):
     """Picture shown while there is nothing else to show; a built-in one if not given."""
     fallback: Fallback = Fallback.PLACEHOLDER
     """While pictures cannot be made the source image is shown, relit; and where that cannot be either, this:
-    `placeholder`, or `live`, the webcam's picture as it is, room and all, if `unlit_allowed` is true too."""
+    `placeholder`, or `filmed`, the webcam's picture as it is, room and all, if `unlit_allowed` is true too."""
     unlit_allowed: bool = False
-    """Whether the picture as filmed may be published: without a subject, without a face in mode ratio, before and after
+    """Whether the picture as filmed may be published: without a subject, without a face in mode live, before and after
     (`split`). Else a placeholder or the subject's relit picture at rest is. The panel can allow it for one run."""
 
     @field_validator("sink", mode="before")
@@ -212,7 +216,7 @@ class RelitSettings(BaseSettings):
     look: Look = Look()
     tracker: TrackerSettings = TrackerSettings()
     matte: str = "selfie"
-    """What finds the person in the live picture (mode ratio): `selfie`, or `recorded:FILE.npz`."""
+    """What finds the person in the live picture (mode live): `selfie`, or `recorded:FILE.npz`."""
     pull_models: Literal["ask", "always", "never"] = "ask"
     """Whether commands get public models that they need and that are missing: `ask` does so on a terminal, once."""
     relight: RelightSettings = RelightSettings()

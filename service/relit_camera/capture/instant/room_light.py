@@ -1,6 +1,6 @@
 """The light of the room, from the skin of a face whose shape and color are taken as known.
 
-As mode ratio does with a captured subject (`live.modes.room_light_estimator`): amounts of soft lights, non-negative,
+As mode live does with a captured subject (`live.modes.room_light_estimator`): amounts of soft lights, non-negative,
 robust, with a ridge.
 """
 

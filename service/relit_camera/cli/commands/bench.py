@@ -23,7 +23,7 @@ def bench(
     ] = None,
     tracker: Annotated[str | None, typer.Option(help="Tracker for the video.")] = None,
     mode: Annotated[
-        list[str] | None, typer.Option(help="reenact or ratio; may be repeated. Both if not given.")
+        list[str] | None, typer.Option(help="live or portrait; may be repeated. Both if not given.")
     ] = None,
     background: Annotated[
         list[str] | None, typer.Option(help="none, blur, …; may be repeated. none and blur if not given.")
@@ -77,7 +77,7 @@ def bench(
     from relit_camera.live.scene.scene_controller import SceneController
     from relit_camera.subject.subject_store import SubjectStore
 
-    modes = [parse_mode(each) for each in mode or ["reenact", "ratio"]]
+    modes = [parse_mode(each) for each in mode or ["live", "portrait"]]
     backgrounds = [parse_background(each) for each in background or ["none", "blur"]]
     sizes = [parse_size(each) for each in size or ["1280x720"]]
     if environments is not None and not environments.is_dir():

@@ -33,7 +33,7 @@ def replay(
         bool, typer.Option("--instant", help="No subject is at hand: capture one from the video itself.")
     ] = False,
     report: Annotated[Path | None, typer.Option(help="JSON to write: state, pose and times of each frame.")] = None,
-    mode: Annotated[str | None, typer.Option(help="reenact, or ratio, which --instant has by default.")] = None,
+    mode: Annotated[str, typer.Option(help="live or portrait.")] = "live",
     tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
     background: Annotated[str, typer.Option(help="none, blur, environment, or #RRGGBB.")] = "none",
     rotate: Annotated[str, typer.Option(help="YAW,PITCH,ROLL of the environment, in degrees.")] = "0,0,0",
@@ -69,10 +69,7 @@ def replay(
     settings = load_command_settings(context, tracker={"name": tracker})
     offer_models(settings.tracker.name, settings.matte, pull, settings.pull_models)
     limit_threads()
-    chosen_background, chosen_mode = (
-        parse_background(background),
-        parse_mode(mode or ("ratio" if instant else "reenact")),
-    )
+    chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
     info = probe_video(video)
     scene_controller = SceneController(settings.storage)
     if instant:

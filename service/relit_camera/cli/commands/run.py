@@ -24,7 +24,10 @@ def run(
         bool, typer.Option("--unlit", help="Allow the picture as filmed, where there is no subject or no face.")
     ] = False,
     environment: Annotated[str | None, typer.Option(help="A stored environment's name, or a panorama file.")] = None,
-    mode: Annotated[str | None, typer.Option(help="reenact or ratio.")] = None,
+    mode: Annotated[
+        str | None,
+        typer.Option(help="live, or portrait: nothing of the room, or of today's hair and clothes, is sent."),
+    ] = None,
     tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
     host: Annotated[str | None, typer.Option(help="Address of API and panel; loopback, or a token is set.")] = None,
     port: Annotated[int | None, typer.Option(help="Port of API and panel; 0 picks one.")] = None,

@@ -1,6 +1,6 @@
 """The background behind the person: a color, a picture, the environment, or the live room, blurred or as it is.
 
-Where the webcam's picture stays private (mode reenact), there is no live room: `none` is then a dark neutral, and
+Where the webcam's picture stays private (mode portrait), there is no live room: `none` is then a dark neutral, and
 `blur` blurs the environment that lights the face. Without an environment both, and `environment`, are the neutral.
 """
 

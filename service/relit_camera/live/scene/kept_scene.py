@@ -122,7 +122,11 @@ def _show_kept(
     look, subject = scene_controller.scene.look, None
     kept = read_kept_scene(kept_scene_path(settings.storage))
     if kept is not None:
-        look = merge_edits(kept.look, before=kept.configured_look, after=settings.look)
+        before = kept.configured_look
+        if "mode" not in settings.look.model_fields_set:
+            # A default that another version changed is no edit: whoever chose portrait stays hidden behind it.
+            before = before.model_copy(update={"mode": settings.look.mode})
+        look = merge_edits(kept.look, before=before, after=settings.look)
         if "subject" in kept.model_fields_set and settings.subject == kept.configured_subject:
             subject = ChosenSubject(kept.subject)
     presets = PresetStore(settings.storage.presets)

@@ -68,7 +68,7 @@ def in_a_thread(work: Callable[[], _RelitSource]) -> Future[_RelitSource]:
 class FallbackRenderer:
     """Gives what `what_is_shown` says while no picture is rendered. Not thread-safe.
 
-    In mode reenact it renders without tracker and reenactor: the subject's source image, relit as the scene says. It
+    In mode portrait it renders without tracker and reenactor: the subject's source image, relit as the scene says. It
     moves aside and nearer with the head, where that was tracked before; else it is at rest.
     """
 
@@ -122,14 +122,14 @@ class FallbackRenderer:
         now = self._used_at = frame.captured_at
         if self._failing_since is None:
             self._failing_since = now
-        rest = self._at_rest(frame, scene) if scene.look.mode is Mode.REENACT else None
+        rest = self._at_rest(frame, scene) if scene.look.mode is Mode.PORTRAIT else None
         situation = Situation(
             scene.look.mode,
             has_subject=scene.subject is not None,
             rendering=Rendering.FAILS if now - self._failing_since < self._hold_s else Rendering.HAS_FAILED,
             can_rest=rest is not None,
             filmed_allowed=scene.unlit_allowed,
-            filmed_when_failing=self._fallback is Fallback.LIVE,
+            filmed_when_failing=self._fallback is Fallback.FILMED,
         )
         match what_is_shown(situation):
             case Shown.HELD:

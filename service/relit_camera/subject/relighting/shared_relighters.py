@@ -1,7 +1,7 @@
 """One relighter for everybody who relights the same subject: it takes a fifth of a second to make, and some 20 MB.
 
 The pipeline, what stands in for it, and the pictures of the subject in each place want one at about the same time. Mode
-ratio wants another one of the subject at half its size, which shares the mixes of clusters, most of the bytes.
+live wants another one of the subject at half its size, which shares the mixes of clusters, most of the bytes.
 """
 
 from __future__ import annotations

@@ -26,10 +26,10 @@ from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject
 
-LIVE, INSTANT = "live", "ratio, instant"
-"""The rows of the live picture itself, and of mode ratio with a subject made of the clip."""
+FILMED, INSTANT = "filmed", "live, instant"
+"""The rows of the picture as filmed, and of mode live with a subject made of the clip."""
 FIRST_FRAME = 2
-"""From here on frames count, so that the rows compare with those of a mode ratio that eased in at the start."""
+"""From here on frames count, so that the rows compare with those of a mode live that eased in at the start."""
 SHEET_FRAMES = 6
 
 
@@ -103,7 +103,7 @@ def evaluate_mode(
     return figures.figures(), shown
 
 
-def evaluate_live(clip: Path, truth: Sequence[TrueFrame]) -> tuple[PartFigures, list[DisplayImage]]:
+def evaluate_filmed(clip: Path, truth: Sequence[TrueFrame]) -> tuple[PartFigures, list[DisplayImage]]:
     """The figures of the clip as it was filmed, and its pictures.
 
     Raises:

@@ -1,6 +1,6 @@
 """Fitting the network of the learned response to people whose response is known.
 
-What counts is by which factor a pixel changes from one light to another: mode ratio multiplies by it, whatever the
+What counts is by which factor a pixel changes from one light to another: mode live multiplies by it, whatever the
 pixel's albedo is. So the error is that of logarithms, a constant for each pixel apart. Skin is of one color within a
 person, or nearly, and the light of a room is told by it: there a part of that constant counts too, robustly, since
 brows, beards and make-up are among it.

@@ -226,7 +226,7 @@ function fold({ dropped, warnings }) {
 
 async function use() {
   try {
-    await call("PATCH", "scene", { subject: $("film-use").dataset.subject, mode: "ratio", unlit_allowed: false });
+    await call("PATCH", "scene", { subject: $("film-use").dataset.subject, mode: "live", unlit_allowed: false });
     location.assign("/");
   } catch (error) {
     showProblem($("use-problem"), error);

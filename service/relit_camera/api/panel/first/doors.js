@@ -113,7 +113,8 @@ async function pass(work, words) {
 
 async function showDemo() {
   const { name } = await call("POST", "demo-subject");
-  await call("PATCH", "scene", { subject: name, mode: "reenact", unlit_allowed: false });
+  // Another's face than the webcam's: only portrait shows it.
+  await call("PATCH", "scene", { subject: name, mode: "portrait", unlit_allowed: false });
 }
 
 async function openFile(file) {

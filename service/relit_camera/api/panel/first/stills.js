@@ -70,7 +70,7 @@ class StillsDialog {
     this.video = button("stills-video", "Use a video…", "quiet", () => this.file.click());
     this.cancel = button("stills-cancel", "Cancel", "quiet", () => this.dialog.close());
     this.again = button("stills-again", "Once more", "", () => this.#show("ready"));
-    this.moved = button("stills-moved", "Captured face, moved", "", () => this.#showMoved());
+    this.moved = button("stills-moved", "Portrait: your captured picture, moved", "", () => this.#showMoved());
     this.start = button("stills-start", "Begin", "firm", () => this.#film());
     this.keep = button("stills-keep", "Done", "firm", () => this.dialog.close());
     this.dialog = make(
@@ -131,7 +131,7 @@ class StillsDialog {
     this.models.element.hidden = step !== "models";
     this.start.hidden = this.video.hidden = !ready;
     this.again.hidden = this.keep.hidden = step !== "done";
-    this.moved.hidden = step !== "done" || scene()?.mode !== "ratio" || scene()?.subject !== this.subject;
+    this.moved.hidden = step !== "done" || scene()?.mode !== "live" || scene()?.subject !== this.subject;
     this.cancel.hidden = step === "done";
     this.start.textContent = step === "failed" ? "Try again" : "Begin";
     if (step !== "failed") showProblem(this.problem, null);
@@ -219,7 +219,7 @@ class StillsDialog {
     this.#mark(status, (name) => (covered.includes(name) ? "good" : "bad"));
     const told = [`${stills} pictures were taken for “${status.subject}”.`];
     if (status.what) told.push(sentence(status.what));
-    if (!this.moved.hidden) told.push("They show with “Captured face, moved”; now “Live picture, relit” is chosen.");
+    if (!this.moved.hidden) told.push("They show with “Portrait: your captured picture, moved”; now “Live picture, relit” is chosen.");
     if (missing.length) told.push(`For more, go through it once more and ${missing.join("; ")}.`);
     this.words.textContent = told.join(" ");
     this.words.hidden = false;
@@ -228,7 +228,7 @@ class StillsDialog {
 
   async #showMoved() {
     try {
-      await call("PATCH", "scene", { mode: "reenact" });
+      await call("PATCH", "scene", { mode: "portrait" });
       this.moved.hidden = true;
       this.keep.focus();
     } catch (error) {

@@ -10,7 +10,7 @@ const BLUR = { label: "Blur", min: 0, max: 1, step: 0.05, initial: 0.15, show: p
 const DEFAULT_COLOR = "#202428";
 const FALLBACK_PLACE = "studio";
 const KEEP = "keep-background";
-const NONE_HINTS = { reenact: "A dark neutral.", ratio: "Your own room, as the webcam sees it." };
+const NONE_HINTS = { live: "Your own room, as the webcam sees it.", portrait: "A dark neutral." };
 
 const kinds = document.getElementById("background-kind");
 const options = document.getElementById("background-options");

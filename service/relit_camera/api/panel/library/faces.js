@@ -11,8 +11,8 @@ import { menuButton, menuEntry } from "./menu.js";
 import { onStored, rename, stored } from "./stored.js";
 
 const MODE_HINTS = {
-  reenact: "Your captured face, relit, moves as you move: the webcam’s picture stays private.",
-  ratio: "Your live picture itself, relit: your own mouth and eyes.",
+  live: "Your live picture itself, relit: your own mouth and eyes.",
+  portrait: "Your captured picture, relit, moves as you move: nothing of your room, or of today’s hair and clothes, is sent.",
 };
 const UNLIT_HINT = "The webcam’s picture is shown to others as it is.";
 const HIDDEN_HINT = "Nobody is shown: others see a still placeholder.";

@@ -22,7 +22,7 @@ def get_instant_capture(api: ApiContextDep) -> CaptureStatus:
 
 @router.post("/captures/instant", status_code=HTTPStatus.ACCEPTED, responses=error_responses(409, 422))
 def start_instant_capture(api: ApiContextDep, capture: InstantCaptureRequest) -> CaptureStatus:
-    """Capture a subject from some three seconds of the webcam; it is stored and shown, in mode ratio."""
+    """Capture a subject from some three seconds of the webcam; it is stored and shown, in mode live."""
     return api.camera.instant_capture.start(capture.name)
 
 

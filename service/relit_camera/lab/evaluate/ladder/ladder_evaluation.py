@@ -1,4 +1,4 @@
-"""The ladder's rungs on a known person: how near each comes to the truth, as a field and in mode ratio."""
+"""The ladder's rungs on a known person: how near each comes to the truth, as a field and in mode live."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from relit_camera.subject.subject import Subject
 OPAQUE = 0.95
 """Matte from which a pixel of a frame counts: below, it shows too much of the room."""
 WHOLLY_TRUSTED = 0.95
-"""Confidence of mode ratio in the true matte from which a pixel lies well inside the person."""
+"""Confidence of mode live in the true matte from which a pixel lies well inside the person."""
 FRAMES = 12
 """Webcam frames in each room: the last is relit, three seconds after the first."""
 
@@ -52,7 +52,7 @@ class RungFigures:
 
     Attributes:
         ratio_db: environment → PSNR of the live picture in its light, for all but the room itself.
-        inner_db: the same, only of pixels that lie well inside the person: at the rim, mode ratio does not trust any
+        inner_db: the same, only of pixels that lie well inside the person: at the rim, mode live does not trust any
             subject (see `ratio_confidence`).
         brightness_ev: how much brighter than the truth the pictures are, mean over the environments, in stops.
         field: figures of the field; None where it is the truth's own.

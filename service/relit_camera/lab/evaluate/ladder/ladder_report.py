@@ -106,7 +106,7 @@ def _blocks(rooms: Sequence[RoomFigures]) -> Iterator[Block]:
     summaries = {TINT: TINT_SUMMARY, **{name: rung.summary for name, rung in RUNGS.items()}}
     yield Paragraph(
         "People whose reflectance field is known sit before a simulated webcam in a room. Each rung makes a subject of "
-        "them; with it, mode ratio estimates the room's light and takes the live picture into other light. "
+        "them; with it, mode live estimates the room's light and takes the live picture into other light. "
         + " ".join(f"{name}: {summaries[name]}." for name in _names(rooms))
     )
     order = list(dict.fromkeys(each.room for each in rooms))

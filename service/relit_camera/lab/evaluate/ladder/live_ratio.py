@@ -1,4 +1,4 @@
-"""The live picture in another light, by the program's own mode ratio and its own estimate of the room's light."""
+"""The live picture in another light, by the program's own mode live and its own estimate of the room's light."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def follow(images: Sequence[DisplayImage], tracker: Tracker) -> list[FollowedFra
 
 
 class LiveRatio:
-    """Mode ratio with one subject, after it has seen some frames.
+    """Mode live with one subject, after it has seen some frames.
 
     Attributes:
         residual: how badly the estimated light explains the face (see `RoomLightEstimate`).

@@ -32,7 +32,7 @@ from relit_camera.live.reenactment.mesh.head_sides import (
 from relit_camera.live.reenactment.source_image import SourceFace
 
 SHOWN_BLEND = 0.07
-"""As `OUTLINE_BLEND`, which mode ratio has for light alone, where the source image itself is shown. Over more, what
+"""As `OUTLINE_BLEND`, which mode live has for light alone, where the source image itself is shown. Over more, what
 mesh and flow show lies beside each other, as stripes along a turned cheek; over less the face seems to be cut out."""
 TURNED_MARGIN = 0.35
 """Eye distances round face and hair that the mesh of a turned head takes in: it fades out there, not over the ear."""

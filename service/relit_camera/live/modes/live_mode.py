@@ -1,4 +1,4 @@
-"""Mode ratio: the live picture itself, with its light exchanged, before its own or another background."""
+"""Mode live: the live picture itself, with its light exchanged, before its own or another background."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ REST_S = 0.3
 """Time constant with which the factor of a person whose face is not seen follows what is known."""
 
 
-class RatioMode:
+class LiveMode:
     """See `RenderMode`.
 
     Where the light of the face cannot be told, because it is lost, in profile or not yet seen, the person goes on in

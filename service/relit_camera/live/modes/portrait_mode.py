@@ -1,4 +1,4 @@
-"""Mode reenact: the subject's source image, relit, moved as the live face moves. No live pixel is in the picture."""
+"""Mode portrait: the subject's source image, relit, moved as the live face moves. No live pixel is in the picture."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from relit_camera.live.scene.scene import Scene
 from relit_camera.subject.subject import Subject
 
 
-class ReenactMode:
+class PortraitMode:
     """See `RenderMode`."""
 
     def __init__(self, context: ModeContext, reenactor: Reenactor) -> None:
@@ -43,7 +43,7 @@ class ReenactMode:
 def blend_with_source(subject: Subject, relit: LinearImage, share: float) -> LinearImage:
     """A `share` of the relit source image, and for the rest the source image as it was captured, lit from the front.
 
-    The live picture, which mode ratio blends with, stays private in mode reenact.
+    The live picture, which mode live blends with, stays private in mode portrait.
     """
     if share >= 1:
         return relit

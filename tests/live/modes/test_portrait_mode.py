@@ -1,11 +1,11 @@
-"""Mode reenact: blending the relit source image with the captured one."""
+"""Mode portrait: blending the relit source image with the captured one."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from relit_camera.base.images.color import linear_from_uint8
-from relit_camera.live.modes.reenact_mode import blend_with_source
+from relit_camera.live.modes.portrait_mode import blend_with_source
 from tests.live.people import close_up
 
 
