@@ -72,7 +72,7 @@ class SelectionTunables:
     mouth_fault: float = 0.05
     light_fault: float = 0.2
     symmetry_fault: float = 0.15
-    shape_fault: float = 0.006
+    shape_fault: float = 0.01
     typical: float = 40.0
     max_shape_change: float = 0.012
     further_faults: float = 1.0
@@ -238,8 +238,9 @@ def _front(face: SeenFace) -> tuple[DisplayImage, NDArray[np.bool_]]:
     size = max(round(scale * crop.shape[1]), 1), max(round(scale * crop.shape[0]), 1)
     small = cv2.resize(crop, size, interpolation=cv2.INTER_AREA)
     affine = _similarity(np.float32(scale) * (face.landmarks - corner), target)
-    front = np.asarray(cv2.warpAffine(small, opencv_affine(affine), (FRONT_PX, FRONT_PX)), np.uint8)
-    inside = np.zeros((FRONT_PX, FRONT_PX), np.uint8)
+    side = (FRONT_PX, FRONT_PX)
+    front = np.asarray(cv2.warpAffine(small, opencv_affine(affine), side, borderMode=cv2.BORDER_REPLICATE), np.uint8)
+    inside = np.zeros(side, np.uint8)
     cv2.fillConvexPoly(inside, cv2.convexHull(target.astype(np.int32)), 1)
     return front, (inside & inside[:, ::-1]) > 0
 
@@ -295,15 +296,20 @@ def _similarity(points: Points, onto: Points) -> Float64Array:
 
 
 def _shape_changes(faces: Sequence[SeenFace]) -> Float64Array:
-    """Mean distances (face, reference) of landmarks aligned by the rigid ones, in heights of the reference."""
-    rigid = landmark_scheme(SCHEME).rigid_indices
+    """Mean distances (face, reference) of landmarks aligned by the rigid ones, in heights of the reference.
+
+    One half is of the lips, which are few, and tell most of the expression.
+    """
+    scheme = landmark_scheme(SCHEME)
+    rigid, lips = scheme.rigid_indices, np.array(scheme.lips)
     # As complex numbers, of which one is a similarity about the origin: (faces, landmarks).
     points = np.stack([face.landmarks for face in faces]).astype(np.float64) @ np.array([1, 1j])
     points -= points[:, rigid].mean(axis=1, keepdims=True)
+    fixed = points[:, rigid]
+    sizes = np.maximum((np.abs(fixed) ** 2).sum(axis=1), 1e-9)
     changes = []
     for reference, face in zip(points, faces, strict=True):
-        fixed = points[:, rigid]
-        similarity = (fixed.conj() @ reference[rigid]) / np.maximum((np.abs(fixed) ** 2).sum(axis=1), 1e-9)
-        distance = np.abs(points * similarity[:, None] - reference).mean(axis=1)
-        changes.append(distance / max(face.height_px, 1.0))
+        similarity = (fixed.conj() @ reference[rigid]) / sizes
+        distance = np.abs(points * similarity[:, None] - reference)
+        changes.append((distance.mean(axis=1) + distance[:, lips].mean(axis=1)) / 2 / max(face.height_px, 1.0))
     return np.stack(changes, axis=1)
