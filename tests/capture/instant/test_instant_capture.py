@@ -188,7 +188,7 @@ class TestOnRealPictures:
             "nobody": lambda: np.full((480, 640, 3), 90, np.uint8),
             "small": lambda: np.asarray(cv2.resize(face, None, fx=0.06, fy=0.06, interpolation=cv2.INTER_AREA)),
             "profile": lambda: frames_of(shared / "driving" / "head-pose-face-detection-female.gif", 23)[3],
-            "dark": lambda: uint8_from_linear(linear * np.float32(0.01)),
+            "dark": lambda: uint8_from_linear(linear * np.float32(0.005)),
             "white": lambda: uint8_from_linear(linear * np.float32(6)),
         }
         picture = np.ascontiguousarray(pictures[name]())

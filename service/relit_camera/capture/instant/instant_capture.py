@@ -68,7 +68,7 @@ class InstantTunables:
         sure_matte: from which a pixel's color is the person's alone; others take the colors next to them.
     """
 
-    black_face: float = 0.002
+    black_face: float = 0.004
     dark_face: float = 0.008
     clipped_code: int = 250
     max_clipped: float = 0.6
