@@ -107,8 +107,8 @@ def far_away(picture: DisplayImage) -> DisplayImage:
     """The picture of somebody who stands seven times as far away, before a wall."""
     height, width = picture.shape[:2]
     small = np.asarray(cv2.resize(picture, (width // 7, height // 7), interpolation=cv2.INTER_AREA))
-    aside = (width - width // 7) // 2
-    room = ((height - height // 7, 0), (aside, width - width // 7 - aside), (0, 0))
+    aside = (width // 2 - width // 7) // 2
+    room = ((height // 2 - height // 7, 0), (aside, aside), (0, 0))
     return np.pad(small, room, mode="edge")
 
 
