@@ -22,7 +22,7 @@ from relit_camera.capture.geometry.shape_estimation import Geometry
 from relit_camera.capture.instant.back_light import soften_back_light
 from relit_camera.capture.instant.face_selection import SCHEME, follow_face, select_faces
 from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
-from relit_camera.capture.instant.median_picture import MedianPicture, median_picture
+from relit_camera.capture.instant.median_picture import MedianPicture, face_hull, median_picture, with_head
 from relit_camera.capture.instant.response.generic_compression import compress_generic_field
 from relit_camera.capture.instant.response.generic_reflectance import (
     GenericField,
@@ -59,17 +59,20 @@ class InstantTunables:
     """What a picture must be like.
 
     Attributes:
-        min_face_luminance: linear mean of the face, below which noise is most of it.
+        black_face, dark_face: linear mean of the face below which nothing is seen of it, and noise is most of it.
         clipped_code: from which a value counts as clipped.
-        max_clipped: largest share of the skin in which two channels are: red alone often is.
+        max_clipped, some_clipped: largest share of the skin in which two channels are, and of what needs no warning:
+            red alone often is.
         least_unclipped: pixels of skin, as a share, that the fit needs; else clipped ones count too.
         harsh_dark_fraction: share of the skin that hardly any light reaches from which a room is harsh.
         sure_matte: from which a pixel's color is the person's alone; others take the colors next to them.
     """
 
-    min_face_luminance: float = 0.008
+    black_face: float = 0.004
+    dark_face: float = 0.008
     clipped_code: int = 250
-    max_clipped: float = 0.25
+    max_clipped: float = 0.6
+    some_clipped: float = 0.25
     least_unclipped: float = 0.3
     harsh_dark_fraction: float = 0.15
     sure_matte: float = 0.9
@@ -113,13 +116,14 @@ def capture_instant(
         progress: called with a stage's name, what is done, and the total.
 
     Raises:
-        CaptureError: no face, two faces, a face that is too small, turned away, in the dark, or over-exposed.
+        CaptureError: no face, or one that is too small, turned away, black or white in all frames.
         ModelError: the networks are not there.
     """
     progress("Finding the face", 0, None)
     states = follow_face(frames)
-    picture = median_picture(select_faces(frames, states, source))
-    return replace(capture_from_picture(picture, source, progress), states=tuple(states))
+    selection = select_faces(frames, states, source)
+    captured = capture_from_picture(median_picture(selection.faces), source, progress)
+    return replace(captured, warnings=selection.warnings + captured.warnings, states=tuple(states))
 
 
 def capture_from_picture(
@@ -128,43 +132,45 @@ def capture_from_picture(
     """Make a subject from one clean picture, its matte and landmarks; see `capture_instant`.
 
     Raises:
-        CaptureError: the face in it is in the dark or over-exposed, or the matte does not show it.
+        CaptureError: the face in it is nearly black, or mostly white.
     """
     progress(STAGE, 0, 3)
-    _require_light(picture, source)
+    warnings = _light_warnings(picture, source)
+    picture, missed = with_head(picture)
+    if missed:
+        warnings += ("the head cannot be told from what is behind it: choose another background, or more light",)
     side = len(picture.matte) // 2
     half = np.asarray(cv2.resize(picture.matte, (side, side), interpolation=cv2.INTER_AREA), np.float32)
     shape = fit_head_shape((picture.landmarks / 2).astype(np.float32), half)
-    _require_exposed(picture, shape, source)
+    warnings += _exposure_warnings(picture, shape, source)
     progress(STAGE, 1, 3)
     response = with_learned_response(shape_response(shape.geometry, shape.certainty, half), shape, half)
-    field, room, warnings = _reflectance(picture, shape, response)
+    field, room, harsh = _reflectance(picture, shape, response)
     progress(STAGE, 2, 3)
     subject = _subject(picture, shape, field, room, source)
     progress(STAGE, 3, 3)
-    return InstantCapture(subject, warnings, picture.frames)
+    return InstantCapture(subject, warnings + harsh, picture.frames)
 
 
-def _require_light(picture: MedianPicture, source: str) -> None:
-    """Raise CaptureError where the face is nearly black, before its matte is looked at, which fails in the dark too."""
-    face = np.zeros(picture.matte.shape, np.uint8)
-    cv2.fillConvexPoly(face, cv2.convexHull(np.round(picture.landmarks).astype(np.int32)), 1)
-    seen = linear_from_uint8(picture.image[face > 0])
-    if float(luminance(seen[None]).mean()) < TUNABLES.min_face_luminance:
+def _light_warnings(picture: MedianPicture, source: str) -> tuple[str, ...]:
+    """What to say of a dark face; raises CaptureError where it is nearly black."""
+    seen = linear_from_uint8(picture.image[face_hull(picture.landmarks, picture.matte.shape) > 0])
+    light = float(luminance(seen[None]).mean())
+    if light < TUNABLES.black_face:
         raise CaptureError(f"it is too dark in {source}: the face is nearly black", "switch a light on")
+    return ("the face is dark: switch a light on for a better subject",) if light < TUNABLES.dark_face else ()
 
 
-def _require_exposed(picture: MedianPicture, shape: HeadShape, source: str) -> None:
-    skin = _doubled(shape.skin)
-    codes = picture.image[skin]
+def _exposure_warnings(picture: MedianPicture, shape: HeadShape, source: str) -> tuple[str, ...]:
+    """What to say of skin that is white; raises CaptureError where most is, or none is seen."""
+    codes = picture.image[_doubled(shape.skin)]
     if len(codes) == 0:
         raise CaptureError(f"no skin can be seen in {source}", "take from your face what covers it")
     clipped = float((np.median(codes, axis=1) >= TUNABLES.clipped_code).mean())
+    what, cure = f"{100 * clipped:.0f} % of the skin is white", "turn the light or the camera's exposure down"
     if clipped > TUNABLES.max_clipped:
-        raise CaptureError(
-            f"the face in {source} is over-exposed: {100 * clipped:.0f} % of the skin is white",
-            "turn the light or the camera's exposure down",
-        )
+        raise CaptureError(f"the face in {source} is over-exposed: {what}", cure)
+    return (f"{what}: {cure}",) if clipped > TUNABLES.some_clipped else ()
 
 
 def _reflectance(

@@ -63,7 +63,7 @@ def known_response(samples: OlatSamples, lights: NDArray[np.float32], lamp_size_
         ModelError: the networks are not there.
     """
     frame = _frame(samples)
-    face = select_faces([frame], follow_face([frame]), "the picture in even light")[0]
+    face = select_faces([frame], follow_face([frame]), "the picture in even light").faces[0]
     picture = median_picture([face])
     side = len(picture.matte) // 2
     matte = np.asarray(cv2.resize(picture.matte, (side, side), interpolation=cv2.INTER_AREA), np.float32)
