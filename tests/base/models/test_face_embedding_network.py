@@ -90,7 +90,8 @@ def halving(value: Float, weights: Weights, name: str) -> Float:
 
 def embedding_of(image: Float, weights: Weights) -> Float:
     """What the network makes of a picture (150, 150, 3) of 0..1."""
-    value = relu(convolved(image - np.array(MEAN_RGB, np.float32) / 255, weights, "conv32_down", stride=2, pad=0))
+    centered = image - np.float32(np.array(MEAN_RGB) / 255)
+    value = relu(convolved(centered, weights, "conv32_down", stride=2, pad=0))
     value = windows(value, 3, 2).max(axis=(3, 4))
     for name in (name for group in GROUPS for name in group):
         if "down" in name:

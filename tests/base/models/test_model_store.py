@@ -42,6 +42,8 @@ AGREED = {
     "selfie_landscape",
     "selfie_square",
 }
+MIRRORED = sorted(AGREED - {"face_embedding", "face_mesh_attention"})
+"""Whose upstream files the shared data has."""
 
 
 def relu_onnx() -> bytes:
@@ -337,15 +339,12 @@ def test_the_public_manifest_has_the_agreed_names() -> None:
             assert (model.sha256, model.size) == (download.sha256, download.size)
 
 
-def test_every_public_model_is_made_to_the_byte(
+def test_every_mirrored_model_is_made_to_the_byte(
     shared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("RELIT_MODELS_DIR", str(tmp_path / "models"))
-    mirrored = AGREED - {"face_mesh_attention"}  # which its authors publish in a package alone
-    if not (shared / "models" / public_manifest().models["face_embedding"].download).exists():
-        mirrored -= {"face_embedding"}
-    ModelStore().verify_mirror(sorted(mirrored), shared / "models")
-    ModelStore().pull(sorted(mirrored), mirror=shared / "models")
-    for name in mirrored:
+    ModelStore().verify_mirror(MIRRORED, shared / "models")
+    ModelStore().pull(MIRRORED, mirror=shared / "models")
+    for name in MIRRORED:
         assert open_session(model_path(name), name).provider == "cpu"
     assert capfd.readouterr() == ("", "")

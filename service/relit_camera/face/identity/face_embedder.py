@@ -1,6 +1,6 @@
 """Face embeddings: vectors that lie near each other where two pictures show one person, whatever the light.
 
-The network is dlib's (docs/models.md). What it makes of a face can be compared and tells nothing else.
+The network is dlib's (docs/models.md).
 """
 
 from __future__ import annotations
