@@ -28,7 +28,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class JudgeTunables:
-    """When a face is looked at, and how it is judged. Measured on recorded people (docs/trackers.md, "Who it is: how sure").
+    """When a face is looked at, and how it is judged, measured on recorded people ("Who it is" in docs/trackers.md).
 
     Attributes:
         distance: of the embeddings of one person at most.
