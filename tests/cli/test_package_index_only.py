@@ -29,7 +29,7 @@ from tests.package_index import require_package_index
 pytestmark = pytest.mark.slow
 
 FRAMES = 24
-HOSTS = ("storage.googleapis.com", "github.com", "cdn.jsdelivr.net")
+HOSTS = ("storage.googleapis.com", "github.com", "cdn.jsdelivr.net", "registry.npmjs.org")
 NO_HOSTS = f"""
 import socket
 ask = socket.getaddrinfo

@@ -63,7 +63,7 @@ def test_what_the_package_index_has_is_fine(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(
         ModelStore, "state", lambda self, name: ModelState.PULLED if name in indexed else ModelState.MISSING
     )
-    expect(check_models(RelitSettings()), Severity.OK, "4 of 8", "missing: face_blendshapes, openseeface")
+    expect(check_models(RelitSettings()), Severity.OK, "4 of 9", "openseeface, face_embedding")
     openseeface = RelitSettings(tracker={"name": "openseeface"})
     expect(check_models(openseeface), Severity.PROBLEM, "tracker openseeface lacks openseeface", "relit models pull")
 

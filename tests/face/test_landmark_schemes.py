@@ -46,6 +46,12 @@ def test_the_mesh_is_the_canonical_face_and_two_irises() -> None:
         assert np.linalg.norm(right - left) == pytest.approx(1.17)  # 11.7 mm
 
 
+def test_the_nose_tip_is_in_the_middle_and_before_all_else(scheme: LandmarkScheme) -> None:
+    tip = scheme.canonical[scheme.nose_tip]
+    assert abs(tip[0]) < 1e-6
+    assert tip[2] > scheme.canonical[:, 2].max() - 0.1
+
+
 def test_left_mirrors_right(scheme: LandmarkScheme) -> None:
     right, left = scheme.right_eye, scheme.left_eye
     assert mirror(scheme, (right.outer, right.inner)) == [left.outer, left.inner]

