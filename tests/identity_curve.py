@@ -24,7 +24,8 @@ from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.reenactment.source_image import find_source_face
 from relit_camera.subject.subject_file import read_subject
 
-WATCHED_S = IdentityTunables().delay_s
+WATCHED_S, INTERVAL_S = 1.5, 0.25
+"""How long a face is watched, and time between two measurements."""
 THRESHOLDS = (0.4, 0.65, 0.8, 1.0, 1.2, 1.4, 1.6, 2.0)
 
 
@@ -55,7 +56,7 @@ def measure(subject: Path, clip: Path) -> Likeness | None:
             if motion.pose is None or motion.neutral is None or motion.presence <= 0:
                 continue
             seen = room.update(frame.image, motion.landmarks, motion.rotation, frame.time_s)
-            if frame.time_s - measured_s < limits.interval_s:
+            if frame.time_s - measured_s < INTERVAL_S:
                 continue
             measured_s = frame.time_s
             distance_cm = shape_distance_cm(motion.neutral.points + motion.expression, face)

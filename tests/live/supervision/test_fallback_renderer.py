@@ -53,7 +53,7 @@ def renderer(
 
 def lit_from(azimuth_deg: float) -> Scene:
     lighting = Lighting(environment=None, lamps=[Lamp(azimuth_deg=azimuth_deg)], transition_s=0)
-    return Scene(Look(lighting=lighting, mode=Mode.REENACT), subject=person())
+    return Scene(Look(lighting=lighting, mode=Mode.PORTRAIT), subject=person())
 
 
 def shown(fallback: FallbackRenderer, frame: Frame, scene: Scene) -> DisplayImage:
@@ -134,7 +134,7 @@ def at(captured_at: float) -> Frame:
 
 @pytest.mark.parametrize(
     ("instead", "allowed", "filmed"),
-    [(Fallback.PLACEHOLDER, True, False), (Fallback.LIVE, False, False), (Fallback.LIVE, True, True)],
+    [(Fallback.PLACEHOLDER, True, False), (Fallback.FILMED, False, False), (Fallback.FILMED, True, True)],
 )
 def test_a_live_picture_is_held_and_nothing_of_the_source_image_appears(
     instead: Fallback, allowed: bool, filmed: bool
@@ -143,7 +143,7 @@ def test_a_live_picture_is_held_and_nothing_of_the_source_image_appears(
         raise AssertionError("the source image is not to be relit")
 
     fallback = renderer(never, instead)
-    scene = Scene(Look(mode=Mode.RATIO), subject=person(), unlit_allowed=allowed)
+    scene = Scene(Look(mode=Mode.LIVE), subject=person(), unlit_allowed=allowed)
     fallback.note_live(at(0.0), None)
     assert fallback.picture(at(2.0), scene) is None
     assert fallback.picture(at(2.0 + HOLD_S - 0.1), scene) is None

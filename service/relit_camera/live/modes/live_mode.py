@@ -86,7 +86,7 @@ class LiveMode:
         followed = self._is_followed(motion)
         presence = self._presence.update(followed, frame.time_s)
         if followed and motion.pose is not None:
-            rotation = motion.pose.rotation * context.face.pose.rotation.inv()
+            rotation = context.face.turn_to(motion.pose)
             with context.timer.stage("room"):
                 self._last = (
                     relighting.room_light.update(frame.image, motion.landmarks, rotation, frame.time_s),

@@ -79,10 +79,10 @@ def what_is_shown(now: Situation) -> Shown:
     if now.rendering is Rendering.WORKS:
         if now.face is FacePresence.FOLLOWED:
             return Shown.RELIT
-        if now.mode is Mode.REENACT:
+        if now.mode is Mode.PORTRAIT:
             return Shown.AT_REST
         return Shown.LAST_LIGHT if now.face is FacePresence.LOST else Shown.PLACE_TINT
-    if now.mode is Mode.REENACT and now.can_rest:
+    if now.mode is Mode.PORTRAIT and now.can_rest:
         return Shown.AT_REST
     if now.rendering is Rendering.FAILS:
         return Shown.HELD

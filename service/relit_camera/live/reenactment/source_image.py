@@ -16,6 +16,7 @@ from relit_camera.base.easing import smoothstep
 from relit_camera.base.errors import SubjectError
 from relit_camera.base.images.image_types import LinearImage, Mask, Points, RgbaImage
 from relit_camera.base.images.tone_mapping import display_from_linear
+from relit_camera.base.rotations import Rotation
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.head_pose import HeadPose, fit_pose, unproject
 from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme, landmark_scheme
@@ -45,6 +46,10 @@ class SourceFace:
     pose: HeadPose
     head_points: NDArray[np.float64]
     size: tuple[int, int]
+
+    def turn_to(self, pose: HeadPose) -> Rotation:
+        """The rotation from the head in the source image to one of that pose, both before the camera."""
+        return pose.rotation * self.pose.rotation.inv()
 
 
 def find_source_face(subject: Subject, tracker: Tracker) -> SourceFace:

@@ -15,7 +15,8 @@ from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import Tracker
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.light.light_map import LightMap
-from relit_camera.live.modes.ratio_relighting import RatioPlan, RatioRelighting, as_large_as_needed
+from relit_camera.light.light_map_rotation import rotate_light_map
+from relit_camera.live.modes.ratio_relighting import FaceLight, RatioPlan, RatioRelighting, as_large_as_needed
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.source_image import find_source_face
@@ -73,7 +74,9 @@ class LiveRatio:
         self._relighting = RatioRelighting(compared, compared_face, estimator, DenseMotion(SessionOptions("cpu")))
         self._gain = np.float32(subject.metadata.display_gain)
         for each in followed:
-            room = estimator.update(each.frame.image, each.motion.landmarks, each.motion.rotation, each.frame.time_s)
+            assert each.motion.pose is not None
+            self._turn = face.turn_to(each.motion.pose)
+            room = estimator.update(each.frame.image, each.motion.landmarks, self._turn, each.frame.time_s)
         self._room, self._last = room, followed[-1]
         self.residual = room.residual
         pose = self._last.motion.pose
@@ -83,8 +86,9 @@ class LiveRatio:
 
     def relit(self, light: LightMap) -> DisplayImage:
         """The last frame, as the program shows it in a light in display exposure."""
-        maps = np.stack([light * self._gain, self._room.in_head_frame(self._last.motion.rotation)])
+        maps = np.stack([rotate_light_map(light, self._turn) * self._gain, self._room.in_head_frame(self._turn)])
         pictures = self._relighting.raised_lights(*self._relighter.relight(maps))
-        presence = float(self._last.motion.presence)
-        plan = RatioPlan(self._last.frame, presence, self._room.gain, pictures, self._positions, self._eye_distance)
-        return self._relighting.apply(self._relighting.aligned(plan))
+        face = FaceLight(self._room.gain, pictures, self._positions, self._eye_distance)
+        rest = self._relighting.mean_factor(pictures, self._room.gain)
+        plan = RatioPlan(self._last.frame, rest, float(self._last.motion.presence), face)
+        return self._relighting.apply(self._relighting.aligned(plan)).image
