@@ -9,11 +9,15 @@ import re
 import tomllib
 from collections import defaultdict
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import grimp
 
+from relit_camera.base.config.look import Mode
+from relit_camera.live.publishing.what_is_shown import FacePresence, Rendering, Situation, what_is_shown
 from tests import recorded_cost
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -79,12 +83,39 @@ def _plug_ins_text() -> str:
     return f"| group | built in |\n|---|---|\n{rows}"
 
 
+PICTURES = {
+    Rendering.WORKS: "come",
+    Rendering.FAILS: "fail, for less than 10 s",
+    Rendering.HAS_FAILED: "have failed for longer",
+}
+FACES = {
+    FacePresence.FOLLOWED: "followed",
+    FacePresence.LOST: "lost, hidden or in profile",
+    FacePresence.NOT_YET: "not seen yet",
+}
+
+
+def _shown_text() -> str:
+    rows = "| pictures | face | live | portrait |\n|---|---|---|---|\n"
+    for rendering, face in product(Rendering, FacePresence):
+        if rendering is not Rendering.WORKS and face is not FacePresence.FOLLOWED:
+            continue
+        cells = [PICTURES[rendering], FACES[face] if rendering is Rendering.WORKS else "any"]
+        for mode in (Mode.LIVE, Mode.PORTRAIT):
+            now = Situation(mode, face, rendering=rendering)
+            kinds = [what_is_shown(replace(now, can_rest=can_rest)) for can_rest in (True, False)]
+            cells.append(", else ".join(f"`{kind}`" for kind in dict.fromkeys(kinds)))
+        rows += f"| {' | '.join(cells)} |\n"
+    return rows
+
+
 TABLES: Mapping[str, Callable[[], str]] = {
     "layers": _layers_text,
     "imports": _imports_text,
     "imports-live": partial(_imports_text, f"{PACKAGE}.live"),
     "imports-capture": partial(_imports_text, f"{PACKAGE}.capture"),
     "plug-ins": _plug_ins_text,
+    "shown": _shown_text,
     **recorded_cost.TABLES,
 }
 

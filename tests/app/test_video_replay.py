@@ -69,7 +69,7 @@ def test_the_report_of_a_frame(tmp_path: Path) -> None:
     told = play(clip(tmp_path), None, SteadyTracker())[-1].as_json()
     assert told["index"] == COUNT - 1
     assert told["state"] == "found"
-    assert set(told) == {"index", "time_s", "state", "pose", "stage_ms"}
+    assert set(told) == {"index", "time_s", "state", "shown", "pose", "stage_ms"}
     assert isinstance(told["pose"], dict)
     assert set(told["pose"]) == {"yaw", "pitch", "roll"}
     assert ReplayedFrame(0, 0.0, None, Shown.RELIT, {}).as_json()["pose"] is None

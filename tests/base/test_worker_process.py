@@ -33,7 +33,11 @@ def before() -> None:
 
 def workers() -> list[psutil.Process]:
     """The worker processes that this test has started and that run."""
-    children = [child for child in psutil.Process().children() if child not in BEFORE]
+    children = [
+        child
+        for child in psutil.Process().children()
+        if child not in BEFORE and child.status() != psutil.STATUS_ZOMBIE  # nobody has waited for it yet
+    ]
     return [child for child in children if "spawn_main" in " ".join(child.cmdline())]
 
 

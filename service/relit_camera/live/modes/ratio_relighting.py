@@ -106,8 +106,8 @@ class RelitFrame:
 
     Attributes:
         image: uint8 sRGB.
-        person: (rows, columns) float32, how surely cells of the frame show the person, by what lies there in the source
-            image, 0..1; None where nobody is followed.
+        person: (rows, columns) float32, how surely cells of the frame show what the source image has there of the
+            person, 0..1; None where nobody is followed.
     """
 
     image: DisplayImage
@@ -251,7 +251,8 @@ class RatioRelighting:
         calm = cv2.multiply(factor[inside], cv2.cvtColor(noise, cv2.COLOR_GRAY2RGB))
         factor[inside] -= calm
         added += cv2.multiply(calm, smooth)
-        added, person = (cv2.copyMakeBorder(each, *beside, cv2.BORDER_CONSTANT) for each in (added, confidence))
+        sure = cv2.extractChannel(cells.ratio, 3)
+        added, person = (cv2.copyMakeBorder(each, *beside, cv2.BORDER_CONSTANT) for each in (added, sure))
         return image, factor, np.asarray(added, np.float32), np.asarray(person, np.float32)
 
     def _warp(self, motion: FaceMotion, pose: HeadPose, size: tuple[int, int]) -> Warp:
