@@ -21,6 +21,7 @@ from relit_camera.base.errors import ModelError
 from relit_camera.base.images.image_types import Alpha, Frame
 from relit_camera.base.models.model_store import FOLDER_VARIABLE
 from relit_camera.base.rotations import Rotation, angles_from_rotation, rotation_from_angles
+from relit_camera.capture.instant.anyone import anyone
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.head_pose import project
 from relit_camera.face.motion.face_follower import FaceMotion
@@ -80,9 +81,39 @@ def test_without_a_subject_the_live_picture_passes() -> None:
     assert rendered.unlit  # the publisher shows it only where that is allowed
 
 
-@pytest.mark.parametrize(("allowed", "shown"), [(True, "the live picture"), (False, "a placeholder")])
-def test_nobody_is_a_trouble(allowed: bool, shown: str) -> None:
-    (trouble,) = subject_troubles(scene(subject=False, unlit_allowed=allowed))
+def test_whoever_comes_is_relit_where_nobody_is_chosen() -> None:
+    """In the light that was chosen, at once, and nothing of the head that stands for them is in the picture."""
+    made, image = pipeline(), textured()
+    bright, dark = (
+        made.process(frame(index, image), scene(subject=False, mode=Mode.LIVE, unlit_allowed=False, lighting=light))
+        for index, light in enumerate([LAMP_LEFT.model_dump(), LAMP_RIGHT.model_dump()])
+    )
+    assert (bright.shown, bright.unlit) == (Shown.RELIT, False)
+    half = SIZE[0] // 2
+    left, right = bright.image.astype(float), dark.image.astype(float)
+    assert (left - right)[20:-20, half - 24 : half - 6].mean() > 3
+    assert (right - left)[20:-20, half + 6 : half + 24].mean() > 3
+    fine = [each - cv2.GaussianBlur(each, (0, 0), 8) for each in (left, image.astype(float))]
+    assert np.corrcoef(*(each[20:-20, half - 40 : half - 16].ravel() for each in fine))[0, 1] > 0.8
+
+
+def textured() -> np.ndarray:
+    """Grey with a pattern that no noise has."""
+    noise = np.random.default_rng(4).normal(0, 120, (SIZE[1], SIZE[0], 1)).repeat(3, axis=2)
+    return np.clip(grey(120) + cv2.GaussianBlur(noise, (0, 0), 2.5), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("mode", "allowed", "shown"),
+    [
+        (Mode.PORTRAIT, True, "the live picture"),
+        (Mode.PORTRAIT, False, "a placeholder"),
+        (Mode.LIVE, True, "the live picture"),
+        (Mode.LIVE, False, "you are lit as a mean head"),
+    ],
+)
+def test_nobody_is_a_trouble(mode: Mode, allowed: bool, shown: str) -> None:
+    (trouble,) = subject_troubles(scene(subject=False, mode=mode, unlit_allowed=allowed))
     assert trouble.code is DegradationCode.NO_SUBJECT
     assert trouble.what.startswith(shown)
     assert subject_troubles(scene()) == []
@@ -310,7 +341,7 @@ def with_third_mode(tracker: Tracker) -> Pipeline:
     """A pipeline whose mode live is another: its logic knows no mode by name."""
     modes = {**mode_factories(CPU), Mode.LIVE: OneGrey}
     follower = make_follower(CPU.tracker, tracker)
-    return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
+    return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone)
 
 
 def test_a_third_mode_needs_nothing_of_the_pipeline() -> None:
@@ -350,7 +381,7 @@ def test_it_says_when_models_are_opened() -> None:
     """For a subject, for a mode, and when a live person must first be parted from the room."""
     tracker, said = SteadyTracker(), []
     follower = make_follower(CPU.tracker, tracker)
-    made = Pipeline(tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere)
+    made = Pipeline(tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere, anyone)
     made.on_opening = lambda: said.append("opening")
     blurred, other = scene(mode=Mode.LIVE, background={"kind": "blur"}), replace(small_subject())
     live = scene(mode=Mode.LIVE)
@@ -392,7 +423,7 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
     tracker = CountingTracker()
     modes = {Mode.PORTRAIT: Noting, Mode.LIVE: Noting}
     follower = make_follower(CPU.tracker, tracker)
-    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
+    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)  # flow needs something to follow
     made.process(frame(0, noise), scene())
     before, made.quality = tracker.measured, QUALITY_LEVELS[-1]
@@ -408,7 +439,7 @@ def test_the_running_camera_measures_every_second_face_in_mode_live(mode: Mode, 
     tracker = CountingTracker()
     modes = {Mode.PORTRAIT: OneGrey, Mode.LIVE: OneGrey}
     follower = make_follower(CPU.tracker, tracker)
-    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail)
+    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)
     made.quality = QUALITY_LEVELS[0]
     made.process(frame(0, noise), scene(mode=mode))

@@ -23,6 +23,7 @@ from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.reenactment.dense_motion import DenseMotion
 from relit_camera.live.reenactment.reenactor import REENACTORS, ReenactorContext, open_reenactor
 from relit_camera.subject.relighting.relighter import RELIGHTERS, open_relighter
+from relit_camera.subject.subject import Subject
 
 
 def session_options(inference: InferenceSettings) -> SessionOptions:
@@ -78,7 +79,14 @@ def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, in
         mode_factories(settings),
         partial(open_relighter, settings.relight.name, session=session),
         open_matting(settings.matte, session),
+        _make_anyone,
     )
+
+
+def _make_anyone() -> Subject:
+    from relit_camera.capture.instant.anyone import anyone  # imports SciPy, which most cameras do without
+
+    return anyone()
 
 
 def make_follower(settings: TrackerSettings, tracker: Tracker) -> FaceFollower:

@@ -34,7 +34,10 @@ def subject_troubles(scene: Scene) -> list[Degradation]:
     """What works less well than asked because nobody is chosen; nothing where somebody is."""
     if scene.subject is not None:
         return []
-    shown = "the live picture is shown as it is" if scene.unlit_allowed else "a placeholder is shown"
+    if not scene.shows_nobody:
+        shown = "you are lit as a mean head would be"
+    else:
+        shown = "the live picture is shown as it is" if scene.unlit_allowed else "a placeholder is shown"
     cure = "choose or capture one in the panel, or name one with --subject"
     return [Degradation(code=DegradationCode.NO_SUBJECT, what=shown, why="no subject is chosen", cure=cure)]
 
@@ -70,6 +73,7 @@ class Pipeline:
         modes: Mapping[Mode, ModeFactory],
         open_relighter: Callable[[Subject], Relighter],
         open_matte: Callable[[], Matting],
+        make_anyone: Callable[[], Subject],
     ) -> None:
         """Set up; the first frame of a subject opens its models.
 
@@ -80,6 +84,7 @@ class Pipeline:
             modes: how each mode is made for a subject.
             open_relighter: makes the relighter of a subject.
             open_matte: called when a live person must first be parted from the room.
+            make_anyone: makes the subject that stands for whoever comes while nobody is chosen.
         """
         self.timer = StageTimer()
         self.quality = FULL_QUALITY
@@ -92,6 +97,8 @@ class Pipeline:
         self._open_relighter = open_relighter
         self._light = LightTransition()
         self._open_matte = open_matte
+        self._make_anyone = make_anyone
+        self._anyone: Subject | None = None
         self._troubles: dict[str, Degradation] = {}
         self._compositor = Compositor(size, self._opened_matte, self.timer, self._troubles)
         self._active: _ActiveMode | None = None
@@ -142,13 +149,14 @@ class Pipeline:
         """
         quality = self.quality
         scene = scene_now()
-        motion = self._track(frame, scene, quality) if scene.subject else None
+        motion = None if scene.shows_nobody else self._track(frame, scene, quality)
         scene = scene_now()
-        if scene.subject is None:
+        if scene.shows_nobody:
             return lambda: self._render_unrelit(frame, scene)
         if motion is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
             motion = self._track(frame, scene, quality)
-        return self._mode(scene.subject, scene.look.mode).begin(frame, motion, scene, quality)
+        subject = scene.subject or self._opened_anyone()
+        return self._mode(subject, scene.look.mode).begin(frame, motion, scene, quality)
 
     def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> FaceMotion:
         is_live = scene.look.mode is Mode.LIVE
@@ -163,6 +171,12 @@ class Pipeline:
         shown = what_is_shown(Situation(scene.look.mode, has_subject=False, filmed_allowed=True))
         # The publisher shows it only where that is allowed.
         return RenderedFrame(image, None, scene, shown, unlit=True)
+
+    def _opened_anyone(self) -> Subject:
+        if self._anyone is None:
+            self.on_opening()
+            self._anyone = self._make_anyone()
+        return self._anyone
 
     def _opened_matte(self) -> Matting:
         self.on_opening()

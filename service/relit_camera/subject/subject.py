@@ -20,6 +20,8 @@ from relit_camera.subject.reflectance_field import TEXELS
 from relit_camera.subject.rungs import Rung
 
 FORMAT_VERSION: Literal[2] = 2
+ANYONE = "anyone"
+"""The method of the subject that is nobody's."""
 MIN_SIDE_PX, MAX_SIDE_PX = 8, 8192
 """Least and largest side of a subject's picture, in pixels."""
 HORIZON_STEP_RAD = np.pi / 255
@@ -142,6 +144,11 @@ class Subject:
     def measured_texels(self) -> NDArray[np.bool_]:
         """Which texels (32, 64) of a light map lie in measured directions."""
         return measured_texels(self.light_directions)
+
+    @property
+    def is_anyone(self) -> bool:
+        """Whether it is the head that stands for anybody of whom nothing is known (`capture.instant.anyone`)."""
+        return self.metadata.method == ANYONE
 
     def drop_pages(self) -> None:
         """Give back the memory of what was read of the mapped file; the system reads it again where it is needed."""

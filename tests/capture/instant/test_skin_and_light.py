@@ -12,7 +12,7 @@ from relit_camera.base.images.color import LUMINANCE
 from relit_camera.capture.instant.instant_capture import TUNABLES
 from relit_camera.capture.instant.room_light import fit_room_light
 from relit_camera.capture.instant.skin.skin_albedo import estimate_albedo
-from relit_camera.capture.instant.skin.skin_prior import DARKEST, LIGHTEST, SKIN, estimate_skin, skin_of_luminance
+from relit_camera.face.skin_prior import DARKEST, LIGHTEST, SKIN, estimate_skin, skin_of_luminance
 from relit_camera.light.directions import direction_from_degrees, texel_directions
 from tests.capture.instant.lit_person import SIDE, field_of, person, window
 from tests.capture.instant.lit_person import SKIN as ALBEDO

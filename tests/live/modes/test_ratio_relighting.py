@@ -57,7 +57,9 @@ class KnownRoom:
 
     def update(self, image: DisplayImage, landmarks: Points, rotation: Rotation, time_s: float) -> RoomLightEstimate:
         room = self.light * exposure()
-        return RoomLightEstimate(room, partial(rotate_light_map, room), np.ones(3, np.float32), 0.0)
+        return RoomLightEstimate(
+            room, partial(rotate_light_map, room), np.ones(3, np.float32), 0.0, np.empty((0, 3), np.float32)
+        )
 
 
 def relighting(light: LightMap | None = None) -> RatioRelighting:

@@ -199,8 +199,17 @@ def test_without_a_face_it_searches(camera: LoopUnderTest) -> None:
     assert camera.events()[2:] == [("tracking", "lost"), ("state", "searching")]
 
 
-def test_without_a_subject_nothing_unlit_is_shown_where_that_is_forbidden(camera: LoopUnderTest) -> None:
+def test_without_a_subject_whoever_comes_is_relit_in_mode_live(camera: LoopUnderTest) -> None:
     camera.scene = replace(camera.scene, unlit_allowed=False)
+    camera.run(1.0)
+    assert camera.newest().image is PICTURE
+    assert camera.board.state is CameraState.LIVE
+
+
+def test_without_a_subject_there_is_no_portrait_and_nothing_unlit_where_that_is_forbidden(
+    camera: LoopUnderTest,
+) -> None:
+    camera.scene = replace(camera.scene, look=Look(mode=Mode.PORTRAIT), unlit_allowed=False)
     camera.run(1.0)
     assert camera.publisher.placeholder is NOBODY
     assert camera.publisher.pictures.newer(0, 0) is None

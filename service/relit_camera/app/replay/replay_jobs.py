@@ -106,7 +106,7 @@ class ReplayJobs:
         with self._job.taken() as canceled:
             if name in self._results.names():
                 raise ConflictError(f"there is a replay '{name}' already", "choose another name, or delete that one")
-            if self._scene_controller.scene.subject is None:
+            if self._scene_controller.scene.shows_nobody:
                 raise ConflictError(NOBODY, NOBODY_CURE)
             self._require_own_folder()
             before, sent = self._last, self._results.folder / SENT
@@ -176,7 +176,7 @@ class ReplayJobs:
         scene = self._scene_controller.scene
         stored = scene.subject_name in self._scene_controller.subjects.names()
         subject = scene.subject_name if stored else scene.subject
-        if subject is None:  # somebody has chosen nobody meanwhile
+        if scene.shows_nobody:  # somebody has chosen nobody meanwhile
             self._remove_sent()
             self._set(ReplayStatus(name, ReplayStage.FAILED, what=NOBODY, cure=NOBODY_CURE))
             return

@@ -21,13 +21,13 @@ class ReplayWork:
     Attributes:
         settings: of the camera: tracker, relighter and so on.
         scene: what to show, without a subject.
-        subject: who: name of a stored one, or one that is not stored.
+        subject: who: name of a stored one, or one that is not stored; None relights whoever comes.
         video: file to read.
     """
 
     settings: RelitSettings
     scene: Scene
-    subject: str | Subject
+    subject: str | Subject | None
     video: Path
 
 

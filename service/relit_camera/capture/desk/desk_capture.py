@@ -46,12 +46,12 @@ from relit_camera.capture.desk.recording_checks import (
 from relit_camera.capture.film.olat.flash_matte import estimate_flash_matte
 from relit_camera.capture.film.olat.head_crop import HeadCrop, place_head_crop
 from relit_camera.capture.instant.skin.eye_whites import eye_white_ratio
-from relit_camera.capture.instant.skin.skin_prior import skin_luminance_by_eyes
 from relit_camera.capture.reflectance.methods.appearance_field import AppearanceField
 from relit_camera.capture.reflectance.methods.gaussian_process import Kernel
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.capture.subject_builder import subject_from_field
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.skin_prior import skin_luminance_by_eyes
 from relit_camera.light.directions import texel_solid_angles
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.reflectance_field import ReflectanceField, texel_vectors

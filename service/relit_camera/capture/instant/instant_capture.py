@@ -38,10 +38,10 @@ from relit_camera.capture.instant.skin.even_sides import even_sides
 from relit_camera.capture.instant.skin.eye_whites import eye_white_ratio
 from relit_camera.capture.instant.skin.skin_albedo import TUNABLES as ALBEDO
 from relit_camera.capture.instant.skin.skin_albedo import estimate_albedo
-from relit_camera.capture.instant.skin.skin_prior import estimate_skin
 from relit_camera.capture.subject_builder import quantize_geometry
 from relit_camera.face.face_state import FaceState
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.skin_prior import estimate_skin
 from relit_camera.light.directions import texel_directions
 from relit_camera.subject.compression.accuracy_target import CompressionTarget
 from relit_camera.subject.rungs import EXPECTED_DB

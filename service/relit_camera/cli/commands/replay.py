@@ -29,9 +29,7 @@ def replay(
     environment: Annotated[str, typer.Option(help="A stored environment's name, or a panorama file.")],
     out: Annotated[Path, typer.Option(help="Video to write: .mp4, .mkv or .mov, at the driving video's size.")],
     subject: Annotated[str | None, typer.Option(help="A stored subject's name, or a .relit file.")] = None,
-    instant: Annotated[
-        bool, typer.Option("--instant", help="No subject is at hand: capture one from the video itself.")
-    ] = False,
+    instant: Annotated[bool, typer.Option("--instant", help="Capture the subject from the video itself.")] = False,
     report: Annotated[Path | None, typer.Option(help="JSON to write: state, pose and times of each frame.")] = None,
     mode: Annotated[str, typer.Option(help="live or portrait.")] = "live",
     tracker: Annotated[str | None, typer.Option(help="mesh, openseeface, or recorded:TRACK.json.")] = None,
@@ -41,7 +39,10 @@ def replay(
     contact_sheet: Annotated[Path | None, typer.Option(help="PNG or JPEG of some frames, live above relit.")] = None,
     pull: Pull = None,
 ) -> None:
-    """Relight a recorded video: the subject under the environment, moved as the face in the video moves."""
+    """Relight a recorded video.
+
+    Without a subject, whoever is in it is lit as a mean head of their skin would be; with one, the better for it.
+    """
     import json
     import sys
     from contextlib import ExitStack
@@ -49,7 +50,7 @@ def replay(
     from relit_camera.app.replay.video_replay import replay as run_replay
     from relit_camera.app.wiring import make_pipeline, make_tracker
     from relit_camera.base.concurrency.threads import limit_threads
-    from relit_camera.base.config.look import Look
+    from relit_camera.base.config.look import Look, Mode
     from relit_camera.base.images.contact_sheet import contact_sheet as draw_sheet
     from relit_camera.base.images.image_files import encode_display
     from relit_camera.base.images.image_types import DisplayImage
@@ -62,8 +63,8 @@ def replay(
 
     if contact_sheet and contact_sheet.suffix.lower() not in (".png", ".jpg", ".jpeg"):
         raise typer.BadParameter(f"{contact_sheet} is neither .png nor .jpg", param_hint="--contact-sheet")
-    if instant == (subject is not None):
-        raise typer.BadParameter("give --subject, or --instant to capture one from the video", param_hint="--subject")
+    if instant and subject is not None:
+        raise typer.BadParameter("give --subject or --instant, not both", param_hint="--subject")
     if video.resolve() == out.resolve():
         raise typer.BadParameter(f"{out} is the driving video itself", param_hint="--out")
     settings = load_command_settings(context, tracker={"name": tracker})
@@ -72,10 +73,12 @@ def replay(
     chosen_background, chosen_mode = parse_background(background), parse_mode(mode)
     info = probe_video(video)
     scene_controller = SceneController(settings.storage)
-    if instant:
-        scene_controller.show_subject("instant", _instant_subject(video, settings))
-    else:
+    if subject is not None:
         scene_controller.load_configured_subject(subject)
+    elif instant and (captured := _instant_subject(video, settings)):
+        scene_controller.show_subject("instant", captured)
+    elif chosen_mode is Mode.PORTRAIT:
+        raise typer.BadParameter("portrait needs --subject, or --instant", param_hint="--mode")
     lighting = parse_lighting(scene_controller.register_temporary_environment(environment), rotate, exposure_ev)
     scene_controller.set_look(Look(lighting=lighting, background=chosen_background, mode=chosen_mode))
     track = make_tracker(settings)
@@ -137,21 +140,21 @@ def _otherwise_shown(frames: Sequence[ReplayedFrame]) -> str:
     return "".join(f"; {what} in {counts[kind]}" for kind, what in words.items() if counts[kind])
 
 
-def _instant_subject(video: Path, settings: RelitSettings) -> Subject:
-    """The subject that the first seconds of the video give; warnings are printed.
-
-    Raises:
-        CaptureError: no usable face is in them.
-    """
+def _instant_subject(video: Path, settings: RelitSettings) -> Subject | None:
+    """The subject that the first seconds of the video give, or None; warnings are printed."""
+    from relit_camera.base.errors import CaptureError
     from relit_camera.capture.instant.frame_reading import read_frames
     from relit_camera.capture.instant.instant_capture import capture_instant
     from relit_camera.cli.progress import progress_bar, stage_reporter
 
-    with progress_bar() as progress:
-        report_stage = stage_reporter(progress)
-        captured = capture_instant(
-            read_frames(str(video), settings.source, report_stage).frames, video.name, report_stage
-        )
+    try:
+        with progress_bar() as progress:
+            report_stage = stage_reporter(progress)
+            frames = read_frames(str(video), settings.source, report_stage).frames
+            captured = capture_instant(frames, video.name, report_stage)
+    except CaptureError as error:
+        typer.echo(f"warning: {error}; whoever is in it is lit as a mean head would be", err=True)
+        return None
     for warning in captured.warnings:
         typer.echo(f"warning: {warning}", err=True)
     return captured.subject

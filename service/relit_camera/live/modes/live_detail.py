@@ -109,6 +109,18 @@ class CellBlend:
     trust: Cells
 
 
+def shape_cells(source: SourceCells) -> CellBlend:
+    """The ratio for each cell where of the source image only the shape is the person's: nothing of it is shown."""
+    confidence = source.confidence
+    weighted = cv2.merge([*(cv2.multiply(each, confidence) for each in cv2.split(_ratio(source))), confidence])
+    return CellBlend(np.asarray(weighted, np.float32), np.ones(confidence.shape, np.float32))
+
+
+def _ratio(source: SourceCells) -> Cells:
+    ratio = cv2.divide(source.relit, np.maximum(source.under_room, _LEAST))
+    return np.asarray(np.clip(ratio, *_RATIO_ROOTS), np.float32)
+
+
 def blend_cells(live: Cells, smooth: Cells, brightest: Cells, source: SourceCells, unit: float) -> CellBlend:
     """Find the ratio for each cell of the live picture, and how far its detail can be trusted.
 
@@ -125,7 +137,7 @@ def blend_cells(live: Cells, smooth: Cells, brightest: Cells, source: SourceCell
     # Single noisy cells in the dark would else not match, and show.
     match = _match(smooth, clipped, source, seen, unit)
     confidence = source.confidence * match
-    ratio = np.clip(cv2.divide(source.relit, np.maximum(source.under_room, _LEAST)), *_RATIO_ROOTS)
+    ratio = _ratio(source)
     ratio *= _correction(source.relit, live * ratio, seen * match, tuning.coarse * unit)
     amplified = (_largest(ratio) / np.float32(tuning.noise)) ** 2
     trust = (1 - clipped) / (1 + amplified * amplified)

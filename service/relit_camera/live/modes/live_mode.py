@@ -17,6 +17,7 @@ from relit_camera.live.modes.mode import ModeContext, RenderedFrame, RenderTask
 from relit_camera.live.modes.ratio_relighting import FaceLight, RatioPlan, RatioRelighting
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
 from relit_camera.live.modes.scene_relighting import SceneRelighting
+from relit_camera.live.modes.skin_tint import SkinTint
 from relit_camera.live.publishing.what_is_shown import FacePresence, Situation, what_is_shown
 from relit_camera.live.render_quality import RenderQuality
 from relit_camera.live.scene.scene import Scene
@@ -51,6 +52,8 @@ class LiveMode:
         self._presence = EasedPresence(EASE_S)
         self._followed = False
         self._last: tuple[RoomLightEstimate, Rotation] | None = None
+        self._skin = SkinTint(context.subject, context.face) if context.subject.is_anyone else None
+        self._tint = np.ones(3, np.float32)
         self._rest: NDArray[np.float32] | None = None
         self._rest_s = 0.0
 
@@ -88,10 +91,10 @@ class LiveMode:
         if followed and motion.pose is not None:
             rotation = context.face.turn_to(motion.pose)
             with context.timer.stage("room"):
-                self._last = (
-                    relighting.room_light.update(frame.image, motion.landmarks, rotation, frame.time_s),
-                    rotation,
-                )
+                room = relighting.room_light.update(frame.image, motion.landmarks, rotation, frame.time_s)
+                if self._skin is not None:
+                    self._tint = self._skin.update(frame.image, room.skin, frame.time_s)
+            self._last = room, rotation
         if self._last is None:
             return RatioPlan(frame, self._eased_rest(self._compared.place_tint(scene, frame.time_s), frame.time_s))
         room, rotation = self._last
@@ -104,6 +107,8 @@ class LiveMode:
             relighting.raised_lights,
             quality.relight_every,
         )
+        if self._skin is not None:
+            pictures = relighting.tinted(pictures, self._tint)
         rest = self._eased_rest(relighting.mean_factor(pictures, room.gain), frame.time_s)
         if presence <= 0 or motion.pose is None:
             return RatioPlan(frame, rest)

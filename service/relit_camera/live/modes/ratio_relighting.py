@@ -26,6 +26,7 @@ from relit_camera.live.modes.live_detail import (
     live_cells,
     noise_fraction,
     overexposed,
+    shape_cells,
     smoothed,
 )
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimate
@@ -125,7 +126,7 @@ class RatioRelighting:
     """
 
     def __init__(self, subject: Subject, face: SourceFace, room_light: RoomLight, motion: DenseMotion) -> None:
-        """Prepare for one subject.
+        """Prepare for one subject. Of one that is nobody's (`Subject.is_anyone`) only the shape counts.
 
         Args:
             subject: the person.
@@ -134,6 +135,7 @@ class RatioRelighting:
             motion: makes the flow between source image and live face.
         """
         self.room_light = room_light
+        self._shape_alone = subject.is_anyone
         self._face = face
         self._motion = motion
         self._points = control_points(face, head_and_shoulder_anchors(face.pose, face.size))
@@ -163,6 +165,11 @@ class RatioRelighting:
             cv2.threshold(picture, 0, 0, cv2.THRESH_TOZERO, dst=half)
         return np.asarray(cv2.add(both, floor, dst=both), np.float32)
 
+    def tinted(self, pictures: NDArray[np.float32], tint: NDArray[np.float32]) -> NDArray[np.float32]:
+        """`raised_lights` with the relit half in another skin's color; `tint` (3,) is the factor, see `SkinTint`."""
+        relit, under_room = np.split(pictures, 2)
+        return np.concatenate([relit * tint, under_room])
+
     def mean_factor(self, pictures: NDArray[np.float32], gain: NDArray[np.float32]) -> NDArray[np.float32]:
         """The factor (3,) by which the light of the whole person is multiplied; arguments as in `FaceLight`."""
         relit, under_room = (np.array(cv2.mean(half, self._inside)[:3]) for half in np.split(pictures, 2))
@@ -180,7 +187,7 @@ class RatioRelighting:
 
     def aligned(self, plan: RatioPlan) -> RatioPlan:
         """The same plan, its positions corrected by what the frame shows; see `live_alignment`."""
-        if plan.face is None:
+        if plan.face is None or self._shape_alone:
             return plan
         face, positions = plan.face, plan.face.positions
         if plan.presence > SURELY_THERE and self._alignment.is_due(plan.frame.time_s):
@@ -241,7 +248,7 @@ class RatioRelighting:
         source = SourceCells(relit, under_room, confidence, skin, on_face, near)
         unit = face.eye_distance / step
         smooth = smoothed(live, unit)
-        cells = blend_cells(live, smooth, brightest, source, unit)
+        cells = shape_cells(source) if self._shape_alone else blend_cells(live, smooth, brightest, source, unit)
         beside = (top, nodes.shape[0] - bottom, left, nodes.shape[1] - right)
         factor = extrapolate_roots(cv2.copyMakeBorder(cells.ratio, *beside, cv2.BORDER_CONSTANT))
         trust = cv2.cvtColor(cells.trust, cv2.COLOR_GRAY2RGB)
@@ -251,7 +258,7 @@ class RatioRelighting:
         calm = cv2.multiply(factor[inside], cv2.cvtColor(noise, cv2.COLOR_GRAY2RGB))
         factor[inside] -= calm
         added += cv2.multiply(calm, smooth)
-        sure = cv2.extractChannel(cells.ratio, 3)
+        sure = confidence * on_face if self._shape_alone else cv2.extractChannel(cells.ratio, 3)
         added, person = (cv2.copyMakeBorder(each, *beside, cv2.BORDER_CONSTANT) for each in (added, sure))
         return image, factor, np.asarray(added, np.float32), np.asarray(person, np.float32)
 

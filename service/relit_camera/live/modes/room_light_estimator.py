@@ -92,12 +92,14 @@ class RoomLightEstimate:
         gain: (3,) float32 by which this frame's exposure differs from the fit's.
         residual: deviation of the live face from the relit one, relative to its contrast (see `relative_deviation`):
             how badly the light explains it; NaN where too little of the face was seen so far.
+        skin: (count, 3) float32 linear values of the live face, where it is seen and not clipped.
     """
 
     light_map: LightMap
     in_head_frame: Callable[[Rotation], LightMap]
     gain: NDArray[np.float32]
     residual: float
+    skin: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,7 @@ class RoomLightEstimator:
                 now if self._residual is None else self._residual + TUNABLES.residual_smoothing * (now - self._residual)
             )
         residual = np.nan if self._residual is None else self._residual
-        return RoomLightEstimate(self._light_map, partial(_soft_light_map, self._amounts), gain, residual)
+        return RoomLightEstimate(self._light_map, partial(_soft_light_map, self._amounts), gain, residual, live[usable])
 
     def _predict_under(self, rotation: Rotation) -> _Prediction:
         return _Prediction(

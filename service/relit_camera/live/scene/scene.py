@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from relit_camera.base.config.look import Look
+from relit_camera.base.config.look import Look, Mode
 from relit_camera.base.images.image_types import DisplayImage
 from relit_camera.light.environments.environment_panorama import Environment
 from relit_camera.subject.subject import Subject
@@ -19,7 +19,8 @@ class Scene:
         environment: the environment that lights the face; None for lamps only.
         background_image: the picture of an `image` background, uint8 sRGB RGB (height, width, 3); None for other kinds.
         subject_name: name of the subject, for status and panel.
-        subject: the person shown; None shows the live picture without relighting where that is allowed.
+        subject: the person shown. Without one whoever comes is relit as anybody would be, in mode live; where the
+            picture as filmed may be published that is shown.
         frozen: whether the published picture is held.
         unlit_allowed: whether the picture as filmed may be published: where there is no subject, no face, before and
             after. Else the subject's relit picture at rest is, or a placeholder.
@@ -39,3 +40,8 @@ class Scene:
     mode_revision: int = 0
     can_undo: bool = False
     can_redo: bool = False
+
+    @property
+    def shows_nobody(self) -> bool:
+        """Whether nobody is relit: nobody is chosen, and in portrait there is nobody to show, or all is as filmed."""
+        return self.subject is None and (self.unlit_allowed or self.look.mode is Mode.PORTRAIT)

@@ -112,9 +112,9 @@ class CameraLoop:
         scene = self._scene()
         if scene.frozen:
             return
-        if scene.subject is None:
+        if scene.shows_nobody:
             self._fallback.forget()
-        if scene.subject is None and not scene.unlit_allowed:
+        if scene.shows_nobody and not scene.unlit_allowed:
             if self._is_capturing():
                 self._show(self._placeholders.capturing, CameraState.CAPTURING)
             else:

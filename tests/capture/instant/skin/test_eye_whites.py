@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from relit_camera.capture.instant.skin.eye_whites import eye_white_ratio
-from relit_camera.capture.instant.skin.skin_prior import skin_luminance_by_eyes
 from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
+from relit_camera.face.skin_prior import skin_luminance_by_eyes
 from tests.capture.instant.canonical_person import canonical_landmarks, canonical_pose
 
 SCHEME = landmark_scheme("mesh478")

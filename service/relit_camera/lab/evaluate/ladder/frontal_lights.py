@@ -39,12 +39,12 @@ from relit_camera.capture.instant.head_shape import HeadShape, fit_head_shape
 from relit_camera.capture.instant.response.generic_reflectance import AMOUNTS, shape_response
 from relit_camera.capture.instant.response.learned_response import with_learned_response
 from relit_camera.capture.instant.response.response_network import DEGREE
-from relit_camera.capture.instant.skin.skin_prior import skin_luminance_by_eyes
 from relit_camera.capture.reflectance.appearance_model import TERM_COUNT, distant_terms
 from relit_camera.capture.reflectance.methods.appearance_field import AppearanceMethod
 from relit_camera.capture.reflectance.methods.blend import Blend
 from relit_camera.capture.reflectance.olat_samples import OlatSamples
 from relit_camera.face.face_state import Tracker
+from relit_camera.face.skin_prior import skin_luminance_by_eyes
 from relit_camera.face.tracking.trackers import track_still
 from relit_camera.lab.evaluate.field.ground_truth import select_lights
 from relit_camera.lab.evaluate.field.relighting_metrics import MAX_DB, Colors
