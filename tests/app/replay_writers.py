@@ -7,7 +7,7 @@ from pathlib import Path
 
 from relit_camera.app.replay.replay_worker import ReplayOutcome, ReplayWork
 from relit_camera.base.concurrency.worker_process import Progress
-from relit_camera.base.errors import VideoError
+from relit_camera.base.errors import VideoErrorfrom relit_camera.subject.subject import Subject
 
 VIDEO = b"a video" * 1000
 
@@ -17,7 +17,7 @@ def write_quickly(work: ReplayWork, out: Path, tell: Progress) -> ReplayOutcome:
     assert work.video.read_bytes() == VIDEO
     tell("Relighting", 15, 30)
     lighting = work.scene.look.lighting
-    who = work.subject if isinstance(work.subject, str) else f"{work.subject.metadata.width} pixels"
+    who = f"{work.subject.metadata.width} pixels" if isinstance(work.subject, Subject) else work.subject or "nobody"
     out.write_text(f"{who} at {lighting.yaw_deg:g}, split {lighting.split:g} by {work.settings.tracker.name}")
     return ReplayOutcome(30, 28, ("slow: a network is missing",))
 

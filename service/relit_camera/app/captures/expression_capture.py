@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from relit_camera.app.captures.expressions.identity_check import IdentityTunables, shape_distance_cm, what_differs
 from relit_camera.base.errors import CaptureError
 from relit_camera.base.images.image_types import DisplayImage, Frame, Points
 from relit_camera.base.video.video_readers import VideoReader
@@ -19,7 +20,6 @@ from relit_camera.face.face_state import FaceState
 from relit_camera.face.tracking.trackers import TrackerOptions, open_tracker
 from relit_camera.light.light_map import LightMap
 from relit_camera.light.light_map_rotation import rotate_light_map
-from relit_camera.live.modes.identity_check import IdentityTunables, shape_distance_cm, what_differs
 from relit_camera.live.modes.room_light_estimator import RoomLightEstimator
 from relit_camera.live.reenactment.source_image import SourceFace, find_source_face
 from relit_camera.subject.expression_stills import ExpressionStill

@@ -12,7 +12,7 @@ from relit_camera.live.reenactment.source_image import SourceFace
 
 @dataclass(frozen=True)
 class IdentityTunables:
-    """Thresholds of the check, measured on recorded and rendered faces (docs/evaluate.md, "The subject and strangers").
+    """Thresholds of the check, measured on recorded and rendered faces.
 
     A person differs from their own subject by 0.03 to 0.17 cm of shape and a residual of 0.08 to 0.34, the most in
     coloured light, other people by 0.10 to 0.40 cm and 0.13 to 1.1. Either alone can mislead (a beard, a cap, a grimace

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from relit_camera.live.modes.identity_check import IdentityTunables, shape_distance_cm, what_differs
+from relit_camera.app.captures.expressions.identity_check import IdentityTunables, shape_distance_cm, what_differs
 from tests.live.people import close_up, face_of
 
 
