@@ -7,7 +7,8 @@ from pathlib import Path
 
 from relit_camera.app.replay.replay_worker import ReplayOutcome, ReplayWork
 from relit_camera.base.concurrency.worker_process import Progress
-from relit_camera.base.errors import VideoErrorfrom relit_camera.subject.subject import Subject
+from relit_camera.base.errors import VideoError
+from relit_camera.subject.subject import Subject
 
 VIDEO = b"a video" * 1000
 
