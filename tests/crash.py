@@ -178,6 +178,7 @@ def run(kills: int, seed: int, say: Callable[[str], None] = lambda line: None) -
         folder = Path(name)
         material, data = write_material(folder, 10), folder / "data"
         options = ["--source", material.clip, "--tracker", material.tracker, "--sink", "null", "--port", 0]
+        options += ["--mode", "portrait"]  # which has nothing to do while nobody is chosen
         for number in range(kills + 1):
             began = time.monotonic()
             camera = start("run", *options, folder=folder)

@@ -47,7 +47,7 @@ def test_replay_writes_video_report_and_sheet(given: str, mode: str, material: M
     yaws = [frame["pose"]["yaw"] for frame in report["frames"]]
     assert max(yaws) - min(yaws) > 20  # the made-up face turns by 20 degrees to either side
     assert report["mode"] == mode
-    assert report["degraded"] == []
+    assert {each["code"] for each in report["degraded"]} <= {"room-not-parted"}  # tests do without the matte's model
     assert all(value > 0 for value in report["frames"][1]["stage_ms"].values())
     assert read_display(tmp_path / "sheet.png").std() > 10
 

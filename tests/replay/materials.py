@@ -6,11 +6,14 @@ import os
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 from relit_camera.base.images.color import parse_gamma
 from relit_camera.base.models.model_store import FOLDER_VARIABLE, ModelState, ModelStore
 from relit_camera.capture.picture_import import import_samples
 from relit_camera.capture.subject_builder import build_subject
 from relit_camera.capture.subject_landmarks import read_landmarks
+from relit_camera.face.matte_files import write_mattes
 from relit_camera.subject.subject_file import SUFFIX, write_subject
 from relit_studio.mannequin.__main__ import generate
 from tests.gate.parts import CAPTURE
@@ -42,6 +45,11 @@ def mannequin() -> Path:
     """The generated person: `olat/lights.lp`, `clip.mp4` and its true track, two seconds long and small."""
     makers = (*CAPTURE, "tests/replay/materials.py")
     return made_once("mannequin", lambda folder: generate(folder, size=160, lights=48, frames=48, quiet=True), makers)
+
+
+def whole_picture() -> Path:
+    """A matte that takes all of each picture for the person: what is relit does not depend on a network then."""
+    return made_once("whole-picture.npz", lambda path: write_mattes(path, [np.ones((9, 16), np.float32)]))
 
 
 @cache

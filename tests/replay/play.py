@@ -17,7 +17,7 @@ from relit_camera.live.pipeline import Pipeline
 from relit_camera.live.scene.scene_controller import SceneController
 from relit_camera.live.status.camera_status import Degradation
 from tests.replay.case import Case
-from tests.replay.materials import find, subject_file, use_models
+from tests.replay.materials import find, subject_file, use_models, whole_picture
 
 RECORDED = "recorded:"
 
@@ -68,9 +68,13 @@ def play(case: Case, folder: Path) -> Played:
         tracker = RECORDED + str(find(tracker.removeprefix(RECORDED), folder, "track.json"))
     else:
         use_models()
-    settings = RelitSettings(storage=StorageSettings(data_dir=folder / "data"), tracker={"name": tracker}, subject=None)
+    settings = RelitSettings(
+        storage=StorageSettings(data_dir=folder / "data"),
+        tracker={"name": tracker},
+        matte=f"{RECORDED}{whole_picture()}" if case.background == "none" else RelitSettings().matte,
+        subject=None,
+    )
     scene_controller = SceneController(settings.storage)
-    scene_controller.set_unlit_allowed(True)  # as a replay to a file
     scene_controller.load_configured_subject(str(subject_file(lights, case.gamma)))
     named = case.environment if case.environment in scene_controller.environments.names() else None
     environment = scene_controller.register_temporary_environment(named or str(find(case.environment, folder, "")))
