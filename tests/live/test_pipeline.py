@@ -24,6 +24,8 @@ from relit_camera.base.rotations import Rotation, angles_from_rotation, rotation
 from relit_camera.capture.instant.anyone import anyone
 from relit_camera.face.face_state import LOST, FaceState, FaceStatus, Tracker
 from relit_camera.face.head_pose import project
+from relit_camera.face.identity.face_embedder import FaceEmbedder
+from relit_camera.face.landmarks.landmark_schemes import LandmarkScheme
 from relit_camera.face.motion.face_follower import FaceMotion
 from relit_camera.lab.bench.synthetic_tracker import SyntheticTracker
 from relit_camera.light.environments.builtin.builtin_environments import builtin_environment
@@ -59,6 +61,10 @@ def scene(subject: bool = True, mode: Mode = Mode.PORTRAIT, unlit_allowed: bool 
 
 def frame(index: int = 0, image: np.ndarray | None = None) -> Frame:
     return Frame(grey() if image is None else image, index, 0.0, index / 20)
+
+
+def no_embedder() -> FaceEmbedder:
+    raise ModelError("model face_embedding is not pulled", "relit models pull")
 
 
 def test_pictures_are_of_the_outputs_size_whatever_comes() -> None:
@@ -101,6 +107,46 @@ def textured() -> np.ndarray:
     """Grey with a pattern that no noise has."""
     noise = np.random.default_rng(4).normal(0, 120, (SIZE[1], SIZE[0], 1)).repeat(3, axis=2)
     return np.clip(grey(120) + cv2.GaussianBlur(noise, (0, 0), 2.5), 0, 255).astype(np.uint8)
+
+
+class Embedder(FaceEmbedder):
+    """Whoever is before the camera is `distance` from the subject."""
+
+    def __init__(self, distance: float) -> None:
+        self.distance, self.looks = distance, 0
+
+    def embed(self, image: np.ndarray, landmarks: np.ndarray, scheme: LandmarkScheme) -> np.ndarray:
+        self.looks += 1
+        return np.eye(1, 128, dtype=np.float32)[0] * np.float32(self.distance)
+
+    def reference_embedding(self, subject: Subject) -> np.ndarray:
+        return np.zeros(128, np.float32)
+
+
+@pytest.mark.parametrize(("distance", "other"), [(0.3, False), (0.8, True)])
+def test_somebody_else_than_the_subject_is_lit_as_anybody_would_be(distance: float, other: bool) -> None:
+    tracker, embedder = SteadyTracker(), Embedder(distance)
+    made = Pipeline(
+        tracker,
+        make_follower(CPU.tracker, tracker),
+        SIZE,
+        mode_factories(CPU),
+        partial(open_relighter, "basis"),
+        pytest.fail,
+        anyone,
+        lambda: embedder,
+    )
+    made._compositor.composite_live = lambda picture, *_: picture  # type: ignore[method-assign]
+    chosen = scene(mode=Mode.LIVE, lighting=LAMP_LEFT.model_dump())
+    rendered = [made.process(frame(index, textured()), chosen) for index in range(60)]
+    assert {each.shown for each in rendered} == {Shown.RELIT}
+    assert 4 <= embedder.looks <= 9
+    assert [trouble.code for trouble in made.troubles] == [DegradationCode.OTHER_PERSON] * other
+    as_anybody = pipeline()
+    as_anybody._compositor.composite_live = lambda picture, *_: picture  # type: ignore[method-assign]
+    unchosen = replace(chosen, subject=None, unlit_allowed=False)
+    expected = [as_anybody.process(frame(index, textured()), unchosen) for index in range(60)][-1]
+    assert (difference(rendered[-1].image, expected.image) < 1) is other
 
 
 @pytest.mark.parametrize(
@@ -341,7 +387,7 @@ def with_third_mode(tracker: Tracker) -> Pipeline:
     """A pipeline whose mode live is another: its logic knows no mode by name."""
     modes = {**mode_factories(CPU), Mode.LIVE: OneGrey}
     follower = make_follower(CPU.tracker, tracker)
-    return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone)
+    return Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone, no_embedder)
 
 
 def test_a_third_mode_needs_nothing_of_the_pipeline() -> None:
@@ -381,7 +427,9 @@ def test_it_says_when_models_are_opened() -> None:
     """For a subject, for a mode, and when a live person must first be parted from the room."""
     tracker, said = SteadyTracker(), []
     follower = make_follower(CPU.tracker, tracker)
-    made = Pipeline(tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere, anyone)
+    made = Pipeline(
+        tracker, follower, SIZE, mode_factories(CPU), partial(open_relighter, "basis"), Everywhere, anyone, no_embedder
+    )
     made.on_opening = lambda: said.append("opening")
     blurred, other = scene(mode=Mode.LIVE, background={"kind": "blur"}), replace(small_subject())
     live = scene(mode=Mode.LIVE)
@@ -423,7 +471,7 @@ def test_each_frame_is_begun_with_the_quality_of_that_moment() -> None:
     tracker = CountingTracker()
     modes = {Mode.PORTRAIT: Noting, Mode.LIVE: Noting}
     follower = make_follower(CPU.tracker, tracker)
-    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone)
+    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone, no_embedder)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)  # flow needs something to follow
     made.process(frame(0, noise), scene())
     before, made.quality = tracker.measured, QUALITY_LEVELS[-1]
@@ -439,7 +487,7 @@ def test_the_running_camera_measures_every_second_face_in_mode_live(mode: Mode, 
     tracker = CountingTracker()
     modes = {Mode.PORTRAIT: OneGrey, Mode.LIVE: OneGrey}
     follower = make_follower(CPU.tracker, tracker)
-    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone)
+    made = Pipeline(tracker, follower, SIZE, modes, partial(open_relighter, "basis"), pytest.fail, anyone, no_embedder)
     noise = np.random.default_rng(0).integers(0, 255, grey().shape).astype(np.uint8)
     made.quality = QUALITY_LEVELS[0]
     made.process(frame(0, noise), scene(mode=mode))

@@ -10,6 +10,7 @@ from relit_camera.base.config.look import Mode
 from relit_camera.base.config.settings import InferenceSettings, RelitSettings, TrackerSettings
 from relit_camera.base.models.session_with_fallback import SessionOptions
 from relit_camera.face.face_state import Tracker
+from relit_camera.face.identity.face_embedder import FaceEmbedder
 from relit_camera.face.matting import matting_factory
 from relit_camera.face.motion.face_follower import FaceFollower, FaceFollowerSettings
 from relit_camera.face.motion.one_euro_filter import FACE_SMOOTHING
@@ -80,6 +81,7 @@ def make_pipeline(settings: RelitSettings, tracker: Tracker, size: tuple[int, in
         partial(open_relighter, settings.relight.name, session=session),
         open_matting(settings.matte, session),
         _make_anyone,
+        partial(FaceEmbedder, session),
     )
 
 

@@ -9,7 +9,11 @@ from dataclasses import dataclass
 from relit_camera.base.concurrency.resident_memory import large_allocations_apart
 from relit_camera.base.config.look import Mode
 from relit_camera.base.images.image_types import Frame
-from relit_camera.face.face_state import Tracker
+from relit_camera.face.face_state import FaceStatus, Tracker
+from relit_camera.face.identity.face_embedder import FaceEmbedder
+from relit_camera.face.identity.identity_judge import Verdict
+from relit_camera.face.identity.live_identity import LiveIdentity
+from relit_camera.face.landmarks.landmark_schemes import landmark_scheme
 from relit_camera.face.matting import Matting
 from relit_camera.face.motion.face_follower import FaceFollower, FaceMotion
 from relit_camera.face.tracking.interval_tracker import IntervalTracker
@@ -40,6 +44,10 @@ def subject_troubles(scene: Scene) -> list[Degradation]:
         shown = "the live picture is shown as it is" if scene.unlit_allowed else "a placeholder is shown"
     cure = "choose or capture one in the panel, or name one with --subject"
     return [Degradation(code=DegradationCode.NO_SUBJECT, what=shown, why="no subject is chosen", cure=cure)]
+
+
+PLAIN_TURN_DEG = 30.0
+"""Angle between nose and camera up to which a face is looked at to tell whose it is."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +82,7 @@ class Pipeline:
         open_relighter: Callable[[Subject], Relighter],
         open_matte: Callable[[], Matting],
         make_anyone: Callable[[], Subject],
+        open_embedder: Callable[[], FaceEmbedder],
     ) -> None:
         """Set up; the first frame of a subject opens its models.
 
@@ -84,7 +93,8 @@ class Pipeline:
             modes: how each mode is made for a subject.
             open_relighter: makes the relighter of a subject.
             open_matte: called when a live person must first be parted from the room.
-            make_anyone: makes the subject that stands for whoever comes while nobody is chosen.
+            make_anyone: makes the subject that stands for whoever comes while nobody is chosen, or somebody else.
+            open_embedder: opens the network that tells people apart; it may be missing.
         """
         self.timer = StageTimer()
         self.quality = FULL_QUALITY
@@ -98,6 +108,7 @@ class Pipeline:
         self._light = LightTransition()
         self._open_matte = open_matte
         self._make_anyone = make_anyone
+        self._identity = LiveIdentity(open_embedder, landmark_scheme(tracker.scheme))
         self._anyone: Subject | None = None
         self._troubles: dict[str, Degradation] = {}
         self._compositor = Compositor(size, self._opened_matte, self.timer, self._troubles)
@@ -155,8 +166,7 @@ class Pipeline:
             return lambda: self._render_unrelit(frame, scene)
         if motion is None:  # the subject was chosen while this frame went untracked: no unlit picture under its scene
             motion = self._track(frame, scene, quality)
-        subject = scene.subject or self._opened_anyone()
-        return self._mode(subject, scene.look.mode).begin(frame, motion, scene, quality)
+        return self._mode(self._lit_as(frame, motion, scene), scene.look.mode).begin(frame, motion, scene, quality)
 
     def _track(self, frame: Frame, scene: Scene, quality: RenderQuality) -> FaceMotion:
         is_live = scene.look.mode is Mode.LIVE
@@ -171,6 +181,26 @@ class Pipeline:
         shown = what_is_shown(Situation(scene.look.mode, has_subject=False, filmed_allowed=True))
         # The publisher shows it only where that is allowed.
         return RenderedFrame(image, None, scene, shown, unlit=True)
+
+    def _lit_as(self, frame: Frame, motion: FaceMotion, scene: Scene) -> Subject:
+        """As whom the live person is lit: as the subject, unless they are known to be somebody else."""
+        if scene.subject is None or scene.look.mode is not Mode.LIVE:
+            self._troubles.pop("identity", None)
+            return scene.subject or self._opened_anyone()
+        plain = motion.status is FaceStatus.FOUND and motion.pose is not None and motion.pose.turn_deg <= PLAIN_TURN_DEG
+        with self.timer.stage("identity"):
+            landmarks = motion.landmarks if plain else None
+            verdict = self._identity.verdict(scene.subject, frame.image, landmarks, frame.time_s)
+        if verdict is not Verdict.OTHER:
+            self._troubles.pop("identity", None)
+            return scene.subject
+        self._troubles["identity"] = Degradation(
+            "you are lit as a mean head would be",
+            f"this is somebody else than {scene.subject_name or 'the subject'}",
+            "choose your own subject, or take one",
+            code=DegradationCode.OTHER_PERSON,
+        )
+        return self._opened_anyone()
 
     def _opened_anyone(self) -> Subject:
         if self._anyone is None:

@@ -52,6 +52,8 @@ class DegradationCode(StrEnum):
     """The configuration file was edited and cannot be used, or counts only from the next start."""
     NO_SUBJECT = "no-subject"
     """No subject is chosen: a placeholder is shown, or the picture as filmed where that is allowed."""
+    OTHER_PERSON = "other-person"
+    """Mode live: somebody else than the subject is before the camera, and lit as anybody would be."""
     ROOM_NOT_PARTED = "room-not-parted"
     """The matting model is not stored: a room that is kept is lit as the person is."""
     PROVIDER_FALLBACK = "provider-fallback"
