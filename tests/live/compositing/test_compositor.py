@@ -111,6 +111,22 @@ def test_what_surely_is_the_person_is_left_out_by_no_matte() -> None:
     assert (picture[:8, 40:] == live.image[0, 0]).all()
 
 
+@pytest.mark.parametrize(("background", "looks"), [(NoBackground(), 3), (GREEN, 6)])
+def test_before_a_kept_room_the_matte_may_be_that_of_the_last_frame(background: object, looks: int) -> None:
+    class Counting(LeftHalf):
+        asked = 0
+
+        def matte(self, frame: Frame) -> Alpha:
+            type(self).asked += 1
+            return super().matte(frame)
+
+    made = compositor(open_matte=Counting)
+    for index in range(6):
+        picture = made.composite_live(relit_picture(), live_frame(index / 30), scene(background), None, 2)
+    assert Counting.asked == looks
+    np.testing.assert_array_equal(picture[:, :32], relit_picture()[:, :32])
+
+
 def test_the_picture_as_filmed_in_its_own_room_needs_no_matte() -> None:
     live, timer = live_frame(), StageTimer()
     assert compositor(timer, pytest.fail).composite_live(live.image, live, scene(NoBackground())) is live.image

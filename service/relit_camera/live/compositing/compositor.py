@@ -47,6 +47,8 @@ class Compositor:
         """
         self._background_renderer = BackgroundRenderer(size)
         self._matte: Matting | None = None
+        self._last_matte: Alpha | None = None
+        self._matte_age = 0
         self._troubles = troubles
         self._open_matte = open_matte
         self._timer = timer
@@ -59,7 +61,12 @@ class Compositor:
         return composite_source_image(self._background_renderer, layer, scene, now)
 
     def composite_live(
-        self, picture: DisplayImage, frame: Frame, scene: Scene, person: NDArray[np.float32] | None = None
+        self,
+        picture: DisplayImage,
+        frame: Frame,
+        scene: Scene,
+        person: NDArray[np.float32] | None = None,
+        matte_every: int = 1,
     ) -> DisplayImage:
         """The person of the relit live picture before the scene's background; both are of the output's size.
 
@@ -72,6 +79,7 @@ class Compositor:
             scene: what to show.
             person: (rows, columns) float32, how surely cells of the frame show the person, 0..1: the matte leaves out
                 nothing that is sure.
+            matte_every: before a kept room, in so many frames the person is parted from it anew.
 
         Raises:
             ModelError: another background needs the matting model, and it is missing.
@@ -80,7 +88,7 @@ class Compositor:
         if kept and picture is frame.image and scene.look.lighting.background_gain_ev == 0:
             return picture
         with self._timer.stage("matte"):
-            matte = self._person_matte(frame, required=not kept)
+            matte = self._person_matte(frame, required=not kept, every=matte_every if kept else 1)
         if matte is None:
             return picture
         if person is not None:
@@ -94,8 +102,14 @@ class Compositor:
             MattedFrame(picture, matte), background, in_place=isinstance(scene.look.background, BlurBackground)
         )
 
-    def _person_matte(self, frame: Frame, required: bool) -> Alpha | None:
-        """The matte of the person in a frame; None where its model is missing, unless it is required."""
+    def _person_matte(self, frame: Frame, required: bool, every: int) -> Alpha | None:
+        """The matte of the person in a frame; None where its model is missing, unless it is required.
+
+        Or that of the last frame again, but for one of `every` frames.
+        """
+        last, self._matte_age = self._last_matte, self._matte_age + 1
+        if last is not None and self._matte_age < every and last.shape == frame.image.shape[:2]:
+            return last
         if self._matte is None and (required or "matte" not in self._troubles):
             try:
                 self._matte = self._open_matte()
@@ -107,7 +121,8 @@ class Compositor:
                 self._troubles["matte"] = Degradation(what, error.what, error.cure, code=code)
             else:
                 self._troubles.pop("matte", None)
-        return None if self._matte is None else self._matte.matte(frame)
+        self._last_matte, self._matte_age = None if self._matte is None else self._matte.matte(frame), 0
+        return self._last_matte
 
 
 def _sure_alpha(person: NDArray[np.float32], size: tuple[int, int]) -> Alpha:

@@ -65,16 +65,18 @@ class LiveMode:
         live = fit_frame(frame, self._context.size)
         fitted = fit_motion(motion, frame.size, self._context.size)  # what is given on is that of the frame
         plan = self._plan(fitted, live, scene, quality)
-        return partial(self._render, plan, live, motion, scene)
+        return partial(self._render, plan, live, motion, scene, quality.matte_every)
 
-    def _render(self, plan: RatioPlan, live: Frame, motion: FaceMotion, scene: Scene) -> RenderedFrame:
+    def _render(
+        self, plan: RatioPlan, live: Frame, motion: FaceMotion, scene: Scene, matte_every: int
+    ) -> RenderedFrame:
         """The relit live picture, and where `split` says so the live one."""
         context, lighting = self._context, scene.look.lighting
         with context.timer.stage("move"):
             relit = self._relighting.apply(plan, lighting.blend)
         with context.timer.stage("compose"):
             sure = relit.person if plan.presence >= 1 else None  # a face that is lost is there no more
-            image = context.compositor.composite_live(relit.image, live, scene, sure)
+            image = context.compositor.composite_live(relit.image, live, scene, sure, matte_every)
         if plan.presence > 0:
             seen = FacePresence.FOLLOWED
         else:
